@@ -1,0 +1,13 @@
+"""Physical constants, in SI units."""
+
+UNIVERSAL_GAS_CONSTANT = 8.314
+"""J/(mol K), as the paper prints it; the exact value is 8.314462618 (CODATA 2018), 0.006 % more."""
+
+STANDARD_ATMOSPHERE = 101325.0
+"""Pa absolute; the zero of gauge pressure unless a parameter set says otherwise."""
+
+STANDARD_REFERENCE_DENSITY_AIR = 1.185
+"""kg/m^3 of air at 100 kPa, 293.15 K and 65 % humidity: the reference of ISO 6358 sonic conductance."""
+
+STANDARD_REFERENCE_TEMPERATURE = 293.15
+"""K, the reference temperature of ISO 6358."""

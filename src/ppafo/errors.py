@@ -1,0 +1,34 @@
+"""Every error that ppafo raises on purpose: one tree, one clear line each."""
+
+import difflib
+from collections.abc import Iterable
+
+
+class PpafoError(Exception):
+    """Something a user can put right; the message is one line that says what and how."""
+
+
+class ParameterError(PpafoError):
+    """A parameter set, a value or an override is not usable."""
+
+
+class DataError(PpafoError):
+    """A recording or result file cannot be read or written."""
+
+
+class ScenarioError(PpafoError):
+    """A scenario file or object asks for something that is not possible."""
+
+
+class SimulationError(PpafoError):
+    """A run could not be carried out, for example because no model could be compiled."""
+
+
+class IdentificationError(PpafoError):
+    """A recording does not allow the estimate that was asked for."""
+
+
+def nearest_name(name: str, allowed: Iterable[str]) -> str:
+    """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near."""
+    near = difflib.get_close_matches(str(name), list(allowed), n=1, cutoff=0.6)
+    return f", did you mean '{near[0]}'?" if near else ""

@@ -1,0 +1,119 @@
+"""Mass flow through a restriction: equations (6) and (7) of the paper, and ISO 6358.
+
+Both forms are one curve, ``mass_flow = conductance * upstream_pressure * flow_function(pressure_ratio)``,
+with a flow function that is 1 when the flow is choked. ``conductance`` [kg/(s Pa)] is ``Cd A C1`` in the paper's
+form and ``C rho_0 sqrt(T_0 / T)`` in the standard's. The exact flow functions stand here beside the fitted one
+that the time stepping uses: a square root times a polynomial, free of powers.
+"""
+
+import math
+from typing import NamedTuple
+
+
+class FlowCurve(NamedTuple):
+    """A flow function as data: ``sqrt(1 - r)`` times a polynomial in ``1 - r``, constant below the critical ratio.
+
+    All dimensionless. Above ``linear_ratio`` the curve is the straight line to zero at ``r = 1``.
+    """
+
+    critical_ratio: float
+    linear_ratio: float
+    c0: float
+    c1: float
+    c2: float
+    c3: float
+    c4: float
+    c5: float
+    c6: float
+
+
+def isentropic_flow_function(pressure_ratio: float, heat_capacity_ratio: float) -> float:
+    """Flow over choked flow [-], 0 to 1, of an isentropic nozzle; ratio is downstream over upstream. Eqs (6), (7)."""
+    k = heat_capacity_ratio
+    critical = (2.0 / (k + 1.0)) ** (k / (k - 1.0))
+    if pressure_ratio <= critical:
+        return 1.0
+    if pressure_ratio >= 1.0:
+        return 0.0
+    subsonic = math.sqrt(2.0 * k / (k - 1.0)) * pressure_ratio ** (1.0 / k)
+    subsonic *= math.sqrt(1.0 - pressure_ratio ** ((k - 1.0) / k))
+    choked = math.sqrt(k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
+    return subsonic / choked
+
+
+def iso6358_flow_function(pressure_ratio: float, critical_ratio: float) -> float:
+    """Flow over choked flow [-], 0 to 1, of ISO 6358-1:2013 with subsonic index 0.5; ratio is downstream over upstream."""
+    if pressure_ratio <= critical_ratio:
+        return 1.0
+    if pressure_ratio >= 1.0:
+        return 0.0
+    position = (pressure_ratio - critical_ratio) / (1.0 - critical_ratio)
+    return math.sqrt(1.0 - position * position)
+
+
+def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
+    """Flow over choked flow [-], 0 to 1, from a fitted curve; ratio is downstream over upstream, at most 1."""
+    gap = 1.0 - pressure_ratio
+    linear_gap = 1.0 - curve.linear_ratio
+    inside = max(min(gap, 1.0 - curve.critical_ratio), linear_gap)
+    polynomial = curve.c6
+    polynomial = polynomial * inside + curve.c5
+    polynomial = polynomial * inside + curve.c4
+    polynomial = polynomial * inside + curve.c3
+    polynomial = polynomial * inside + curve.c2
+    polynomial = polynomial * inside + curve.c1
+    polynomial = polynomial * inside + curve.c0
+    return math.sqrt(inside) * polynomial * min(gap / linear_gap, 1.0)
+
+
+def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:
+    """Flow function [-] and its derivative with respect to the pressure ratio [-], at most 0, from a fitted curve."""
+    gap = 1.0 - pressure_ratio
+    linear_gap = 1.0 - curve.linear_ratio
+    choked_gap = 1.0 - curve.critical_ratio
+    inside = max(min(gap, choked_gap), linear_gap)
+    polynomial = curve.c6
+    derivative = curve.c6
+    polynomial = polynomial * inside + curve.c5
+    derivative = derivative * inside + polynomial
+    polynomial = polynomial * inside + curve.c4
+    derivative = derivative * inside + polynomial
+    polynomial = polynomial * inside + curve.c3
+    derivative = derivative * inside + polynomial
+    polynomial = polynomial * inside + curve.c2
+    derivative = derivative * inside + polynomial
+    polynomial = polynomial * inside + curve.c1
+    derivative = derivative * inside + polynomial
+    polynomial = polynomial * inside + curve.c0
+    root = math.sqrt(inside)
+    value = root * polynomial
+    line = value / linear_gap
+    curved = (0.5 * polynomial + inside * derivative) / root
+    slope = line if gap < linear_gap else curved
+    slope = 0.0 if gap > choked_gap else slope
+    return value * min(gap / linear_gap, 1.0), -slope
+
+
+def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve) -> float:
+    """Mass flow from a to b [kg/s], positive from a to b, antisymmetric under exchange. Eqs (6), (7)."""
+    upstream = max(pressure_a, pressure_b)
+    ratio = min(pressure_a, pressure_b) / upstream
+    flow = conductance * upstream * fitted_flow_function(ratio, curve)
+    return flow if pressure_a >= pressure_b else -flow
+
+
+def orifice_flow_slopes(
+    pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve
+) -> tuple[float, float, float]:
+    """Mass flow from a to b [kg/s] and its derivatives with respect to both pressures [kg/(s Pa)]. Eqs (6), (7)."""
+    forward = pressure_a >= pressure_b
+    upstream = max(pressure_a, pressure_b)
+    ratio = min(pressure_a, pressure_b) / upstream
+    value, slope = fitted_flow_slope(ratio, curve)
+    flow = conductance * upstream * value
+    by_upstream = conductance * (value - ratio * slope)
+    by_downstream = conductance * slope
+    signed = flow if forward else -flow
+    by_a = by_upstream if forward else -by_downstream
+    by_b = by_downstream if forward else -by_upstream
+    return signed, by_a, by_b
