@@ -8,6 +8,10 @@ class PpafoError(Exception):
     """Something a user can put right; the message is one line that says what and how."""
 
 
+class UnitError(PpafoError):
+    """A text is not a quantity, or its unit does not fit; whoever reads a file adds the file and the key."""
+
+
 class ParameterError(PpafoError):
     """A parameter set, a value or an override is not usable."""
 

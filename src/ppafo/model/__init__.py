@@ -1,0 +1,1 @@
+"""The physics: pure functions on floats, one module per component. No engine, no files, no units."""

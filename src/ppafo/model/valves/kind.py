@@ -1,14 +1,51 @@
-"""What a valve declares of itself."""
+"""What a valve declares of itself, and the two ways in which an engine can see it."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ppafo.model.declaration import Quantity
 
 
 @dataclass(frozen=True, slots=True)
+class ValveModel:
+    """Compiled side of a valve.
+
+    ``parameters`` and ``state`` are NamedTuple classes of floats; ``prepare(settings, step)`` makes the first from
+    the declared settings and the step [s]; ``initial()`` the second. ``advance(parameters, state, command, time,
+    step)`` returns what the valve shows the plant during the step, and the next state. ``connect(plant, shown)``
+    turns that into ports, and ``port_flow`` and ``port_flow_slopes`` are the functions of that kind of port.
+    ``command_delay(settings)`` is the dead time [s] before a command reaches the valve.
+
+    The reference solver sees the same valve in continuous time: ``instant(parameters, state, command)`` returns the
+    openings at an instant, ``rates(parameters, state, command)`` the time derivatives of the state,
+    ``next_event(parameters, state, command, time)`` when something changes abruptly (infinite for never), and
+    ``settle(parameters, state, command, time)`` the state after the abrupt changes that are due.
+    """
+
+    parameters: type
+    state: type
+    prepare: Callable[[Mapping[str, float], float], Any]
+    initial: Callable[[], Any]
+    advance: Callable[..., Any]
+    connect: Callable[..., Any]
+    port_flow: Callable[..., Any]
+    port_flow_slopes: Callable[..., Any]
+    command_delay: Callable[[Mapping[str, float]], float]
+    instant: Callable[..., Any]
+    rates: Callable[..., Any]
+    next_event: Callable[..., float]
+    settle: Callable[..., Any]
+
+
+@dataclass(frozen=True, slots=True)
 class ValveKind:
-    """A valve as the catalogue knows it: name, what it is, and its parameters beside the orifice's own."""
+    """A valve as the catalogue knows it: name, what it is, its parameters beside the orifice's own, and its models.
+
+    ``choose(settings)`` returns the simplest model that is exact for the settings.
+    """
 
     name: str
     summary: str
     quantities: tuple[Quantity, ...]
+    choose: Callable[[Mapping[str, float]], ValveModel]

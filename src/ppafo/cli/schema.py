@@ -1,0 +1,29 @@
+"""``ppafo schema NAME``: the JSON Schema of a file format, for editors and other programs."""
+
+import argparse
+import importlib
+
+from ppafo.cli.output import add_output_arguments, deliver
+from ppafo.errors import DataError, nearest_name
+
+FORMATS: dict[str, str] = {
+    "parameters": "ppafo.parameters.schema",
+}
+"""Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("format", metavar="NAME", help=f"one of: {', '.join(FORMATS)}")
+    add_output_arguments(parser)
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Print the schema, which is JSON with or without ``--json``."""
+    if parsed.format not in FORMATS:
+        hint = nearest_name(parsed.format, FORMATS)
+        raise DataError(f"there is no file format '{parsed.format}'{hint}; known are {', '.join(FORMATS)}")
+    document = importlib.import_module(FORMATS[parsed.format]).json_schema()
+    parsed.json = True
+    deliver(f"{parsed.format}.schema", "", document, parsed)
+    return 0

@@ -1,0 +1,119 @@
+"""``ppafo sets``: which parameter sets there are, and what is in one, value by value."""
+
+import argparse
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+from ppafo.cli.output import add_output_arguments, add_override_argument, deliver
+
+if TYPE_CHECKING:
+    from ppafo.parameters import ParameterSet
+
+_WIDTH = 110
+_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "valves", "reported")
+_COLUMNS = ("path", "value", "unit", "origin", "source")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    add_output_arguments(parser)
+    actions = parser.add_subparsers(dest="action", metavar="ACTION")
+    show = actions.add_parser(
+        "show",
+        help="show one set",
+        description="Show every value of a set and its source.",
+        argument_default=argparse.SUPPRESS,
+    )
+    show.add_argument("name", metavar="SET", help="name of a set, or a .toml file")
+    add_override_argument(show)
+    add_output_arguments(show)
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """List the sets, or show one."""
+    if parsed.action == "show":
+        _show(parsed)
+    else:
+        _list(parsed)
+    return 0
+
+
+def _list(parsed: argparse.Namespace) -> None:
+    from ppafo.parameters import list_sets, load_parameter_set
+
+    sets = [load_parameter_set(name) for name in list_sets()]
+    width = max(len(item.name) for item in sets)
+    text = "\n".join(f"{item.name:<{width}}  {item.title}" for item in sets)
+    document = {"sets": [{"name": item.name, "title": item.title, "valves": dict(item.valve_kinds)} for item in sets]}
+    deliver("sets", text, document, parsed)
+
+
+def _show(parsed: argparse.Namespace) -> None:
+    from ppafo.parameters import apply_overrides, load_parameter_set
+
+    parameter_set = apply_overrides(load_parameter_set(parsed.name), parsed.overrides)
+    deliver(parameter_set.name, _text(parameter_set), _document(parameter_set), parsed)
+
+
+def _document(parameter_set: "ParameterSet") -> dict[str, Any]:
+    citation = parameter_set.citation
+    entries = sorted({**parameter_set.texts, **parameter_set.numbers}.items(), key=_section_order)
+    return {
+        "name": parameter_set.name,
+        "title": parameter_set.title,
+        "citation": None if citation is None else citation.model_dump(mode="json"),
+        "notes": parameter_set.notes.strip(),
+        "completed_by": parameter_set.completed_by,
+        "default_valve": parameter_set.default_valve,
+        "valves": dict(parameter_set.valve_kinds),
+        "values": [{"path": path, **entry.model_dump(mode="json")} for path, entry in entries],
+        "accepted": dict(parameter_set.accepted),
+    }
+
+
+def _section_order(item: tuple[str, object]) -> int:
+    """Sort by section only, so that within a section texts come first and numbers as they are declared."""
+    return _SECTIONS.index(item[0].partition(".")[0])
+
+
+def _text(parameter_set: "ParameterSet") -> str:
+    document = _document(parameter_set)
+    lines = [f"{document['name']}: {document['title']}"]
+    lines += textwrap.wrap(document["notes"], _WIDTH)
+    if document["citation"] is not None:
+        lines += ["", *textwrap.wrap(_citation(document["citation"]), _WIDTH)]
+    valves = ", ".join(f"{name} ({kind})" for name, kind in document["valves"].items())
+    lines += ["", f"valves: {valves}; default {document['default_valve']}", "", *_table(document["values"])]
+    for finding, reason in document["accepted"].items():
+        lines += ["", *textwrap.wrap(f"accepted: {finding}: {reason}", _WIDTH, subsequent_indent="    ")]
+    return "\n".join(lines)
+
+
+def _citation(citation: dict[str, Any]) -> str:
+    authors = ", ".join(citation["authors"])
+    year = f" ({citation['year']})" if citation["year"] else ""
+    doi = f" doi:{citation['doi']}" if citation["doi"] else ""
+    return f"{authors}{': ' if authors else ''}{citation['title']}{year}.{doi} {citation['note']}".strip()
+
+
+def _table(values: list[dict[str, Any]]) -> list[str]:
+    """Return aligned rows, each followed by its note."""
+    rows = [_cells(value) for value in values]
+    widths = [max(len(row[column]) for row in (_COLUMNS, *rows)) for column in range(len(_COLUMNS))]
+    lines = [_row(_COLUMNS, widths), _row(tuple("-" * width for width in widths), widths)]
+    for value, row in zip(values, rows, strict=True):
+        lines.append(_row(row, widths))
+        lines += textwrap.wrap(value["note"], _WIDTH, initial_indent="    ", subsequent_indent="    ")
+    return lines
+
+
+def _cells(value: dict[str, Any]) -> tuple[str, ...]:
+    number = value["value"]
+    written = number if isinstance(number, str) else f"{number:.6g}"
+    if value.get("uncertainty") is not None:
+        written += f" +- {value['uncertainty']:.3g}"
+    return (value["path"], written, value.get("unit", ""), value["origin"], value["source"])
+
+
+def _row(cells: tuple[str, ...], widths: list[int]) -> str:
+    return "  ".join(f"{cell:<{width}}" for cell, width in zip(cells, widths, strict=True)).rstrip()

@@ -1,0 +1,58 @@
+"""PID control of a proportional valve, equation (13), with anti-windup and derivative filter as options."""
+
+from typing import NamedTuple
+
+from ppafo.control.kind import ControllerKind
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+
+
+class PidParameters(NamedTuple):
+    """Gains [1/(N m)], [1/(N m s)], [s/(N m)]; time constant of the derivative filter [s]; back-calculation [1/s]."""
+
+    proportional_gain: float
+    integral_gain: float
+    derivative_gain: float
+    derivative_filter: float
+    anti_windup: float
+
+
+class PidState(NamedTuple):
+    """Integral part of the command [-], error one sample ago [N m], filtered slope of the error [N m/s], start mark."""
+
+    integral: float
+    error: float
+    slope: float
+    started: float
+
+
+def update(
+    parameters: PidParameters, state: PidState, reference: float, measurement: Measurement, period: float
+) -> tuple[float, PidState]:
+    """Command from -1 to 1 of the torque error; integral by rectangles, slope by backward difference. Equation (13)."""
+    error = reference - measurement.torque
+    raw_slope = (error - state.error) / period * state.started
+    share = period / (period + parameters.derivative_filter)
+    slope = state.slope + share * (raw_slope - state.slope)
+    integral = state.integral + parameters.integral_gain * error * period
+    wanted = parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
+    command = max(-1.0, min(1.0, wanted))
+    integral = integral + parameters.anti_windup * period * (command - wanted)
+    return command, PidState(integral, error, slope, 1.0)
+
+
+KIND = ControllerKind(
+    name="pid",
+    summary="Proportional, integral and derivative action on the torque error.",
+    source="the paper, equation (13); gains k_p 0.095, k_i 0.25, k_d 0.006",
+    quantities=(
+        Quantity("proportional_gain", "1/(N m)", "k_p", 0.095, 0.0, 1.0e3),
+        Quantity("integral_gain", "1/(N m s)", "k_i", 0.25, 0.0, 1.0e4),
+        Quantity("derivative_gain", "s/(N m)", "k_d", 0.006, 0.0, 1.0e3),
+        Quantity("derivative_filter", "s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0),
+        Quantity("anti_windup", "1/s", "rate of back-calculation while the command is clipped, 0 for none", 0.0, 0.0, 1.0e3),
+    ),
+    parameters=PidParameters,
+    initial=PidState(0.0, 0.0, 0.0, 0.0),
+    update=update,
+)

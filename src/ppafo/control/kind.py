@@ -1,0 +1,57 @@
+"""What a controller and a profile declare of themselves."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+
+
+class Command(NamedTuple):
+    """Result of one update is a command from -1 to 1 and the controller's next state."""
+
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerKind:
+    """A controller in the catalogue.
+
+    ``parameters`` is a NamedTuple class whose fields are the quantities in order, ``state`` one of floats, and
+    ``initial`` its start. ``update(parameters, state, reference, measurement, period)`` returns the command from -1
+    to 1 and the next state, once every ``period`` [s].
+    """
+
+    name: str
+    summary: str
+    source: str
+    quantities: tuple[Quantity, ...]
+    parameters: type
+    initial: Any
+    update: Callable[..., Any]
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileKind:
+    """A function of time in the catalogue, for a reference or a prescribed angle.
+
+    ``parameters`` is a NamedTuple class whose fields are the quantities in order; ``value(parameters, time)`` returns
+    value, rate and second derivative at a time [s]. A quantity with unit ``""`` takes the unit of what is prescribed.
+    """
+
+    name: str
+    summary: str
+    quantities: tuple[Quantity, ...]
+    parameters: type
+    value: Callable[..., Any]
+
+
+class PythonController(Protocol):
+    """Any Python object can control: it is asked sample by sample."""
+
+    def reset(self) -> None:
+        """Forget everything; called once before the run."""
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+        """Return the command from -1 to 1 at a time [s], for a reference [N m] and a measurement."""

@@ -1,0 +1,222 @@
+"""Writes the source of the lane loop of one program: loads, calls and stores, with the rows as literals."""
+
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.scheme import motion
+from ppafo.engine.source_text import SourceCollector
+from ppafo.model.plant import chamber_pressures
+from ppafo.model.sensors import Measurement, measure
+from ppafo.model.vane import actuator_torque
+
+LANES = 32
+IMPOSSIBLE_RATE = 1.0e6
+IMPOSSIBLE_MASS = 1.0e3
+
+HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
+
+import math
+from collections import namedtuple
+
+import numpy as np
+from numba import njit
+
+FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}
+'''
+INLINE = '@njit(forceinline=True, fastmath=FAST, error_model="numpy")'
+SIGNATURE = (
+    '"void(float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], '
+    'int64, int64, int64, int64, int64, int64)"'
+)
+COMPILED = f'@njit({SIGNATURE}, cache=True, nogil=True, fastmath=FAST, error_model="numpy")'
+ARGUMENTS = (
+    "states, parameters, signal_history, command_history, record, "
+    "first_step, step_count, steps_per_sample, record_every, signal_delay, command_delay"
+)
+
+
+def lane_source(program: Program) -> str:
+    """Source text of the module whose ``advance`` runs one block of this program."""
+    collector = SourceCollector(INLINE)
+    writer = _Writer(program, collector)
+    control = writer.control_loop()
+    plant = writer.plant_loop()
+    body = [
+        COMPILED,
+        f"def advance({ARGUMENTS}):",
+        *_indent(
+            [
+                f"x = np.empty(({writer.state_count}, {LANES}))",
+                f"p = np.empty(({writer.parameter_count}, {LANES}))",
+                *_copy("x", "states", writer.state_count),
+                *_copy("p", "parameters", writer.parameter_count),
+                "for step_index in range(first_step, first_step + step_count):",
+                *_indent([*writer.remember_signals(), *control, *RECORD, *writer.remember_commands(), *plant]),
+                *_copy("states", "x", writer.state_count),
+            ]
+        ),
+    ]
+    return f"{HEADER}\n\n{collector.text()}\n\n\n" + "\n".join(body) + "\n"
+
+
+RECORD = [
+    "if record_every > 0 and step_index % record_every == 0:",
+    "    for row in range(record.shape[1]):",
+    "        for lane in range(record.shape[2]):",
+    "            record[step_index // record_every, row, lane] = x[row, lane]",
+]
+
+
+def _indent(lines: list[str], levels: int = 1) -> list[str]:
+    return ["    " * levels + line for line in lines]
+
+
+def _copy(target: str, source: str, rows: int) -> list[str]:
+    return [
+        f"for row in range({rows}):",
+        f"    for lane in range({LANES}):",
+        f"        {target}[row, lane] = {source}[row, lane]",
+    ]
+
+
+class _Writer:
+    """Knows the rows of one program and writes the loops over the lanes."""
+
+    def __init__(self, program: Program, collector: SourceCollector) -> None:
+        self.program = program
+        self.collector = collector
+        self.parameter_at = _row_numbers(program.parameter_rows())
+        self.state_at = _row_numbers(program.state_rows())
+        self.parameter_count = len(self.parameter_at)
+        self.state_count = len(self.state_at)
+        self.cells = {path: f"p[{row}, lane]" for path, row in self.parameter_at.items()}
+        self.cells |= {path: f"x[{row}, lane]" for path, row in self.state_at.items()}
+
+    def control_loop(self) -> list[str]:
+        """Sense and control, at every sample; without a controller only what is seen is stored."""
+        controller = self.program.controller
+        lines = [self.load("timing"), self.load("plant"), self.load("state"), *self.sense()]
+        if controller is None:
+            lines += self.store("seen")
+        else:
+            lines += [
+                self.load("controller"),
+                self.load("controller_state"),
+                self.load("reference"),
+                f"wanted = {self.collector.add(self.program.reference.value)}(reference, step_index * timing.step)[0]",
+                f"command, controller_state = {self.collector.add(controller.update)}"
+                "(controller, controller_state, wanted, seen, timing.period)",
+                *self.store("controller_state"),
+                f"x[{self.state_at['result.command']}, lane] = command",
+            ]
+        loop = [f"for lane in range({LANES}):", *_indent(lines)]
+        return ["if step_index % steps_per_sample == 0:", *_indent(loop)]
+
+    def sense(self) -> list[str]:
+        """Lines that make the measurement ``seen``."""
+        if not self.program.ideal_sensors:
+            sense = self.collector.add(measure)
+            return [
+                self.load("sensors"),
+                "depth = signal_history.shape[1]",
+                "late = (step_index - signal_delay) % depth",
+                "later = (step_index - signal_delay - 1) % depth",
+                *[
+                    f"{name} = signal_history[{row}, late, lane] + timing.signal_lag * "
+                    f"(signal_history[{row}, later, lane] - signal_history[{row}, late, lane])"
+                    for row, name in enumerate(("angle", "pressure_1", "pressure_2"))
+                ],
+                f"seen = {sense}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, "
+                "step_index // steps_per_sample)",
+            ]
+        return [
+            f"pressure_1, pressure_2 = {self.collector.add(chamber_pressures)}"
+            "(plant, state.angle, state.mass_1, state.mass_2)",
+            f"torque = {self.collector.add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
+            f"seen = {self.collector.add(Measurement)}(state.angle, pressure_1, pressure_2, torque)",
+        ]
+
+    def remember_signals(self) -> list[str]:
+        """Keeps the signals of every step, where they are seen late."""
+        if self.program.ideal_sensors:
+            return []
+        lines = [
+            self.load("plant"),
+            self.load("state"),
+            f"pressure_1, pressure_2 = {self.collector.add(chamber_pressures)}"
+            "(plant, state.angle, state.mass_1, state.mass_2)",
+            "signal_history[0, step_index % signal_history.shape[1], lane] = state.angle",
+            "signal_history[1, step_index % signal_history.shape[1], lane] = pressure_1",
+            "signal_history[2, step_index % signal_history.shape[1], lane] = pressure_2",
+        ]
+        return [f"for lane in range({LANES}):", *_indent(lines)]
+
+    def remember_commands(self) -> list[str]:
+        """Keeps the command of every step, where the valve gets it late."""
+        if not self.program.late_commands:
+            return []
+        lines = [
+            "command_history[step_index % command_history.shape[0], lane] = "
+            f"x[{self.state_at['result.command']}, lane]",
+        ]
+        return [f"for lane in range({LANES}):", *_indent(lines)]
+
+    def plant_loop(self) -> list[str]:
+        """Valve, gas and vane, one step."""
+        valve = self.program.valve
+        add = self.collector.add
+        lines = [
+            *[self.load(name) for name in ("timing", "plant", "valve", "result", "state", "valve_state")],
+            "time = step_index * timing.step",
+            *self.command(),
+            f"shown, valve_state = {add(valve.advance)}(valve, valve_state, command, time, timing.step)",
+            f"port_1, port_2 = {add(valve.connect)}(plant, shown)",
+            *self.move(),
+            f"possible = (abs(state.angular_velocity) < {IMPOSSIBLE_RATE} and state.mass_1 > 0.0 "
+            f"and state.mass_2 > 0.0 and state.mass_1 < {IMPOSSIBLE_MASS} and state.mass_2 < {IMPOSSIBLE_MASS})",
+            "failed = result.failure_time if possible else min(result.failure_time, time + timing.step)",
+            f"x[{self.state_at['result.failure_time']}, lane] = failed",
+            *self.store("state"),
+            *self.store("valve_state"),
+        ]
+        return [f"for lane in range({LANES}):", *_indent(lines)]
+
+    def command(self) -> list[str]:
+        """The command that reaches the valve in this step: its mean over the step, where it comes late."""
+        if not self.program.late_commands:
+            return ["command = result.command"]
+        return [
+            "depth = command_history.shape[0]",
+            "newer = command_history[(step_index - command_delay) % depth, lane]",
+            "older = command_history[(step_index - command_delay - 1) % depth, lane]",
+            "command = newer + timing.command_lag * (older - newer)",
+        ]
+
+    def move(self) -> list[str]:
+        """The step of gas and vane."""
+        add = self.collector.add
+        valve = self.program.valve
+        flows = f"{add(valve.port_flow)}, {add(valve.port_flow_slopes)}"
+        if self.program.angle is None:
+            return [f"state = {add(motion.advance_free)}(plant, state, port_1, port_2, timing.step, {flows})"]
+        return [
+            self.load("path"),
+            f"next_angle, next_rate, _ = {add(self.program.angle.value)}(path, (step_index + 1) * timing.step)",
+            f"state = {add(motion.advance_led)}"
+            f"(plant, state, next_angle, next_rate, port_1, port_2, timing.step, {flows})",
+        ]
+
+    def load(self, group: str) -> str:
+        """Line that makes the NamedTuple ``group`` from its rows."""
+        states = self.program.state_rows()
+        row = states[group] if group in states else self.program.parameter_rows()[group]
+        return f"{group} = {row_expression(row, group, self.cells, self.collector.add)}"
+
+    def store(self, group: str) -> list[str]:
+        """Lines that write the NamedTuple ``group`` back to its rows."""
+        paths = leaf_paths(self.program.state_rows()[group], group)
+        return [f"x[{self.state_at[path]}, lane] = {path}" for path in paths]
+
+
+def _row_numbers(groups: dict[str, type]) -> dict[str, int]:
+    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
+    return {path: number for number, path in enumerate(paths)}

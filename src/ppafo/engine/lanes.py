@@ -1,0 +1,143 @@
+"""Runs many devices at once: blocks of 32 lanes, spread over threads, the same numbers in any order.
+
+A run's result does not depend on its block, its place in it or the number of threads, because every lane goes
+through the same instructions and no lane sees another.
+"""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.cache import load_generated
+from ppafo.engine.lane_source import LANES, lane_source
+from ppafo.engine.program import Program
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Whole numbers that all runs of a batch share; delays are in steps, ``record_every`` 0 records nothing."""
+
+    step_count: int
+    steps_per_sample: int
+    record_every: int
+    signal_delay: int
+    command_delay: int
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Runs of one program and clock: parameters (rows, runs) and initial states (rows, runs)."""
+
+    program: Program
+    clock: Clock
+    parameters: Floats
+    states: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class BatchResult:
+    """Final states (rows, runs) and records (records, rows, runs), the first at time 0 and the last at the end."""
+
+    states: Floats
+    record: Floats
+
+
+def load_program(program: Program) -> ModuleType:
+    """The compiled module of a program, from the disk cache where it is there."""
+    return load_generated("lanes", lane_source(program))
+
+
+def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
+    """Run a batch on ``threads`` threads (all cores by default)."""
+    module = load_program(batch.program)
+    runs = batch.states.shape[1]
+    starts = range(0, runs, LANES)
+    workers = min(len(starts), threads or os.cpu_count() or 1)
+
+    def run_block(start: int) -> BatchResult:
+        return _run_block(module, batch, slice(start, min(start + LANES, runs)))
+
+    if workers == 1:
+        return _joined([run_block(start) for start in starts])
+    with ThreadPoolExecutor(workers) as pool:
+        return _joined(list(pool.map(run_block, starts)))
+
+
+def _joined(results: Sequence[BatchResult]) -> BatchResult:
+    if len(results) == 1:
+        return results[0]
+    states = np.concatenate([result.states for result in results], axis=1)
+    return BatchResult(states, np.concatenate([result.record for result in results], axis=2))
+
+
+def _run_block(module: ModuleType, batch: Batch, runs: slice) -> BatchResult:
+    block = LaneBlock(module, batch.clock, batch.parameters[:, runs], batch.states[:, runs])
+    block.advance(batch.clock.step_count)
+    return block.result()
+
+
+class LaneBlock:
+    """Up to 32 runs in progress; ``states`` (rows, 32) may be read and written between two calls of ``advance``."""
+
+    def __init__(self, module: ModuleType, clock: Clock, parameters: Floats, states: Floats) -> None:
+        self._module = module
+        self._clock = clock
+        self._width = states.shape[1]
+        self._next_step = 0
+        self._parameters = _filled(parameters)
+        self.states = _filled(states)
+        records = clock.step_count // clock.record_every + 1 if clock.record_every else 0
+        self._record = np.empty((records, states.shape[0], self._width))
+        self._signals = np.zeros((3, clock.signal_delay + 2, LANES))
+        self._commands = np.zeros((clock.command_delay + 2, LANES))
+
+    def fill_signals(self, signals: Floats) -> None:
+        """Set what sensors saw before the start: angle, pressures (3, runs)."""
+        self._signals[:] = _filled(signals)[:, None, :]
+
+    def advance(self, step_count: int) -> None:
+        """Go ``step_count`` steps on."""
+        clock = self._clock
+        self._module.advance(
+            self.states,
+            self._parameters,
+            self._signals,
+            self._commands,
+            self._record,
+            self._next_step,
+            step_count,
+            clock.steps_per_sample,
+            clock.record_every,
+            clock.signal_delay,
+            clock.command_delay,
+        )
+        self._next_step += step_count
+
+    def result(self) -> BatchResult:
+        """States and record so far; the last record is the present state where it is due."""
+        clock = self._clock
+        if clock.record_every and self._next_step % clock.record_every == 0:
+            self._record[self._next_step // clock.record_every] = self.states[:, : self._width]
+        return BatchResult(self.states[:, : self._width].copy(), self._record)
+
+
+def _filled(columns: Floats) -> Floats:
+    """A contiguous copy with exactly 32 columns; the last one repeated where there are fewer."""
+    missing = LANES - columns.shape[1]
+    return np.ascontiguousarray(np.pad(columns, ((0, 0), (0, missing)), mode="edge"), dtype=np.float64)
+
+
+def row_of(groups: dict[str, type], path: str) -> int:
+    """Row number of one number, such as ``state.angle``, in the rows of a program."""
+    from ppafo.engine.rows import leaf_paths
+
+    paths: list[Any] = [leaf for name, row in groups.items() for leaf in leaf_paths(row, name)]
+    return paths.index(path)

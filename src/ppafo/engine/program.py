@@ -1,0 +1,68 @@
+"""Which compiled pieces a run is made of."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.model.plant import PlantParameters, PlantState
+from ppafo.model.sensors import Measurement, SensorParameters
+from ppafo.model.valves.kind import ValveModel
+
+
+class LaneTiming(NamedTuple):
+    """Step and sample period [s]; parts of a step by which commands and signals are late beyond whole steps [-]."""
+
+    step: float
+    period: float
+    command_lag: float
+    signal_lag: float
+
+
+class LaneResult(NamedTuple):
+    """Command in force [-], first time [s] at which a run left what is possible (huge where it did not)."""
+
+    command: float
+    failure_time: float
+
+
+class NoParameters(NamedTuple):
+    """Stands where a program has no such piece."""
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """One combination of pieces; each combination is compiled once.
+
+    ``angle`` None leaves the vane free, otherwise it is led along that profile. ``controller`` None leaves the command
+    to the caller, sample by sample. ``ideal_sensors`` False adds noise, quantisation and delay of the signals.
+    ``late_commands`` True adds a dead time before the valve.
+    """
+
+    valve: ValveModel
+    reference: ProfileKind
+    controller: ControllerKind | None
+    angle: ProfileKind | None
+    ideal_sensors: bool
+    late_commands: bool
+
+    def parameter_rows(self) -> dict[str, type]:
+        """Groups of parameter rows of this program, in order."""
+        return {
+            "timing": LaneTiming,
+            "plant": PlantParameters,
+            "valve": self.valve.parameters,
+            "controller": NoParameters if self.controller is None else self.controller.parameters,
+            "reference": self.reference.parameters,
+            "path": NoParameters if self.angle is None else self.angle.parameters,
+            "sensors": SensorParameters,
+        }
+
+    def state_rows(self) -> dict[str, type]:
+        """Groups of state rows of this program, in order."""
+        return {
+            "result": LaneResult,
+            "state": PlantState,
+            "valve_state": self.valve.state,
+            "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
+            "seen": NoParameters if self.controller is not None else Measurement,
+        }

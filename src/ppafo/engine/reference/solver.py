@@ -1,0 +1,263 @@
+"""Integrates one run with CVODE from event to event: samples, valve switchings, breakaway, reversal, stops."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.cache import load_generated
+from ppafo.engine.reference import vane_mode
+from ppafo.engine.reference.source import PLANT_UNKNOWNS, right_hand_side_source
+from ppafo.engine.rows import numbers, rebuild
+from ppafo.engine.run import Run
+from ppafo.errors import SimulationError
+from ppafo.model.plant import PlantState, chamber_pressures
+from ppafo.model.sensors import Measurement, measure
+from ppafo.model.vane import actuator_torque
+
+Floats = NDArray[np.float64]
+
+SAME_TIME = 1.0e-12
+TOLERANCES = (1e-11, 1e-10, 1e-15, 1e-15, 1e-15, 1e-15, 1e-15)
+VALVE_TOLERANCE = 1e-11
+MOST_STEPS = 200_000
+
+
+@dataclass(slots=True)
+class ReferenceResult:
+    """Record of one run: times [s], the seven numbers of ``PlantState`` and the command at each; event times [s]."""
+
+    times: Floats
+    states: Floats
+    commands: Floats
+    impacts: list[float] = field(default_factory=list)
+    breakaways: list[float] = field(default_factory=list)
+    evaluations: int = 0
+
+
+def load_right_hand_side(run: Run) -> Callable[..., None]:
+    """The compiled right-hand side ``fill(t, y, slopes, parameters, command, way)`` of a run's program."""
+    fill: Callable[..., None] = load_generated("slopes", right_hand_side_source(run.program)).fill
+    return fill
+
+
+def right_hand_side_parameters(run: Run) -> Floats:
+    """The numbers that ``fill`` needs, in its order."""
+    groups = (run.plant, run.valve_orifice, run.leak_orifice, run.valve, run.path)
+    return np.array([number for group in groups for number in numbers(group)])
+
+
+def solve_reference(run: Run, tolerance: float = 1e-10) -> ReferenceResult:
+    """Solve a run with relative tolerance ``tolerance``; records at the run's record times.
+
+    SimulationError where the extra ``reference`` is not installed or the solver gives up.
+    """
+    return _Solution(run, tolerance).solve()
+
+
+class _Solution:
+    """State of one reference solution while it is being made."""
+
+    def __init__(self, run: Run, tolerance: float) -> None:
+        self.run = run
+        self.fill = load_right_hand_side(run)
+        self.parameters = right_hand_side_parameters(run)
+        self.y = np.array([*numbers(run.initial), *numbers(run.program.valve.initial())])
+        self.command = 0.0
+        self.way = self.rest_mode() if run.program.angle is None else 0.0
+        if self.y[1] != 0.0 and run.program.angle is None:
+            self.way = float(np.sign(self.y[1]))
+        self.time = 0.0
+        self.controller_state = None if run.program.controller is None else run.program.controller.initial
+        self.signals: dict[int, tuple[float, float, float]] = {}
+        self.pending: list[tuple[float, float]] = []
+        count = run.step_count // run.record_every + 1
+        self.result = ReferenceResult(
+            np.arange(count) * (run.step * run.record_every), np.empty((count, PLANT_UNKNOWNS)), np.zeros(count)
+        )
+        self.records = 0
+        self.solver = self.make_solver(tolerance)
+
+    def make_solver(self, tolerance: float) -> Any:
+        """CVODE with two root functions that belong to the present mode."""
+        try:
+            from sksundae.cvode import CVODE
+        except ImportError as error:
+            raise SimulationError("the reference solver needs scikit-sundae: pip install 'ppafo[reference]'") from error
+
+        def slopes(t: float, y: Floats, yp: Floats) -> None:
+            self.result.evaluations += 1
+            self.fill(t, y, yp, self.parameters, self.command, self.way)
+
+        def roots(t: float, y: Floats, events: Floats) -> None:
+            events[:] = self.roots(y)
+
+        roots.terminal = [True, True]  # type: ignore[attr-defined]
+        roots.direction = [-1, -1]  # type: ignore[attr-defined]
+        valve_count = self.y.size - PLANT_UNKNOWNS
+        free = self.run.program.angle is None
+        return CVODE(
+            slopes,
+            rtol=tolerance,
+            atol=np.array(TOLERANCES + (VALVE_TOLERANCE,) * valve_count),
+            eventsfn=roots if free else None,
+            num_events=2 if free else 0,
+            max_num_steps=MOST_STEPS,
+        )
+
+    def roots(self, y: Floats) -> vane_mode.Roots:
+        """Root functions of the present mode."""
+        plant = self.run.plant
+        if self.way == 0.0:
+            return vane_mode.roots_at_rest(plant, y[0], vane_mode.torque_on_vane(plant, y[0], y[2], y[3]))
+        return vane_mode.roots_sliding(plant, y[0], y[1], self.way)
+
+    def rest_mode(self) -> float:
+        """Mode of the vane at rest with the present gas."""
+        plant = self.run.plant
+        torque = vane_mode.torque_on_vane(plant, self.y[0], self.y[2], self.y[3])
+        return vane_mode.mode_at_rest(plant, self.y[0], torque)
+
+    def solve(self) -> ReferenceResult:
+        """Sample by sample from beginning to end."""
+        run = self.run
+        end = run.step * run.step_count
+        sample = 0
+        while self.time < end - SAME_TIME:
+            self.control(sample)
+            sample += 1
+            self.advance_to(min(sample * run.period, end), sample)
+        self.record_until(end + 1.0, None)
+        return self.result
+
+    def control(self, sample: int) -> None:
+        """Take a sample and queue the new command."""
+        run = self.run
+        if run.program.controller is None:
+            raise SimulationError("the reference solver runs controllers of the catalogue only")
+        seen = self.measurement(sample)
+        wanted = run.program.reference.value(run.reference, self.time)[0]
+        command, self.controller_state = run.program.controller.update(
+            run.controller, self.controller_state, wanted, seen, run.period
+        )
+        self.decided = command
+        self.pending.append((self.time + run.command_delay, command))
+
+    def measurement(self, sample: int) -> Measurement:
+        """What the controller sees: the present, or what was kept of the past."""
+        run = self.run
+        signals = self.signals.pop(sample, None) or self.present_signals()
+        if run.program.ideal_sensors:
+            angle, pressure_1, pressure_2 = signals
+            torque = actuator_torque(pressure_1, pressure_2, run.plant.torque_constant)
+            return Measurement(angle, pressure_1, pressure_2, torque)
+        return measure(run.sensors, *signals, run.plant.torque_constant, sample)
+
+    def present_signals(self) -> tuple[float, float, float]:
+        """Angle and pressures now."""
+        run = self.run
+        angle = self.y[0] if run.program.angle is None else run.program.angle.value(run.path, self.time)[0]
+        pressure_1, pressure_2 = chamber_pressures(run.plant, angle, self.y[2], self.y[3])
+        return float(angle), float(pressure_1), float(pressure_2)
+
+    def advance_to(self, end: float, next_sample: int) -> None:
+        """Integrate to the next sample over all that happens on the way."""
+        run = self.run
+        looks = [
+            (index * run.period - run.signal_delay, index)
+            for index in range(next_sample, next_sample + int(run.signal_delay / run.period) + 2)
+            if run.signal_delay > 0.0
+        ]
+        while self.time < end - SAME_TIME:
+            for moment, index in looks:
+                if abs(moment - self.time) <= SAME_TIME:
+                    self.signals[index] = self.present_signals()
+            self.apply_commands()
+            stops = [moment for moment, _ in [*looks, *self.pending] if moment > self.time + SAME_TIME]
+            self.integrate(min([end, self.next_valve_event(), *stops]))
+
+    def apply_commands(self) -> None:
+        """Give the valve the commands that are due, and let it settle."""
+        while self.pending and self.pending[0][0] <= self.time + SAME_TIME:
+            self.command = self.pending.pop(0)[1]
+        valve = self.run.program.valve
+        state = valve.settle(self.run.valve, self.valve_state(), self.command, self.time)
+        self.y[PLANT_UNKNOWNS:] = numbers(state)
+
+    def valve_state(self) -> Any:
+        """The valve's part of the unknowns."""
+        return rebuild(self.run.program.valve.state, self.y[PLANT_UNKNOWNS:])
+
+    def next_valve_event(self) -> float:
+        """When the valve next changes by itself."""
+        valve = self.run.program.valve
+        return max(
+            valve.next_event(self.run.valve, self.valve_state(), self.command, self.time), self.time + 2 * SAME_TIME
+        )
+
+    def integrate(self, end: float) -> None:
+        """Integrate to ``end`` or to the next event of the vane, and change the mode there."""
+        if self.run.program.angle is None and self.way == 0.0:
+            self.way = self.rest_mode()
+            if self.way != 0.0:
+                self.result.breakaways.append(self.time)
+        times = self.result.times
+        wanted = times[self.records : np.searchsorted(times, end - SAME_TIME)]
+        grid = np.unique(np.concatenate([[self.time], wanted[wanted > self.time + SAME_TIME], [end]]))
+        inner = grid if grid.size > 2 else np.array([grid[0], 0.5 * (grid[0] + grid[1]), grid[1]])
+        solution = self.solver.solve(inner, self.y)
+        if not solution.success:
+            raise SimulationError(f"the reference solver stopped at t = {solution.t[-1]:.6g} s: {solution.message}")
+        self.record_until(solution.t[-1] + SAME_TIME, solution)
+        self.time = float(solution.t[-1])
+        self.y = np.array(solution.y[-1])
+        if self.time < end - SAME_TIME:
+            self.change_mode()
+        else:
+            self.time = end
+
+    def record_until(self, end: float, solution: Any) -> None:
+        """Keep the states at the record times before ``end``."""
+        times = self.result.times
+        while self.records < times.size and times[self.records] < end - 2 * SAME_TIME:
+            moment = times[self.records]
+            state = self.y if solution is None else solution.y[np.argmin(np.abs(solution.t - moment))]
+            self.result.states[self.records] = self.led(state[:PLANT_UNKNOWNS], moment)
+            self.result.commands[self.records] = self.decided
+            self.records += 1
+
+    def led(self, state: Floats, time: float) -> Floats:
+        """The state with the prescribed angle put in, where there is one."""
+        if self.run.program.angle is None:
+            return state
+        angle, rate, _ = self.run.program.angle.value(self.run.path, time)
+        return np.array([angle, rate, *state[2:]])
+
+    def change_mode(self) -> None:
+        """The vane breaks away, comes to rest, or meets a stop."""
+        plant = self.run.plant
+        if self.way == 0.0:
+            self.way = self.rest_mode_after_breakaway()
+            self.result.breakaways.append(self.time)
+            return
+        roots = self.roots(self.y)
+        if roots.second < roots.first * 1e-3 or roots.second <= 0.0:
+            self.result.impacts.append(self.time)
+            self.y[0] = plant.angle_max if self.way > 0.0 else plant.angle_min
+            self.y[1] = vane_mode.after_stop(plant, self.y[1])
+        else:
+            self.y[1] = 0.0
+        self.way = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()
+
+    def rest_mode_after_breakaway(self) -> float:
+        """Way of the vane at the instant of breakaway, where the torque equals the static limit to rounding."""
+        plant = self.run.plant
+        torque = vane_mode.torque_on_vane(plant, self.y[0], self.y[2], self.y[3])
+        return 1.0 if torque > 0.0 else -1.0
+
+
+def final_state(result: ReferenceResult) -> PlantState:
+    """The last recorded state."""
+    return PlantState(*(float(value) for value in result.states[-1]))

@@ -1,0 +1,74 @@
+"""Writes the source of the right-hand side that the reference solver and the benchmark's solvers integrate."""
+
+from ppafo.engine.program import NoParameters, Program
+from ppafo.engine.reference.derivative import ExactOrifice, free_motion, gas_rates
+from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.source_text import SourceCollector
+from ppafo.model.plant import PlantParameters, chamber_pressures
+
+PLANT_UNKNOWNS = 7
+
+HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
+
+import math
+from collections import namedtuple
+
+import numpy as np
+from numba import njit
+'''
+INLINE = '@njit(error_model="numpy")'
+READ_ONLY = 'Array(float64, 1, "C", readonly=True)'
+
+
+def parameter_groups(program: Program) -> dict[str, type]:
+    """Groups of numbers that the right-hand side needs, in order."""
+    return {
+        "plant": PlantParameters,
+        "valve_orifice": ExactOrifice,
+        "leak_orifice": ExactOrifice,
+        "valve": program.valve.parameters,
+        "path": NoParameters if program.angle is None else program.angle.parameters,
+    }
+
+
+def right_hand_side_source(program: Program) -> str:
+    """Source of the module whose ``fill(t, y, slopes, parameters, command, way)`` writes the slopes of all unknowns.
+
+    The unknowns are angle, angular velocity, both masses, the three gas totals, and the state of the valve.
+    """
+    collector = SourceCollector(INLINE)
+    add = collector.add
+    cells: dict[str, str] = {}
+    for name, row in parameter_groups(program).items():
+        for path in leaf_paths(row, name):
+            cells[path] = f"parameters[{len(cells)}]"
+    valve_paths = leaf_paths(program.valve.state, "valve_state")
+    cells |= {path: f"y[{PLANT_UNKNOWNS + number}]" for number, path in enumerate(valve_paths)}
+    groups = parameter_groups(program) | {"valve_state": program.valve.state}
+    lines = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in groups.items()]
+    lines += [f"openings = {add(program.valve.instant)}(valve, valve_state, command)"]
+    if program.angle is None:
+        lines += ["angle = y[0]"]
+    else:
+        lines += [f"angle, _, _ = {add(program.angle.value)}(path, t)"]
+    lines += [
+        f"pressure_1, pressure_2 = {add(chamber_pressures)}(plant, angle, y[2], y[3])",
+        f"gas = {add(gas_rates)}(plant, valve_orifice, leak_orifice, openings, pressure_1, pressure_2)",
+        "slopes[2] = gas.mass_1",
+        "slopes[3] = gas.mass_2",
+        "slopes[4] = gas.supplied",
+        "slopes[5] = gas.vented",
+        "slopes[6] = gas.leaked",
+    ]
+    if program.angle is None:
+        lines += [f"slopes[0], slopes[1] = {add(free_motion)}(plant, y[0], y[1], pressure_1, pressure_2, way)"]
+    else:
+        lines += ["slopes[0] = 0.0", "slopes[1] = 0.0"]
+    lines += [f"moves = {add(program.valve.rates)}(valve, valve_state, command)"]
+    lines += [
+        f"slopes[{PLANT_UNKNOWNS + number}] = {path.replace('valve_state', 'moves', 1)}"
+        for number, path in enumerate(valve_paths)
+    ]
+    body = "\n".join(f"    {line}" for line in lines)
+    function = f'@njit(cache=True, error_model="numpy")\ndef fill(t, y, slopes, parameters, command, way):\n{body}\n'
+    return f"{HEADER}\n\n{collector.text()}\n\n\n{function}"

@@ -1,0 +1,35 @@
+"""How many times a step must be divided so that the fastest chamber is followed: one number for a whole run.
+
+A chamber fills or empties in about V / (conductance R T / M), and the gas is a spring for the vane. A step of 1/25 of
+the first time and 1/10 of a radian of the second keeps the error of the scheme below 2e-4 of the angle range and 1e-3
+of the pressure range (docs/decisions/0002).
+"""
+
+import math
+
+from ppafo.model.plant import PlantParameters, chamber_volumes
+
+STEPS_PER_FILLING = 25.0
+RADIANS_PER_STEP = 0.1
+MOST_DIVISIONS = 1000
+
+
+def filling_time(plant: PlantParameters, volume: float) -> float:
+    """Shortest time constant [s] of a chamber of ``volume`` [m^3] behind the fully open valve and the leak."""
+    return volume / ((plant.valve_conductance + plant.leak_conductance) * plant.gas_product)
+
+
+def gas_spring_frequency(plant: PlantParameters, volume: float) -> float:
+    """Angular frequency [rad/s] of the vane on the gas of one chamber at the highest pressure."""
+    pressure = max(plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure)
+    stiffness = plant.torque_constant * pressure * plant.volume_per_angle / volume
+    return math.sqrt(stiffness / plant.inertia)
+
+
+def divisions(plant: PlantParameters, step: float, lowest_angle: float, highest_angle: float, is_free: bool) -> int:
+    """Number of parts [-] into which a step [s] is divided for a vane that stays between two angles [rad]."""
+    volume = min(chamber_volumes(plant, lowest_angle)[0], chamber_volumes(plant, highest_angle)[1])
+    parts = step * STEPS_PER_FILLING / filling_time(plant, volume)
+    if is_free:
+        parts = max(parts, step * gas_spring_frequency(plant, volume) / RADIANS_PER_STEP)
+    return min(max(1, math.ceil(parts - 1e-9)), MOST_DIVISIONS)

@@ -1,0 +1,50 @@
+"""How NamedTuples of floats lie in the rows of a lane block: one row for each number, nested ones flattened."""
+
+from collections.abc import Callable
+from typing import Any, get_type_hints
+
+import numpy as np
+
+from ppafo.engine.source_text import is_row
+
+
+def leaf_paths(row: type, prefix: str) -> list[str]:
+    """Attribute paths of all numbers in a NamedTuple class, in order, each beginning with ``prefix``."""
+    paths = []
+    hints = get_type_hints(row)
+    for name in row._fields:  # type: ignore[attr-defined]
+        path = f"{prefix}.{name}"
+        paths += leaf_paths(hints[name], path) if is_row(hints[name]) else [path]
+    return paths
+
+
+def row_expression(row: type, path: str, cells: dict[str, str], name_of: Callable[[type], str]) -> str:
+    """Source text that makes a NamedTuple from the cells that hold its numbers; an empty one is ``()``."""
+    fields = row._fields  # type: ignore[attr-defined]
+    if not fields:
+        return "()"
+    hints = get_type_hints(row)
+    inner = [
+        row_expression(hints[name], f"{path}.{name}", cells, name_of) if is_row(hints[name]) else cells[f"{path}.{name}"]
+        for name in fields
+    ]
+    return f"{name_of(row)}({', '.join(inner)})"
+
+
+def numbers(row: Any) -> list[float]:
+    """All numbers of a NamedTuple, in the order of ``leaf_paths``."""
+    flat: list[float] = []
+    for value in row:
+        flat += numbers(value) if isinstance(value, tuple) else [float(value)]
+    return flat
+
+
+def rebuild(row: type, values: "np.ndarray[Any, Any] | list[float]") -> Any:
+    """The NamedTuple whose numbers are ``values``; the inverse of ``numbers``."""
+    return _rebuild(row, iter([float(value) for value in values]))
+
+
+def _rebuild(row: type, values: Any) -> Any:
+    hints = get_type_hints(row)
+    fields = row._fields  # type: ignore[attr-defined]
+    return row(*[_rebuild(hints[name], values) if is_row(hints[name]) else next(values) for name in fields])

@@ -1,0 +1,72 @@
+"""One run as values: what both the lanes and the reference solver are given."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.lanes import Batch, Clock
+from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
+from ppafo.engine.reference.derivative import ExactOrifice
+from ppafo.engine.rows import numbers
+from ppafo.model.plant import PlantParameters, PlantState
+from ppafo.model.sensors import SensorParameters
+
+NEVER_FAILED = 1.0e300
+WHOLE = 1.0e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A device in one experiment, SI units.
+
+    ``step`` divides ``period`` (of the controller). ``valve``, ``controller``, ``reference`` and ``path`` are the
+    parameters of the program's pieces, () where it has none. Delays are in seconds.
+    """
+
+    program: Program
+    plant: PlantParameters
+    valve_orifice: ExactOrifice
+    leak_orifice: ExactOrifice
+    initial: PlantState
+    valve: Any
+    controller: Any
+    reference: Any
+    path: Any
+    sensors: SensorParameters
+    step: float
+    step_count: int
+    steps_per_sample: int
+    record_every: int
+    signal_delay: float
+    command_delay: float
+
+    @property
+    def period(self) -> float:
+        """Time between two samples of the controller [s]."""
+        return self.step * self.steps_per_sample
+
+
+def whole_and_rest(delay: float, step: float) -> tuple[int, float]:
+    """Whole steps in a delay [s] and the rest as a share of a step."""
+    steps = delay / step
+    whole = int(np.floor(steps + WHOLE))
+    return whole, max(0.0, steps - whole)
+
+
+def batch_of(run: Run) -> Batch:
+    """The run as a batch of one, for the lanes."""
+    program = run.program
+    command_steps, command_lag = whole_and_rest(run.command_delay, run.step)
+    signal_steps, signal_lag = whole_and_rest(run.signal_delay, run.step)
+    clock = Clock(run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
+    timing = LaneTiming(run.step, run.period, command_lag, signal_lag)
+    parameters = [timing, run.plant, run.valve, run.controller, run.reference, run.path, run.sensors]
+    controller_state = NoParameters() if program.controller is None else program.controller.initial
+    seen = () if program.controller is not None else (0.0,) * 4
+    states = [LaneResult(0.0, NEVER_FAILED), run.initial, program.valve.initial(), controller_state, seen]
+    return Batch(program, clock, _column(parameters), _column(states))
+
+
+def _column(groups: list[Any]) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
+    return np.array([number for group in groups for number in numbers(group)])[:, None]

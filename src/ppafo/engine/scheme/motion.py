@@ -1,0 +1,183 @@
+"""One step of the vane, free between its stops or led along a prescribed angle, with the gas in the chambers.
+
+Order of a free step: the angle is predicted with the present acceleration; the gas runs with volumes that lead to the
+predicted angle; the angular velocity follows from the trapezoidal rule with the new pressures. What ends or starts
+motion inside the step (breakaway, reversal, a stop) is located by interpolation, and the rest of the step is integrated
+from there with a torque that runs linearly.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from ppafo.engine.scheme.pneumatics import GasChange, advance_gas
+from ppafo.model.friction import holds_still
+from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, driving_torque
+
+
+class Departure(NamedTuple):
+    """Second part of a step: where it begins (share of the step), angle [rad], angular velocity [rad/s]."""
+
+    share: float
+    angle: float
+    angular_velocity: float
+
+
+def direction_of(value: float) -> float:
+    """Sign of a number: 1, -1 or 0."""
+    return (1.0 if value > 0.0 else 0.0) - (1.0 if value < 0.0 else 0.0)
+
+
+def bounded(plant: PlantParameters, angle: float) -> float:
+    """``angle`` [rad], not beyond the stops."""
+    return max(plant.angle_min, min(plant.angle_max, angle))
+
+
+def next_velocity(
+    plant: PlantParameters, angular_velocity: float, acceleration: float, torque: float, duration: float
+) -> float:
+    """Angular velocity [rad/s] after ``duration`` [s] by the trapezoidal rule; ``torque`` at the end [N m], less friction."""
+    half = 0.5 * duration
+    return (angular_velocity + half * (acceleration + torque / plant.inertia)) / (
+        1.0 + half * plant.viscous_damping / plant.inertia
+    )
+
+
+def time_to_stop(distance: float, angular_velocity: float, acceleration: float) -> float:
+    """Time [s] to cover ``distance`` [rad] towards a stop at constant acceleration, all along the motion."""
+    reach = max(angular_velocity * angular_velocity + 2.0 * acceleration * distance, 0.0)
+    return 2.0 * distance / max(angular_velocity + math.sqrt(reach), 1.0e-30)
+
+
+def depart(
+    plant: PlantParameters, departure: Departure, torque: float, next_torque: float, step: float
+) -> tuple[float, float]:
+    """Angle and angular velocity at the end of a step whose last part begins with ``departure``.
+
+    ``torque`` and ``next_torque`` [N m] drive the vane at the departure and at the end, and run linearly between.
+    """
+    at_lower = departure.angle <= plant.angle_min
+    at_upper = departure.angle >= plant.angle_max
+    moving = departure.angular_velocity != 0.0
+    leaves_at_once = not holds_still(torque, plant.static_torque, at_lower, at_upper)
+    leaves_later = not holds_still(next_torque, plant.static_torque, at_lower, at_upper)
+    way = direction_of(torque if leaves_at_once else next_torque)
+    change = next_torque - torque
+    waits = (way * plant.static_torque - torque) / (change if change != 0.0 else 1.0)
+    waits = 0.0 if moving or leaves_at_once else max(0.0, min(1.0, waits))
+    start_torque = torque + waits * change
+    way = direction_of(departure.angular_velocity) if moving else way
+    sliding = way * plant.dynamic_torque
+    duration = step * (1.0 - departure.share) * (1.0 - waits)
+    velocity = departure.angular_velocity
+    first = (start_torque - sliding - plant.viscous_damping * velocity) / plant.inertia
+    last = (next_torque - sliding) / plant.inertia
+    next_rate = next_velocity(plant, velocity, first, next_torque - sliding, duration)
+    travel = duration * velocity + duration * duration * (first / 3.0 + last / 6.0)
+    goes = moving or leaves_at_once or leaves_later
+    turned = next_rate * way <= 0.0
+    angle = departure.angle + (travel if goes and travel * way > 0.0 else 0.0)
+    rate = next_rate if goes and not turned else 0.0
+    hits = angle < plant.angle_min or angle > plant.angle_max
+    return bounded(plant, angle), (0.0 if hits else rate)
+
+
+def advance_free(
+    plant: PlantParameters,
+    state: PlantState,
+    port_1: Any,
+    port_2: Any,
+    step: float,
+    port_flow: Callable[..., Any],
+    port_flow_slopes: Callable[..., Any],
+) -> PlantState:
+    """State one step [s] later of a vane that is free between its stops. Equations (1) to (10)."""
+    angle = state.angle
+    velocity = state.angular_velocity
+    way = direction_of(velocity)
+    moving = way != 0.0
+    sliding = way * plant.dynamic_torque
+    pressure_1, pressure_2 = chamber_pressures(plant, angle, state.mass_1, state.mass_2)
+    torque = driving_torque(plant, angle, pressure_1, pressure_2)
+    acceleration = (torque - sliding - plant.viscous_damping * velocity) / plant.inertia
+    acceleration = acceleration if moving else 0.0
+    free_angle = angle + step * (velocity + 0.5 * step * acceleration)
+    predicted = bounded(plant, free_angle)
+    gas = advance_gas(
+        plant,
+        state.mass_1,
+        state.mass_2,
+        chamber_volumes(plant, angle),
+        chamber_volumes(plant, predicted),
+        port_1,
+        port_2,
+        step,
+        port_flow,
+        port_flow_slopes,
+    )
+    mass_1 = state.mass_1 + gas.mass_1
+    mass_2 = state.mass_2 + gas.mass_2
+    next_1, next_2 = chamber_pressures(plant, predicted, mass_1, mass_2)
+    next_torque = driving_torque(plant, predicted, next_1, next_2)
+    full_velocity = next_velocity(plant, velocity, acceleration, next_torque - sliding, step)
+
+    reverses = moving and full_velocity * way <= 0.0
+    fall = velocity - full_velocity
+    reversal = velocity / (fall if reverses else 1.0)
+    stop = plant.angle_max if velocity > 0.0 else plant.angle_min
+    hits = moving and free_angle != predicted
+    impact = min(time_to_stop(abs(stop - angle), abs(velocity), acceleration * way) / step, 1.0)
+    hits_first = hits and not (reverses and reversal < impact)
+    rebound = -plant.restitution * (velocity - impact * fall)
+    turning_angle = bounded(plant, angle + 0.5 * reversal * step * velocity)
+    share = impact if hits_first else (reversal if reverses else 0.0)
+    start_angle = stop if hits_first else (turning_angle if reverses else angle)
+    departure = Departure(share, start_angle, rebound if hits_first else 0.0)
+    share_torque = torque + share * (next_torque - torque)
+    left_angle, left_velocity = depart(plant, departure, share_torque, next_torque, step)
+
+    slides_through = moving and not reverses and not hits
+    next_angle = predicted if slides_through else left_angle
+    next_rate = full_velocity if slides_through else left_velocity
+    return after_gas(state, next_angle, next_rate, gas)
+
+
+def advance_led(
+    plant: PlantParameters,
+    state: PlantState,
+    next_angle: float,
+    next_rate: float,
+    port_1: Any,
+    port_2: Any,
+    step: float,
+    port_flow: Callable[..., Any],
+    port_flow_slopes: Callable[..., Any],
+) -> PlantState:
+    """State one step [s] later of a vane that is led to ``next_angle`` [rad]. Equations (3) to (9)."""
+    gas = advance_gas(
+        plant,
+        state.mass_1,
+        state.mass_2,
+        chamber_volumes(plant, state.angle),
+        chamber_volumes(plant, next_angle),
+        port_1,
+        port_2,
+        step,
+        port_flow,
+        port_flow_slopes,
+    )
+    return after_gas(state, next_angle, next_rate, gas)
+
+
+def after_gas(state: PlantState, angle: float, angular_velocity: float, gas: GasChange) -> PlantState:
+    """State with a new angle [rad], angular velocity [rad/s] and the gas of one step added."""
+    vented = gas.supplied - gas.mass_1 - gas.mass_2
+    return PlantState(
+        angle,
+        angular_velocity,
+        state.mass_1 + gas.mass_1,
+        state.mass_2 + gas.mass_2,
+        state.supplied_mass + gas.supplied,
+        state.vented_mass + vented,
+        state.leaked_mass + abs(gas.leaked),
+    )

@@ -1,0 +1,66 @@
+"""Flow curves fitted to the exact flow functions, and conductances, for both forms of an orifice."""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from ppafo.constants import STANDARD_REFERENCE_DENSITY_AIR, STANDARD_REFERENCE_TEMPERATURE
+from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
+from ppafo.model.orifice import FlowCurve, iso6358_flow_function, isentropic_flow_function
+
+DEGREE = 6
+FIT_POINTS = 400
+
+
+@lru_cache(maxsize=256)
+def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
+    """Fitted curve of equations (6), (7) for a gas; within 1e-7 of the exact function up to ``linear_ratio``."""
+    critical = critical_pressure_ratio(heat_capacity_ratio)
+    gaps = _gaps(critical)
+    exact = [isentropic_flow_function(1.0 - gap, heat_capacity_ratio) for gap in gaps]
+    return _fitted(critical, linear_ratio, gaps, np.array(exact))
+
+
+@lru_cache(maxsize=256)
+def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
+    """Fitted curve of ISO 6358 for a critical ratio; within 1e-5 of the exact function up to ``linear_ratio``."""
+    gaps = _gaps(critical_ratio)
+    exact = [iso6358_flow_function(1.0 - gap, critical_ratio) for gap in gaps]
+    return _fitted(critical_ratio, linear_ratio, gaps, np.array(exact))
+
+
+def area_conductance(
+    area: float, discharge_coefficient: float, heat_capacity_ratio: float, gas_constant: float, temperature: float
+) -> float:
+    """Conductance Cd A C1 [kg/(s Pa)] of an area [m^2]; ``gas_constant`` is the specific one. Equation (6)."""
+    return discharge_coefficient * area * choked_flow_constant(heat_capacity_ratio, gas_constant, temperature)
+
+
+def sonic_conductance_mass(sonic_conductance: float, gas_constant: float, temperature: float) -> float:
+    """Conductance [kg/(s Pa)] of a sonic conductance [m^3/(s Pa)] measured with air, for another gas and temperature.
+
+    ISO 6358 gives C rho_0 sqrt(T_0 / T) for air; another gas passes sqrt(R_air / R) times as much.
+    """
+    air_constant = 1.0e5 / (STANDARD_REFERENCE_DENSITY_AIR * STANDARD_REFERENCE_TEMPERATURE)
+    same_gas = sonic_conductance * STANDARD_REFERENCE_DENSITY_AIR * math.sqrt(STANDARD_REFERENCE_TEMPERATURE / temperature)
+    return same_gas * math.sqrt(air_constant / gas_constant)
+
+
+def _gaps(critical_ratio: float) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
+    """Chebyshev-like points of 1 - r between 0 and the critical gap."""
+    angles = np.linspace(0.0, math.pi, FIT_POINTS + 1)[1:]
+    return np.asarray(0.5 * (1.0 - critical_ratio) * (1.0 - np.cos(angles)))
+
+
+def _fitted(
+    critical_ratio: float,
+    linear_ratio: float,
+    gaps: "np.ndarray[tuple[int], np.dtype[np.float64]]",
+    exact: "np.ndarray[tuple[int], np.dtype[np.float64]]",
+) -> FlowCurve:
+    """Relative least squares of a polynomial times a root."""
+    target = exact / np.sqrt(gaps)
+    powers = np.vander(gaps, DEGREE + 1, increasing=True)
+    coefficients = np.linalg.lstsq(powers / target[:, None], np.ones_like(target), rcond=None)[0]
+    return FlowCurve(critical_ratio, linear_ratio, *(float(value) for value in coefficients))

@@ -1,0 +1,96 @@
+"""The plant: all components of one device put together, as floats."""
+
+from typing import NamedTuple
+
+from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
+from ppafo.model.orifice import FlowCurve
+from ppafo.model.ports import BlendedPort, SinglePort
+from ppafo.model.vane import actuator_torque, gravity_torque, net_driving_torque
+
+
+class PlantParameters(NamedTuple):
+    """Everything fixed about a device and the bench it stands on, SI units; conductances are Cd A C1 [kg/(s Pa)]."""
+
+    gas_product: float
+    torque_constant: float
+    volume_per_angle: float
+    angle_min: float
+    angle_max: float
+    dead_volume_1: float
+    dead_volume_2: float
+    restitution: float
+    static_torque: float
+    dynamic_torque: float
+    viscous_damping: float
+    inertia: float
+    gravity_torque: float
+    external_torque: float
+    supply_pressure: float
+    dorsiflexion_pressure: float
+    atmospheric_pressure: float
+    valve_conductance: float
+    leak_conductance: float
+    valve_curve: FlowCurve
+    leak_curve: FlowCurve
+
+
+class PlantState(NamedTuple):
+    """Angle [rad], angular velocity [rad/s], gas in the chambers [kg]; gas totals [kg] since the start of the run."""
+
+    angle: float
+    angular_velocity: float
+    mass_1: float
+    mass_2: float
+    supplied_mass: float
+    vented_mass: float
+    leaked_mass: float
+
+
+class Openings(NamedTuple):
+    """Share of the valve's full area that joins each chamber to the source and to the atmosphere, each 0 to 1."""
+
+    source_1: float
+    vent_1: float
+    source_2: float
+    vent_2: float
+
+
+def chamber_volumes(plant: PlantParameters, angle: float) -> tuple[float, float]:
+    """Volumes of both chambers [m^3] at an angle [rad]. Equations (4), (5)."""
+    volume_1 = chamber_1_volume(angle, plant.angle_min, plant.volume_per_angle, plant.dead_volume_1)
+    volume_2 = chamber_2_volume(angle, plant.angle_max, plant.volume_per_angle, plant.dead_volume_2)
+    return volume_1, volume_2
+
+
+def chamber_pressures(plant: PlantParameters, angle: float, mass_1: float, mass_2: float) -> tuple[float, float]:
+    """Absolute pressures of both chambers [Pa]. Equation (3)."""
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    pressure_1 = chamber_pressure(mass_1, volume_1, plant.gas_product)
+    pressure_2 = chamber_pressure(mass_2, volume_2, plant.gas_product)
+    return pressure_1, pressure_2
+
+
+def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Torque on the vane before friction and damping [N m], positive in plantarflexion. Equations (1), (2)."""
+    actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+    gravity = gravity_torque(angle, plant.gravity_torque)
+    return net_driving_torque(actuator, gravity, plant.external_torque)
+
+
+def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, SinglePort]:
+    """Ports of both chambers for a steady opening from -1 to 1: above 0 feeds chamber 1 and vents 2. Equation (8)."""
+    conductance = abs(opening) * plant.valve_conductance
+    feeds_1 = opening >= 0.0
+    node_1 = plant.supply_pressure if feeds_1 else plant.atmospheric_pressure
+    node_2 = plant.atmospheric_pressure if feeds_1 else plant.dorsiflexion_pressure
+    share_1 = 1.0 if feeds_1 else 0.0
+    return SinglePort(conductance, node_1, share_1), SinglePort(conductance, node_2, 1.0 - share_1)
+
+
+def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPort, BlendedPort]:
+    """Ports of both chambers for four openings, which may be means over a step. Equation (8)."""
+    full = plant.valve_conductance
+    ambient = plant.atmospheric_pressure
+    port_1 = BlendedPort(openings.source_1 * full, plant.supply_pressure, openings.vent_1 * full, ambient)
+    port_2 = BlendedPort(openings.source_2 * full, plant.dorsiflexion_pressure, openings.vent_2 * full, ambient)
+    return port_1, port_2

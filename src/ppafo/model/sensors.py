@@ -1,0 +1,67 @@
+"""What a controller sees of the plant: ideal, or with noise and quantisation.
+
+Noise is a pure function of seed, sample number and channel, so that a run gives the same noise alone, in any block
+and on any number of threads.
+"""
+
+from typing import NamedTuple
+
+MASK = 0xFFFFFFFF
+
+
+class Measurement(NamedTuple):
+    """Angle [rad], absolute pressures [Pa] and the actuator torque worked out from them [N m]."""
+
+    angle: float
+    pressure_1: float
+    pressure_2: float
+    torque: float
+
+
+class SensorParameters(NamedTuple):
+    """Standard deviations and quantisation steps of angle [rad] and pressure [Pa] (0 for none), and a seed."""
+
+    angle_noise: float
+    pressure_noise: float
+    angle_quantum: float
+    pressure_quantum: float
+    seed: float
+
+
+def mixed(value: int) -> int:
+    """A 32-bit integer that looks unrelated to ``value`` (0 to 2^32 - 1): xor, shift and multiply, thrice."""
+    value = (value ^ (value >> 16)) * 0x7FEB352D & MASK
+    value = (value ^ (value >> 15)) * 0x6C50B47D & MASK
+    value = (value ^ (value >> 16)) * 0x45D9F3B & MASK
+    return value ^ (value >> 16)
+
+
+def standard_noise(seed: int, sample: int, channel: int) -> float:
+    """Random number of mean 0 and variance 1 for one sample of one channel: twelve uniforms added up.
+
+    The sum is within 6 and has an excess kurtosis of -0.1, near enough to normal for a sensor.
+    """
+    word = mixed(mixed(mixed(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))
+    total = 0
+    for _ in range(6):
+        total += (word & 0xFFFF) + (word >> 16)
+        word = mixed((word + 0x1E3779B9) & MASK)
+    return (total + 6.0) / 65536.0 - 6.0
+
+
+def quantised(value: float, quantum: float) -> float:
+    """``value`` rounded to a whole number of ``quantum`` (half upwards); unchanged where that is 0."""
+    safe = quantum if quantum > 0.0 else 1.0
+    rounded = quantum * float(int(value / safe + 0.5)) if value >= 0.0 else -quantum * float(int(0.5 - value / safe))
+    return rounded if quantum > 0.0 else value
+
+
+def measure(
+    sensors: SensorParameters, angle: float, pressure_1: float, pressure_2: float, torque_constant: float, sample: int
+) -> Measurement:
+    """Measurement of one sample with noise and quantisation; angle [rad], pressures [Pa absolute]."""
+    seed = int(sensors.seed)
+    angle = quantised(angle + sensors.angle_noise * standard_noise(seed, sample, 0), sensors.angle_quantum)
+    first = quantised(pressure_1 + sensors.pressure_noise * standard_noise(seed, sample, 1), sensors.pressure_quantum)
+    second = quantised(pressure_2 + sensors.pressure_noise * standard_noise(seed, sample, 2), sensors.pressure_quantum)
+    return Measurement(angle, first, second, torque_constant * (first - second))

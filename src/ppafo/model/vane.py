@@ -1,0 +1,39 @@
+"""The vane with the foot plate: torques and acceleration. Equations (1) and (2)."""
+
+QUARTER_TURN = 1.5707963267948966
+
+
+def actuator_torque(pressure_1: float, pressure_2: float, torque_constant: float) -> float:
+    """Actuator torque [N m], positive in plantarflexion, of two absolute pressures [Pa]. Equation (2)."""
+    return torque_constant * (pressure_1 - pressure_2)
+
+
+def gravity_torque(angle: float, largest_torque: float) -> float:
+    """Torque [N m] that gravity takes from the vane (it is subtracted in equation (1)), for an upright shank.
+
+    The foot plate is level at 90 deg, where gravity pulls the toes down with ``largest_torque`` = m g l, that is in
+    plantarflexion, so the value is negative. The cosine of the slope is a power series, good to 1e-8 within 0 to
+    180 deg, because a library cosine cannot run in many lanes at once.
+    """
+    slope = angle - QUARTER_TURN
+    square = slope * slope
+    cosine = 1.0 / 479001600.0
+    cosine = cosine * square - 1.0 / 3628800.0
+    cosine = cosine * square + 1.0 / 40320.0
+    cosine = cosine * square - 1.0 / 720.0
+    cosine = cosine * square + 1.0 / 24.0
+    cosine = cosine * square - 0.5
+    cosine = cosine * square + 1.0
+    return -largest_torque * cosine
+
+
+def net_driving_torque(actuator: float, gravity: float, external: float) -> float:
+    """Torque [N m] that drives the vane before friction and damping: actuator less gravity less T_ex. Equation (1)."""
+    return actuator - gravity - external
+
+
+def vane_acceleration(
+    driving_torque: float, angular_velocity: float, friction: float, viscous_damping: float, inertia: float
+) -> float:
+    """Angular acceleration [rad/s^2]; friction [N m] and damping are subtracted. Equation (1)."""
+    return (driving_torque - viscous_damping * angular_velocity - friction) / inertia

@@ -1,0 +1,129 @@
+"""What the checks read: the numbers of a set in SI, how exactly they were printed, and how to write them again."""
+
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import NamedTuple
+
+from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
+from ppafo.errors import UnitError
+from ppafo.model.declaration import Quantity
+from ppafo.model.gas import specific_gas_constant
+from ppafo.parameters.audit.finding import NamedValue
+from ppafo.parameters.declaration import alternatives, is_within
+from ppafo.parameters.device import Gas
+from ppafo.parameters.parameter_set import ATMOSPHERE_PATH, ParameterSet, atmospheric_pressure, number_in_si
+from ppafo.parameters.provenance import Entry
+from ppafo.units import from_si
+
+GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
+
+_SMALLEST, _LARGEST = 1e-20, 1e20
+"""SI magnitudes beyond which a number is a slip, and products of numbers leave the range of floating point."""
+
+
+class Interval(NamedTuple):
+    """The range of numbers that a printed number can stand for; SI, positive."""
+
+    low: float
+    high: float
+
+    def times(self, other: "Interval") -> "Interval":
+        """Return the range of the product."""
+        return Interval(self.low * other.low, self.high * other.high)
+
+    def over(self, other: "Interval") -> "Interval":
+        """Return the range of the quotient."""
+        return Interval(self.low / other.high, self.high / other.low)
+
+    def meets(self, other: "Interval") -> bool:
+        """Tell whether one number could be meant by both."""
+        return self.low <= other.high and other.low <= self.high
+
+    def common(self, other: "Interval") -> "Interval":
+        """Return the part that both share; only for ranges that meet."""
+        return Interval(max(self.low, other.low), min(self.high, other.high))
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Read access to a set for the checks."""
+
+    parameter_set: ParameterSet
+    declared: dict[str, Quantity]
+
+    def number(self, path: str) -> float | None:
+        """Return the value at a path in SI, None where the set does not have it or it is beyond all measure."""
+        value = number_in_si(self.parameter_set, path)
+        return value if value is None or value == 0.0 or _SMALLEST < abs(value) < _LARGEST else None
+
+    def numbers(self, *paths: str) -> tuple[float, ...] | None:
+        """Return the values at all paths in SI, None where one is lacking."""
+        found = [self.number(path) for path in paths]
+        present = tuple(value for value in found if value is not None)
+        return present if len(present) == len(paths) else None
+
+    def text(self, path: str) -> str | None:
+        """Return the name or formula at a path."""
+        entry = self.parameter_set.texts.get(path)
+        return None if entry is None else entry.value
+
+    def magnitude(self, path: str) -> Interval | None:
+        """Return the range that the printed digits at a path leave open, without sign, in SI."""
+        value, entry = self.number(path), self.parameter_set.numbers.get(path)
+        if value is None or entry is None or entry.value == 0.0:
+            return None
+        relative = min(printed_half_width(entry) / abs(entry.value), 0.99)
+        return Interval(abs(value) * (1.0 - relative), abs(value) * (1.0 + relative))
+
+    def written(self, path: str, value: float) -> str:
+        """Return an SI value in the unit in which the set gives the quantity at a path, for example ``84 g m^2``."""
+        entry, quantity = self.parameter_set.numbers.get(path), self.declared[path]
+        for unit in alternatives(quantity) if entry is not None else ():
+            try:
+                converted = (
+                    from_si(value, entry.unit, unit, atmospheric_pressure(self.parameter_set)) if entry else value
+                )
+            except UnitError:
+                continue
+            return f"{converted:.4g} {entry.unit if entry else ''}".rstrip()
+        return f"{value:.4g} {quantity.unit.removesuffix('_a')}".rstrip()
+
+    def named(self, *paths: str) -> tuple[NamedValue, ...]:
+        """Return the values at those paths that the set has, as they were given."""
+        numbers, texts = self.parameter_set.numbers, self.parameter_set.texts
+        found = [NamedValue(p, numbers[p].value, numbers[p].unit, numbers[p].origin) for p in paths if p in numbers]
+        return (*found, *(NamedValue(p, texts[p].value, "", texts[p].origin) for p in paths if p in texts))
+
+    def gas(self) -> Gas | None:
+        """Return the gas, None where the set does not say enough or what it says is no gas."""
+        found = self.numbers(*GAS_PATHS)
+        if found is None or not all(is_within(found[i], self.declared[path]) for i, path in enumerate(GAS_PATHS)):
+            return None
+        return Gas(self.text("gas.species") or "gas", *found)
+
+    def atmosphere(self) -> float:
+        """Return the ambient pressure [Pa absolute], the standard one where the set does not say."""
+        return self.number(ATMOSPHERE_PATH) or STANDARD_ATMOSPHERE
+
+    def angle_range(self) -> tuple[str, float, str, float] | None:
+        """Return path and value [rad] of the smallest and the largest angle in use: reported ones, else the stops."""
+        low_path = self._first("reported.smallest_angle", "actuator.angle_min")
+        high_path = self._first("reported.largest_angle", "actuator.angle_max")
+        found = self.numbers(low_path, high_path)
+        return None if found is None else (low_path, found[0], high_path, found[1])
+
+    def _first(self, preferred: str, other: str) -> str:
+        return preferred if preferred in self.parameter_set.numbers else other
+
+
+def printed_half_width(entry: Entry) -> float:
+    """Return half a unit of the last printed digit, or the stated uncertainty, in the entry's unit."""
+    if entry.uncertainty is not None:
+        return entry.uncertainty
+    exponent = Decimal(repr(entry.value)).normalize().as_tuple().exponent
+    return 0.5 * 10.0 ** min(int(exponent), 0)
+
+
+def density_change(gas: Gas, pressure_change: float) -> float:
+    """Return the change of density [kg/m^3] of an ideal gas with pressure [Pa] at its temperature; equation (3)."""
+    return pressure_change / (specific_gas_constant(UNIVERSAL_GAS_CONSTANT, gas.molar_mass) * gas.temperature)

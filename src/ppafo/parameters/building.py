@@ -1,0 +1,160 @@
+"""From a parameter set to a device in SI units; here, and not earlier, a set must be complete and make sense."""
+
+import math
+from collections.abc import Callable, Iterable
+
+from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.model.declaration import Quantity
+from ppafo.model.gas import SPECIES
+from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters import declaration
+from ppafo.parameters.device import (
+    Actuator,
+    Device,
+    Flow,
+    FootPlate,
+    Friction,
+    Gas,
+    Orifice,
+    SonicOrifice,
+    Supply,
+    Valve,
+)
+from ppafo.parameters.parameter_set import (
+    ATMOSPHERE_PATH,
+    ParameterSet,
+    atmospheric_pressure,
+    chosen_valve,
+    entry_in_si,
+    shown,
+)
+
+_FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
+
+
+def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Device:
+    """Return the device with one of the set's valves (default: the set's own choice), in SI units."""
+    name = chosen_valve(parameter_set, valve)
+    _check_complete(parameter_set, name)
+    reader = _reader(parameter_set)
+    device = Device(
+        name=parameter_set.name,
+        gas=Gas(_species(parameter_set), **_section(reader, "gas", declaration.GAS)),
+        actuator=Actuator(
+            **_section(reader, "actuator", declaration.ACTUATOR), leak=_orifice(parameter_set, reader, "actuator.leak")
+        ),
+        friction=Friction(**_section(reader, "friction", declaration.FRICTION)),
+        foot_plate=FootPlate(**_section(reader, "foot_plate", declaration.FOOT_PLATE)),
+        supply=Supply(**_section(reader, "supply", declaration.SUPPLY)),
+        valve=_valve(parameter_set, reader, name),
+        flow=Flow(**_section(reader, "flow", declaration.FLOW)),
+        valve_name=name,
+    )
+    _check_consistent(parameter_set, device)
+    return device
+
+
+def _reader(parameter_set: ParameterSet) -> Callable[[str], float]:
+    """Return a function that gives the value at a path in SI, checked against its declared unit and range."""
+    declared = parameter_set.declared()
+    atmosphere = atmospheric_pressure(parameter_set)
+
+    def read(path: str) -> float:
+        entry = parameter_set.numbers[path]
+        given = f"{parameter_set.file}: {path} = {shown(entry)}"
+        try:
+            value = entry_in_si(entry, declared[path], atmosphere)
+        except UnitError as error:
+            raise ParameterError(f"{given}: {error}") from error
+        _check_range(given, value, declared[path])
+        return value
+
+    return read
+
+
+def _check_range(given: str, value: float, quantity: Quantity) -> None:
+    if declaration.is_within(value, quantity):
+        return
+    lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
+    upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
+    unit = f" {quantity.unit}".rstrip()
+    raise ParameterError(f"{given}: {quantity.summary} must be {lower}{upper}{unit}")
+
+
+def _section(read: Callable[[str], float], section: str, members: Iterable[Quantity]) -> dict[str, float]:
+    return {member.name: read(f"{section}.{member.name}") for member in members}
+
+
+def _species(parameter_set: ParameterSet) -> str:
+    name = parameter_set.texts[declaration.SPECIES_PATH].value
+    if name not in SPECIES:
+        hint = nearest_name(name, SPECIES)
+        known = ", ".join(SPECIES)
+        raise ParameterError(f"{parameter_set.file}: gas.species = '{name}' is unknown{hint}; known are {known}")
+    return name
+
+
+def _orifice(parameter_set: ParameterSet, read: Callable[[str], float], section: str) -> Orifice | SonicOrifice:
+    if _uses_sonic_form(parameter_set, section):
+        return SonicOrifice(**_section(read, section, declaration.SONIC_FORM))
+    return Orifice(**_section(read, section, declaration.AREA_FORM))
+
+
+def _valve(parameter_set: ParameterSet, read: Callable[[str], float], name: str) -> Valve:
+    kind = parameter_set.valve_kinds[name]
+    section = f"valves.{name}"
+    settings = {}
+    for quantity in VALVES[kind].quantities:
+        path = f"{section}.{quantity.name}"
+        given = path in parameter_set.numbers or quantity.default is None
+        settings[quantity.name] = read(path) if given else float(quantity.default or 0.0)
+    return Valve(kind, _orifice(parameter_set, read, section), settings)
+
+
+def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
+    """Tell which form an orifice is given in; both at once would be two answers to one question."""
+    names = {path.rpartition(".")[2] for path in parameter_set.numbers if path.rpartition(".")[0] == section}
+    area = sorted(names & {quantity.name for quantity in declaration.AREA_FORM})
+    sonic = sorted(names & {quantity.name for quantity in declaration.SONIC_FORM})
+    if area and sonic:
+        raise ParameterError(
+            f"{parameter_set.file}: {section} has {', '.join(area)} and {', '.join(sonic)}; "
+            f"give either area and discharge_coefficient or sonic_conductance and critical_ratio"
+        )
+    return bool(sonic)
+
+
+def _check_complete(parameter_set: ParameterSet, valve: str) -> None:
+    needed = [f"{name}.{member.name}" for name in _FLAT_SECTIONS for member in declaration.SECTIONS[name]]
+    for section in ("actuator.leak", f"valves.{valve}"):
+        sonic = _uses_sonic_form(parameter_set, section)
+        form = declaration.SONIC_FORM if sonic else declaration.AREA_FORM
+        needed += [f"{section}.{member.name}" for member in form]
+    kind = parameter_set.valve_kinds[valve]
+    needed += [f"valves.{valve}.{member.name}" for member in VALVES[kind].quantities if member.default is None]
+    missing = [path for path in needed if path not in parameter_set.numbers]
+    missing += [path for path in (declaration.SPECIES_PATH,) if path not in parameter_set.texts]
+    if missing:
+        completed = parameter_set.completed_by
+        remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
+        raise ParameterError(f"{parameter_set.file}: a device needs {', '.join(missing)}: missing here; {remedy}")
+
+
+def _check_consistent(parameter_set: ParameterSet, device: Device) -> None:
+    actuator, friction, supply = device.actuator, device.friction, device.supply
+    atmosphere = supply.atmospheric_pressure
+    rules = (
+        ("actuator.angle_min", "below", "actuator.angle_max", actuator.angle_min < actuator.angle_max),
+        (
+            "friction.dynamic_torque",
+            "at most",
+            "friction.static_torque",
+            friction.dynamic_torque <= friction.static_torque,
+        ),
+        ("supply.pressure", "above", ATMOSPHERE_PATH, supply.pressure > atmosphere),
+        ("supply.dorsiflexion_pressure", "at least", ATMOSPHERE_PATH, supply.dorsiflexion_pressure >= atmosphere),
+    )
+    for path, relation, other, holds in rules:
+        if not holds:
+            given, limit = shown(parameter_set.numbers[path]), shown(parameter_set.numbers[other])
+            raise ParameterError(f"{parameter_set.file}: {path} = {given} must be {relation} {other} = {limit}")

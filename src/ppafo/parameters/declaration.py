@@ -1,0 +1,119 @@
+"""Every value that a parameter set can hold: section, name, SI unit, range and meaning.
+
+The schema, the conversion to SI, the messages and the table of ``ppafo sets show`` all read this list. Pressures are
+``Pa_a`` (a level, absolute in SI). Limits are wide: they exclude slips of the pen and what no solver could handle.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.valves.catalog import VALVES
+
+SPECIES_PATH = "gas.species"
+
+GAS = (
+    Quantity("molar_mass", "kg/mol", "molar mass", minimum=1e-3, maximum=0.5),
+    Quantity("heat_capacity_ratio", "", "ratio of heat capacities k", minimum=1.01, maximum=1.67),
+    Quantity("temperature", "K", "gas temperature, constant", minimum=150.0, maximum=600.0),
+)
+AREA_FORM = (
+    Quantity("area", "m^2", "area of the opening", minimum=0.0, maximum=1e-2),
+    Quantity(
+        "discharge_coefficient",
+        "",
+        "discharge coefficient Cd, flow over A C1 P",
+        minimum=0.0,
+        maximum=2.0,
+        minimum_allowed=False,
+    ),
+)
+SONIC_FORM = (
+    Quantity("sonic_conductance", "m^3/(s Pa)", "sonic conductance C of ISO 6358", minimum=0.0, maximum=1e-4),
+    Quantity("critical_ratio", "", "critical pressure ratio b of ISO 6358", minimum=0.0, maximum=0.95),
+)
+ORIFICE = AREA_FORM + SONIC_FORM
+ACTUATOR = (
+    Quantity("torque_constant", "m^3", "torque per pressure difference", minimum=0.0, minimum_allowed=False),
+    Quantity("volume_per_angle", "m^3/rad", "chamber volume per angle", minimum=0.0, minimum_allowed=False),
+    Quantity("angle_min", "rad", "lower stop, where chamber 1 is smallest", minimum=-10.0, maximum=10.0),
+    Quantity("angle_max", "rad", "upper stop, where chamber 2 is smallest", minimum=-10.0, maximum=10.0),
+    Quantity("dead_volume_1", "m^3", "line and clearance of chamber 1", minimum=0.0, minimum_allowed=False),
+    Quantity("dead_volume_2", "m^3", "line and clearance of chamber 2", minimum=0.0, minimum_allowed=False),
+    Quantity("restitution", "", "rebound speed over impact speed at a stop", minimum=0.0, maximum=1.0),
+)
+FRICTION = (
+    Quantity("static_torque", "N m", "largest friction torque at rest", minimum=0.0, maximum=1e4),
+    Quantity("dynamic_torque", "N m", "friction torque in motion", minimum=0.0, maximum=1e4),
+    Quantity("viscous_damping", "N m s/rad", "friction torque per angular velocity", minimum=0.0, maximum=1e4),
+)
+FOOT_PLATE = (
+    Quantity("inertia", "kg m^2", "inertia about the ankle", minimum=0.0, maximum=1e3, minimum_allowed=False),
+    Quantity("gravity_torque", "N m", "largest gravity torque about the ankle, m g l", minimum=0.0, maximum=1e4),
+)
+SUPPLY = (
+    Quantity("pressure", "Pa_a", "regulated pressure to chamber 1", minimum=1e3, maximum=1e8),
+    Quantity("dorsiflexion_pressure", "Pa_a", "regulated pressure to chamber 2", minimum=1e3, maximum=1e8),
+    Quantity("atmospheric_pressure", "Pa_a", "ambient pressure, the zero of gauge", minimum=1e3, maximum=1e6),
+)
+FLOW = (Quantity("linear_ratio", "", "pressure ratio above which flow is linear", minimum=0.99, maximum=0.9999),)
+
+REPORTED = (
+    Quantity("choked_flow_constant", "s/m", "C1 of equation (6)"),
+    Quantity("subsonic_flow_constant", "s/m", "C2 of equation (7)"),
+    Quantity("critical_pressure_ratio", "", "upstream over downstream pressure where flow chokes"),
+    Quantity("acceleration_over_velocity", "1/s", "free decay: angular acceleration over angular velocity, -beta/I"),
+    Quantity("velocity_over_acceleration", "s", "free decay: angular velocity over angular acceleration, -I/beta"),
+    Quantity("stopping_deceleration", "rad/s^2", "deceleration near standstill, dynamic friction over inertia"),
+    Quantity("smallest_angle", "rad", "smallest angle that was used or measured"),
+    Quantity("largest_angle", "rad", "largest angle that was used or measured"),
+    Quantity("other_supply_pressure", "Pa_a", "a second supply pressure used in experiments"),
+    Quantity("demanded_torque", "N m", "largest torque that a task asks for"),
+)
+REPORTED_FORMULA = "choked_flow_exponent"
+REPORTED_OF_A_VALVE = (
+    Quantity("mass_flow", "kg/s", "measured flow, fully open, into the atmosphere"),
+    Quantity("flow_pressure", "Pa_a", "supply pressure of the measured flow"),
+    Quantity("single_fill_gas", "kg", "gas used in a task that fills one chamber once"),
+)
+
+SECTIONS: dict[str, tuple[Quantity, ...]] = {
+    "gas": GAS,
+    "actuator": ACTUATOR,
+    "actuator.leak": ORIFICE,
+    "friction": FRICTION,
+    "foot_plate": FOOT_PLATE,
+    "supply": SUPPLY,
+    "flow": FLOW,
+    "reported": REPORTED,
+}
+
+_ALTERNATIVE_UNITS = {"N m s/rad": ("N m s",)}
+
+
+def alternatives(quantity: Quantity) -> tuple[str, ...]:
+    """Return the SI units in which a value may be given; 1/rad is often left out of a damping, as in the paper."""
+    return (quantity.unit, *_ALTERNATIVE_UNITS.get(quantity.unit, ()))
+
+
+def is_within(value: float, quantity: Quantity) -> bool:
+    """Tell whether an SI value keeps the limits of its declaration."""
+    above = value >= quantity.minimum if quantity.minimum_allowed else value > quantity.minimum
+    return above and value <= quantity.maximum
+
+
+def quantities(valve_kinds: dict[str, str]) -> dict[str, Quantity]:
+    """Return every number's declaration by dotted path, for a set whose valves have the given names and kinds."""
+    return {quantity.name: quantity for quantity in _declared(valve_kinds)}
+
+
+def _declared(valve_kinds: dict[str, str]) -> Iterator[Quantity]:
+    for section, members in SECTIONS.items():
+        yield from (_at(section, member) for member in members)
+    for name, kind in valve_kinds.items():
+        yield from (_at(f"valves.{name}", member) for member in ORIFICE + VALVES[kind].quantities)
+        yield from (_at(f"reported.valves.{name}", member) for member in REPORTED_OF_A_VALVE)
+
+
+def _at(section: str, quantity: Quantity) -> Quantity:
+    return replace(quantity, name=f"{section}.{quantity.name}")

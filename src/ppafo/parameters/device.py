@@ -1,0 +1,113 @@
+"""What a device is, in SI units: plain frozen values that the rest of the package computes with."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ppafo.constants import UNIVERSAL_GAS_CONSTANT
+from ppafo.model.gas import specific_gas_constant
+
+
+@dataclass(frozen=True, slots=True)
+class Gas:
+    """A gas at one temperature: molar mass [kg/mol], heat capacity ratio [-], temperature [K]."""
+
+    species: str
+    molar_mass: float
+    heat_capacity_ratio: float
+    temperature: float
+
+    @property
+    def specific_gas_constant(self) -> float:
+        """Specific gas constant R/M [J/(kg K)]; equation (3)."""
+        return specific_gas_constant(UNIVERSAL_GAS_CONSTANT, self.molar_mass)
+
+
+@dataclass(frozen=True, slots=True)
+class Orifice:
+    """A restriction in the paper's form: area [m^2], discharge coefficient [-]; equations (6) and (7)."""
+
+    area: float
+    discharge_coefficient: float
+
+
+@dataclass(frozen=True, slots=True)
+class SonicOrifice:
+    """A restriction in the form of ISO 6358: sonic conductance [m^3/(s Pa)], critical pressure ratio [-]."""
+
+    sonic_conductance: float
+    critical_ratio: float
+
+
+@dataclass(frozen=True, slots=True)
+class Actuator:
+    """A vane actuator between two stops; chamber 1 grows with the angle. Equations (2), (4), (5).
+
+    torque_constant [m^3], volume_per_angle [m^3/rad], angle_min and angle_max [rad], dead_volume_1 and dead_volume_2
+    [m^3], restitution of the stops [-], leak across the vane.
+    """
+
+    torque_constant: float
+    volume_per_angle: float
+    angle_min: float
+    angle_max: float
+    dead_volume_1: float
+    dead_volume_2: float
+    restitution: float
+    leak: Orifice | SonicOrifice
+
+
+@dataclass(frozen=True, slots=True)
+class Friction:
+    """Friction of the vane: static limit and dynamic torque [N m], viscous damping [N m s/rad]; equations (1), (10)."""
+
+    static_torque: float
+    dynamic_torque: float
+    viscous_damping: float
+
+
+@dataclass(frozen=True, slots=True)
+class FootPlate:
+    """What the vane moves: inertia about the ankle [kg m^2], largest gravity torque m g l [N m]; equation (1)."""
+
+    inertia: float
+    gravity_torque: float
+
+
+@dataclass(frozen=True, slots=True)
+class Supply:
+    """Regulated pressures [Pa absolute]: to chamber 1, to chamber 2 (dorsiflexion), and the atmosphere."""
+
+    pressure: float
+    dorsiflexion_pressure: float
+    atmospheric_pressure: float
+
+
+@dataclass(frozen=True, slots=True)
+class Valve:
+    """A valve: its kind in the catalogue, its orifice fully open, and its settings in SI, all of them present."""
+
+    kind: str
+    orifice: Orifice | SonicOrifice
+    settings: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """How flow is computed: the pressure ratio [-] above which it is linear in the ratio, as in ISO 6358."""
+
+    linear_ratio: float
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """A complete device with the one valve that was chosen; everything that a run needs to know of the hardware."""
+
+    name: str
+    gas: Gas
+    actuator: Actuator
+    friction: Friction
+    foot_plate: FootPlate
+    supply: Supply
+    valve: Valve
+    flow: Flow
+    valve_name: str

@@ -1,0 +1,99 @@
+"""Changing single values of a set by dotted path, with the change visible in the provenance."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.model.gas import SPECIES
+from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, SPECIES_PATH
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, entry_in_si, shown
+from ppafo.parameters.provenance import Entry, TextEntry
+from ppafo.units import split_quantity
+
+SOURCE = "override"
+
+_AREA_NAMES = frozenset(quantity.name for quantity in AREA_FORM)
+_SONIC_NAMES = frozenset(quantity.name for quantity in SONIC_FORM)
+
+
+def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve: str | None = None) -> ParameterSet:
+    """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``.
+
+    ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
+    Naming another gas brings that gas's molar mass and heat capacity ratio; giving an orifice in the form of ISO 6358
+    drops its area and discharge coefficient, and the reverse.
+    """
+    chosen = chosen_valve(parameter_set, valve)
+    for override in overrides:
+        on_one_line = " ".join(override.split())
+        path, separator, text = (part.strip() for part in on_one_line.partition("="))
+        if not separator or not path or not text:
+            raise ParameterError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
+        if path.startswith("valve."):
+            path = f"valves.{chosen}.{path.removeprefix('valve.')}"
+        change = _with_species if path == SPECIES_PATH else _with_number
+        parameter_set = change(parameter_set, path, text)
+    return parameter_set
+
+
+def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
+    """Return the paths whose values come from overrides."""
+    entries: dict[str, Entry | TextEntry] = {**parameter_set.numbers, **parameter_set.texts}
+    return frozenset(path for path, entry in entries.items() if entry.source == SOURCE)
+
+
+def _with_number(parameter_set: ParameterSet, path: str, text: str) -> ParameterSet:
+    declared = parameter_set.declared()
+    if path not in declared:
+        allowed = [*declared, SPECIES_PATH]
+        hint = nearest_name(path, allowed) or f"; for example {', '.join(_neighbours(path, allowed))}"
+        raise ParameterError(f"override '{path}={text}': {parameter_set.file} has no value '{path}'{hint}")
+    try:
+        value, unit = split_quantity(text)
+        entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+        entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
+    except UnitError as error:
+        raise ParameterError(f"override '{path}={text}': {error}") from error
+    kept = {key: old for key, old in parameter_set.numbers.items() if key not in _other_form(path)}
+    return replace(parameter_set, numbers={**kept, path: entry})
+
+
+def _with_species(parameter_set: ParameterSet, path: str, text: str) -> ParameterSet:
+    species = SPECIES.get(text)
+    if species is None:
+        raise ParameterError(
+            f"override '{path}={text}': unknown gas{nearest_name(text, SPECIES)}; known are {', '.join(SPECIES)}"
+        )
+    note = f"follows from the override {path}={text}"
+    constants = {"gas.molar_mass": (species.molar_mass, "kg/mol")}
+    constants["gas.heat_capacity_ratio"] = (species.heat_capacity_ratio, "")
+    numbers = {
+        key: Entry(value=value, unit=unit, origin="datasheet", source=species.source, note=note)
+        for key, (value, unit) in constants.items()
+    }
+    chosen = TextEntry(value=text, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+    return replace(
+        parameter_set,
+        numbers={**parameter_set.numbers, **numbers},
+        texts={**parameter_set.texts, path: chosen},
+    )
+
+
+def _before(parameter_set: ParameterSet, path: str) -> str:
+    """Return what stood at the path, so that an override never hides the value it replaces."""
+    number, text = parameter_set.numbers.get(path), parameter_set.texts.get(path)
+    if number is not None:
+        return f"the set has {shown(number)} ({number.origin}: {number.source})"
+    return f"the set has {text.value} ({text.origin}: {text.source})" if text is not None else "the set has no value"
+
+
+def _other_form(path: str) -> frozenset[str]:
+    """Return the paths that no longer hold when an orifice is given in the form that ``path`` belongs to."""
+    section, _, name = path.rpartition(".")
+    other = _SONIC_NAMES if name in _AREA_NAMES else _AREA_NAMES if name in _SONIC_NAMES else frozenset()
+    return frozenset(f"{section}.{member}" for member in other)
+
+
+def _neighbours(path: str, allowed: list[str]) -> list[str]:
+    section = path.partition(".")[0]
+    return [name for name in allowed if name.startswith(f"{section}.")][:6] or allowed[:6]

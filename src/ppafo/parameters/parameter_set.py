@@ -1,0 +1,90 @@
+"""A parameter set in memory: every value by its dotted path, as it was given."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.declaration import alternatives, quantities
+from ppafo.parameters.provenance import Citation, Entry, TextEntry
+from ppafo.units import base_value, format_quantity, to_si
+
+ATMOSPHERE_PATH = "supply.atmospheric_pressure"
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSet:
+    """Values as given, with their provenance; conflicts and gaps allowed. ``build_device`` asks for more.
+
+    ``file`` is what messages call the set; ``numbers`` and ``texts`` are keyed by paths such as ``actuator.leak.area``
+    or ``valves.solenoid.area``; ``valve_kinds`` gives each valve's kind in the catalogue.
+    """
+
+    file: str
+    name: str
+    title: str
+    citation: Citation | None
+    notes: str
+    completed_by: str
+    default_valve: str
+    valve_kinds: Mapping[str, str]
+    numbers: Mapping[str, Entry]
+    texts: Mapping[str, TextEntry]
+    accepted: Mapping[str, str]
+
+    def declared(self) -> dict[str, Quantity]:
+        """Return the declaration of every number that this set may hold, by path."""
+        return quantities(dict(self.valve_kinds))
+
+
+def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
+    """Return the name of the valve to use: the one asked for, else the set's default."""
+    name = valve or parameter_set.default_valve
+    if name not in parameter_set.valve_kinds:
+        known = ", ".join(parameter_set.valve_kinds)
+        hint = nearest_name(name, parameter_set.valve_kinds)
+        raise ParameterError(f"{parameter_set.file}: there is no valve '{name}'{hint}; it has {known}")
+    return name
+
+
+def atmospheric_pressure(parameter_set: ParameterSet) -> float:
+    """Return the pressure [Pa absolute] from which the set's gauge pressures count."""
+    entry = parameter_set.numbers.get(ATMOSPHERE_PATH)
+    if entry is None:
+        return STANDARD_ATMOSPHERE
+    if not entry.unit.endswith("_a"):
+        unit = entry.unit
+        raise ParameterError(f"{parameter_set.file}: {ATMOSPHERE_PATH} = {entry.value:g} {unit}: give it as absolute")
+    return entry_in_si(entry, parameter_set.declared()[ATMOSPHERE_PATH], STANDARD_ATMOSPHERE)
+
+
+def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
+    """Return the entry's value in the quantity's SI unit; UnitError where the dimension does not fit."""
+    refused: UnitError | None = None
+    for unit in alternatives(quantity):
+        try:
+            return to_si(entry.value, entry.unit, unit, atmosphere)
+        except UnitError as error:
+            refused = refused or error
+    raise refused or UnitError(f"'{quantity.name}' has no unit")
+
+
+def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
+    """Return the value at a path in SI, None where the set does not have it.
+
+    A value whose dimension does not fit is taken in the base units of its own unit: the audit reports the unit in one
+    place and can still compare the number in others.
+    """
+    entry = parameter_set.numbers.get(path)
+    if entry is None:
+        return None
+    try:
+        return entry_in_si(entry, parameter_set.declared()[path], atmospheric_pressure(parameter_set))
+    except UnitError:
+        return base_value(entry.value, entry.unit)
+
+
+def shown(entry: Entry) -> str:
+    """Return an entry's value and unit as a person would write them."""
+    return format_quantity(entry.value, entry.unit)

@@ -1,0 +1,55 @@
+"""One value with where it comes from. This is what a parameter set consists of."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Origin = Literal["published", "datasheet", "derived", "identified", "assumed"]
+
+_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+_Text = Annotated[str, Field(min_length=1)]
+
+
+class Entry(BaseModel):
+    """A number as it was given, in its own unit."""
+
+    model_config = _STRICT
+
+    value: Annotated[float, Field(description="the number, in the unit beside it")]
+    unit: Annotated[str, Field(description="such as 'mm^2', 'psi_g' (gauge), 'psi_a' (absolute); '' for a number")]
+    origin: Annotated[Origin, Field(description="how the value came to be known")]
+    source: Annotated[_Text, Field(description="where to look it up: page, equation, data sheet, recording")]
+    note: Annotated[str, Field(description="reason, conflict or remark")] = ""
+    uncertainty: Annotated[float | None, Field(ge=0.0, description="half width of the 95 % interval, same unit")] = None
+
+
+class TextEntry(BaseModel):
+    """A name or formula as it was given."""
+
+    model_config = _STRICT
+
+    value: _Text
+    origin: Annotated[Origin, Field(description="how the value came to be known")]
+    source: Annotated[_Text, Field(description="where to look it up")]
+    note: Annotated[str, Field(description="reason, conflict or remark")] = ""
+
+
+class Citation(BaseModel):
+    """The publication or report that the set comes from; what is not known is left out."""
+
+    model_config = _STRICT
+
+    title: _Text
+    authors: tuple[str, ...] = ()
+    year: Annotated[int | None, Field(ge=1800, le=2200)] = None
+    doi: str = ""
+    note: str = ""
+
+
+class Accepted(BaseModel):
+    """A contradiction that the author of the set knows of and keeps, with the reason."""
+
+    model_config = _STRICT
+
+    finding: Annotated[_Text, Field(description="identifier of the finding, as 'ppafo audit' prints it")]
+    reason: _Text

@@ -1,0 +1,215 @@
+"""Units at the edge: text and units in, SI floats out, and back. Inside the package there are only SI floats.
+
+Three rules go beyond arithmetic:
+
+- A pressure says what it is: ``psi_g`` gauge, ``psi_a`` absolute, ``psi_d`` a difference; the suffix works on
+  every unit of pressure. ``psi`` alone is refused, except inside a compound such as ``N m/psi``. In SI a level is
+  ``Pa_a`` and a difference ``Pa_d``.
+- An angle is a dimension: ``75`` is no angle, ``75 deg`` is, and ``rad/s`` is not ``Hz``.
+- Only the units listed here exist. A short list makes a misspelling an error and the start quick.
+"""
+
+import functools
+import math
+import re
+from decimal import Decimal
+from typing import TYPE_CHECKING, Any
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import UnitError, nearest_name
+
+if TYPE_CHECKING:
+    import pint
+
+_PREFIXES = {
+    "u": "micro- = 1e-6 = µ- = u-",
+    "m": "milli- = 1e-3 = m-",
+    "c": "centi- = 1e-2 = c-",
+    "d": "deci- = 1e-1 = d-",
+    "k": "kilo- = 1e3 = k-",
+    "M": "mega- = 1e6 = M-",
+}
+_UNITS = {
+    "m": "metre = [length] = m",
+    "kg": "kilogram = [mass] = kg",
+    "g": "gram = 1e-3 * kilogram = g",
+    "s": "second = [time] = s",
+    "K": "kelvin = [temperature] = K",
+    "mol": "mole = [substance] = mol",
+    "rad": "radian = [angle] = rad",
+    "deg": "degree = 0.017453292519943295 * radian = deg",
+    "degC": "degree_celsius = kelvin; offset: 273.15 = degC",
+    "min": "minute = 60 * second = min",
+    "Hz": "hertz = 1 / second = Hz",
+    "N": "newton = kilogram * metre / second ** 2 = N",
+    "J": "joule = newton * metre = J",
+    "W": "watt = joule / second = W",
+    "Pa": "pascal = newton / metre ** 2 = Pa",
+    "bar": "bar = 1e5 * pascal = bar",
+    "psi": "pound_per_square_inch = 6894.757293168361 * pascal = psi",
+    "L": "litre = 1e-3 * metre ** 3 = L = l",
+    "in": "inch = 0.0254 * metre = in",
+    "ft": "foot = 0.3048 * metre = ft",
+    "lb": "pound = 0.45359237 * kilogram = lb",
+    "lbf": "pound_force = 4.4482216152605 * newton = lbf",
+    "percent": "percent = 0.01 = percent",
+}
+_LEVEL, _DIFFERENCE = "Pa_a", "Pa_d"
+_KINDS = {"g": "gauge pressure", "a": "absolute pressure", "d": "pressure difference"}
+_KIND_BELONGS = "_g, _a and _d belong to a unit of pressure that stands alone, such as psi_g"
+_LONGEST_UNIT = 60
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_PRESSURE_KIND = re.compile(r"([A-Za-z]+)_([gad])")
+_FACTOR = r"[A-Za-zµ]+(?:_[gad])?(?:\^-?[0-9])?"
+_PRODUCT = rf"{_FACTOR}(?: {_FACTOR})*"
+_EXPRESSION = re.compile(rf"(?:1|{_PRODUCT})(?:/(?:{_FACTOR}|\({_PRODUCT}\)))*")
+_SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "°": "deg", "μ": "µ", "%": "percent"})
+
+
+def split_quantity(text: str) -> tuple[float, str]:
+    """Return number and unit of a text such as ``12.6mm^2``, ``50 psi_g`` or ``0.4 1/s``; the unit may be empty."""
+    stripped = text.strip()
+    match = _NUMBER.match(stripped)
+    if match is None:
+        raise UnitError(f"{_shown(text)} does not start with a number; write for example '12.6 mm^2' or '50 psi_g'")
+    unit = stripped[match.end() :].strip()
+    check_unit(unit)
+    return _finite(float(match.group()), text), unit
+
+
+def parse_quantity(text: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return the value of a text in ``si_unit``; gauge pressure counts from ``atmosphere`` [Pa absolute]."""
+    value, unit = split_quantity(text)
+    return to_si(value, unit, si_unit, atmosphere)
+
+
+def to_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return ``value`` in ``si_unit``: ``Pa_a`` for a pressure level, ``Pa_d`` for a pressure difference."""
+    scale, offset, counts_from_atmosphere = _conversion(unit, si_unit)
+    exact = Decimal(repr(_finite(value, value))) * scale + offset
+    return _finite(float(exact) + (atmosphere if counts_from_atmosphere else 0.0), f"{value:g} {unit}")
+
+
+def from_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return the SI ``value`` in ``unit``: the inverse of ``to_si``."""
+    scale, offset, counts_from_atmosphere = _conversion(unit, si_unit)
+    above = _finite(value, value) - (atmosphere if counts_from_atmosphere else 0.0)
+    return float((Decimal(repr(above)) - offset) / scale)
+
+
+def format_quantity(value: float, unit: str) -> str:
+    """Return a text that ``split_quantity`` reads back to exactly the same number and unit."""
+    return f"{repr(float(value)).removesuffix('.0')} {unit}".rstrip()
+
+
+def check_unit(unit: str) -> None:
+    """Refuse a unit that does not exist or is not written as ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``."""
+    _parsed(unit)
+
+
+def base_value(value: float, unit: str) -> float:
+    """Return ``value`` in the base units (m, kg, s, K, mol, rad) of its own unit, whatever its dimension is."""
+    parsed, kind = _parsed(unit)
+    exact = Decimal(repr(_finite(value, value)))
+    base = float(_registry().Quantity(exact, parsed).to_base_units().magnitude)
+    return base + (STANDARD_ATMOSPHERE if kind == "g" else 0.0)
+
+
+@functools.lru_cache(maxsize=512)
+def _conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
+    """Return scale, offset and whether the atmosphere is to be added; in decimals, so that 8.4 g is 0.0084 kg."""
+    given, kind = _parsed(unit)
+    wanted, _ = _parsed(si_unit)
+    if given.dimensionality != wanted.dimensionality:
+        raise UnitError(f"{_named(unit)} does not fit: {_wanted(si_unit)}")
+    _check_kind(unit, kind, si_unit)
+    quantity = _registry().Quantity
+    offset = quantity(Decimal(0), given).to(wanted).magnitude
+    scale = quantity(Decimal(1), given).to(wanted).magnitude - offset
+    return scale, offset, kind == "g" and si_unit == _LEVEL
+
+
+def _check_kind(unit: str, kind: str, si_unit: str) -> None:
+    if si_unit not in (_LEVEL, _DIFFERENCE):
+        return
+    if not kind:
+        name = unit or "Pa"
+        raise UnitError(
+            f"'{name}' does not say which pressure: write {name}_g for gauge, {name}_a for absolute "
+            f"or {name}_d for a difference"
+        )
+    if (kind == "d") != (si_unit == _DIFFERENCE):
+        raise UnitError(f"'{unit}' is a {_KINDS[kind]}, {_wanted(si_unit)}")
+
+
+def _wanted(si_unit: str) -> str:
+    if si_unit == _LEVEL:
+        return "a pressure level is needed, for example '50 psi_g' or '446 kPa_a'"
+    if si_unit == _DIFFERENCE:
+        return "a pressure difference is needed, for example '5 psi_d'"
+    if si_unit == "rad":
+        return "an angle is needed, for example '75 deg' or '1.3 rad'"
+    return f"a unit like '{si_unit}' is needed" if si_unit else "a plain number without a unit is needed"
+
+
+def _named(unit: str) -> str:
+    return f"unit '{unit}'" if unit else "a number without a unit"
+
+
+@functools.lru_cache(maxsize=512)
+def _parsed(unit: str) -> "tuple[pint.Unit, str]":
+    """Return pint's unit of a text, and ``g``, ``a`` or ``d`` for a pressure that says so; else an empty text."""
+    import pint
+
+    normal = _normal(unit)
+    pressure = _PRESSURE_KIND.fullmatch(normal)
+    bare, kind = (pressure[1], pressure[2]) if pressure else (normal, "")
+    try:
+        parsed = _registry().parse_units(bare.replace("^", "**").replace(" ", "*"))
+    except pint.UndefinedUnitError as error:
+        unknown = error.unit_names
+        raise _unknown_unit(unknown if isinstance(unknown, str) else next(iter(unknown))) from error
+    if kind and parsed.dimensionality != _registry().parse_units("Pa").dimensionality:
+        raise UnitError(f"'{unit}': {_KIND_BELONGS}")
+    return parsed, kind
+
+
+def _normal(unit: str) -> str:
+    """Return the unit in the one spelling that the grammar knows, or refuse it."""
+    normal = unit.replace("**", "^").translate(_SPELLINGS)
+    normal = re.sub(r" *([/()^]) *", r"\1", normal.strip(" "))
+    normal = re.sub(r" +", " ", normal)
+    if normal and (len(normal) > _LONGEST_UNIT or _EXPRESSION.fullmatch(normal) is None):
+        raise UnitError(f"{_shown(unit)} is not a unit; write it like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'")
+    return normal
+
+
+def _unknown_unit(name: str) -> UnitError:
+    if name[-2:] in ("_g", "_a", "_d"):
+        return UnitError(f"'{name}': {_KIND_BELONGS}")
+    hint = nearest_name(name, [prefix + unit for unit in _UNITS for prefix in ("", *_PREFIXES)])
+    known = f"{', '.join(_UNITS)}, with the prefixes {', '.join(_PREFIXES)}"
+    return UnitError(f"'{name}' is not a known unit{hint}; known are {known}")
+
+
+@functools.cache
+def _registry() -> "pint.UnitRegistry[Any]":
+    """Build the registry of the units above: milliseconds, where pint's own list takes a tenth of a second."""
+    import pint
+
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(None, non_int_type=Decimal)
+    registry.load_definitions([*_PREFIXES.values(), *_UNITS.values()])
+    return registry
+
+
+def _finite(value: float, shown: object) -> float:
+    if not math.isfinite(value):
+        raise UnitError(f"{_shown(shown)} is not a finite number")
+    return value
+
+
+def _shown(text: object) -> str:
+    """Return a short quotation of what was given, on one line."""
+    quoted = repr(text)
+    return quoted if len(quoted) <= 50 else f"{quoted[:46]}...'"

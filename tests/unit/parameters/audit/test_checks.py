@@ -1,0 +1,144 @@
+"""Each check of the audit, on sets other than the paper's: it fires where it should and is silent where it should."""
+
+from dataclasses import replace
+
+import pytest
+
+from ppafo.parameters import apply_overrides, load_parameter_set
+from ppafo.parameters.audit import Finding, audit
+
+BASE = load_parameter_set("ppafo2011")
+REPORTED_FLOW = "reported.valves.proportional.mass_flow"
+
+
+def findings(*overrides: str) -> dict[str, Finding]:
+    return {finding.id: finding for finding in audit(apply_overrides(BASE, overrides))}
+
+
+def side(finding: Finding, label: str) -> float:
+    return next(side.value for side in finding.sides if side.label == label)
+
+
+def test_a_flow_that_follows_from_cd_a_is_no_finding() -> None:
+    assert "flow-of-proportional" not in findings(f"{REPORTED_FLOW}=4.48 g/s")
+
+
+def test_the_reconciling_cd_a_gives_the_printed_flow() -> None:
+    needed = side(findings()["flow-of-proportional"], "Cd A that gives the printed flow")
+    assert needed == pytest.approx(1.196e-6, rel=1e-3)
+    assert "flow-of-proportional" not in findings(f"valve.discharge_coefficient={needed / 31.6e-6:.6f}")
+
+
+def test_a_flow_below_the_critical_ratio_uses_the_subsonic_formula() -> None:
+    flow = findings("reported.valves.proportional.flow_pressure=5 psi_g")["flow-of-proportional"]
+    assert 0.0 < side(flow, "Cd A C1 P") < 4.479e-3 * (101325 + 5 * 6894.757) / 446063
+
+
+def test_flows_as_areas_are_no_finding() -> None:
+    shared = findings(f"{REPORTED_FLOW}=4.48 g/s", "reported.valves.solenoid.mass_flow=1.79 g/s")
+    assert not [name for name in shared if name.startswith("one-coefficient")]
+
+
+def test_the_form_of_iso_6358_is_checked_too() -> None:
+    iso = ("valve.sonic_conductance=1 L/(s bar)", "valve.critical_ratio=0.4")
+    flow = findings(*iso)["flow-of-proportional"]
+    needed = side(flow, "sonic conductance that gives the printed flow")
+    matched = findings(f"valve.sonic_conductance={needed!r} m^3/(s Pa)", "valve.critical_ratio=0.4")
+    assert "flow-of-proportional" not in matched
+
+
+def test_constants_of_another_gas_are_an_error() -> None:
+    found = findings("gas.molar_mass=28 g/mol")
+    assert found["gas-molar-mass"].severity == "error"
+    assert found["choked-flow-constant"].severity == "error"
+    assert found["critical-pressure-ratio"].severity == "note"
+
+
+def test_a_gas_named_by_override_contradicts_the_printed_constants_but_not_itself() -> None:
+    found = findings("gas.species=N2")
+    assert "gas-molar-mass" not in found
+    assert found["choked-flow-constant"].severity == "error"
+
+
+def test_damping_and_friction_that_follow_from_inertia_are_no_finding() -> None:
+    found = findings("foot_plate.inertia=84 g m^2")
+    assert not {"damping-against-inertia", "dynamic-friction-against-inertia", "one-inertia-for-both"} & set(found)
+
+
+def test_the_common_inertia_is_computed_from_the_values() -> None:
+    found = findings(
+        "foot_plate.inertia=1 kg m^2",
+        "friction.viscous_damping=2 N m s/rad",
+        "friction.dynamic_torque=0.4 N m",
+        "reported.acceleration_over_velocity=-8 1/s",
+        "reported.stopping_deceleration=1.6 rad/s^2",
+    )
+    assert side(found["one-inertia-for-both"], "reconciling inertia") == pytest.approx(0.25, rel=0.1)
+
+
+def test_two_products_that_no_inertia_reconciles_are_not_said_to_agree() -> None:
+    assert "one-inertia-for-both" not in findings("friction.dynamic_torque=0.4 N m")
+
+
+def test_torque_constant_and_volume_that_agree_are_no_finding() -> None:
+    assert "virtual-work" not in findings("actuator.torque_constant=50 cm^3")
+
+
+def test_dead_volume_makes_the_volumes_positive() -> None:
+    assert findings("reported.largest_angle=150 deg")["volume-2"].severity == "error"
+    assert "volume-2" not in findings("reported.largest_angle=150 deg", "actuator.dead_volume_2=20 cm^3")
+
+
+def test_chamber_1_is_checked_at_the_lower_end() -> None:
+    finding = findings("reported.smallest_angle=0 deg")["volume-1"]
+    assert side(finding, "V1 at the end of the range") == pytest.approx(8e-6 - 51e-6 * 20 / 57.29578, rel=1e-6)
+
+
+def test_a_demand_above_the_ceiling_is_a_warning_with_the_pressure_that_is_needed() -> None:
+    finding = findings("reported.demanded_torque=6 N m")["torque-ceiling"]
+    assert finding.severity == "warning"
+    assert "413.5 kPa_g" in finding.paragraph
+
+
+def test_a_demand_below_the_ceiling_is_a_note() -> None:
+    assert findings("reported.demanded_torque=3 N m")["torque-ceiling"].severity == "note"
+
+
+def test_static_friction_above_the_ceiling_is_an_error() -> None:
+    assert findings("friction.static_torque=9 N m")["torque-ceiling"].severity == "error"
+
+
+def test_the_ideal_gas_law_is_better_for_nitrogen_and_worse_at_high_pressure() -> None:
+    assert "0.08" in findings("gas.species=N2")["ideal-gas"].title
+    assert findings("supply.pressure=200 psi_g")["ideal-gas"].severity == "warning"
+
+
+def test_a_foreign_unit_of_a_ratio_is_turned_over() -> None:
+    found = findings("reported.velocity_over_acceleration=-2.5 s")
+    assert "velocity-over-acceleration-upside-down" not in found
+
+
+def test_an_accepted_error_is_a_warning_with_its_reason() -> None:
+    finding = findings()["damping-against-inertia"]
+    assert finding.severity == "warning"
+    assert finding.accepted == BASE.accepted["damping-against-inertia"]
+
+
+def test_the_reason_does_not_cover_a_value_that_was_overridden() -> None:
+    finding = findings("foot_plate.inertia=9 g m^2")["damping-against-inertia"]
+    assert (finding.severity, finding.accepted) == ("error", "")
+
+
+def test_a_reason_for_nothing_is_a_warning() -> None:
+    idle = audit(replace(BASE, accepted={**BASE.accepted, "volume-7": "because"}))
+    assert [finding.severity for finding in idle if finding.id == "idle-acceptance"] == ["warning"]
+
+
+def test_a_value_that_no_device_can_have_is_an_error() -> None:
+    finding = findings("actuator.restitution=1.5")["range-of-actuator-restitution"]
+    assert finding.severity == "error"
+    assert "must lie between 0 and 1" in finding.paragraph
+
+
+def test_a_set_with_almost_nothing_in_it_has_almost_nothing_to_say() -> None:
+    assert audit(replace(BASE, numbers={}, texts={}, accepted={})) == []

@@ -1,0 +1,189 @@
+"""Parameter sets from names and files, and every mistake that a file can have."""
+
+import re
+import textwrap
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from ppafo.errors import ParameterError
+from ppafo.parameters import list_sets, load_device, load_parameter_set
+from ppafo.parameters.loading import parse_parameter_set
+
+SMALL = """
+schema_version = 1
+name = "bench"
+title = "A bench"
+default_valve = "main"
+
+[actuator.torque_constant]
+value = 14
+unit = "cm^3"
+origin = "identified"
+source = "recording 7"
+uncertainty = 0.5
+
+[valves.main]
+kind = "proportional"
+area = { value = 12.6, unit = "mm^2", origin = "datasheet", source = "page 2" }
+"""
+
+
+def problem_of(text: str) -> str:
+    with pytest.raises(ParameterError) as caught:
+        parse_parameter_set(text.encode(), "bench.toml")
+    message = str(caught.value)
+    assert message.startswith("bench.toml: ")
+    assert "\n" not in message
+    return message
+
+
+def changed(old: str, new: str) -> str:
+    assert old in SMALL
+    return SMALL.replace(old, new)
+
+
+def test_the_sets_of_the_package_are_listed() -> None:
+    assert {"ppafo2011", "ppafo2011-printed"} <= set(list_sets())
+
+
+@pytest.mark.parametrize("name", list_sets())
+def test_every_set_of_the_package_loads_under_its_own_name(name: str) -> None:
+    assert load_parameter_set(name).name == name
+
+
+def test_values_keep_their_provenance() -> None:
+    entry = parse_parameter_set(SMALL.encode(), "bench.toml").numbers["actuator.torque_constant"]
+    assert (entry.value, entry.unit, entry.origin, entry.source) == (14.0, "cm^3", "identified", "recording 7")
+    assert entry.uncertainty == 0.5
+
+
+def test_a_set_is_found_by_path(tmp_path: Path) -> None:
+    file = tmp_path / "bench.toml"
+    file.write_text(SMALL)
+    assert load_parameter_set(file).valve_kinds == {"main": "proportional"}
+
+
+def test_an_unknown_name_is_answered_with_the_nearest_one() -> None:
+    with pytest.raises(ParameterError, match="no parameter set 'ppafo2012', did you mean 'ppafo2011'"):
+        load_parameter_set("ppafo2012")
+
+
+def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="No such file"):
+        load_parameter_set(tmp_path / "gone.toml")
+    with pytest.raises(ParameterError, match="directory"):
+        load_parameter_set(tmp_path)
+
+
+def test_a_name_with_a_null_character_is_a_clean_error() -> None:
+    with pytest.raises(ParameterError):
+        load_parameter_set("a\0b.toml")
+
+
+def test_empty_binary_and_foreign_encodings_are_named() -> None:
+    for content, reason in ((b" \n", "is empty"), (b"\x00\xff\x80", "UTF-8"), ("é".encode("latin-1"), "UTF-8")):
+        with pytest.raises(ParameterError, match=f"bench.toml: .*{reason}"):
+            parse_parameter_set(content, "bench.toml")
+
+
+def test_a_duplicate_key_is_an_error_with_its_line() -> None:
+    assert "line 4" in problem_of(changed('name = "bench"', 'name = "bench"\nname = "bench"'))
+
+
+def test_deep_nesting_is_a_clean_error() -> None:
+    assert "nested too deeply" in problem_of("a = " + "[" * 20000)
+
+
+def test_a_misspelt_key_names_the_nearest_and_the_allowed_ones() -> None:
+    message = problem_of(changed("[actuator.torque_constant]", "[actuator.torque_constnt]"))
+    assert "unknown key 'actuator.torque_constnt', did you mean 'torque_constant'?" in message
+    assert "volume_per_angle" in message
+
+
+def test_a_misspelt_section_names_the_nearest() -> None:
+    assert "'actuatr', did you mean 'actuator'" in problem_of(changed("[actuator.", "[actuatr."))
+
+
+def test_a_misspelt_key_of_a_value_names_the_nearest() -> None:
+    assert "'valves.main.area.unti', did you mean 'unit'" in problem_of(changed('unit = "mm^2"', 'unti = "mm^2"'))
+
+
+def test_a_setting_of_another_kind_of_valve_is_unknown() -> None:
+    other = "switching_interval = { value = 1, unit = 's', origin = 'assumed', source = 'x' }"
+    message = problem_of(SMALL + other)
+    assert "unknown key 'valves.main.switching_interval'" in message
+    assert "spool_frequency" in message
+
+
+def test_an_unknown_kind_of_valve_names_the_nearest() -> None:
+    message = problem_of(changed('kind = "proportional"', 'kind = "proportionl"'))
+    assert "valves.main.kind = 'proportionl' is not known, did you mean 'proportional'?" in message
+
+
+def test_a_valve_without_a_kind_is_named() -> None:
+    assert "'valves.main.kind' is missing" in problem_of(changed('kind = "proportional"', ""))
+
+
+def test_an_unknown_origin_names_the_nearest() -> None:
+    message = problem_of(changed('"identified"', '"identifed"'))
+    assert "actuator.torque_constant.origin = 'identifed' is not allowed, did you mean 'identified'?" in message
+
+
+@pytest.mark.parametrize("value", ["true", '"14"', "[14]", "nan", "inf", "1979-05-27"])
+def test_a_value_that_is_no_finite_number_is_refused(value: str) -> None:
+    assert "actuator.torque_constant.value = " in problem_of(changed("value = 14", f"value = {value}"))
+
+
+def test_a_number_without_provenance_is_refused() -> None:
+    area = 'area = { value = 12.6, unit = "mm^2", origin = "datasheet", source = "page 2" }'
+    assert "valves.main.area = 12.6 must be a table" in problem_of(changed(area, "area = 12.6"))
+
+
+def test_a_value_without_a_source_is_refused() -> None:
+    assert "'actuator.torque_constant.source' is missing" in problem_of(changed('source = "recording 7"', ""))
+
+
+def test_a_negative_uncertainty_is_refused() -> None:
+    assert "uncertainty = -0.5" in problem_of(changed("uncertainty = 0.5", "uncertainty = -0.5"))
+
+
+def test_an_unknown_unit_is_refused_with_its_key() -> None:
+    message = problem_of(changed('"cm^3"', '"cmm^3"'))
+    assert "actuator.torque_constant.unit: 'cmm' is not a known unit, did you mean 'mm'?" in message
+
+
+def test_a_default_valve_that_does_not_exist_is_refused() -> None:
+    assert "there is no valve 'mian', did you mean 'main'?" in problem_of(changed('"main"', '"mian"'))
+
+
+def test_a_report_on_a_valve_that_does_not_exist_is_refused() -> None:
+    report = "[reported.valves.mian]\nmass_flow = { value = 1, unit = 'g/s', origin = 'assumed', source = 'x' }"
+    assert "no valve 'mian', did you mean 'main'" in problem_of(SMALL + report)
+
+
+def test_a_newer_schema_version_is_refused() -> None:
+    assert "schema_version" in problem_of(changed("schema_version = 1", "schema_version = 2"))
+
+
+def test_the_number_of_further_problems_is_told() -> None:
+    text = changed('source = "recording 7"', "").replace('source = "page 2"', 'sorce = "page 2"')
+    assert re.search(r"\(and 2 more\)$", problem_of(text))
+
+
+def test_a_wrong_dimension_is_kept_for_the_audit_and_refused_for_a_device(tmp_path: Path) -> None:
+    text = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text()
+    file = tmp_path / "wrong.toml"
+    file.write_text(text.replace('value = 31.6\nunit = "mm^2"', 'value = 31.6\nunit = "mm"'))
+    load_parameter_set(file)
+    with pytest.raises(ParameterError, match=r"wrong.toml: valves.proportional.area = 31.6 mm: unit 'mm' does not fit"):
+        load_device(file)
+
+
+def test_the_example_of_the_how_to_page_is_a_valid_set() -> None:
+    page = Path(__file__).parents[3] / "docs" / "how-to" / "add-a-parameter-set.md"
+    blocks = re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL)
+    parameter_set = parse_parameter_set("\n".join(map(textwrap.dedent, blocks)).encode(), page.name)
+    assert set(parameter_set.accepted) == {"flow-of-main"}
+    assert "reported.valves.main.mass_flow" in parameter_set.numbers

@@ -1,0 +1,110 @@
+"""Overrides by dotted path."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ppafo.errors import ParameterError
+from ppafo.parameters import apply_overrides, load_device, load_parameter_set
+from ppafo.parameters.device import Orifice
+from ppafo.parameters.parameter_set import number_in_si
+
+COMPLETED = load_parameter_set("ppafo2011")
+PATHS = sorted(COMPLETED.numbers)
+
+
+def problem_of(override: str) -> str:
+    with pytest.raises(ParameterError) as caught:
+        apply_overrides(COMPLETED, [override])
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_valve_means_the_valve_that_is_chosen() -> None:
+    device = load_device("ppafo2011", "solenoid", ("valve.area=5mm^2",))
+    assert device.valve.orifice == Orifice(5e-6, 0.113)
+
+
+def test_a_valve_by_name_is_changed_whichever_is_chosen() -> None:
+    device = load_device("ppafo2011", "proportional", ("valves.solenoid.area=5mm^2",))
+    assert device.valve.orifice == Orifice(31.6e-6, 0.113)
+
+
+def test_an_override_stays_visible_and_tells_what_it_replaced() -> None:
+    entry = apply_overrides(COMPLETED, ["valve.area=12.6mm^2"]).numbers["valves.proportional.area"]
+    assert (entry.origin, entry.source) == ("assumed", "override")
+    assert "31.6 mm^2 (published: " in entry.note
+
+
+def test_an_override_leaves_the_original_set_as_it_was() -> None:
+    apply_overrides(COMPLETED, ["valve.area=1mm^2"])
+    assert COMPLETED.numbers["valves.proportional.area"].value == 31.6
+
+
+def test_the_last_of_two_overrides_counts() -> None:
+    changed = apply_overrides(COMPLETED, ["valve.area=1mm^2", "valve.area=2mm^2"])
+    assert changed.numbers["valves.proportional.area"].value == 2.0
+
+
+def test_a_value_that_the_set_lacks_can_be_given() -> None:
+    printed = apply_overrides(load_parameter_set("ppafo2011-printed"), ["actuator.dead_volume_1=8cm^3"])
+    assert number_in_si(printed, "actuator.dead_volume_1") == 8e-6
+
+
+def test_a_misspelt_path_names_the_nearest() -> None:
+    assert "did you mean 'valves.proportional.area'" in problem_of("valve.aera=1mm^2")
+
+
+@pytest.mark.parametrize("override", ["valve.area", "=3", "valve.area=", "", "valve.area 3"])
+def test_what_is_not_path_and_value_is_refused(override: str) -> None:
+    assert "is not of the form PATH=VALUE" in problem_of(override)
+
+
+def test_a_wrong_dimension_is_refused_with_the_unit_that_is_needed() -> None:
+    assert "unit 'mm' does not fit: a unit like 'm^2' is needed" in problem_of("valve.area=3mm")
+
+
+def test_a_bare_pressure_is_refused() -> None:
+    assert "write psi_g for gauge" in problem_of("supply.pressure=50 psi")
+
+
+def test_damping_may_leave_out_the_radian_as_the_paper_does() -> None:
+    for text in ("32 g m^2/s", "0.032 N m s/rad", "0.032 N m s"):
+        assert (
+            number_in_si(apply_overrides(COMPLETED, [f"friction.viscous_damping={text}"]), "friction.viscous_damping")
+            == 0.032
+        )
+
+
+def test_another_gas_brings_its_own_constants() -> None:
+    gas = load_device("ppafo2011", overrides=("gas.species=N2",)).gas
+    assert (gas.species, gas.molar_mass, gas.heat_capacity_ratio) == ("N2", 0.028013, 1.401)
+
+
+def test_an_unknown_gas_names_the_nearest() -> None:
+    assert "unknown gas, did you mean 'CO2'?; known are CO2, air" in problem_of("gas.species=CO")
+
+
+def test_one_form_of_an_orifice_replaces_the_other() -> None:
+    iso = apply_overrides(COMPLETED, ["valve.sonic_conductance=1 L/(s bar)", "valve.critical_ratio=0.3"])
+    assert "valves.proportional.area" not in iso.numbers
+    assert "valves.solenoid.area" in iso.numbers
+    back = apply_overrides(iso, ["valve.area=1mm^2", "valve.discharge_coefficient=0.6"])
+    assert "valves.proportional.sonic_conductance" not in back.numbers
+
+
+@given(path=st.sampled_from(PATHS), factor=st.floats(0.1, 10.0))
+def test_an_override_reads_back_as_the_value_that_was_given(path: str, factor: float) -> None:
+    entry = COMPLETED.numbers[path]
+    value = entry.value * factor
+    changed = apply_overrides(COMPLETED, [f"{path}={value!r} {entry.unit}"])
+    assert (changed.numbers[path].value, changed.numbers[path].unit) == (value, entry.unit)
+    assert {key for key in PATHS if changed.numbers[key] != COMPLETED.numbers[key]} == {path}
+
+
+@given(path=st.sampled_from(PATHS), text=st.text(max_size=30))
+def test_any_override_text_is_taken_or_refused_cleanly(path: str, text: str) -> None:
+    try:
+        apply_overrides(COMPLETED, [f"{path}={text}"])
+    except ParameterError as error:
+        assert "\n" not in str(error)

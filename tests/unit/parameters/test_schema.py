@@ -1,0 +1,38 @@
+"""The published schema says the same as the loader."""
+
+import tomllib
+from importlib import resources
+from typing import Any
+
+import jsonschema  # type: ignore[import-untyped]
+import pytest
+
+from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters import list_sets
+from ppafo.parameters.schema import json_schema
+
+
+def document_of(name: str) -> dict[str, Any]:
+    return tomllib.loads((resources.files("ppafo.parameters") / "sets" / f"{name}.toml").read_text())
+
+
+def test_the_schema_is_itself_valid() -> None:
+    jsonschema.Draft202012Validator.check_schema(json_schema())
+
+
+@pytest.mark.parametrize("name", list_sets())
+def test_every_set_of_the_package_fits_the_schema(name: str) -> None:
+    jsonschema.validate(document_of(name), json_schema())
+
+
+def test_the_schema_refuses_an_unknown_key() -> None:
+    document = document_of("ppafo2011") | {"colour": "blue"}
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(document, json_schema())
+
+
+def test_the_schema_knows_every_valve_of_the_catalogue_and_its_settings() -> None:
+    definitions = json_schema()["$defs"]
+    for kind in VALVES.values():
+        properties = definitions[f"{kind.name.capitalize()}Valve"]["properties"]
+        assert {quantity.name for quantity in kind.quantities} <= set(properties)

@@ -1,0 +1,160 @@
+"""Units at the edge."""
+
+import math
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ppafo.errors import UnitError
+from ppafo.units import base_value, check_unit, format_quantity, from_si, parse_quantity, split_quantity, to_si
+
+PAIRS = [
+    ("mm^2", "m^2"),
+    ("cm^3/rad", "m^3/rad"),
+    ("cm^3/deg", "m^3/rad"),
+    ("g m^2", "kg m^2"),
+    ("g m^2/s", "N m s"),
+    ("deg", "rad"),
+    ("psi_g", "Pa_a"),
+    ("bar_a", "Pa_a"),
+    ("kPa_d", "Pa_d"),
+    ("degC", "K"),
+    ("kHz", "Hz"),
+    ("L/(s bar)", "m^3/(s Pa)"),
+    ("lbf in", "N m"),
+    ("percent", ""),
+    ("", ""),
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "si_unit", "expected"),
+    [
+        ("12.6mm^2", "m^2", 12.6e-6),
+        ("12.6 mm²", "m^2", 12.6e-6),
+        ("20 deg", "rad", math.pi / 9.0),
+        ("0.4 1/s", "1/s", 0.4),
+        ("8.4 g m^2", "kg m^2", 0.0084),
+        ("8.4 g*m**2", "kg m^2", 0.0084),
+        ("25 degC", "K", 298.15),
+        ("0.1 N m/psi", "m^3", 0.1 / 6894.757293168361),
+        ("1 dm^3/(s bar)", "m^3/(s Pa)", 1e-8),
+        ("-5e-1 m", "m", -0.5),
+        ("3", "", 3.0),
+        ("5 %", "", 0.05),
+    ],
+)
+def test_a_text_becomes_its_value_in_si(text: str, si_unit: str, expected: float) -> None:
+    assert parse_quantity(text, si_unit) == pytest.approx(expected, rel=1e-14)
+
+
+def test_decimal_prefixes_are_exact() -> None:
+    assert to_si(8.4, "g m^2", "kg m^2") == 0.0084
+    assert to_si(31.6, "mm^2", "m^2") == 31.6e-6
+
+
+def test_gauge_pressure_counts_from_the_atmosphere_that_is_given() -> None:
+    assert parse_quantity("50 psi_g", "Pa_a") == pytest.approx(101325.0 + 50.0 * 6894.757293168361)
+    assert parse_quantity("50 psi_g", "Pa_a", atmosphere=90e3) == pytest.approx(90e3 + 50.0 * 6894.757293168361)
+
+
+def test_absolute_pressure_and_differences_ignore_the_atmosphere() -> None:
+    assert parse_quantity("5 bar_a", "Pa_a", atmosphere=90e3) == 5e5
+    assert parse_quantity("5 bar_d", "Pa_d", atmosphere=90e3) == 5e5
+
+
+@pytest.mark.parametrize("unit", ["psi", "bar", "kPa", "Pa"])
+@pytest.mark.parametrize("si_unit", ["Pa_a", "Pa_d"])
+def test_a_bare_pressure_is_refused_with_the_three_ways_to_say_it(unit: str, si_unit: str) -> None:
+    with pytest.raises(UnitError, match=f"'{unit}' does not say which pressure: write {unit}_g for gauge, {unit}_a"):
+        parse_quantity(f"50 {unit}", si_unit)
+
+
+def test_a_difference_is_refused_for_a_level() -> None:
+    with pytest.raises(UnitError, match="'psi_d' is a pressure difference, a pressure level is needed"):
+        parse_quantity("50 psi_d", "Pa_a")
+
+
+@pytest.mark.parametrize("unit", ["psi_g", "psi_a"])
+def test_a_level_is_refused_for_a_difference(unit: str) -> None:
+    with pytest.raises(UnitError, match="a pressure difference is needed"):
+        parse_quantity(f"50 {unit}", "Pa_d")
+
+
+@pytest.mark.parametrize("text", ["4 kg_g", "1 N m/psi_g", "1 m_a"])
+def test_the_kind_of_pressure_stands_only_on_a_pressure_alone(text: str) -> None:
+    with pytest.raises(UnitError, match="belong to a unit of pressure that stands alone"):
+        split_quantity(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "si_unit"), [("20", "rad"), ("20 deg", ""), ("3 rad/s", "Hz"), ("3 1/s", "rad/s"), ("3 mm", "m^2")]
+)
+def test_a_foreign_dimension_is_refused_and_angles_are_a_dimension(text: str, si_unit: str) -> None:
+    with pytest.raises(UnitError, match="does not fit"):
+        parse_quantity(text, si_unit)
+
+
+@pytest.mark.parametrize("text", ["nan m", "inf m", "-inf m", "1e999 m", "", "m", "--3 m", "0x10 m", "\u0661 m"])
+def test_what_is_not_a_finite_number_is_refused(text: str) -> None:
+    with pytest.raises(UnitError):
+        split_quantity(text)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_numbers_that_are_not_finite_are_refused_in_both_directions(value: float) -> None:
+    with pytest.raises(UnitError, match="not a finite number"):
+        to_si(value, "m", "m")
+    with pytest.raises(UnitError, match="not a finite number"):
+        from_si(value, "m", "m")
+
+
+@pytest.mark.parametrize(
+    "unit", ["m)", "2 m", "m^", "m//s", "m/s kg", "mm2", "m;s", "(" * 50 + "m" + ")" * 50, "m" * 99]
+)
+def test_what_is_not_written_like_a_unit_is_refused(unit: str) -> None:
+    with pytest.raises(UnitError, match="is not a unit"):
+        check_unit(unit)
+
+
+def test_an_unknown_unit_names_the_nearest_one() -> None:
+    with pytest.raises(UnitError, match="'kPq' is not a known unit, did you mean 'kPa'"):
+        check_unit("kPq")
+
+
+def test_a_value_of_any_dimension_has_a_value_in_base_units() -> None:
+    assert base_value(113.0, "ms/m") == pytest.approx(0.113)
+    assert base_value(2.0, "kPa_a") == pytest.approx(2000.0)
+
+
+@given(pair=st.sampled_from(PAIRS), value=st.floats(-1e9, 1e9))
+def test_conversion_to_si_and_back_gives_the_same_value(pair: tuple[str, str], value: float) -> None:
+    unit, si_unit = pair
+    there = to_si(value, unit, si_unit)
+    scale = to_si(1.0, unit, si_unit) - to_si(0.0, unit, si_unit)
+    rounding = 4e-16 * abs(there) / abs(scale)
+    assert from_si(there, unit, si_unit) == pytest.approx(value, rel=1e-14, abs=rounding + 1e-300)
+
+
+@given(unit=st.sampled_from([unit for unit, _ in PAIRS]), value=st.floats(allow_nan=False, allow_infinity=False))
+def test_a_formatted_quantity_reads_back_exactly(unit: str, value: float) -> None:
+    assert split_quantity(format_quantity(value, unit)) == (value, unit)
+
+
+@given(text=st.text(max_size=80))
+def test_any_text_is_a_quantity_or_a_clear_error(text: str) -> None:
+    try:
+        value, unit = split_quantity(text)
+    except UnitError as error:
+        assert "\n" not in str(error)
+    else:
+        assert math.isfinite(value)
+        check_unit(unit)
+
+
+def test_importing_the_module_does_not_load_pint() -> None:
+    code = "import sys, ppafo.units; sys.exit('pint' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
