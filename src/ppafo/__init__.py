@@ -1,3 +1,102 @@
-"""Model-based design of pneumatic powered orthoses."""
+"""Model-based design of pneumatic powered orthoses.
+
+    import ppafo
+
+    result = ppafo.simulate("torque-task-proportional")
+    result.plot().savefig("torque-task.png")
+
+Everything below is loaded when it is first used, so that ``import ppafo`` is quick.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ppafo.errors import (
+        DataError,
+        IdentificationError,
+        ParameterError,
+        PpafoError,
+        ScenarioError,
+        SimulationError,
+        UnitError,
+    )
+    from ppafo.metrics import Metric, evaluate
+    from ppafo.parameters import ParameterSet, apply_overrides, list_sets, load_device, load_parameter_set
+    from ppafo.parameters.audit import audit
+    from ppafo.parameters.device import Device
+    from ppafo.signals import Channel, Recording
+    from ppafo.simulation.loading import list_scenarios, load_scenario
+    from ppafo.simulation.result import Result, Status
+    from ppafo.simulation.scenario import Scenario
+    from ppafo.simulation.simulate import simulate, simulate_many
+    from ppafo.storage import read_recording, read_result
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Channel",
+    "DataError",
+    "Device",
+    "IdentificationError",
+    "Metric",
+    "ParameterError",
+    "ParameterSet",
+    "PpafoError",
+    "Recording",
+    "Result",
+    "Scenario",
+    "ScenarioError",
+    "SimulationError",
+    "Status",
+    "UnitError",
+    "apply_overrides",
+    "audit",
+    "evaluate",
+    "list_scenarios",
+    "list_sets",
+    "load_device",
+    "load_parameter_set",
+    "load_scenario",
+    "read_recording",
+    "read_result",
+    "simulate",
+    "simulate_many",
+]
+
+_HOMES = {
+    "ppafo.errors": (
+        "DataError",
+        "IdentificationError",
+        "ParameterError",
+        "PpafoError",
+        "ScenarioError",
+        "SimulationError",
+        "UnitError",
+    ),
+    "ppafo.metrics": ("Metric", "evaluate"),
+    "ppafo.parameters": ("ParameterSet", "apply_overrides", "list_sets", "load_device", "load_parameter_set"),
+    "ppafo.parameters.audit": ("audit",),
+    "ppafo.parameters.device": ("Device",),
+    "ppafo.signals": ("Channel", "Recording"),
+    "ppafo.simulation.loading": ("list_scenarios", "load_scenario"),
+    "ppafo.simulation.result": ("Result", "Status"),
+    "ppafo.simulation.scenario": ("Scenario",),
+    "ppafo.simulation.simulate": ("simulate", "simulate_many"),
+    "ppafo.storage": ("read_recording", "read_result"),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its module the first time it is asked for."""
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'ppafo' has no attribute '{name}'")
+    value = getattr(importlib.import_module(_HOME_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names, loaded or not."""
+    return sorted([*__all__, "__version__"])

@@ -35,10 +35,15 @@ def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.
     encoded = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
     if parsed.out is not None:
         write_files(parsed.out, {f"{name}.txt": text + "\n", f"{name}.json": encoded + "\n"})
-    _print(encoded if parsed.json else text)
+    print_text(encoded if parsed.json else text)
 
 
-def _print(text: str) -> None:
+def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
+    """Print the text, or the document as JSON; for commands that write files of their own."""
+    print_text(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) if as_json else text)
+
+
+def print_text(text: str) -> None:
     """Print, and end quietly where the reader has gone, as in ``ppafo sets show X | head``."""
     try:
         print(text, flush=True)

@@ -75,5 +75,5 @@ def _write(folder: Path, file_name: str, source: str) -> Path:
     handle, aside = tempfile.mkstemp(dir=folder, suffix=".tmp")
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         file.write(source)
-    os.replace(aside, path)
+    Path(aside).replace(path)
     return path

@@ -47,6 +47,7 @@ def lane_source(program: Program) -> str:
             [
                 f"x = np.empty(({writer.state_count}, {LANES}))",
                 f"p = np.empty(({writer.parameter_count}, {LANES}))",
+                f"lengths = np.empty((3, {LANES}))",
                 *_copy("x", "states", writer.state_count),
                 *_copy("p", "parameters", writer.parameter_count),
                 "for step_index in range(first_step, first_step + step_count):",
@@ -63,6 +64,15 @@ RECORD = [
     "    for row in range(record.shape[1]):",
     "        for lane in range(record.shape[2]):",
     "            record[step_index // record_every, row, lane] = x[row, lane]",
+]
+
+
+SKIP_EMPTY = [
+    "longest = 0.0",
+    f"for lane in range({LANES}):",
+    "    longest = max(longest, lengths[part, lane])",
+    "if longest == 0.0:",
+    "    break",
 ]
 
 
@@ -92,22 +102,20 @@ class _Writer:
         self.cells |= {path: f"x[{row}, lane]" for path, row in self.state_at.items()}
 
     def control_loop(self) -> list[str]:
-        """Sense and control, at every sample; without a controller only what is seen is stored."""
+        """Sense and control, at every sample; nothing where the caller sets the command."""
         controller = self.program.controller
-        lines = [self.load("timing"), self.load("plant"), self.load("state"), *self.sense()]
         if controller is None:
-            lines += self.store("seen")
-        else:
-            lines += [
-                self.load("controller"),
-                self.load("controller_state"),
-                self.load("reference"),
-                f"wanted = {self.collector.add(self.program.reference.value)}(reference, step_index * timing.step)[0]",
-                f"command, controller_state = {self.collector.add(controller.update)}"
-                "(controller, controller_state, wanted, seen, timing.period)",
-                *self.store("controller_state"),
-                f"x[{self.state_at['result.command']}, lane] = command",
-            ]
+            return []
+        groups = ("timing", "plant", "state", "controller", "controller_state", "reference")
+        lines = [
+            *[self.load(group) for group in groups],
+            *self.sense(),
+            f"wanted = {self.collector.add(self.program.reference.value)}(reference, step_index * timing.step)[0]",
+            f"command, controller_state = {self.collector.add(controller.update)}"
+            "(controller, controller_state, wanted, seen, timing.period)",
+            *self.store("controller_state"),
+            f"x[{self.state_at['result.command']}, lane] = command",
+        ]
         loop = [f"for lane in range({LANES}):", *_indent(lines)]
         return ["if step_index % steps_per_sample == 0:", *_indent(loop)]
 
@@ -137,7 +145,7 @@ class _Writer:
 
     def remember_signals(self) -> list[str]:
         """Keeps the signals of every step, where they are seen late."""
-        if self.program.ideal_sensors:
+        if self.program.ideal_sensors or self.program.controller is None:
             return []
         lines = [
             self.load("plant"),
@@ -148,7 +156,12 @@ class _Writer:
             "signal_history[1, step_index % signal_history.shape[1], lane] = pressure_1",
             "signal_history[2, step_index % signal_history.shape[1], lane] = pressure_2",
         ]
-        return [f"for lane in range({LANES}):", *_indent(lines)]
+        before_start = [
+            "if step_index == 0:",
+            "    for slot in range(1, signal_history.shape[1]):",
+            "        signal_history[:, slot, :] = signal_history[:, 0, :]",
+        ]
+        return [f"for lane in range({LANES}):", *_indent(lines), *before_start]
 
     def remember_commands(self) -> list[str]:
         """Keeps the command of every step, where the valve gets it late."""
@@ -161,34 +174,84 @@ class _Writer:
         return [f"for lane in range({LANES}):", *_indent(lines)]
 
     def plant_loop(self) -> list[str]:
-        """Valve, gas and vane, one step."""
+        """Valve, gas and vane, one step: whole, or in parts where something changes abruptly inside it."""
+        if self.program.late_commands:
+            return self.late_loop()
+        if self.program.valve.cuts is not None:
+            return self.cut_loop()
+        return [f"for lane in range({LANES}):", *_indent([*self.opening(), "length = timing.step", *self.part()])]
+
+    def opening(self) -> list[str]:
+        """Lines that load what a step needs."""
+        names = ("timing", "plant", "valve", "result", "state", "valve_state")
+        return [*[self.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
+
+    def cut_loop(self) -> list[str]:
+        """Three parts, between the switchings of the valve; parts that no lane needs are passed over."""
+        add = self.collector.add
+        cut = [
+            f"first, second = {add(self.program.valve.cuts)}(valve, valve_state, command, time, timing.step)",
+            "whole = first <= 0.0",
+            "lengths[0, lane] = timing.step if whole else first",
+            "lengths[1, lane] = 0.0 if whole else (second - first if second > first else timing.step - first)",
+            "lengths[2, lane] = timing.step - second if second > first else 0.0",
+        ]
+        begin = [
+            "length = lengths[part, lane]",
+            "time += (lengths[0, lane] if part > 0 else 0.0) + (lengths[1, lane] if part > 1 else 0.0)",
+        ]
+        return [
+            f"for lane in range({LANES}):",
+            *_indent([*self.opening(), *cut]),
+            "for part in range(3):",
+            *_indent(SKIP_EMPTY),
+            f"    for lane in range({LANES}):",
+            *_indent([*self.opening(), *begin, *self.part()], 2),
+        ]
+
+    def late_loop(self) -> list[str]:
+        """Two parts, before and after a late command arrives; the first is passed over where no lane has it."""
+        lag = f"p[{self.parameter_at['timing.command_lag']}, lane] * p[{self.parameter_at['timing.step']}, lane]"
+        before = [
+            *self.opening(),
+            self.load("early_valve"),
+            "valve = early_valve",
+            "length = lengths[part, lane]",
+            "command = command_history[(step_index - command_delay - 1) % command_history.shape[0], lane]",
+            *self.part(),
+        ]
+        after = [
+            *self.opening(),
+            "time += timing.command_lag * timing.step",
+            "length = timing.step - timing.command_lag * timing.step",
+            "command = command_history[(step_index - command_delay) % command_history.shape[0], lane]",
+            *self.part(),
+        ]
+        return [
+            f"for lane in range({LANES}):",
+            f"    lengths[0, lane] = {lag}",
+            "for part in range(1):",
+            *_indent(SKIP_EMPTY),
+            f"    for lane in range({LANES}):",
+            *_indent(before, 2),
+            f"for lane in range({LANES}):",
+            *_indent(after),
+        ]
+
+    def part(self) -> list[str]:
+        """Valve, gas and vane over ``length`` [s] from ``time`` [s]."""
         valve = self.program.valve
         add = self.collector.add
-        lines = [
-            *[self.load(name) for name in ("timing", "plant", "valve", "result", "state", "valve_state")],
-            "time = step_index * timing.step",
-            *self.command(),
-            f"shown, valve_state = {add(valve.advance)}(valve, valve_state, command, time, timing.step)",
+        return [
+            f"shown, valve_state = {add(valve.advance)}(valve, valve_state, command, time, length)",
             f"port_1, port_2 = {add(valve.connect)}(plant, shown)",
             *self.move(),
             f"possible = (abs(state.angular_velocity) < {IMPOSSIBLE_RATE} and state.mass_1 > 0.0 "
             f"and state.mass_2 > 0.0 and state.mass_1 < {IMPOSSIBLE_MASS} and state.mass_2 < {IMPOSSIBLE_MASS})",
-            "failed = result.failure_time if possible else min(result.failure_time, time + timing.step)",
+            "failed = result.failure_time if possible else min(result.failure_time, time + length)",
             f"x[{self.state_at['result.failure_time']}, lane] = failed",
             *self.store("state"),
             *self.store("valve_state"),
-        ]
-        return [f"for lane in range({LANES}):", *_indent(lines)]
-
-    def command(self) -> list[str]:
-        """The command that reaches the valve in this step: its mean over the step, where it comes late."""
-        if not self.program.late_commands:
-            return ["command = result.command"]
-        return [
-            "depth = command_history.shape[0]",
-            "newer = command_history[(step_index - command_delay) % depth, lane]",
-            "older = command_history[(step_index - command_delay - 1) % depth, lane]",
-            "command = newer + timing.command_lag * (older - newer)",
         ]
 
     def move(self) -> list[str]:
@@ -197,12 +260,11 @@ class _Writer:
         valve = self.program.valve
         flows = f"{add(valve.port_flow)}, {add(valve.port_flow_slopes)}"
         if self.program.angle is None:
-            return [f"state = {add(motion.advance_free)}(plant, state, port_1, port_2, timing.step, {flows})"]
+            return [f"state = {add(motion.advance_free)}(plant, state, port_1, port_2, length, {flows})"]
         return [
             self.load("path"),
-            f"next_angle, next_rate, _ = {add(self.program.angle.value)}(path, (step_index + 1) * timing.step)",
-            f"state = {add(motion.advance_led)}"
-            f"(plant, state, next_angle, next_rate, port_1, port_2, timing.step, {flows})",
+            f"next_angle, next_rate, _ = {add(self.program.angle.value)}(path, time + length)",
+            f"state = {add(motion.advance_led)}(plant, state, next_angle, next_rate, port_1, port_2, length, {flows})",
         ]
 
     def load(self, group: str) -> str:

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,10 +98,6 @@ class LaneBlock:
         self._signals = np.zeros((3, clock.signal_delay + 2, LANES))
         self._commands = np.zeros((clock.command_delay + 2, LANES))
 
-    def fill_signals(self, signals: Floats) -> None:
-        """Set what sensors saw before the start: angle, pressures (3, runs)."""
-        self._signals[:] = _filled(signals)[:, None, :]
-
     def advance(self, step_count: int) -> None:
         """Go ``step_count`` steps on."""
         clock = self._clock
@@ -121,6 +116,11 @@ class LaneBlock:
         )
         self._next_step += step_count
 
+    def past(self, step: int) -> Floats:
+        """States (rows, runs) at the beginning of an earlier step; every step must be recorded. Step 0 before that."""
+        step = max(0, step)
+        return self.states[:, : self._width] if step >= self._next_step else self._record[step]
+
     def result(self) -> BatchResult:
         """States and record so far; the last record is the present state where it is due."""
         clock = self._clock
@@ -133,11 +133,3 @@ def _filled(columns: Floats) -> Floats:
     """A contiguous copy with exactly 32 columns; the last one repeated where there are fewer."""
     missing = LANES - columns.shape[1]
     return np.ascontiguousarray(np.pad(columns, ((0, 0), (0, missing)), mode="edge"), dtype=np.float64)
-
-
-def row_of(groups: dict[str, type], path: str) -> int:
-    """Row number of one number, such as ``state.angle``, in the rows of a program."""
-    from ppafo.engine.rows import leaf_paths
-
-    paths: list[Any] = [leaf for name, row in groups.items() for leaf in leaf_paths(row, name)]
-    return paths.index(path)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.model.plant import PlantParameters, PlantState
-from ppafo.model.sensors import Measurement, SensorParameters
+from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 
 
@@ -35,7 +35,8 @@ class Program:
 
     ``angle`` None leaves the vane free, otherwise it is led along that profile. ``controller`` None leaves the command
     to the caller, sample by sample. ``ideal_sensors`` False adds noise, quantisation and delay of the signals.
-    ``late_commands`` True adds a dead time before the valve.
+    ``late_commands`` True adds a dead time before the valve; a step is then done in two parts, before and after the
+    instant at which a command arrives, each with valve parameters of its own length.
     """
 
     valve: ValveModel
@@ -51,6 +52,7 @@ class Program:
             "timing": LaneTiming,
             "plant": PlantParameters,
             "valve": self.valve.parameters,
+            "early_valve": self.valve.parameters if self.late_commands else NoParameters,
             "controller": NoParameters if self.controller is None else self.controller.parameters,
             "reference": self.reference.parameters,
             "path": NoParameters if self.angle is None else self.angle.parameters,
@@ -64,5 +66,4 @@ class Program:
             "state": PlantState,
             "valve_state": self.valve.state,
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
-            "seen": NoParameters if self.controller is not None else Measurement,
         }

@@ -25,7 +25,9 @@ def row_expression(row: type, path: str, cells: dict[str, str], name_of: Callabl
         return "()"
     hints = get_type_hints(row)
     inner = [
-        row_expression(hints[name], f"{path}.{name}", cells, name_of) if is_row(hints[name]) else cells[f"{path}.{name}"]
+        row_expression(hints[name], f"{path}.{name}", cells, name_of)
+        if is_row(hints[name])
+        else cells[f"{path}.{name}"]
         for name in fields
     ]
     return f"{name_of(row)}({', '.join(inner)})"

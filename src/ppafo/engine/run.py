@@ -1,11 +1,12 @@
 """One run as values: what both the lanes and the reference solver are given."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ppafo.engine.lanes import Batch, Clock
+from ppafo.engine.lanes import Batch, BatchResult, Clock, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.rows import numbers
@@ -21,7 +22,8 @@ class Run:
     """A device in one experiment, SI units.
 
     ``step`` divides ``period`` (of the controller). ``valve``, ``controller``, ``reference`` and ``path`` are the
-    parameters of the program's pieces, () where it has none. Delays are in seconds.
+    parameters of the program's pieces, () where it has none; ``early_valve`` are those of the valve for the part of a
+    step before a late command arrives, and ``valve`` those for the part after it. Delays are in seconds.
     """
 
     program: Program
@@ -30,6 +32,7 @@ class Run:
     leak_orifice: ExactOrifice
     initial: PlantState
     valve: Any
+    early_valve: Any
     controller: Any
     reference: Any
     path: Any
@@ -61,11 +64,27 @@ def batch_of(run: Run) -> Batch:
     signal_steps, signal_lag = whole_and_rest(run.signal_delay, run.step)
     clock = Clock(run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     timing = LaneTiming(run.step, run.period, command_lag, signal_lag)
-    parameters = [timing, run.plant, run.valve, run.controller, run.reference, run.path, run.sensors]
+    parameters = [timing, run.plant, run.valve, run.early_valve, run.controller, run.reference, run.path, run.sensors]
     controller_state = NoParameters() if program.controller is None else program.controller.initial
-    seen = () if program.controller is not None else (0.0,) * 4
-    states = [LaneResult(0.0, NEVER_FAILED), run.initial, program.valve.initial(), controller_state, seen]
+    states = [LaneResult(0.0, NEVER_FAILED), run.initial, program.valve.initial(), controller_state]
     return Batch(program, clock, _column(parameters), _column(states))
+
+
+def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchResult]:
+    """Results of many runs, each exactly as if it ran alone; those of one program and clock share blocks."""
+    batches = [batch_of(run) for run in runs]
+    groups: dict[tuple[Program, Clock], list[int]] = {}
+    for index, batch in enumerate(batches):
+        groups.setdefault((batch.program, batch.clock), []).append(index)
+    results: dict[int, BatchResult] = {}
+    for (program, clock), members in groups.items():
+        parameters = np.concatenate([batches[index].parameters for index in members], axis=1)
+        states = np.concatenate([batches[index].states for index in members], axis=1)
+        joint = run_batch(Batch(program, clock, parameters, states), threads)
+        for column, index in enumerate(members):
+            one = slice(column, column + 1)
+            results[index] = BatchResult(joint.states[:, one], joint.record[:, :, one])
+    return [results[index] for index in range(len(runs))]
 
 
 def _column(groups: list[Any]) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":

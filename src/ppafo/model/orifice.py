@@ -38,11 +38,11 @@ def isentropic_flow_function(pressure_ratio: float, heat_capacity_ratio: float) 
     subsonic = math.sqrt(2.0 * k / (k - 1.0)) * pressure_ratio ** (1.0 / k)
     subsonic *= math.sqrt(1.0 - pressure_ratio ** ((k - 1.0) / k))
     choked = math.sqrt(k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
-    return subsonic / choked
+    return float(subsonic / choked)
 
 
 def iso6358_flow_function(pressure_ratio: float, critical_ratio: float) -> float:
-    """Flow over choked flow [-], 0 to 1, of ISO 6358-1:2013 with subsonic index 0.5; ratio is downstream over upstream."""
+    """Flow over choked flow [-], 0 to 1, of ISO 6358-1:2013 (index 0.5); ratio is downstream over upstream."""
     if pressure_ratio <= critical_ratio:
         return 1.0
     if pressure_ratio >= 1.0:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_REFERENCE_DENSITY_AIR, STANDARD_REFERENCE_TEMPERATURE
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
-from ppafo.model.orifice import FlowCurve, iso6358_flow_function, isentropic_flow_function
+from ppafo.model.orifice import FlowCurve, isentropic_flow_function, iso6358_flow_function
 
 DEGREE = 6
 FIT_POINTS = 400
@@ -15,7 +15,7 @@ FIT_POINTS = 400
 
 @lru_cache(maxsize=256)
 def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve of equations (6), (7) for a gas; within 1e-7 of the exact function up to ``linear_ratio``."""
+    """Fitted curve of equations (6), (7) for a gas; within 3e-7 of the exact function below ``linear_ratio``."""
     critical = critical_pressure_ratio(heat_capacity_ratio)
     gaps = _gaps(critical)
     exact = [isentropic_flow_function(1.0 - gap, heat_capacity_ratio) for gap in gaps]
@@ -24,7 +24,7 @@ def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCur
 
 @lru_cache(maxsize=256)
 def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve of ISO 6358 for a critical ratio; within 1e-5 of the exact function up to ``linear_ratio``."""
+    """Fitted curve of ISO 6358 for a critical ratio; within 1e-5 of the exact function below ``linear_ratio``."""
     gaps = _gaps(critical_ratio)
     exact = [iso6358_flow_function(1.0 - gap, critical_ratio) for gap in gaps]
     return _fitted(critical_ratio, linear_ratio, gaps, np.array(exact))
@@ -43,7 +43,9 @@ def sonic_conductance_mass(sonic_conductance: float, gas_constant: float, temper
     ISO 6358 gives C rho_0 sqrt(T_0 / T) for air; another gas passes sqrt(R_air / R) times as much.
     """
     air_constant = 1.0e5 / (STANDARD_REFERENCE_DENSITY_AIR * STANDARD_REFERENCE_TEMPERATURE)
-    same_gas = sonic_conductance * STANDARD_REFERENCE_DENSITY_AIR * math.sqrt(STANDARD_REFERENCE_TEMPERATURE / temperature)
+    same_gas = (
+        sonic_conductance * STANDARD_REFERENCE_DENSITY_AIR * math.sqrt(STANDARD_REFERENCE_TEMPERATURE / temperature)
+    )
     return same_gas * math.sqrt(air_constant / gas_constant)
 
 

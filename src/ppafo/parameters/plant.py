@@ -1,7 +1,7 @@
 """From a device to the numbers that the plant computes with."""
 
 from ppafo.model.orifice import FlowCurve
-from ppafo.model.orifice_curves import area_conductance, iso6358_curve, isentropic_curve, sonic_conductance_mass
+from ppafo.model.orifice_curves import area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
 

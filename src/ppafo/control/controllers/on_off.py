@@ -5,6 +5,9 @@ from typing import NamedTuple
 from ppafo.control.kind import ControllerKind
 from ppafo.model.sensors import Measurement
 
+ROUNDING = 1.0e-9
+"""N m: an error this small counts as zero, so that rounding does not decide the first command."""
+
 
 class OnOffParameters(NamedTuple):
     """The law has no parameters; the paper has no dead zone."""
@@ -19,7 +22,7 @@ def update(
 ) -> tuple[float, OnOffState]:
     """Command: 1 (valve A) where the error [N m] is 0 or more, else -1 (valve B). Equation (14)."""
     error = reference - measurement.torque
-    return (1.0 if error >= 0.0 else -1.0), state
+    return (1.0 if error >= -ROUNDING else -1.0), state
 
 
 KIND = ControllerKind(

@@ -50,7 +50,9 @@ KIND = ControllerKind(
         Quantity("integral_gain", "1/(N m s)", "k_i", 0.25, 0.0, 1.0e4),
         Quantity("derivative_gain", "s/(N m)", "k_d", 0.006, 0.0, 1.0e3),
         Quantity("derivative_filter", "s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0),
-        Quantity("anti_windup", "1/s", "rate of back-calculation while the command is clipped, 0 for none", 0.0, 0.0, 1.0e3),
+        Quantity(
+            "anti_windup", "1/s", "rate of back-calculation while the command is clipped, 0 for none", 0.0, 0.0, 1.0e3
+        ),
     ),
     parameters=PidParameters,
     initial=PidState(0.0, 0.0, 0.0, 0.0),

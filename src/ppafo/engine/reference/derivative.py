@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
-from ppafo.model.plant import Openings, PlantParameters, chamber_pressures, driving_torque
+from ppafo.model.plant import Openings, PlantParameters, driving_torque
 from ppafo.model.vane import vane_acceleration
 
 
@@ -61,9 +61,7 @@ def gas_rates(
     vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, openings.vent_1, valve_orifice)
     vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, openings.vent_2, valve_orifice)
     leak = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
-    return GasRates(
-        source_1 - vent_1 - leak, source_2 - vent_2 + leak, source_1 + source_2, vent_1 + vent_2, abs(leak)
-    )
+    return GasRates(source_1 - vent_1 - leak, source_2 - vent_2 + leak, source_1 + source_2, vent_1 + vent_2, abs(leak))
 
 
 def free_motion(

@@ -72,11 +72,11 @@ class _Solution:
         self.time = 0.0
         self.controller_state = None if run.program.controller is None else run.program.controller.initial
         self.signals: dict[int, tuple[float, float, float]] = {}
+        self.first_signals = self.present_signals()
         self.pending: list[tuple[float, float]] = []
         count = run.step_count // run.record_every + 1
-        self.result = ReferenceResult(
-            np.arange(count) * (run.step * run.record_every), np.empty((count, PLANT_UNKNOWNS)), np.zeros(count)
-        )
+        times = np.arange(count, dtype=np.float64) * (run.step * run.record_every)
+        self.result = ReferenceResult(times, np.empty((count, PLANT_UNKNOWNS)), np.zeros(count))
         self.records = 0
         self.solver = self.make_solver(tolerance)
 
@@ -91,7 +91,7 @@ class _Solution:
             self.result.evaluations += 1
             self.fill(t, y, yp, self.parameters, self.command, self.way)
 
-        def roots(t: float, y: Floats, events: Floats) -> None:
+        def roots(_t: float, y: Floats, events: Floats) -> None:
             events[:] = self.roots(y)
 
         roots.terminal = [True, True]  # type: ignore[attr-defined]
@@ -148,7 +148,8 @@ class _Solution:
     def measurement(self, sample: int) -> Measurement:
         """What the controller sees: the present, or what was kept of the past."""
         run = self.run
-        signals = self.signals.pop(sample, None) or self.present_signals()
+        before_start = sample * run.period < run.signal_delay - SAME_TIME
+        signals = self.signals.pop(sample, None) or (self.first_signals if before_start else self.present_signals())
         if run.program.ideal_sensors:
             angle, pressure_1, pressure_2 = signals
             torque = actuator_torque(pressure_1, pressure_2, run.plant.torque_constant)

@@ -13,11 +13,11 @@ HEADER = '''"""Generated from the functions of ppafo; their hash is in the file 
 import math
 from collections import namedtuple
 
-import numpy as np
-from numba import njit
+from numba import float64, njit, types, void
 '''
 INLINE = '@njit(error_model="numpy")'
-READ_ONLY = 'Array(float64, 1, "C", readonly=True)'
+SIGNATURE = 'void(float64, types.Array(float64, 1, "C", readonly=True), float64[::1], float64[::1], float64, float64)'
+COMPILED = f'@njit({SIGNATURE}, cache=True, error_model="numpy")'
 
 
 def parameter_groups(program: Program) -> dict[str, type]:
@@ -70,5 +70,5 @@ def right_hand_side_source(program: Program) -> str:
         for number, path in enumerate(valve_paths)
     ]
     body = "\n".join(f"    {line}" for line in lines)
-    function = f'@njit(cache=True, error_model="numpy")\ndef fill(t, y, slopes, parameters, command, way):\n{body}\n'
+    function = f"{COMPILED}\ndef fill(t, y, slopes, parameters, command, way):\n{body}\n"
     return f"{HEADER}\n\n{collector.text()}\n\n\n{function}"

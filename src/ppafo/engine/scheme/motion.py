@@ -36,7 +36,7 @@ def bounded(plant: PlantParameters, angle: float) -> float:
 def next_velocity(
     plant: PlantParameters, angular_velocity: float, acceleration: float, torque: float, duration: float
 ) -> float:
-    """Angular velocity [rad/s] after ``duration`` [s] by the trapezoidal rule; ``torque`` at the end [N m], less friction."""
+    """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; ``torque`` at the end [N m], less friction."""
     half = 0.5 * duration
     return (angular_velocity + half * (acceleration + torque / plant.inertia)) / (
         1.0 + half * plant.viscous_damping / plant.inertia

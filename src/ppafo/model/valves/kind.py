@@ -15,7 +15,10 @@ class ValveModel:
     the declared settings and the step [s]; ``initial()`` the second. ``advance(parameters, state, command, time,
     step)`` returns what the valve shows the plant during the step, and the next state. ``connect(plant, shown)``
     turns that into ports, and ``port_flow`` and ``port_flow_slopes`` are the functions of that kind of port.
-    ``command_delay(settings)`` is the dead time [s] before a command reaches the valve.
+    ``cuts(parameters, state, command, time, step)`` returns two lengths [s], the times from the beginning of the step
+    to the first and to the last abrupt change inside it (both 0 for none): the step is done in parts there. None
+    for a valve that does not jump by itself. ``command_delay(settings)`` is the dead time [s] before a command reaches
+    the valve.
 
     The reference solver sees the same valve in continuous time: ``instant(parameters, state, command)`` returns the
     openings at an instant, ``rates(parameters, state, command)`` the time derivatives of the state,
@@ -31,6 +34,7 @@ class ValveModel:
     connect: Callable[..., Any]
     port_flow: Callable[..., Any]
     port_flow_slopes: Callable[..., Any]
+    cuts: Callable[..., Any] | None
     command_delay: Callable[[Mapping[str, float]], float]
     instant: Callable[..., Any]
     rates: Callable[..., Any]

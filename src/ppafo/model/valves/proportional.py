@@ -1,7 +1,8 @@
-"""Proportional spool valve: ideal, or with dead band, dead time, second-order spool and slew limit.
+"""Proportional spool valve: ideal, or with dead band, dead time, slew limit and second-order spool, in that order.
 
-The spool obeys x'' = w^2 (u - x) - 2 d w x', with |x'| held at the slew limit. Between samples the command u is
-constant, so one step of the linear spool is exact: a constant matrix, worked out once for each step size.
+The opening that is asked for runs at most at the slew limit towards the command; the spool follows it with
+x'' = w^2 (r - x) - 2 d w x'. A step of the spool is exact for the mean of r over the step: a constant matrix, worked
+out once for each length of a step.
 """
 
 import math
@@ -20,6 +21,7 @@ from ppafo.model.valves.kind import ValveKind, ValveModel
 
 NO_SLEW_LIMIT = 1.0e12
 SAME_INSTANT = 1.0e-11
+TINY = 1.0e-300
 
 
 class IdealProportional(NamedTuple):
@@ -37,7 +39,7 @@ class NoValveState(NamedTuple):
 class MovingProportional(NamedTuple):
     """Dead band [-], slew limit [1/s], undamped frequency [Hz] and damping ratio [-] of the spool, and its exact step.
 
-    The step gives next x, next x' and mean x from x and x', both as offsets from the target.
+    The step gives next x, next x' and mean x from x and x', x as an offset from the mean of what is asked for.
     """
 
     dead_band: float
@@ -53,8 +55,9 @@ class MovingProportional(NamedTuple):
 
 
 class SpoolState(NamedTuple):
-    """Opening of the spool from -1 to 1 and its rate [1/s]."""
+    """Opening asked for behind the slew limit, opening of the spool, both from -1 to 1, and its rate [1/s]."""
 
+    asked: float
     opening: float
     rate: float
 
@@ -73,27 +76,42 @@ def advance_ideal(
     return opening, NoValveState(opening)
 
 
+def slewed(asked: float, target: float, slew_limit: float, step: float) -> tuple[float, float]:
+    """Opening asked for after a step [s], and its mean, on the way to a target at the slew limit [1/s]; exact."""
+    distance = target - asked
+    reach = slew_limit * step
+    arrives = abs(distance) <= reach
+    moved = distance if arrives else (reach if distance > 0.0 else -reach)
+    # The way is a ramp of this share of the step, then a rest at the target.
+    share = abs(distance) / max(reach, TINY) if arrives else 1.0
+    return asked + moved, asked + moved * (1.0 - 0.5 * share)
+
+
+def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float:
+    """Mean over a step of the part of an opening that is above 0; exact where it runs straight or keeps its sign."""
+    higher = max(opening, next_opening)
+    lower = min(opening, next_opening)
+    crosses = higher > 0.0 and lower < 0.0
+    straight = 0.5 * higher * higher / max(higher - lower, TINY)
+    return straight if crosses else max(mean, 0.0)
+
+
 def advance_moving(
     valve: MovingProportional, state: SpoolState, command: float, time: float, step: float
 ) -> tuple[Openings, SpoolState]:
-    """Mean openings during the step and the spool at its end; exact for a linear spool that keeps its side."""
+    """Mean openings during the step and the spool at its end."""
     target = opening_of_command(command, valve.dead_band)
-    away = state.opening - target
-    linear = target + valve.next_by_opening * away + valve.next_by_rate * state.rate
+    asked, asked_mean = slewed(state.asked, target, valve.slew_limit, step)
+    away = state.opening - asked_mean
+    has_spool = valve.frequency > 0.0
+    spool = asked_mean + valve.next_by_opening * away + valve.next_by_rate * state.rate
+    spool_mean = asked_mean + valve.mean_by_opening * away + valve.mean_by_rate * state.rate
     rate = valve.rate_by_opening * away + valve.rate_by_rate * state.rate
-    reach = valve.slew_limit * step
-    move = linear - state.opening
-    limited = max(-reach, min(reach, move))
-    unlimited = limited == move
-    opening = state.opening + limited
-    trapezoid = 0.5 * (state.opening + opening)
-    exact = target + valve.mean_by_opening * away + valve.mean_by_rate * state.rate
-    mean = max(-1.0, min(1.0, exact if unlimited else trapezoid))
-    same_side = state.opening * opening >= 0.0
-    towards_1 = max(mean, 0.0) if same_side else 0.5 * (max(state.opening, 0.0) + max(opening, 0.0))
-    towards_2 = max(-mean, 0.0) if same_side else 0.5 * (max(-state.opening, 0.0) + max(-opening, 0.0))
-    next_rate = max(-valve.slew_limit, min(valve.slew_limit, rate))
-    return Openings(towards_1, towards_2, towards_2, towards_1), SpoolState(opening, next_rate)
+    opening = spool if has_spool else asked
+    mean = max(-1.0, min(1.0, spool_mean if has_spool else asked_mean))
+    towards_1 = towards_chamber_1(state.opening, opening, mean)
+    towards_2 = towards_chamber_1(-state.opening, -opening, -mean)
+    return Openings(towards_1, towards_2, towards_2, towards_1), SpoolState(asked, opening, rate)
 
 
 def spool_acceleration(opening: float, rate: float, target: float, frequency: float, damping_ratio: float) -> float:
@@ -136,32 +154,27 @@ def instant_moving(valve: MovingProportional, state: SpoolState, command: float)
 
 
 def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -> SpoolState:
-    """Rate of the opening [1/s], held at the slew limit, and its derivative [1/s^2]."""
+    """Rates of what is asked for and of the opening [1/s], and the second derivative of the opening [1/s^2]."""
     target = opening_of_command(command, valve.dead_band)
+    slew = 0.0 if target == state.asked else (valve.slew_limit if target > state.asked else -valve.slew_limit)
     if valve.frequency == 0.0:
-        way = 1.0 if target > state.opening else -1.0
-        return SpoolState(0.0 if target == state.opening else way * valve.slew_limit, 0.0)
-    rate = max(-valve.slew_limit, min(valve.slew_limit, state.rate))
-    acceleration = spool_acceleration(state.opening, rate, target, valve.frequency, valve.damping_ratio)
-    held = (state.rate >= valve.slew_limit and acceleration > 0.0) or (
-        state.rate <= -valve.slew_limit and acceleration < 0.0
-    )
-    return SpoolState(rate, 0.0 if held else acceleration)
+        return SpoolState(slew, slew, 0.0)
+    acceleration = spool_acceleration(state.opening, state.rate, state.asked, valve.frequency, valve.damping_ratio)
+    return SpoolState(slew, state.rate, acceleration)
 
 
 def next_moving_event(valve: MovingProportional, state: SpoolState, command: float, time: float) -> float:
-    """Time [s] at which a spool that only slews arrives at its target."""
+    """Time [s] at which what is asked for arrives at the command."""
     target = opening_of_command(command, valve.dead_band)
-    if valve.frequency > 0.0 or target == state.opening:
-        return math.inf
-    return time + abs(target - state.opening) / valve.slew_limit
+    return math.inf if target == state.asked else time + abs(target - state.asked) / valve.slew_limit
 
 
 def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
-    """A spool without inertia that is at its target, or has no slew limit, stands there."""
+    """The state with what is asked for at its target, where it has arrived or no slew limit holds it."""
     target = opening_of_command(command, valve.dead_band)
-    arrives = abs(target - state.opening) <= SAME_INSTANT * valve.slew_limit
-    return SpoolState(target, 0.0) if valve.frequency == 0.0 and arrives else state
+    if abs(target - state.asked) > SAME_INSTANT * valve.slew_limit:
+        return state
+    return SpoolState(target, target if valve.frequency == 0.0 else state.opening, state.rate)
 
 
 def prepare_ideal(settings: Mapping[str, float], step: float) -> IdealProportional:
@@ -172,8 +185,9 @@ def prepare_ideal(settings: Mapping[str, float], step: float) -> IdealProportion
 def prepare_moving(settings: Mapping[str, float], step: float) -> MovingProportional:
     """Parameters of the moving valve for steps of ``step`` [s]: the exact transition of the spool."""
     limit = settings["slew_limit"] or NO_SLEW_LIMIT
-    if settings["spool_frequency"] == 0.0:
-        return MovingProportional(settings["dead_band"], limit, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if settings["spool_frequency"] == 0.0 or step <= 0.0:
+        still = (1.0, 0.0, 0.0, 1.0, 1.0, 0.0)
+        return MovingProportional(settings["dead_band"], limit, settings["spool_frequency"], 1.0, *still)
     frequency, damping_ratio = settings["spool_frequency"], settings["spool_damping_ratio"]
     transition = _spool_transition(2.0 * math.pi * frequency, damping_ratio, step)
     return MovingProportional(settings["dead_band"], limit, frequency, damping_ratio, *transition)
@@ -203,7 +217,7 @@ def _spool_transition(angular: float, damping_ratio: float, step: float) -> tupl
 
 def closed_at_rest() -> SpoolState:
     """A spool at rest in the middle."""
-    return SpoolState(0.0, 0.0)
+    return SpoolState(0.0, 0.0, 0.0)
 
 
 def closed() -> NoValveState:
@@ -225,6 +239,7 @@ IDEAL = ValveModel(
     connect=single_ports,
     port_flow=single_port_flow,
     port_flow_slopes=single_port_flow_slopes,
+    cuts=None,
     command_delay=dead_time,
     instant=instant_ideal,
     rates=rates_ideal,
@@ -241,6 +256,7 @@ MOVING = ValveModel(
     connect=blended_ports,
     port_flow=blended_port_flow,
     port_flow_slopes=blended_port_flow_slopes,
+    cuts=None,
     command_delay=dead_time,
     instant=instant_moving,
     rates=rates_moving,

@@ -10,24 +10,17 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
-from ppafo.model.plant import Openings, PlantParameters, blended_ports
-from ppafo.model.ports import (
-    SinglePort,
-    blended_port_flow,
-    blended_port_flow_slopes,
-    single_port_flow,
-    single_port_flow_slopes,
-)
+from ppafo.model.plant import Openings, PlantParameters
+from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.valves.kind import ValveKind, ValveModel
 
 NEVER = -1.0e9
+FOREVER = 1.0e9
 SAME_INSTANT = 1.0e-9
 
 
 class IdealSolenoid(NamedTuple):
-    """An ideal pair has one parameter for form's sake: a threshold on the command [-]."""
-
-    threshold: float
+    """An ideal pair has no parameters."""
 
 
 class PairPositions(NamedTuple):
@@ -77,19 +70,13 @@ def advance_ideal(
 
 def connect_positions(plant: PlantParameters, shown: PairPositions) -> tuple[SinglePort, SinglePort]:
     """Ports of both chambers for a pair that stands still; one full area each. Equation (8)."""
-    node_1 = plant.supply_pressure if shown.position_a > 0.5 else plant.atmospheric_pressure
-    node_2 = plant.dorsiflexion_pressure if shown.position_b > 0.5 else plant.atmospheric_pressure
-    port_1 = SinglePort(plant.valve_conductance, node_1, shown.position_a)
-    port_2 = SinglePort(plant.valve_conductance, node_2, shown.position_b)
+    open_a = shown.position_a > 0.5
+    open_b = shown.position_b > 0.5
+    node_1 = plant.supply_pressure if open_a else plant.atmospheric_pressure
+    node_2 = plant.dorsiflexion_pressure if open_b else plant.atmospheric_pressure
+    port_1 = SinglePort(plant.valve_conductance, node_1, 1.0 if open_a else 0.0)
+    port_2 = SinglePort(plant.valve_conductance, node_2, 1.0 if open_b else 0.0)
     return port_1, port_2
-
-
-def open_time(coil: Coil, begin: float, end: float) -> tuple[float, float]:
-    """Time [s] between ``begin`` and ``end`` that a coil left alone spends open, and its position at the end."""
-    changes = coil.position != coil.target and coil.change_time < end - SAME_INSTANT
-    change = max(begin, min(end, coil.change_time)) if changes else end
-    after = coil.target if changes else coil.position
-    return coil.position * (change - begin) + after * (end - change), after
 
 
 def accept_time(coil: Coil, switching_interval: float, time: float) -> float:
@@ -97,30 +84,67 @@ def accept_time(coil: Coil, switching_interval: float, time: float) -> float:
     return max(time, coil.accepted_time + switching_interval)
 
 
-def advance_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float, step: float) -> tuple[float, Coil]:
-    """Share of the step [-] that one valve is open to the source, exact, and the coil at the end of the step."""
-    end = time + step
-    at = accept_time(coil, valve.switching_interval, time)
-    accepts = wanted != coil.target and at < end - SAME_INSTANT
-    until = at if accepts else end
-    before, position = open_time(coil, time, until)
+def moved(coil: Coil, time: float) -> float:
+    """Position [-] of the flow at ``time`` [s] of a coil that was told nothing new."""
+    return coil.target if coil.change_time <= time + SAME_INSTANT else coil.position
+
+
+def told(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> Coil:
+    """A coil at ``time`` [s] with an order standing: the flow moves if it is due, then the order is taken if it may be.
+
+    A change that is still waiting when the coil is told otherwise is lost.
+    """
+    position = moved(coil, time)
+    accepts = wanted != coil.target and accept_time(coil, valve.switching_interval, time) <= time + SAME_INSTANT
     delay = valve.opening_delay if wanted > 0.5 else valve.closing_delay
-    target = wanted if accepts else coil.target
-    accepted = at if accepts else coil.accepted_time
-    change = at + delay if accepts else coil.change_time
-    told = Coil(position, target, accepted, change)
-    after, position = open_time(told, until, end)
-    return (before + after) / step, Coil(position, target, accepted, change)
+    at_once = accepts and delay <= SAME_INSTANT
+    return Coil(
+        wanted if at_once else position,
+        wanted if accepts else coil.target,
+        time if accepts else coil.accepted_time,
+        time + delay if accepts else coil.change_time,
+    )
+
+
+def next_coil_event(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> float:
+    """Time [s] at which a coil next takes a waiting order or its flow changes; huge for never."""
+    order = accept_time(coil, valve.switching_interval, time) if wanted != coil.target else FOREVER
+    change = coil.change_time if coil.position != coil.target else FOREVER
+    return min(order, change)
+
+
+def settle_timed(valve: TimedSolenoid, state: PairState, command: float, time: float) -> PairState:
+    """Both coils after the changes and orders that are due at ``time`` [s]."""
+    wanted_a, wanted_b = energised(command)
+    return PairState(told(valve, state.coil_a, wanted_a, time), told(valve, state.coil_b, wanted_b, time))
+
+
+def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, time: float) -> float:
+    """Time [s] at which a coil next takes a waiting order or its flow changes; huge for never."""
+    wanted_a, wanted_b = energised(command)
+    event_a = next_coil_event(valve, state.coil_a, wanted_a, time)
+    return min(event_a, next_coil_event(valve, state.coil_b, wanted_b, time))
+
+
+def switching_cuts(
+    valve: TimedSolenoid, state: PairState, command: float, time: float, step: float
+) -> tuple[float, float]:
+    """Times from the beginning of a step to the first and the second switching inside it [s]; 0 for none."""
+    now = settle_timed(valve, state, command, time)
+    first = next_timed_event(valve, now, command, time)
+    then = settle_timed(valve, now, command, first)
+    second = next_timed_event(valve, then, command, first)
+    end = time + step - SAME_INSTANT
+    first_cut = first - time if first < end else 0.0
+    return first_cut, (second - time if second < end else first_cut)
 
 
 def advance_timed(
     valve: TimedSolenoid, state: PairState, command: float, time: float, step: float
-) -> tuple[Openings, PairState]:
-    """Mean openings during the step and both coils at its end."""
-    wanted_a, wanted_b = energised(command)
-    share_a, coil_a = advance_coil(valve, state.coil_a, wanted_a, time, step)
-    share_b, coil_b = advance_coil(valve, state.coil_b, wanted_b, time, step)
-    return Openings(share_a, 1.0 - share_a, share_b, 1.0 - share_b), PairState(coil_a, coil_b)
+) -> tuple[PairPositions, PairState]:
+    """Positions during one part of a step, at whose beginning all that is due happens, and both coils."""
+    settled = settle_timed(valve, state, command, time)
+    return PairPositions(settled.coil_a.position, settled.coil_b.position), settled
 
 
 def instant_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> Openings:
@@ -156,41 +180,9 @@ def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairS
     return PairState(still, still)
 
 
-def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, time: float) -> float:
-    """Time [s] at which a coil next takes a waiting order or its flow changes."""
-    wanted_a, wanted_b = energised(command)
-    return min(
-        next_coil_event(valve, state.coil_a, wanted_a, time), next_coil_event(valve, state.coil_b, wanted_b, time)
-    )
-
-
-def next_coil_event(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> float:
-    """As ``next_timed_event``, for one coil."""
-    order = accept_time(coil, valve.switching_interval, time) if wanted != coil.target else math.inf
-    change = coil.change_time if coil.position != coil.target else math.inf
-    return min(order, change)
-
-
-def settle_timed(valve: TimedSolenoid, state: PairState, command: float, time: float) -> PairState:
-    """Both coils after the changes and orders that are due at ``time`` [s]."""
-    wanted_a, wanted_b = energised(command)
-    return PairState(settle_coil(valve, state.coil_a, wanted_a, time), settle_coil(valve, state.coil_b, wanted_b, time))
-
-
-def settle_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> Coil:
-    """As ``settle_timed``, for one coil: the flow changes first, then an order is taken and may act at once."""
-    now = time + SAME_INSTANT
-    position = coil.target if coil.change_time <= now else coil.position
-    if wanted == coil.target or accept_time(coil, valve.switching_interval, time) > now:
-        return Coil(position, coil.target, coil.accepted_time, coil.change_time)
-    delay = valve.opening_delay if wanted > 0.5 else valve.closing_delay
-    position = wanted if delay <= SAME_INSTANT else position
-    return Coil(position, wanted, time, time + delay)
-
-
 def prepare_ideal(settings: Mapping[str, float], step: float) -> IdealSolenoid:
     """Parameters of the ideal pair."""
-    return IdealSolenoid(0.0)
+    return IdealSolenoid()
 
 
 def prepare_timed(settings: Mapping[str, float], step: float) -> TimedSolenoid:
@@ -223,6 +215,7 @@ IDEAL = ValveModel(
     connect=connect_positions,
     port_flow=single_port_flow,
     port_flow_slopes=single_port_flow_slopes,
+    cuts=None,
     command_delay=no_dead_time,
     instant=instant_ideal,
     rates=rates_ideal,
@@ -236,9 +229,10 @@ TIMED = ValveModel(
     prepare=prepare_timed,
     initial=both_off_long_ago,
     advance=advance_timed,
-    connect=blended_ports,
-    port_flow=blended_port_flow,
-    port_flow_slopes=blended_port_flow_slopes,
+    connect=connect_positions,
+    port_flow=single_port_flow,
+    port_flow_slopes=single_port_flow_slopes,
+    cuts=switching_cuts,
     command_delay=no_dead_time,
     instant=instant_timed,
     rates=rates_timed,

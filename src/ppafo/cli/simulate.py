@@ -1,0 +1,81 @@
+"""``ppafo simulate SCENARIO``: runs a scenario and writes a result folder."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ppafo.cli.output import add_override_argument, print_result
+from ppafo.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from ppafo.simulation.result import Result
+
+EXIT_GOOD = 0
+EXIT_CHECK_FAILED = 1
+
+DEFAULT_FOLDER = Path("out")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help="name of a scenario, or a .toml file")
+    add_override_argument(parser)
+    parser.add_argument("--list", action="store_true", help="list the scenarios that come with the package")
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="result folder; default out/NAME of the scenario")
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Run a scenario and say what came of it; 1 where the run diverged."""
+    if parsed.list:
+        return _list(parsed)
+    if parsed.scenario is None:
+        raise ScenarioError("no scenario was given: name one or give a .toml file; 'ppafo simulate --list' shows them")
+    from ppafo.simulation.loading import load_scenario
+    from ppafo.simulation.simulate import simulate
+    from ppafo.storage import check_result_folder
+
+    scenario = load_scenario(parsed.scenario, parsed.overrides)
+    folder = parsed.out if parsed.out is not None else DEFAULT_FOLDER / scenario.name
+    check_result_folder(folder)
+    result = simulate(scenario)
+    _save(result, folder)
+    print_result(_text(result, folder), _document(result, folder), parsed.json)
+    return EXIT_GOOD if result.status.is_completed else EXIT_CHECK_FAILED
+
+
+def _save(result: "Result", folder: Path) -> None:
+    from ppafo.reporting.figures import figure_files
+
+    result.save(folder, figure_files(result.plot()))
+
+
+def _list(parsed: argparse.Namespace) -> int:
+    from ppafo.simulation.loading import list_scenarios, load_scenario
+
+    summaries = {name: load_scenario(name).description for name in list_scenarios()}
+    width = max(len(name) for name in summaries)
+    text = "\n".join(f"{name:<{width}}  {' '.join(summary.split())}" for name, summary in summaries.items())
+    document = {"scenarios": [{"name": name, "description": summary} for name, summary in summaries.items()]}
+    print_result(text, document, parsed.json)
+    return EXIT_GOOD
+
+
+def _text(result: "Result", folder: Path) -> str:
+    from ppafo.reporting.metrics_table import metrics_table
+
+    head = f"{result.scenario.name}: {result.status.message or result.status.kind}"
+    tail = f"written: {folder} (recording.nc, recording.csv, run.json, figure.png, figure.svg)"
+    return "\n".join([head, "", *metrics_table(result.metrics), "", tail])
+
+
+def _document(result: "Result", folder: Path) -> dict[str, Any]:
+    from ppafo.simulation.document import plain
+
+    metrics = {name: plain(metric) for name, metric in result.metrics.items()}
+    return {
+        "scenario": result.scenario.name,
+        "status": plain(result.status),
+        "metrics": metrics,
+        "folder": str(folder),
+    }

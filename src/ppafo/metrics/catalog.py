@@ -1,0 +1,21 @@
+"""Every metric by name. To add one: a function and its MetricKind in a module of this folder, listed in METRICS."""
+
+from ppafo.metrics import gas, motion, switching, tracking
+from ppafo.metrics.metric import Metric, MetricKind
+from ppafo.signals import Recording
+
+METRICS: dict[str, MetricKind] = {
+    kind.name: kind for kind in (*tracking.METRICS, *gas.METRICS, *switching.METRICS, *motion.METRICS)
+}
+
+
+def evaluate(recording: Recording) -> dict[str, Metric]:
+    """Return every metric that the channels of the recording allow; one sample alone allows none."""
+    found: dict[str, Metric] = {}
+    for kind in METRICS.values():
+        if len(recording) < 2 or not set(kind.channels) <= set(recording.names):
+            continue
+        value = kind.compute(recording)
+        if value is not None:
+            found[kind.name] = Metric(value, kind.unit, kind.summary)
+    return found

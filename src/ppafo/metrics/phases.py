@@ -1,0 +1,30 @@
+"""The two parts of a torque task: the ramp, and the hold after it."""
+
+import numpy as np
+
+from ppafo.signals import Recording
+
+_SAME_LEVEL = 1.0e-9
+
+
+def hold_start(recording: Recording) -> float | None:
+    """Return the time [s] from which on the reference stays at its final level; None where it never rests there."""
+    reference = recording["reference"]
+    tolerance = _SAME_LEVEL * float(np.max(np.abs(reference)))
+    away = np.flatnonzero(np.abs(reference - reference[-1]) > tolerance)
+    first = int(away[-1]) + 1 if away.size else 0
+    return float(recording.time[first]) if len(recording) - first >= 2 else None
+
+
+def ramp(recording: Recording) -> Recording | None:
+    """Return the recording until the reference reaches the level it keeps; None where there is no ramp or no hold."""
+    start = hold_start(recording)
+    if start is None or start == recording.time[0]:
+        return None
+    return recording.between(float(recording.time[0]), start)
+
+
+def hold(recording: Recording) -> Recording | None:
+    """Return the recording from where the reference stays at its final level; None where it never does."""
+    start = hold_start(recording)
+    return None if start is None else recording.between(start, float(recording.time[-1]))

@@ -1,0 +1,104 @@
+"""Figure 8 of the paper: the torque task with both valves, as simulated, and the gas that each takes."""
+
+from typing import TYPE_CHECKING
+
+from ppafo.reporting.figures import GRAMS_PER_KILOGRAM
+from ppafo.reporting.style import ACTUAL, BLUE, GREY, VERMILION, WANTED, house_style
+from ppafo.signals import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_SIZE = (7.6, 8.2)
+"""Inches."""
+_HEIGHTS = (3.0, 0.9, 3.0, 0.9, 2.0)
+_SOLENOID, _PROPORTIONAL = VERMILION, BLUE
+
+
+def torque_task_figure(
+    solenoid: Recording, proportional: Recording, ceiling: float, gas_in_paper: tuple[float, float]
+) -> "Figure":
+    """Return figure 8: torque and reference with each valve, what the valve does below, and the gas at the bottom.
+
+    ``ceiling`` is the torque that the supply can hold [N m], ``gas_in_paper`` what the paper states for the solenoid
+    valves and for the proportional valve [g].
+    """
+    with house_style():
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=_SIZE, layout="constrained")
+        grid = figure.subplots(5, 1, sharex=True, height_ratios=_HEIGHTS)
+        _torque(grid[0], solenoid, "Solenoid valves: on or off, decided every 50 ms", _SOLENOID, ceiling)
+        _states(grid[1], solenoid)
+        _torque(grid[2], proportional, "Proportional valve: PID controller", _PROPORTIONAL, ceiling)
+        _opening(grid[3], proportional)
+        _gas(grid[4], solenoid, proportional, gas_in_paper)
+        grid[4].set_xlabel("Time (s)")
+        grid[4].set_xlim(float(solenoid.time[0]), float(solenoid.time[-1]))
+        figure.align_ylabels(grid)
+        return figure
+
+
+def _torque(axes: "Axes", recording: Recording, title: str, colour: str, ceiling: float) -> None:
+    axes.axhline(ceiling, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)), zorder=0.9)
+    axes.plot(recording.time, recording["reference"], "--", color=WANTED, linewidth=1.3, label="reference")
+    axes.plot(recording.time, recording["torque"], color=colour, label="torque, simulated")
+    axes.set_title(title)
+    axes.set_ylabel("Torque (N m)")
+    axes.annotate(
+        f"most that the supply can hold: {ceiling:.1f} N m",
+        (1.0, ceiling),
+        xycoords=("axes fraction", "data"),
+        xytext=(-2, -4),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=8.5,
+        color=GREY,
+    )
+    axes.legend(loc="lower right")
+
+
+def _states(axes: "Axes", recording: Recording) -> None:
+    """Show which of the two valves is on, as bars."""
+    command = recording["command"]
+    for row, is_on, colour in ((1, command > 0.0, _SOLENOID), (0, command < 0.0, GREY)):
+        axes.fill_between(
+            recording.time, row + 0.12, row + 0.88, where=list(is_on), step="post", color=colour, linewidth=0.0
+        )
+    axes.set_ylim(0.0, 2.0)
+    axes.set_yticks((0.5, 1.5), ("B on", "A on"))
+    axes.tick_params(axis="y", length=0.0, labelsize=8.5)
+    axes.grid(visible=False)
+    axes.set_ylabel("Valve", rotation=90)
+
+
+def _opening(axes: "Axes", recording: Recording) -> None:
+    axes.plot(recording.time, recording["command"], color=_PROPORTIONAL, drawstyle="steps-post")
+    axes.set_ylim(-0.08, 1.08) if recording["command"].min() >= 0.0 else axes.set_ylim(-1.1, 1.1)
+    axes.set_ylabel("Opening")
+
+
+def _gas(axes: "Axes", solenoid: Recording, proportional: Recording, gas_in_paper: tuple[float, float]) -> None:
+    for recording, name, colour, stated in (
+        (solenoid, "solenoid valves", _SOLENOID, gas_in_paper[0]),
+        (proportional, "proportional valve", _PROPORTIONAL, gas_in_paper[1]),
+    ):
+        supplied = GRAMS_PER_KILOGRAM * recording["supplied_mass"]
+        axes.plot(recording.time, supplied, color=colour)
+        axes.axhline(stated, color=colour, linewidth=0.9, linestyle=(0, (1, 2)), zorder=0.9)
+        axes.annotate(
+            f"{name}: {supplied[-1]:.2f} g simulated, {stated:g} g in the paper",
+            (1.0, max(float(supplied[-1]), stated)),
+            xycoords=("axes fraction", "data"),
+            xytext=(-2, 4),
+            textcoords="offset points",
+            ha="right",
+            va="bottom",
+            fontsize=8.5,
+            color=colour,
+        )
+    axes.set_title("Gas taken from the supply")
+    axes.set_ylabel("CO$_2$ (g)")
+    axes.set_ylim(0.0, 1.3 * max(gas_in_paper[0], GRAMS_PER_KILOGRAM * float(solenoid["supplied_mass"][-1])))

@@ -1,0 +1,34 @@
+"""The channels that the package knows by name: SI unit, meaning, and how to read between two samples."""
+
+from dataclasses import dataclass
+
+TIME = "time"
+TIME_UNIT = "s"
+PLAIN_NUMBER = "-"
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelKind:
+    """A known channel; a held one keeps its value until the next sample, the others run straight to it."""
+
+    unit: str
+    summary: str
+    is_held: bool = False
+
+
+CHANNELS: dict[str, ChannelKind] = {
+    "angle": ChannelKind("rad", "ankle angle, growing in plantarflexion"),
+    "angular_velocity": ChannelKind("rad/s", "ankle angular velocity"),
+    "pressure_1": ChannelKind("Pa", "absolute pressure in chamber 1, the one that grows with the angle"),
+    "pressure_2": ChannelKind("Pa", "absolute pressure in chamber 2"),
+    "torque": ChannelKind("N m", "actuator torque, positive in plantarflexion"),
+    "reference": ChannelKind("N m", "torque that the controller was asked for"),
+    "command": ChannelKind(PLAIN_NUMBER, "command to the valve, from -1 to 1", is_held=True),
+    "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start"),
+    "vented_mass": ChannelKind("kg", "gas let out to the atmosphere since the start"),
+    "leaked_mass": ChannelKind("kg", "gas leaked from chamber 1 to chamber 2 since the start"),
+    "external_torque": ChannelKind("N m", "torque on the wearer, T_ex of equation (1)"),
+    "mass_1": ChannelKind("kg", "gas in chamber 1"),
+    "mass_2": ChannelKind("kg", "gas in chamber 2"),
+}
+"""To add one: one line here. A recording may also have channels that are not listed."""

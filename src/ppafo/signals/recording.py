@@ -1,0 +1,194 @@
+"""A recording: time and named channels with units. Measured and simulated data take the same road from here on."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ppafo.errors import DataError, nearest_name
+from ppafo.signals.channels import CHANNELS, TIME
+
+Floats = NDArray[np.float64]
+
+_NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """Values of one quantity, read-only, and their unit as SI text: ``rad``, ``Pa`` (absolute), ``N m``, ``-``."""
+
+    values: Floats
+    unit: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", _read_only(self.values))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Channel) and self.unit == other.unit and np.array_equal(self.values, other.values)
+
+    __hash__ = None  # type: ignore[assignment]  # arrays have no hash
+
+    def __reduce__(self) -> tuple[Callable[..., "Channel"], tuple[Any, ...]]:
+        """Copy and unpickle through the constructor, so that the values stay read-only."""
+        return Channel, (self.values, self.unit)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """Channels over a common, strictly increasing time [s]; all values are finite.
+
+    ``is_synthetic`` marks a recording that a model made and nobody measured; figures and reports say so.
+    """
+
+    label: str
+    time: Floats
+    channels: Mapping[str, Channel]
+    is_synthetic: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time", _read_only(self.time))
+        object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
+        if not self.label or not self.label.isprintable():
+            raise DataError(f"the label of a recording is one line of text, not {self.label!r}")
+        _check_time(self)
+        for name in self.channels:
+            _check_channel(self, name)
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Recording)
+            and (self.label, self.is_synthetic) == (other.label, other.is_synthetic)
+            and np.array_equal(self.time, other.time)
+            and dict(self.channels) == dict(other.channels)
+        )
+
+    __hash__ = None  # type: ignore[assignment]  # arrays have no hash
+
+    def __reduce__(self) -> tuple[Callable[..., "Recording"], tuple[Any, ...]]:
+        """Copy and unpickle through the constructor: a read-only mapping cannot be pickled."""
+        return Recording, (self.label, self.time, dict(self.channels), self.is_synthetic)
+
+    def __getitem__(self, name: str) -> Floats:
+        """Return the values of a channel, read-only, in its SI unit."""
+        return self._channel(name).values
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.channels
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.time)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the channels, in the order in which they were given."""
+        return tuple(self.channels)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    def unit(self, name: str) -> str:
+        """Return the SI unit of a channel; ``-`` for a plain number."""
+        return self._channel(name).unit
+
+    def with_channel(self, name: str, values: ArrayLike, unit: str) -> "Recording":
+        """Return the recording with one channel added or replaced."""
+        channel = Channel(np.asarray(values, dtype=np.float64), unit)
+        return Recording(self.label, self.time, {**self.channels, name: channel}, self.is_synthetic)
+
+    def between(self, start: float, end: float) -> "Recording":
+        """Return the samples with ``start`` <= time <= ``end`` [s]; times stay as they are."""
+        inside = (self.time >= start) & (self.time <= end)
+        if not inside.any():
+            raise DataError(f"{self.label}: there is no sample between {start:g} s and {end:g} s; {_span(self)}")
+        kept = {name: Channel(channel.values[inside], channel.unit) for name, channel in self.channels.items()}
+        return Recording(self.label, self.time[inside], kept, self.is_synthetic)
+
+    def resampled(self, times: ArrayLike) -> "Recording":
+        """Return the recording at other times [s] within its own: the last value of a held channel, else a line."""
+        wanted = np.asarray(times, dtype=np.float64)
+        if wanted.size and (wanted.min() < self.time[0] or wanted.max() > self.time[-1]):
+            raise DataError(
+                f"{self.label}: nothing is known from {wanted.min():g} s to {wanted.max():g} s; {_span(self)}"
+            )
+        moved = {name: Channel(_values_at(self, name, wanted), self.unit(name)) for name in self.names}
+        return Recording(self.label, wanted, moved, self.is_synthetic)
+
+    def _channel(self, name: str) -> Channel:
+        if name not in self.channels:
+            hint = nearest_name(name, self.names)
+            raise DataError(f"{self.label}: there is no channel '{name}'{hint}; there are {', '.join(self.names)}")
+        return self.channels[name]
+
+
+def aligned(first: Recording, second: Recording) -> tuple[Recording, Recording]:
+    """Return both recordings at the times of the first that lie within the second, for a comparison in time."""
+    start, end = max(first.time[0], second.time[0]), min(first.time[-1], second.time[-1])
+    if start > end:
+        raise DataError(f"{first.label} and {second.label} have no time in common: {_span(first)}, {_span(second)}")
+    common = first.between(float(start), float(end))
+    return common, second.resampled(common.time)
+
+
+def _values_at(recording: Recording, name: str, times: Floats) -> Floats:
+    values = recording[name]
+    if name in CHANNELS and CHANNELS[name].is_held:
+        return values[np.searchsorted(recording.time, times, side="right") - 1]
+    return np.interp(times, recording.time, values)
+
+
+def _check_time(recording: Recording) -> None:
+    time = recording.time
+    if time.size == 0:
+        raise DataError(f"{recording.label}: has no samples")
+    _check_finite(recording, "time", time)
+    stalled = np.flatnonzero(np.diff(time) <= 0.0)
+    if stalled.size:
+        index = int(stalled[0]) + 1
+        raise DataError(
+            f"{recording.label}: time must grow from sample to sample, but {time[index]:g} s (sample {index + 1}) "
+            f"follows {time[index - 1]:g} s"
+        )
+
+
+def _check_channel(recording: Recording, name: str) -> None:
+    channel = recording.channels[name]
+    if _NAME.fullmatch(name) is None or name == TIME:
+        raise DataError(
+            f"{recording.label}: {name!r} cannot name a channel; letters, digits and _ can, except '{TIME}'"
+        )
+    if not channel.unit.strip() or not channel.unit.isprintable() or set(channel.unit) & set("[]"):
+        raise DataError(f"{recording.label}: channel '{name}' has no usable unit: {channel.unit!r}; a number has '-'")
+    if len(channel.values) != len(recording.time):
+        counts = f"{len(channel.values)} values for {len(recording.time)} times"
+        raise DataError(f"{recording.label}: channel '{name}' has {counts}")
+    _check_finite(recording, f"channel '{name}'", channel.values)
+    if name in CHANNELS and channel.unit != CHANNELS[name].unit:
+        raise DataError(
+            f"{recording.label}: channel '{name}' is in '{channel.unit}', it is always kept in '{CHANNELS[name].unit}'"
+        )
+
+
+def _check_finite(recording: Recording, name: str, values: Floats) -> None:
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        index = int(bad[0])
+        raise DataError(f"{recording.label}: {name} is {values[index]} at sample {index + 1}, not a finite number")
+
+
+def _read_only(values: ArrayLike) -> Floats:
+    copy = np.array(values, dtype=np.float64)
+    if copy.ndim != 1:
+        raise DataError(f"a channel is a plain list of numbers, not an array of {copy.ndim} dimensions")
+    copy.setflags(write=False)
+    return copy
+
+
+def _span(recording: Recording) -> str:
+    return f"{recording.label} goes from {recording.time[0]:g} s to {recording.time[-1]:g} s"

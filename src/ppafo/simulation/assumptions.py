@@ -1,0 +1,80 @@
+"""The values of a scenario that no source gives, each with what it is and why."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from ppafo.errors import ScenarioError, nearest_name
+from ppafo.model.declaration import Quantity
+from ppafo.parameters import ParameterSet
+from ppafo.parameters.declaration import SPECIES_PATH
+from ppafo.parameters.parameter_set import shown as shown_entry
+from ppafo.simulation.declaration import quantities, value_at
+from ppafo.simulation.overriding import device_paths, scenario_paths, split_override
+from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.scenario import Assumption
+
+_SECTION = "assumed"
+
+
+@dataclass(frozen=True, slots=True)
+class Hardware:
+    """The parameter set with all overrides in it and the name of its valve that is used."""
+
+    parameter_set: ParameterSet
+    valve: str
+
+
+def read_assumptions(
+    before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[str]
+) -> tuple[Assumption, ...]:
+    """Return every assumption that still has a value; one that an override replaced says what it was ``before``."""
+    replaced = frozenset(split_override(text)[0] for text in overrides)
+    notes: Mapping[str, str] = reading.document.get(_SECTION, {})
+    assumptions = []
+    for path, note in notes.items():
+        value, earlier = _value(reading, hardware, path), _value(before, hardware, path)
+        if value is None and earlier is None:
+            raise _unknown(reading, path)
+        if value is not None:
+            assumptions.append(
+                Assumption(path, value, _note(before, path, note, earlier) if path in replaced else note)
+            )
+    return tuple(assumptions)
+
+
+def _note(before: Reading, path: str, note: str, earlier: str | None) -> str:
+    """Return the note of a value that an override has replaced."""
+    was = earlier if value_at(before.document, path) is not None else "another value"
+    return f"set by an override; the scenario has {was}: {note}"
+
+
+def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
+    """Return the value at a path as written in the file or, where it has none, the default; None without either."""
+    given = value_at(reading.document, path)
+    if path in scenario_paths(reading.document) and given is not None:
+        return str(given)
+    quantity = quantities(reading.document).get(path)
+    return _device_value(hardware, path) if quantity is None else _default(quantity)
+
+
+def _device_value(hardware: Hardware, path: str) -> str | None:
+    full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+    if path == SPECIES_PATH:
+        return hardware.parameter_set.texts[path].value
+    entry = hardware.parameter_set.numbers.get(full)
+    quantity = hardware.parameter_set.declared().get(full)
+    if entry is not None:
+        return shown_entry(entry)
+    return None if quantity is None else _default(quantity)
+
+
+def _default(quantity: Quantity) -> str | None:
+    return None if quantity.default is None else written(quantity.default, quantity.unit)
+
+
+def _unknown(reading: Reading, path: str) -> ScenarioError:
+    hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
+    on_one_line = " ".join(path.split())
+    return ScenarioError(
+        f"{reading.file}: [{_SECTION}] names '{on_one_line}', which has no value in this scenario{hint}"
+    )

@@ -1,0 +1,138 @@
+"""From the document of a scenario file to a Scenario in SI units."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ppafo.errors import ParameterError, nearest_name
+from ppafo.parameters import apply_overrides as apply_device_overrides
+from ppafo.parameters import build_device, list_sets, load_parameter_set
+from ppafo.parameters.device import Device, Supply
+from ppafo.parameters.parameter_set import chosen_valve
+from ppafo.simulation.assumptions import Hardware, read_assumptions
+from ppafo.simulation.clock import read_clock
+from ppafo.simulation.declaration import (
+    AT_REST,
+    INITIAL,
+    PRESSURE_WORDS,
+    SEED,
+    SENSORS,
+    TORQUE_LEVEL,
+    controller_settings,
+    kind_at,
+    value_at,
+)
+from ppafo.simulation.motion import read_motion, read_profile
+from ppafo.simulation.overriding import Changed
+from ppafo.simulation.reading import Reading
+from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors
+
+_NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What a scenario is made from.
+
+    ``file`` is what messages call it, ``path`` the file itself if there is one, ``folder`` where relative paths begin,
+    ``content`` the document as it was given.
+    """
+
+    file: str
+    path: str | None
+    folder: Path
+    content: dict[str, Any]
+    overrides: tuple[str, ...]
+
+
+def build_scenario(given: Given, changed: Changed) -> Scenario:
+    """Return the scenario of a document that has the right keys, or refuse the first value that is not usable."""
+    document = changed.document
+    reading = Reading(given.file, document, changed.paths)
+    hardware = _hardware(reading, given.folder, changed.device)
+    device = _device(reading, hardware)
+    clock = read_clock(reading)
+    before = Reading(given.file, given.content)
+    return Scenario(
+        name=document["name"],
+        description=document.get("description", ""),
+        device=device,
+        duration=clock.duration,
+        time_step=clock.step,
+        output_interval=clock.output_interval,
+        motion=read_motion(reading, device, clock.duration, clock.step),
+        initial_pressure_1=_initial_pressure(reading, 0, device.supply),
+        initial_pressure_2=_initial_pressure(reading, 1, device.supply),
+        control=_control(reading, clock.period),
+        reference=read_profile(reading, "reference", TORQUE_LEVEL) if "reference" in document else _NOTHING_TO_FOLLOW,
+        sensors=_sensors(reading, clock.duration),
+        assumptions=read_assumptions(before, reading, hardware, given.overrides),
+        origin=Origin(given.path, document["device"]["set"], hardware.valve, given.overrides, given.content),
+    )
+
+
+def _hardware(reading: Reading, folder: Path, overrides: tuple[str, ...]) -> Hardware:
+    """Return the parameter set with the overrides of the file and then those of the caller."""
+    section = reading.document["device"]
+    valve = section.get("valve")
+    try:
+        parameter_set = load_parameter_set(_set_name(section["set"], folder))
+        name = chosen_valve(parameter_set, valve)
+        parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
+    except ParameterError as error:
+        raise _of_device(reading, error) from error
+    except OSError as error:
+        raise reading.refusal("device.set", f"cannot be looked up: {error.strerror or error}") from error
+    return Hardware(apply_device_overrides(parameter_set, overrides, valve), name)
+
+
+def _set_name(name: str, folder: Path) -> str:
+    """Return the name of a set of the package, or the path of a set file, which may be relative to the scenario."""
+    is_path = Path(name).suffix == ".toml" or "/" in name
+    return str(folder / name) if is_path and name not in list_sets() else name
+
+
+def _device(reading: Reading, hardware: Hardware) -> Device:
+    try:
+        return build_device(hardware.parameter_set, hardware.valve)
+    except ParameterError as error:
+        raise _of_device(reading, error) from error
+
+
+def _of_device(reading: Reading, error: ParameterError) -> ParameterError:
+    """Return the error with the scenario it happened in, on one line whatever the names are."""
+    return ParameterError(f"{reading.file}: [device]: {' '.join(str(error).split())}")
+
+
+def _initial_pressure(reading: Reading, chamber: int, supply: Supply) -> float:
+    """Return the pressure [Pa absolute] of a chamber at the start, from a number or a word."""
+    quantity = INITIAL[chamber]
+    path = f"initial.{quantity.name}"
+    value = value_at(reading.document, path)
+    word = AT_REST if value is None else value
+    if isinstance(word, str) and word.strip() in PRESSURE_WORDS:
+        return float(getattr(supply, PRESSURE_WORDS[word.strip()]))
+    if isinstance(word, str) and not any(character.isdigit() for character in word):
+        words = ", ".join(PRESSURE_WORDS)
+        hint = nearest_name(word, PRESSURE_WORDS)
+        raise reading.refusal(path, f"is neither a pressure such as '50 psi_g' nor one of {words}{hint}")
+    return reading.number(path, quantity, supply.atmospheric_pressure)
+
+
+def _control(reading: Reading, period: float) -> Control:
+    kind = kind_at(reading.document, "controller")
+    return Control(kind, reading.section("controller", controller_settings(kind)), period)
+
+
+def _sensors(reading: Reading, duration: float) -> Sensors:
+    values = reading.section("sensors", SENSORS)
+    if values["delay"] > duration:
+        raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
+    return Sensors(
+        delay=values["delay"],
+        angle_noise=values["angle_noise"],
+        pressure_noise=values["pressure_noise"],
+        angle_quantum=values["angle_resolution"],
+        pressure_quantum=values["pressure_resolution"],
+        seed=int(reading.number("sensors.seed", SEED)),
+    )

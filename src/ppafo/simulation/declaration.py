@@ -1,0 +1,118 @@
+"""Every value that a scenario can hold: section, name, SI unit, range, default and meaning.
+
+The schema, the conversion to SI, the messages and the overrides all read these lists; the settings of controllers and
+profiles come from their own catalogues. Limits are wide: they exclude slips of the pen and what no solver could handle.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.model.declaration import Quantity
+
+LARGEST_SEED = 2**32 - 1
+
+RUN = (
+    Quantity("duration", "s", "length of the run", None, 0.0, 1.0e6, minimum_allowed=False),
+    Quantity("step", "s", "largest step; 1 ms unless given, less where a sample comes sooner", 1.0e-3, 1.0e-8, 1.0e3),
+    Quantity("output_interval", "s", "time between two recorded samples; the step unless given", 1.0e-3, 1.0e-8, 1.0e6),
+)
+ANGLE = Quantity("angle", "rad", "angle of the vane, 90 deg neutral, growing in plantarflexion", None, -10.0, 10.0)
+FREE = (
+    ANGLE,
+    Quantity("angular_velocity", "rad/s", "angular velocity at the start", 0.0, -1.0e4, 1.0e4),
+    Quantity("external_torque", "N m", "constant torque T_ex, above 0 against plantarflexion", 0.0, -1.0e4, 1.0e4),
+)
+INITIAL = (
+    Quantity("pressure_1", "Pa_a", "pressure in chamber 1 at the start", None, 1.0e3, 1.0e8),
+    Quantity("pressure_2", "Pa_a", "pressure in chamber 2 at the start", None, 1.0e3, 1.0e8),
+)
+PRESSURE_WORDS = {
+    "supply": "pressure",
+    "dorsiflexion_supply": "dorsiflexion_pressure",
+    "atmosphere": "atmospheric_pressure",
+}
+"""Words that stand for a pressure of the device, and the name of that pressure in its supply."""
+AT_REST = "atmosphere"
+
+SENSORS = (
+    Quantity("delay", "s", "age of a measurement when the controller uses it", 0.0, 0.0, 1.0e6),
+    Quantity("angle_noise", "rad", "standard deviation of the measured angle", 0.0, 0.0, 10.0),
+    Quantity("pressure_noise", "Pa_d", "standard deviation of the measured pressures", 0.0, 0.0, 1.0e8),
+    Quantity("angle_resolution", "rad", "step of the measured angle", 0.0, 0.0, 10.0),
+    Quantity("pressure_resolution", "Pa_d", "step of the measured pressures", 0.0, 0.0, 1.0e8),
+)
+SEED = Quantity("seed", "", "seed of the noise, a whole number", 1.0, 0.0, float(LARGEST_SEED))
+
+RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.0e-6, 1.0e8)
+PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6)
+SAMPLING = (RATE, PERIOD)
+
+TORQUE_LEVEL = Quantity("level", "N m", "", None, -1.0e4, 1.0e4)
+ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
+
+MOTIONS = ("free", "held", "led")
+SECTIONS = ("device", "run", "motion", "initial", "controller", "reference", "sensors", "assumed")
+TEXTS = ("name", "description", "device.set", "device.valve")
+
+
+def controller_settings(kind: str) -> tuple[Quantity, ...]:
+    """Return the settings of a controller of the catalogue, none where it is unknown."""
+    return CONTROLLERS[kind].quantities if kind in CONTROLLERS else ()
+
+
+def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
+    """Return the settings of a profile; a level, which has no unit of its own, gets that of what is prescribed."""
+    return tuple(_level(item, prescribed) for item in PROFILES[kind].quantities) if kind in PROFILES else ()
+
+
+def motion_settings(kind: str) -> tuple[Quantity, ...]:
+    """Return the settings of a kind of motion; a led one has a profile instead."""
+    return {"free": FREE, "held": (ANGLE,)}.get(kind, ())
+
+
+def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
+    """Return the declaration of every number that a document with its kinds can hold, by path."""
+    motion = kind_at(document, "motion")
+    sections = {
+        "run": RUN,
+        "motion": motion_settings(motion),
+        "motion.profile": profile_settings(kind_at(document, "motion.profile"), ANGLE_LEVEL) if motion == "led" else (),
+        "initial": INITIAL,
+        "controller": SAMPLING + controller_settings(kind_at(document, "controller")),
+        "reference": profile_settings(kind_at(document, "reference"), TORQUE_LEVEL),
+        "sensors": (*SENSORS, SEED),
+    }
+    return {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
+
+
+def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the paths of every text that a document can hold."""
+    kinds = ["motion.kind", "controller.kind", "reference.kind"]
+    return (*TEXTS, *kinds, *(["motion.profile.kind"] if kind_at(document, "motion") == "led" else []))
+
+
+def kind_at(document: Mapping[str, Any], section: str) -> str:
+    """Return the kind that a section names, an empty text where it does not."""
+    kind = value_at(document, f"{section}.kind")
+    return kind if isinstance(kind, str) else ""
+
+
+def value_at(document: Mapping[str, Any], path: str) -> Any:
+    """Return what a document has at a dotted path, None where it has nothing."""
+    node: Any = document
+    for part in path.split("."):
+        node = node.get(part) if isinstance(node, Mapping) else None
+    return node
+
+
+def _level(quantity: Quantity, prescribed: Quantity) -> Quantity:
+    if quantity.unit:
+        return quantity
+    return replace(
+        quantity,
+        unit=prescribed.unit,
+        minimum=max(quantity.minimum, prescribed.minimum),
+        maximum=min(quantity.maximum, prescribed.maximum),
+    )

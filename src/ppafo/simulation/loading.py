@@ -1,0 +1,99 @@
+"""From a name, a file or plain Python values to a scenario; every mistake is one clear line."""
+
+import copy
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from ppafo.errors import ScenarioError, nearest_name
+from ppafo.simulation.building import Given, build_scenario
+from ppafo.simulation.overriding import apply_overrides
+from ppafo.simulation.problems import first_problem, is_gap
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.schema import scenario_file
+from ppafo.simulation.toml_text import parse_toml, read_bytes
+
+_SCENARIOS = resources.files("ppafo") / "scenarios"
+_SUFFIX = ".toml"
+
+
+def list_scenarios() -> tuple[str, ...]:
+    """Return the names of the scenarios that come with the package."""
+    names = (Path(item.name) for item in _SCENARIOS.iterdir())
+    return tuple(sorted(name.stem for name in names if name.suffix == _SUFFIX))
+
+
+def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
+    """Return a scenario by its name in the package or by the path of a TOML file, in SI units.
+
+    ``overrides`` are texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
+    ``valve.area=12.6mm^2``.
+    """
+    name = str(name_or_path)
+    if name in list_scenarios():
+        return parse_scenario((_SCENARIOS / (name + _SUFFIX)).read_bytes(), name, overrides)
+    path = Path(name_or_path)
+    if path.suffix != _SUFFIX and not _exists(path):
+        hint = nearest_name(name, list_scenarios())
+        known = ", ".join(list_scenarios())
+        on_one_line = " ".join(name.split())
+        raise ScenarioError(f"there is no scenario '{on_one_line}'{hint}; known are {known}, or give a .toml file")
+    return parse_scenario(read_bytes(path, _label(name)), name, overrides, path.parent)
+
+
+def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
+    """Return the scenario in the bytes of a TOML file; relative paths in it begin in ``folder``."""
+    document = parse_toml(content, _label(file))
+    return _scenario(Given(_label(file), file, folder or Path(), document, tuple(overrides)))
+
+
+def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()) -> Scenario:
+    """Return a scenario from nested dictionaries that are laid out as a scenario file is.
+
+    Quantities are texts with their unit, ``{"angle": "75 deg"}``; relative paths begin in the working folder.
+    """
+    if not isinstance(content, Mapping):
+        raise ScenarioError(f"a scenario is a dictionary laid out as a scenario file, not a {type(content).__name__}")
+    name = content.get("name")
+    file = f"scenario '{_label(name)}'" if isinstance(name, str) else "scenario"
+    return _scenario(Given(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides)))
+
+
+def _scenario(given: Given) -> Scenario:
+    """Check the keys of the file itself, put the overrides in, and then ask for all that is needed."""
+    if given.overrides:
+        wrong = [item for item in _problems(given.content) if not is_gap(item)]
+        _refuse(wrong, given.file)
+    changed = apply_overrides(given.content, given.overrides, given.file)
+    _refuse(_problems(changed.document), given.file)
+    return build_scenario(given, changed)
+
+
+def _problems(document: dict[str, Any]) -> list[ErrorDetails]:
+    """Return unknown keys, unknown kinds and gaps."""
+    try:
+        scenario_file().model_validate(document)
+    except ValidationError as error:
+        return error.errors(include_url=False)
+    return []
+
+
+def _refuse(problems: list[ErrorDetails], file: str) -> None:
+    if problems:
+        raise ScenarioError(f"{file}: {first_problem(problems, scenario_file())}")
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
+def _label(file: str) -> str:
+    """Return what messages call a file, on one line."""
+    return " ".join(file.split())

@@ -1,0 +1,67 @@
+"""What the vane does, read from a scenario and checked against the stops of the device."""
+
+from collections.abc import Iterator
+
+from ppafo.control.catalog import PROFILES
+from ppafo.errors import ScenarioError
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.device import Device
+from ppafo.simulation.declaration import ANGLE, ANGLE_LEVEL, FREE, kind_at, profile_settings
+from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice
+
+MOST_CHECKED_TIMES = 20_000
+_TOLERANCE = 1.0e-9
+_ANGLE_PATH = "motion.angle"
+
+
+def read_motion(reading: Reading, device: Device, duration: float, step: float) -> FreeMotion | LedMotion:
+    """Return the motion of the vane, which stays between the stops at every time that it prescribes."""
+    kind = kind_at(reading.document, "motion")
+    if kind == "led":
+        profile = read_profile(reading, "motion.profile", ANGLE_LEVEL)
+        _check_profile(reading, device, profile, duration, step)
+        return LedMotion(profile)
+    angle = reading.number(_ANGLE_PATH, ANGLE)
+    if not _is_between_stops(device, angle):
+        raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_stops(device)}")
+    if kind == "held":
+        return LedMotion(ProfileChoice("constant", {"level": angle}))
+    return FreeMotion(**reading.section("motion", FREE))
+
+
+def read_profile(reading: Reading, section: str, prescribed: Quantity) -> ProfileChoice:
+    """Return a function of time with all its settings in SI."""
+    kind = kind_at(reading.document, section)
+    return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))
+
+
+def _check_profile(reading: Reading, device: Device, profile: ProfileChoice, duration: float, step: float) -> None:
+    for time, angle in _angles(profile, duration, step):
+        if not _is_between_stops(device, angle):
+            raise ScenarioError(
+                f"{reading.file}: [motion.profile] leaves the stops of {device.name}, {_stops(device)}: it is at "
+                f"{written(angle, 'rad')} at {time:.6g} s"
+            )
+
+
+def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tuple[float, float]]:
+    """Yield times and angles [rad]: those that the engine asks for, and the crests between them."""
+    kind = PROFILES[profile.kind]
+    parameters = kind.parameters(*(profile.settings[item.name] for item in kind.quantities))
+    count = max(1, min(MOST_CHECKED_TIMES, round(duration / step)))
+    for number in range(count + 1):
+        time = duration * number / count
+        angle, rate, acceleration = kind.value(parameters, time)
+        yield time, angle
+        away = -rate / acceleration if acceleration else 0.0
+        if 0.0 < away < min(duration / count, duration - time):
+            yield time + away, angle + 0.5 * rate * away
+
+
+def _is_between_stops(device: Device, angle: float) -> bool:
+    return device.actuator.angle_min - _TOLERANCE <= angle <= device.actuator.angle_max + _TOLERANCE
+
+
+def _stops(device: Device) -> str:
+    return f"{written(device.actuator.angle_min, 'rad')} to {written(device.actuator.angle_max, 'rad')}"

@@ -1,0 +1,150 @@
+"""From a scenario to a run: step sizes, rows of parameters, initial gas."""
+
+import math
+
+import numpy as np
+
+from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.control.kind import ProfileKind
+from ppafo.engine.program import Program
+from ppafo.engine.reference.derivative import ExactOrifice
+from ppafo.engine.refinement import divisions
+from ppafo.engine.run import Run, whole_and_rest
+from ppafo.model.chambers import chamber_mass
+from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
+from ppafo.model.sensors import SensorParameters
+from ppafo.model.valves.catalog import VALVES
+from ppafo.model.valves.kind import ValveModel
+from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.plant import orifice_conductance, plant_parameters
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, ProfileChoice, Scenario
+
+PATH_SAMPLES = 2001
+WHOLE = 1.0e-9
+
+
+def plan_run(scenario: Scenario) -> Run:
+    """The run of a scenario; with a Python controller it records every step, because that controller needs the past."""
+    device, motion, control = scenario.device, scenario.motion, scenario.control
+    is_free = isinstance(motion, FreeMotion)
+    plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
+    valve = VALVES[device.valve.kind].choose(device.valve.settings)
+    delay = valve.command_delay(device.valve.settings)
+    in_lanes = control.kind != PYTHON_CONTROLLER
+    controller = CONTROLLERS[control.kind] if in_lanes else None
+    program = Program(
+        valve=valve,
+        reference=PROFILES[scenario.reference.kind],
+        controller=controller,
+        angle=None if isinstance(motion, FreeMotion) else PROFILES[motion.profile.kind],
+        ideal_sensors=has_ideal_sensors(scenario),
+        late_commands=delay > 0.0,
+    )
+    steps_per_sample, step = divided_step(scenario, plant)
+    lag = whole_and_rest(delay, step)[1] * step
+    settings = device.valve.settings
+    record_every = max(1, round(scenario.output_interval / step)) if in_lanes else 1
+    step_count = math.ceil(scenario.duration / (step * record_every) - WHOLE) * record_every
+    return Run(
+        program=program,
+        plant=plant,
+        valve_orifice=exact_orifice(device.valve.orifice, device),
+        leak_orifice=exact_orifice(device.actuator.leak, device),
+        initial=initial_state(scenario, plant),
+        valve=valve.prepare(settings, step - lag),
+        early_valve=valve.prepare(settings, lag) if program.late_commands else (),
+        controller=() if controller is None else controller.parameters(**control.settings),
+        reference=profile_parameters(scenario.reference),
+        path=() if is_free else profile_parameters(_path(scenario)),
+        sensors=sensor_parameters(scenario),
+        step=step,
+        step_count=step_count,
+        steps_per_sample=steps_per_sample,
+        record_every=record_every,
+        signal_delay=scenario.sensors.delay,
+        command_delay=delay,
+    )
+
+
+def has_ideal_sensors(scenario: Scenario) -> bool:
+    """True where the controller sees the present without noise or rounding."""
+    sensors = scenario.sensors
+    return not any(
+        (sensors.delay, sensors.angle_noise, sensors.pressure_noise, sensors.angle_quantum, sensors.pressure_quantum)
+    )
+
+
+def sensor_parameters(scenario: Scenario) -> SensorParameters:
+    """Noise and quantisation as the engine takes them."""
+    sensors = scenario.sensors
+    return SensorParameters(
+        sensors.angle_noise,
+        sensors.pressure_noise,
+        sensors.angle_quantum,
+        sensors.pressure_quantum,
+        float(sensors.seed),
+    )
+
+
+def profile_parameters(choice: ProfileChoice) -> tuple[float, ...]:
+    """The NamedTuple of a profile."""
+    parameters: tuple[float, ...] = PROFILES[choice.kind].parameters(**choice.settings)
+    return parameters
+
+
+def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> np.ndarray:
+    """Value, rate and second derivative of a profile at times [s], shape (3, times)."""
+    kind: ProfileKind = PROFILES[choice.kind]
+    parameters = profile_parameters(choice)
+    return np.array([kind.value(parameters, float(time)) for time in times]).T
+
+
+def divided_step(scenario: Scenario, plant: PlantParameters) -> tuple[int, float]:
+    """Steps in a sample period and their length [s]: a whole number, fine enough for the fastest chamber."""
+    period = scenario.control.period
+    coarse = max(1, math.ceil(period / scenario.time_step - WHOLE))
+    lowest, highest = angle_range(scenario, plant)
+    parts = divisions(plant, period / coarse, lowest, highest, isinstance(scenario.motion, FreeMotion))
+    return coarse * parts, period / (coarse * parts)
+
+
+def angle_range(scenario: Scenario, plant: PlantParameters) -> tuple[float, float]:
+    """Smallest and largest angle [rad] that the vane can reach in this scenario."""
+    if isinstance(scenario.motion, FreeMotion):
+        return plant.angle_min, plant.angle_max
+    angles = profile_values(scenario.motion.profile, np.linspace(0.0, scenario.duration, PATH_SAMPLES))[0]
+    return float(angles.min()), float(angles.max())
+
+
+def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
+    """Angle, angular velocity and gas at the start."""
+    motion = scenario.motion
+    if isinstance(motion, FreeMotion):
+        angle, rate = motion.angle, motion.angular_velocity
+    else:
+        kind = PROFILES[motion.profile.kind]
+        angle, rate, _ = kind.value(profile_parameters(motion.profile), 0.0)
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    mass_1 = chamber_mass(scenario.initial_pressure_1, volume_1, plant.gas_product)
+    mass_2 = chamber_mass(scenario.initial_pressure_2, volume_2, plant.gas_product)
+    return PlantState(angle, rate, mass_1, mass_2, 0.0, 0.0, 0.0)
+
+
+def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifice:
+    """An orifice for the reference solver, with the exact flow function."""
+    conductance = orifice_conductance(orifice, device.gas)
+    if isinstance(orifice, SonicOrifice):
+        return ExactOrifice(conductance, 1.0, orifice.critical_ratio, device.flow.linear_ratio)
+    return ExactOrifice(conductance, 0.0, device.gas.heat_capacity_ratio, device.flow.linear_ratio)
+
+
+def valve_model(scenario: Scenario) -> ValveModel:
+    """The model of the scenario's valve."""
+    valve = scenario.device.valve
+    return VALVES[valve.kind].choose(valve.settings)
+
+
+def _path(scenario: Scenario) -> ProfileChoice:
+    if isinstance(scenario.motion, FreeMotion):
+        raise TypeError("a free vane has no path")
+    return scenario.motion.profile

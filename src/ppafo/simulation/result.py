@@ -1,0 +1,61 @@
+"""What a run gives back: the recording, its metrics, and how the run ended."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from ppafo.metrics import Metric
+from ppafo.signals import Recording
+from ppafo.simulation.document import result_document, scenario_document
+from ppafo.simulation.scenario import Scenario
+from ppafo.storage import dataset_of, write_result
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How a run ended: ``time`` [s] is where a diverged run stopped; ``message`` says its state and the remedy."""
+
+    kind: Literal["completed", "diverged"]
+    time: float | None = None
+    message: str = ""
+
+    @property
+    def is_completed(self) -> bool:
+        """True where the run reached the end of the scenario."""
+        return self.kind == "completed"
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """A finished run. ``versions`` are those of the packages, ``engine`` the figures of the time stepping."""
+
+    scenario: Scenario
+    recording: Recording
+    metrics: Mapping[str, Metric]
+    status: Status
+    versions: Mapping[str, str]
+    engine: Mapping[str, float | int | str]
+
+    def plot(self) -> "Figure":
+        """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` writes it."""
+        from ppafo.reporting.figures import recording_figure
+
+        remark = "" if self.status.is_completed else self.status.message
+        atmosphere = self.scenario.device.supply.atmospheric_pressure
+        return recording_figure(self.recording, self.scenario.name, remark, atmosphere)
+
+    def dataset(self) -> "xarray.Dataset":
+        """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON."""
+        return dataset_of(self.recording, scenario_document(self.scenario))
+
+    def save(self, folder: str | Path, attachments: Mapping[str, bytes] | None = None) -> Path:
+        """Write ``recording.nc``, ``recording.csv``, ``run.json`` and any attachments (contents by file name).
+
+        The folder is complete or not there; an earlier result in it is replaced. Returns the folder.
+        """
+        return write_result(folder, self.recording, result_document(self), attachments or {})

@@ -1,0 +1,128 @@
+"""What is to be run: one device in one experiment, as frozen values in SI units.
+
+``load_scenario`` makes one from a file; in Python, ``dataclasses.replace`` changes a value and ``controlled_by`` puts
+an object of your own in charge of the valve.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ppafo.control.kind import PythonController
+from ppafo.errors import ScenarioError
+from ppafo.parameters.device import Device
+
+PYTHON_CONTROLLER = "python"
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileChoice:
+    """A function of time: its kind in ``control.catalog.PROFILES`` and all its settings in SI units."""
+
+    kind: str
+    settings: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class FreeMotion:
+    """The vane moves as the torques demand.
+
+    Starts at ``angle`` [rad] with ``angular_velocity`` [rad/s]; ``external_torque`` [N m] is the constant T_ex of
+    equation (1), positive where it works against plantarflexion.
+    """
+
+    angle: float
+    angular_velocity: float = 0.0
+    external_torque: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LedMotion:
+    """The vane is led along an angle in time [rad]; a held vane is led along the constant profile."""
+
+    profile: ProfileChoice
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """What the controller sees, ideal by default.
+
+    Age of a measurement when it is used [s], standard deviations [rad], [Pa], steps of quantisation [rad], [Pa], and
+    the seed of the noise.
+    """
+
+    delay: float = 0.0
+    angle_noise: float = 0.0
+    pressure_noise: float = 0.0
+    angle_quantum: float = 0.0
+    pressure_quantum: float = 0.0
+    seed: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """A sampled controller: kind in ``control.catalog.CONTROLLERS``, settings in SI units, sample period [s].
+
+    With kind ``python`` there are no settings and ``custom`` is asked sample by sample.
+    """
+
+    kind: str
+    settings: Mapping[str, float]
+    period: float
+    custom: PythonController | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Assumption:
+    """A value that no source gives: its path in the scenario, the value as written, and why this one."""
+
+    path: str
+    value: str
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a scenario comes from, for the record: file, parameter set, valve, overrides and what the file said."""
+
+    file: str | None
+    parameter_set: str
+    valve: str
+    overrides: tuple[str, ...]
+    content: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A device in one experiment.
+
+    Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
+    ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
+    reference is a torque [N m].
+    """
+
+    name: str
+    description: str
+    device: Device
+    duration: float
+    time_step: float
+    output_interval: float
+    motion: FreeMotion | LedMotion
+    initial_pressure_1: float
+    initial_pressure_2: float
+    control: Control
+    reference: ProfileChoice
+    sensors: Sensors
+    assumptions: tuple[Assumption, ...]
+    origin: Origin
+
+    def controlled_by(self, controller: PythonController) -> "Scenario":
+        """Return the scenario with any object that has ``reset`` and ``update``, at the same sample period."""
+        for method in ("reset", "update"):
+            if not callable(getattr(controller, method, None)):
+                kind = type(controller).__name__
+                raise ScenarioError(
+                    f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "
+                    f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
+                )
+        return replace(self, control=Control(PYTHON_CONTROLLER, {}, self.control.period, controller))

@@ -1,0 +1,121 @@
+"""Runs a scenario and gathers what came of it."""
+
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+import ppafo
+from ppafo.engine.lanes import BatchResult, Floats, run_batch
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together
+from ppafo.metrics.catalog import evaluate
+from ppafo.model.friction import sliding_friction
+from ppafo.model.plant import chamber_pressures
+from ppafo.model.vane import gravity_torque
+from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run, profile_values
+from ppafo.simulation.result import Result, Status
+from ppafo.simulation.sampled import run_sampled, state_row_numbers
+from ppafo.simulation.scenario import LedMotion, Scenario
+
+REMEDY = (
+    "the step may be too long for this device, or a value far from any real one: try a smaller run.step, "
+    "and look at the inertia, the volumes and the valve area (ppafo audit)"
+)
+
+
+def simulate(scenario: Scenario | str | Path, overrides: Sequence[str] = ()) -> Result:
+    """Run one scenario: an object, the name of a shipped one, or a file; ``overrides`` as on the command line.
+
+    A run that diverges is a Result with that status, up to the time of failure. ScenarioError or ParameterError for
+    bad input.
+    """
+    chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
+    run = plan_run(chosen)
+    custom = chosen.control.custom
+    outcome = run_batch(batch_of(run)) if custom is None else run_sampled(run, custom)
+    return _result(chosen, run, outcome)
+
+
+def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> list[Result]:
+    """Run many scenarios side by side, each exactly as if it ran alone."""
+    runs = [plan_run(scenario) for scenario in scenarios]
+    inside = [index for index, scenario in enumerate(scenarios) if scenario.control.custom is None]
+    outcomes = dict(zip(inside, run_together([runs[index] for index in inside], threads), strict=True))
+    return [
+        _result(scenario, run, outcomes[index]) if index in outcomes else simulate(scenario)
+        for index, (scenario, run) in enumerate(zip(scenarios, runs, strict=True))
+    ]
+
+
+def _result(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
+    rows = state_row_numbers(run)
+    times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
+    record = outcome.record[:, :, 0]
+    status = _status(outcome, record, rows, times)
+    thin = max(1, round(scenario.output_interval / (run.step * run.record_every)))
+    kept = times < status.time if status.time is not None else np.ones(times.size, dtype=bool)
+    recording = _recording(scenario, run, times[kept][::thin], record[kept][::thin], rows)
+    return Result(
+        scenario=scenario,
+        recording=recording,
+        metrics=evaluate(recording),
+        status=status,
+        versions={"ppafo": ppafo.__version__, "python": platform.python_version(), "numpy": np.__version__},
+        engine={"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample},
+    )
+
+
+def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:
+    """Completed, or diverged with time, the last good state and what to do."""
+    failed = float(outcome.states[rows["result.failure_time"], 0])
+    if failed >= NEVER_FAILED and bool(np.isfinite(outcome.states).all()):
+        return Status("completed", None, "completed")
+    time = failed if failed < NEVER_FAILED else float(times[-1])
+    last = record[max(0, int(np.searchsorted(times, time)) - 1)]
+    state = ", ".join(
+        f"{name.replace('_', ' ')} {last[rows[f'state.{name}']]:.4g} {unit}"
+        for name, unit in (("angle", "rad"), ("angular_velocity", "rad/s"), ("mass_1", "kg"), ("mass_2", "kg"))
+    )
+    return Status("diverged", time, f"diverged at t = {time:.6g} s (before that: {state}); {REMEDY}")
+
+
+def _recording(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: dict[str, int]) -> Recording:
+    def row(path: str) -> Floats:
+        return record[:, rows[path]]
+
+    angle, rate = row("state.angle"), row("state.angular_velocity")
+    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, row("state.mass_1"), row("state.mass_2"))  # type: ignore[arg-type]
+    torque = run.plant.torque_constant * np.subtract(pressure_1, pressure_2)
+    channels = {
+        "angle": (angle, "rad"),
+        "angular_velocity": (rate, "rad/s"),
+        "pressure_1": (pressure_1, "Pa"),
+        "pressure_2": (pressure_2, "Pa"),
+        "torque": (torque, "N m"),
+        "reference": (profile_values(scenario.reference, times)[0] if times.size else times, "N m"),
+        "command": (row("result.command"), "-"),
+        "supplied_mass": (row("state.supplied_mass"), "kg"),
+        "vented_mass": (row("state.vented_mass"), "kg"),
+        "leaked_mass": (row("state.leaked_mass"), "kg"),
+        "external_torque": (_external_torque(scenario, run, times, angle, rate, torque), "N m"),
+        "mass_1": (row("state.mass_1"), "kg"),
+        "mass_2": (row("state.mass_2"), "kg"),
+    }
+    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
+    return Recording(scenario.name, times, values, is_synthetic=True)
+
+
+def _external_torque(
+    scenario: Scenario, run: Run, times: Floats, angle: Floats, rate: Floats, torque: Floats
+) -> Floats:
+    """T_ex of equation (1) [N m]: what was prescribed, or what holds a led vane to its path."""
+    plant = run.plant
+    if not isinstance(scenario.motion, LedMotion) or not times.size:
+        return np.full(times.size, plant.external_torque)
+    acceleration = profile_values(scenario.motion.profile, times)[2]
+    friction = np.array([sliding_friction(float(value), plant.dynamic_torque) for value in rate])
+    gravity = gravity_torque(angle, plant.gravity_torque)  # type: ignore[arg-type]
+    return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)

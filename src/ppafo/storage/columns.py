@@ -1,0 +1,69 @@
+"""The columns of a table of text: names and units from the header, numbers in SI units from the rows."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.errors import DataError, UnitError
+from ppafo.signals import CHANNELS
+from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
+from ppafo.signals.recording import Floats
+
+_HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*", re.ASCII)
+_LEVEL = "Pa_a"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """What a header says of a column: channel (or time) and the unit of its numbers."""
+
+    name: str
+    unit: str
+
+    @property
+    def si_unit(self) -> str:
+        """The unit in which the recording keeps it; a channel that is not known by name stays as it is."""
+        if self.name == TIME:
+            return TIME_UNIT
+        return CHANNELS[self.name].unit if self.name in CHANNELS else self.unit
+
+
+def parse_header(cells: list[str]) -> list[Column]:
+    """Return the columns of a header such as ``time [s]``, ``pressure_1 [psi_g]``; time comes first."""
+    columns = [_column(cell) for cell in cells]
+    names = [column.name for column in columns]
+    if names[0] != TIME:
+        raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'")
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DataError(f"there are two columns '{twice}'")
+    return columns
+
+
+def _column(cell: str) -> Column:
+    match = _HEADER.fullmatch(cell)
+    if match is None:
+        shown = cell if len(cell) <= 40 else f"{cell[:36]} ..."
+        raise DataError(f"the header must name columns as 'name [unit]', parted by commas; '{shown}' is none")
+    return Column(match[1], match[2])
+
+
+def in_si(column: Column, values: Floats, atmosphere: float) -> Floats:
+    """Return the values in the unit in which a recording keeps them; gauge counts from ``atmosphere`` [Pa absolute]."""
+    from ppafo.units import check_unit, to_si
+
+    try:
+        if column.unit != column.si_unit:
+            given, wanted = (_for_conversion(unit) for unit in (column.unit, column.si_unit))
+            return np.array([to_si(value, given, wanted, atmosphere) for value in values.tolist()])
+        if column.name not in CHANNELS:
+            check_unit(_for_conversion(column.unit))
+    except UnitError as error:
+        raise DataError(f"column '{column.name} [{column.unit}]': {error}") from error
+    return values
+
+
+def _for_conversion(unit: str) -> str:
+    """Return the unit as ``ppafo.units`` spells it: there a pressure says its kind and a plain number has no unit."""
+    return {"Pa": _LEVEL, PLAIN_NUMBER: ""}.get(unit, unit)

@@ -1,0 +1,90 @@
+"""Recordings as CSV: one header line ``time [s],angle [rad],...``, then one line a sample, exact to the last bit.
+
+Files from elsewhere may use other units (``angle [deg]``, ``pressure_1 [psi_g]``) and begin with lines of comment (#).
+"""
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import DataError
+from ppafo.signals import Channel, Recording
+from ppafo.signals.channels import TIME, TIME_UNIT
+from ppafo.signals.recording import Floats
+from ppafo.storage.columns import Column, in_si, parse_header
+from ppafo.storage.files import read_bytes, write_file
+
+SYNTHETIC_MARK = "# synthetic: made by a model, not measured"
+
+
+def write_csv(path: str | Path, recording: Recording) -> Path:
+    """Write a recording as CSV in SI units; one that no one measured says so in a line of comment. Returns the path."""
+    mark = f"{SYNTHETIC_MARK}\n" if recording.is_synthetic else ""
+    return write_file(path, mark.encode() + csv_bytes(recording))
+
+
+def csv_bytes(recording: Recording) -> bytes:
+    """Return the bare table of a recording; its label, and whether it is synthetic, are not in it."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow([f"{TIME} [{TIME_UNIT}]", *(f"{name} [{recording.unit(name)}]" for name in recording.names)])
+    columns = [recording.time, *(recording[name] for name in recording.names)]
+    writer.writerows(zip(*(map(repr, column.tolist()) for column in columns), strict=True))
+    return buffer.getvalue().encode()
+
+
+def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
+    """Return the recording in a CSV file, in SI units; its label is the file's name unless one is given.
+
+    Gauge pressure counts from ``atmosphere`` [Pa absolute].
+    """
+    lines = _lines(path)
+    is_synthetic = SYNTHETIC_MARK in lines
+    first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    try:
+        rows = list(csv.reader(lines[first:], strict=True))
+        if len(rows) < 2:
+            raise DataError("has a header but no samples" if rows else "has no header")
+        columns = parse_header(rows[0])
+        values = _table(rows, len(columns), first)
+        time, *channels = (_channel(column, values[:, index], atmosphere) for index, column in enumerate(columns))
+        named = {column.name: channel for column, channel in zip(columns[1:], channels, strict=True)}
+        return Recording(label or Path(path).stem, time.values, named, is_synthetic)
+    except csv.Error as error:
+        raise DataError(f"{path}: is not a CSV file: {error}") from error
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from error
+
+
+def _lines(path: str | Path) -> list[str]:
+    content = read_bytes(path)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: is not a text file in UTF-8 (byte {error.start})") from error
+    if "\0" in text:
+        raise DataError(f"{path}: is not a text file (byte {text.index(chr(0))} is zero)")
+    if not text.endswith(("\n", "\r")):
+        raise DataError(f"{path}: the last line has no end: the file is cut off, or lacks its final line break")
+    return text.splitlines()
+
+
+def _table(rows: list[list[str]], width: int, skipped: int) -> Floats:
+    """Return the numbers below the header, row by row."""
+    table = np.empty((len(rows) - 1, width))
+    for index, row in enumerate(rows[1:]):
+        line = skipped + index + 2
+        if len(row) != width:
+            raise DataError(f"line {line} has {len(row)} values for {width} columns")
+        try:
+            table[index] = [float(cell) for cell in row]
+        except ValueError as error:
+            raise DataError(f"line {line} holds something that is not a number: {str(error)[-60:]}") from error
+    return table
+
+
+def _channel(column: Column, values: Floats, atmosphere: float) -> Channel:
+    return Channel(in_si(column, values, atmosphere), column.si_unit)

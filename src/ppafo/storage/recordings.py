@@ -1,0 +1,31 @@
+"""A recording from wherever it is: a NetCDF file, a CSV file or a result folder."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from ppafo.errors import DataError
+from ppafo.signals import Recording
+from ppafo.storage.comma_separated import read_csv
+from ppafo.storage.netcdf import read_netcdf
+from ppafo.storage.result_folder import CSV_FILE, NETCDF_FILE, RUN_FILE, read_document
+
+
+def read_recording(path: str | Path) -> Recording:
+    """Return the recording in a ``.nc`` or ``.csv`` file or in a result folder."""
+    place = Path(path)
+    if place.is_dir():
+        return read_netcdf(place / NETCDF_FILE)
+    if place.suffix == ".nc":
+        return read_netcdf(place)
+    if place.suffix == ".csv":
+        return _of_its_folder(read_csv(place), place)
+    raise DataError(f"{path}: is neither a .nc or .csv file nor a result folder")
+
+
+def _of_its_folder(recording: Recording, path: Path) -> Recording:
+    """Return the recording with what ``run.json`` beside it says of it, where it is the one of a result folder."""
+    if path.name != CSV_FILE or not (path.parent / RUN_FILE).exists():
+        return recording
+    described = read_document(path.parent)["recording"]
+    label = str(described.get("label", recording.label))
+    return replace(recording, label=label, is_synthetic=bool(described.get("synthetic", False)))

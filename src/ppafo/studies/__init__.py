@@ -1,0 +1,1 @@
+"""Named studies: many runs, one question, the same answer every time."""

@@ -1,0 +1,5 @@
+"""Every study by name and what it asks. Package ``ppafo.studies.NAME`` holds each one. To add one: one line here."""
+
+STUDIES: dict[str, str] = {
+    "reproduction": "which of the paper's claims hold when its experiments are run again?",
+}

@@ -1,0 +1,138 @@
+"""Runs the paper's experiments and judges what the paper claims of them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from ppafo.errors import SimulationError
+from ppafo.parameters import load_parameter_set
+from ppafo.parameters.audit import Finding, audit
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.overriding import scenario_paths, split_override
+from ppafo.simulation.result import Result
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate
+from ppafo.studies.reproduction.arithmetic import arithmetic_claims
+from ppafo.studies.reproduction.assumed import AssumedValue, assumed_values, used_by
+from ppafo.studies.reproduction.claim import Claim
+from ppafo.studies.reproduction.measured import measured_claims
+from ppafo.studies.reproduction.observation import Observation
+from ppafo.studies.reproduction.printed import load_printed
+from ppafo.studies.reproduction.step_response import Levels, StepEvents, step_events, step_observations
+from ppafo.studies.reproduction.torque_task import torque_task_claims, torque_task_observations
+
+STEP = "step-response"
+SOLENOID = "torque-task-solenoid"
+PROPORTIONAL = "torque-task-proportional"
+EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
+"""Shipped scenarios that stand for the paper's experiments."""
+
+ORDER = (
+    "c1",
+    "c2",
+    "critical_pressure_ratio",
+    "k_actuator",
+    "static_friction",
+    "rotary_damping",
+    "dynamic_friction",
+    "discharge_coefficient_solenoid",
+    "discharge_coefficient_proportional",
+    "leak_area",
+    "step_rms_position",
+    "step_rms_pressure_1",
+    "step_rms_pressure_2",
+    "step_rms_pressure_difference",
+    "torque_rms_improvement",
+    "co2_solenoid",
+    "co2_proportional",
+    "co2_saving",
+)
+"""Every claim, in the order of the paper."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """What came of it: claims in the order of the paper, what the text tells, runs, assumptions and audit findings."""
+
+    claims: tuple[Claim, ...]
+    step_observations: tuple[Observation, ...]
+    torque_observations: tuple[Observation, ...]
+    step: Result
+    step_events: StepEvents | None
+    solenoid: Result
+    proportional: Result
+    assumed: tuple[AssumedValue, ...]
+    printed_set: str
+    printed_findings: tuple[Finding, ...]
+    completed_set: str
+    completed_findings: tuple[Finding, ...]
+    overrides: tuple[str, ...]
+
+    @property
+    def missed(self) -> tuple[Claim, ...]:
+        """Claims whose number is outside the window that it has to meet."""
+        return tuple(claim for claim in self.claims if claim.is_missed)
+
+
+def _silent(text: str) -> None:
+    """Say nothing."""
+
+
+def reproduce(overrides: Sequence[str] = (), tell: Callable[[str], None] = _silent) -> Reproduction:
+    """Run the paper's experiments with the shipped scenarios and judge every claim.
+
+    ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
+    have it, a path of the device all of them. ``tell`` hears what is being done. SimulationError where a run diverges.
+    """
+    scenarios = _scenarios(overrides)
+    runs = {name: _run(scenario, tell) for name, scenario in scenarios.items()}
+    step, solenoid, proportional = (runs[name] for name in EXPERIMENTS)
+    tell("checking the paper's own numbers")
+    printed = load_printed()
+    completed = load_parameter_set(step.scenario.origin.parameter_set)
+    assumed = assumed_values(scenarios)
+    claims = [
+        *arithmetic_claims(printed),
+        *measured_claims(printed),
+        *torque_task_claims(solenoid, proportional, used_by(assumed, SOLENOID, PROPORTIONAL)),
+    ]
+    events = step_events(step.recording)
+    return Reproduction(
+        claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
+        step_observations=tuple(step_observations(step.recording, _levels(step), events)),
+        torque_observations=tuple(torque_task_observations(solenoid, proportional)),
+        step=step,
+        step_events=events,
+        solenoid=solenoid,
+        proportional=proportional,
+        assumed=assumed,
+        printed_set=printed.parameter_set.name,
+        printed_findings=tuple(audit(printed.parameter_set)),
+        completed_set=completed.name,
+        completed_findings=tuple(audit(completed)),
+        overrides=tuple(overrides),
+    )
+
+
+def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
+    """Return the experiments, each with the overrides that are meant for it."""
+    known = {name: scenario_paths(load_scenario(name).origin.content) for name in EXPERIMENTS if overrides}
+    meant: dict[str, list[str]] = {name: [] for name in EXPERIMENTS}
+    for override in overrides:
+        path, _ = split_override(override)
+        having = [name for name, paths in known.items() if path in paths]
+        for name in having or EXPERIMENTS:
+            meant[name].append(override)
+    return {name: load_scenario(name, chosen) for name, chosen in meant.items()}
+
+
+def _run(scenario: Scenario, tell: Callable[[str], None]) -> Result:
+    tell(f"simulating {scenario.name}: {scenario.description}")
+    result = simulate(scenario)
+    if not result.status.is_completed:
+        raise SimulationError(f"{scenario.name}: {result.status.message}")
+    return result
+
+
+def _levels(step: Result) -> Levels:
+    supply = step.scenario.device.supply
+    return Levels(supply.pressure, supply.atmospheric_pressure)

@@ -1,0 +1,35 @@
+"""Shared set-up: scenarios of the paper, and one cache folder for compiled models."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.scenario import Scenario
+
+
+@pytest.fixture
+def step_response() -> Scenario:
+    """The step response of figure 7."""
+    return load_scenario("step-response")
+
+
+@pytest.fixture
+def torque_task() -> Callable[[str], Scenario]:
+    """The torque task of figure 8, by valve."""
+    return lambda valve: load_scenario(f"torque-task-{valve}")
+
+
+@pytest.fixture
+def shorter() -> Callable[[Scenario, float], Scenario]:
+    """A scenario that ends earlier [s]."""
+    return lambda scenario, duration: dataclasses.replace(scenario, duration=duration)
+
+
+@pytest.fixture
+def fresh_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder for compiled models."""
+    monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path / "programs"))
+    return tmp_path / "programs"

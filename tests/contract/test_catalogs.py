@@ -1,0 +1,94 @@
+"""Every entry of every catalogue keeps the contract of its kind."""
+
+import dataclasses
+import math
+
+import pytest
+
+from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.engine.rows import numbers, rebuild
+from ppafo.model.plant import Openings
+from ppafo.model.sensors import Measurement
+from ppafo.model.valves.catalog import VALVES
+from ppafo.model.valves.kind import ValveKind, ValveModel
+
+CATALOGS = [*CONTROLLERS.items(), *PROFILES.items(), *VALVES.items()]
+
+
+def defaults(kind: ControllerKind | ProfileKind | ValveKind) -> dict[str, float]:
+    """A setting for every quantity."""
+    return {item.name: 1.0 if item.default is None else item.default for item in kind.quantities}
+
+
+def valve_models() -> list[tuple[str, ValveModel, dict[str, float]]]:
+    """Every model that the valves choose, with settings that lead to it."""
+    found = []
+    for name, kind in VALVES.items():
+        settings = defaults(kind)
+        busy = {item.name: min(item.maximum, max(item.minimum, 0.01)) for item in kind.quantities}
+        busy |= {"spool_frequency": 80.0} if "spool_frequency" in busy else {}
+        found += [(f"{name}-plain", kind.choose(settings), settings), (f"{name}-busy", kind.choose(busy), busy)]
+    return found
+
+
+@pytest.mark.parametrize(("name", "kind"), CATALOGS)
+def test_catalogue_entries_are_found_by_their_own_name_and_say_what_they_are(name: str, kind: ValveKind) -> None:
+    assert kind.name == name
+    assert kind.summary.endswith(".")
+    for quantity in kind.quantities:
+        assert quantity.summary
+        assert quantity.default is None or quantity.minimum <= quantity.default <= quantity.maximum
+
+
+@pytest.mark.parametrize("kind", [*CONTROLLERS.values(), *PROFILES.values()], ids=lambda kind: kind.name)
+def test_declared_quantities_are_the_fields_of_the_parameters_in_order(kind: ControllerKind | ProfileKind) -> None:
+    assert tuple(item.name for item in kind.quantities) == kind.parameters._fields  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("kind", CONTROLLERS.values(), ids=lambda kind: kind.name)
+@pytest.mark.parametrize("torque", [-50.0, -1.0, 0.0, 1.0, 50.0])
+def test_controllers_return_commands_from_minus_one_to_one_and_a_state_of_the_same_kind(
+    kind: ControllerKind, torque: float
+) -> None:
+    parameters = kind.parameters(**defaults(kind))
+    state = kind.initial
+    for _ in range(5):
+        command, state = kind.update(parameters, state, 2.0, Measurement(1.3, 2e5, 1e5, torque), 1e-3)
+        assert -1.0 <= command <= 1.0
+        assert type(state) is type(kind.initial)
+        assert all(math.isfinite(number) for number in numbers(state))
+
+
+@pytest.mark.parametrize("kind", PROFILES.values(), ids=lambda kind: kind.name)
+def test_profiles_return_value_rate_and_second_derivative_that_belong_together(kind: ProfileKind) -> None:
+    parameters = kind.parameters(**defaults(kind))
+    width = 1e-5
+    for time in (0.13, 0.41, 0.77, 1.31):
+        _, rate, second = kind.value(parameters, time)
+        before, after = kind.value(parameters, time - width), kind.value(parameters, time + width)
+        assert rate == pytest.approx((after[0] - before[0]) / (2 * width), abs=1e-6)
+        assert second == pytest.approx((after[1] - before[1]) / (2 * width), abs=1e-4)
+
+
+@pytest.mark.parametrize(("name", "model", "settings"), valve_models())
+def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
+    name: str, model: ValveModel, settings: dict[str, float]
+) -> None:
+    valve = model.prepare(settings, 1e-3)
+    for command in (-1.0, -0.3, 0.0, 0.4, 1.0):
+        state = model.settle(valve, model.initial(), command, 0.0)
+        openings = model.instant(valve, state, command)
+        assert isinstance(openings, Openings), name
+        assert all(0.0 <= share <= 1.0 for share in openings)
+
+
+@pytest.mark.parametrize(("name", "model", "settings"), valve_models())
+def test_valve_states_survive_the_way_through_rows(name: str, model: ValveModel, settings: dict[str, float]) -> None:
+    state = model.settle(model.prepare(settings, 1e-3), model.initial(), 0.6, 0.0)
+    assert rebuild(model.state, numbers(state)) == state, name
+
+
+def test_kinds_are_frozen() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        VALVES["solenoid"].name = "other"  # type: ignore[misc]

@@ -1,0 +1,53 @@
+"""The lanes at steps of 1 ms against the reference solver: the limits that the package promises."""
+
+import dataclasses
+from collections.abc import Callable
+from types import ModuleType
+
+import pytest
+
+from ppafo.engine.reference.agreement import Agreement, compare_with_reference
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import Scenario
+
+LARGEST_ANGLE = 2.0e-4
+LARGEST_PRESSURE = 1.0e-3
+LARGEST_RMS = 1.0e-4
+SEEDS = range(200)
+SEEDS_PER_TEST = 25
+
+
+def assert_within_limits(agreement: Agreement, what: str) -> None:
+    assert agreement.angle <= LARGEST_ANGLE, (what, agreement)
+    assert agreement.worst_pressure <= LARGEST_PRESSURE, (what, agreement)
+    assert agreement.worst_rms <= LARGEST_RMS, (what, agreement)
+
+
+def test_step_response_is_within_the_limits(step_response: Scenario) -> None:
+    agreement = compare_with_reference(plan_run(step_response))
+    assert agreement.impacts, "the vane must reach its stop"
+    assert_within_limits(agreement, "step response")
+
+
+@pytest.mark.parametrize("valve", ["proportional", "solenoid"])
+def test_torque_task_is_within_the_limits(torque_task: Callable[[str], Scenario], valve: str) -> None:
+    assert_within_limits(compare_with_reference(plan_run(torque_task(valve))), valve)
+
+
+def test_valve_open_by_a_tenth_is_within_the_limits(step_response: Scenario) -> None:
+    control = dataclasses.replace(step_response.control, settings={"command": 0.1})
+    scenario = dataclasses.replace(step_response, control=control, duration=3.0)
+    assert_within_limits(compare_with_reference(plan_run(scenario)), "10 % opening")
+
+
+@pytest.mark.parametrize("name", ["step-response", "torque-task-proportional"])
+def test_dead_volume_of_one_cubic_centimetre_is_within_the_limits(name: str) -> None:
+    overrides = ("actuator.dead_volume_1=1cm^3", "actuator.dead_volume_2=1cm^3")
+    assert_within_limits(compare_with_reference(plan_run(load_scenario(name, overrides))), name)
+
+
+@pytest.mark.parametrize("first", range(0, len(SEEDS), SEEDS_PER_TEST))
+def test_random_devices_are_within_the_limits(draws: ModuleType, first: int) -> None:
+    for seed in SEEDS[first : first + SEEDS_PER_TEST]:
+        assert_within_limits(compare_with_reference(plan_run(draws.random_scenario(seed))), f"seed {seed}")

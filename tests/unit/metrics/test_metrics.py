@@ -1,0 +1,167 @@
+"""Metrics."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ppafo.metrics import METRICS, evaluate
+from ppafo.metrics.phases import hold_start
+from ppafo.metrics.switching import reversals
+from ppafo.signals import CHANNELS, Channel, Recording
+
+TIME = np.linspace(0.0, 3.0, 3001)
+RAMP = np.minimum(6.0 * TIME, 6.0)
+
+
+def recording(**channels: np.ndarray) -> Recording:
+    made = {name: Channel(values, CHANNELS[name].unit) for name, values in channels.items()}
+    return Recording("made", TIME, made)
+
+
+def value(name: str, **channels: np.ndarray) -> float:
+    return evaluate(recording(**channels))[name].value
+
+
+def test_every_metric_needs_channels_that_exist_and_says_what_it_is() -> None:
+    for name, kind in METRICS.items():
+        assert name == kind.name
+        assert kind.summary
+        assert kind.channels
+        assert set(kind.channels) <= set(CHANNELS)
+
+
+def test_metrics_whose_channels_are_missing_are_left_out() -> None:
+    assert set(evaluate(recording(command=np.ones(3001)))) == {"switchings"}
+
+
+def test_one_sample_has_no_metrics() -> None:
+    single = Recording("made", np.array([0.0]), {"command": Channel(np.array([1.0]), "-")})
+    assert evaluate(single) == {}
+
+
+def test_a_constant_error_is_its_own_rms_error_on_ramp_and_hold() -> None:
+    metrics = evaluate(recording(reference=RAMP, torque=RAMP - 0.5))
+    for name in ("rms_error", "rms_error_ramp", "rms_error_hold", "peak_error"):
+        assert metrics[name].value == pytest.approx(0.5)
+        assert metrics[name].unit == "N m"
+
+
+def test_the_rms_error_does_not_depend_on_how_densely_a_part_is_sampled() -> None:
+    sparse = recording(reference=RAMP, torque=0.9 * RAMP)
+    crowded = sparse.resampled(np.concatenate([TIME[:1000], np.linspace(1.0, 1.2, 5000), TIME[1201:]]))
+    assert evaluate(crowded)["rms_error"].value == pytest.approx(evaluate(sparse)["rms_error"].value, rel=1e-5)
+
+
+def test_ramp_and_hold_part_where_the_reference_reaches_the_level_it_keeps() -> None:
+    torque = np.where(TIME < 1.0, RAMP - 2.0, RAMP - 1.0)
+    assert hold_start(recording(reference=RAMP)) == 1.0
+    assert value("rms_error_hold", reference=RAMP, torque=torque) == pytest.approx(1.0)
+    assert value("rms_error_ramp", reference=RAMP, torque=torque) == pytest.approx(2.0, rel=1e-3)
+
+
+def test_a_reference_that_crosses_its_final_level_is_not_on_hold_yet() -> None:
+    overshooting = np.where(TIME < 2.0, 8.0 * TIME / 2.0, 6.0)
+    assert hold_start(recording(reference=overshooting)) == 2.0
+
+
+def test_a_reference_that_never_rests_has_neither_ramp_nor_hold() -> None:
+    metrics = evaluate(recording(reference=np.sin(TIME), torque=np.zeros(3001)))
+    assert "rms_error" in metrics
+    assert not {"rms_error_ramp", "rms_error_hold", "oscillations_ramp", "oscillations_hold"} & set(metrics)
+
+
+def test_a_constant_reference_has_a_hold_but_no_ramp() -> None:
+    metrics = evaluate(recording(reference=np.full(3001, 2.0), torque=np.zeros(3001)))
+    assert metrics["rms_error_hold"].value == pytest.approx(2.0)
+    assert "rms_error_ramp" not in metrics
+
+
+def test_gas_is_counted_from_the_first_sample() -> None:
+    supplied = 1e-3 + 2e-4 * TIME
+    assert value("gas_supplied", supplied_mass=supplied) == pytest.approx(6e-4)
+    assert evaluate(recording(supplied_mass=supplied))["gas_supplied"].unit == "kg"
+
+
+def test_gas_that_appears_from_nowhere_shows_as_imbalance() -> None:
+    flows = {"supplied_mass": 3e-4 * TIME, "vented_mass": 1e-4 * TIME, "mass_2": np.full(3001, 1e-4)}
+    assert value("gas_imbalance", mass_1=2e-4 * TIME, **flows) == pytest.approx(0.0, abs=1e-18)
+    assert value("gas_imbalance", mass_1=2.1e-4 * TIME, **flows) == pytest.approx(-3e-5)
+
+
+def test_the_largest_pressure_is_looked_for_in_both_chambers() -> None:
+    assert value("largest_pressure", pressure_1=1e5 + TIME, pressure_2=4e5 - TIME) == 4e5
+
+
+def test_work_is_torque_over_angle_and_is_positive_where_the_actuator_drives() -> None:
+    angle = 0.2 + 0.5 * TIME
+    assert value("mechanical_work", angle=angle, torque=np.full(3001, 4.0)) == pytest.approx(6.0)
+    assert value("mechanical_work", angle=angle, torque=np.full(3001, -4.0)) == pytest.approx(-6.0)
+
+
+def test_work_per_gas_is_left_out_where_no_gas_was_taken() -> None:
+    motion = {"angle": TIME, "torque": np.full(3001, 2.0)}
+    assert value("work_per_gas", supplied_mass=1e-3 * TIME, **motion) == pytest.approx(2000.0)
+    assert "work_per_gas" not in evaluate(recording(supplied_mass=np.zeros(3001), **motion))
+
+
+def test_a_command_that_rests_at_zero_between_two_signs_switches_once() -> None:
+    command = np.zeros(3001)
+    command[:1000], command[2000:] = 1.0, -1.0
+    assert value("switchings", command=command) == 1.0
+    assert value("switchings", command=np.sign(np.sin(2.0 * math.pi * (TIME + 0.0001)))) == 5.0
+
+
+def test_oscillation_on_the_ramp_is_counted_there_and_not_on_the_hold() -> None:
+    wave = np.where(TIME < 1.0, np.arcsin(np.sin(2.0 * math.pi * 5.0 * TIME)), 0.0)
+    metrics = evaluate(recording(reference=RAMP, torque=RAMP + wave))
+    assert metrics["oscillations_ramp"].value == 10.0
+    assert metrics["oscillations_hold"].value == 0.0
+
+
+def test_noise_below_the_threshold_is_no_oscillation() -> None:
+    noise = 0.05 * np.random.default_rng(1).uniform(-1.0, 1.0, 3001)
+    metrics = evaluate(recording(reference=RAMP, torque=RAMP + noise))
+    assert metrics["oscillations_ramp"].value == 0.0
+    assert metrics["oscillations_hold"].value == 0.0
+
+
+def test_noise_on_an_oscillation_does_not_change_its_count() -> None:
+    wave = np.sin(2.0 * math.pi * 5.0 * TIME)
+    noise = 0.1 * np.random.default_rng(1).uniform(-1.0, 1.0, 3001)
+    assert reversals(wave + noise, 0.3) == reversals(wave, 0.3) == 30
+
+
+def test_oscillation_needs_a_reference_to_be_measured_against() -> None:
+    still = evaluate(recording(reference=np.zeros(3001), torque=np.sin(9.0 * TIME)))
+    assert "oscillations_hold" not in still
+
+
+@given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=60), st.floats(0.1, 3.0))
+def test_reversals_do_not_depend_on_sign_or_level_and_never_grow_with_the_threshold(
+    values: list[float], swing: float
+) -> None:
+    signal = np.round(np.array(values), 6)
+    count = reversals(signal, swing)
+    assert reversals(-signal, swing) == count
+    assert reversals(np.sort(signal), swing) == 0
+    assert reversals(signal, 2.0 * swing) <= count
+
+
+def test_departure_and_arrival_are_at_one_percent_of_the_move_from_either_end() -> None:
+    angle = np.clip(TIME - 1.0, 0.0, 1.0) * 2.0 + 0.3
+    metrics = evaluate(recording(angle=angle))
+    assert metrics["departure_time"].value == pytest.approx(1.01)
+    assert metrics["arrival_time"].value == pytest.approx(1.99)
+    assert metrics["angle_range"].value == pytest.approx(2.0)
+
+
+def test_a_vane_that_is_held_neither_departs_nor_arrives() -> None:
+    metrics = evaluate(recording(angle=np.full(3001, 1.3)))
+    assert set(metrics) == {"angle_range"}
+
+
+def test_the_largest_speed_counts_either_way() -> None:
+    assert value("largest_speed", angular_velocity=-3.0 + TIME) == 3.0

@@ -1,0 +1,81 @@
+"""Chambers, vane, friction and sensors."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_mass, chamber_pressure
+from ppafo.model.friction import holds_still, sliding_friction
+from ppafo.model.sensors import SensorParameters, measure, quantised, standard_noise
+from ppafo.model.vane import actuator_torque, gravity_torque, vane_acceleration
+
+
+def test_printed_volumes_are_the_case_without_dead_volume_and_lower_stop() -> None:
+    assert chamber_1_volume(0.5, 0.0, 51e-6, 0.0) == pytest.approx(51e-6 * 0.5)
+    assert chamber_2_volume(0.5, math.pi / 2, 51e-6, 0.0) == pytest.approx(51e-6 * (math.pi / 2 - 0.5))
+
+
+@given(st.floats(0.3, 2.3))
+def test_volumes_add_up_to_the_same_sum_at_every_angle(angle: float) -> None:
+    total = chamber_1_volume(angle, 0.3, 51e-6, 2e-6) + chamber_2_volume(angle, 2.3, 51e-6, 2e-6)
+    assert total == pytest.approx(2.0 * 51e-6 + 4e-6)
+
+
+@given(st.floats(1e4, 1e6), st.floats(1e-6, 1e-4))
+def test_mass_and_pressure_are_inverse(pressure: float, volume: float) -> None:
+    assert chamber_pressure(chamber_mass(pressure, volume, 5.6e4), volume, 5.6e4) == pytest.approx(pressure)
+
+
+def test_torque_is_positive_in_plantarflexion() -> None:
+    assert actuator_torque(2e5, 1e5, 1.451e-5) == pytest.approx(1.451)
+
+
+@given(st.floats(0.0, math.pi))
+def test_gravity_pulls_the_toes_down_most_where_the_foot_plate_is_level(angle: float) -> None:
+    assert gravity_torque(angle, 0.6) == pytest.approx(-0.6 * math.cos(angle - math.pi / 2), abs=1e-7)
+
+
+@given(st.floats(-20.0, 20.0), st.floats(0.0, 1.0))
+def test_friction_never_adds_energy(angular_velocity: float, dynamic_torque: float) -> None:
+    assert sliding_friction(angular_velocity, dynamic_torque) * angular_velocity >= 0.0
+
+
+def test_friction_decelerates_a_vane_that_nothing_drives() -> None:
+    assert vane_acceleration(0.0, 1.0, sliding_friction(1.0, 0.011), 0.032, 8.4e-3) < 0.0
+    assert vane_acceleration(0.0, -1.0, sliding_friction(-1.0, 0.011), 0.032, 8.4e-3) > 0.0
+
+
+def test_stop_holds_against_any_torque_towards_it_but_not_away_from_it() -> None:
+    assert holds_still(-9.0, 0.45, at_lower_stop=True, at_upper_stop=False)
+    assert not holds_still(0.46, 0.45, at_lower_stop=True, at_upper_stop=False)
+    assert holds_still(9.0, 0.45, at_lower_stop=False, at_upper_stop=True)
+
+
+def test_noise_has_mean_zero_and_variance_one_and_no_memory() -> None:
+    values = [standard_noise(7, sample, 1) for sample in range(20_000)]
+    mean = sum(values) / len(values)
+    variance = sum(value * value for value in values) / len(values) - mean * mean
+    neighbours = sum(a * b for a, b in zip(values, values[1:], strict=False)) / len(values)
+    assert abs(mean) < 0.025
+    assert abs(variance - 1.0) < 0.04
+    assert abs(neighbours) < 0.025
+
+
+def test_noise_of_channels_and_seeds_is_unrelated() -> None:
+    for other in ((7, 2), (8, 1)):
+        product = [standard_noise(7, s, 1) * standard_noise(other[0], s, other[1]) for s in range(20_000)]
+        assert abs(sum(product) / len(product)) < 0.03
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e3))
+def test_quantised_values_are_whole_quanta_within_half_of_one(value: float, quantum: float) -> None:
+    result = quantised(value, quantum)
+    assert abs(result - value) <= 0.5 * quantum * (1 + 1e-9)
+    assert result / quantum == pytest.approx(round(result / quantum), abs=1e-6)
+
+
+def test_ideal_sensors_change_nothing() -> None:
+    seen = measure(SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0), 1.2, 3e5, 1e5, 1.451e-5, 4)
+    assert seen == (1.2, 3e5, 1e5, pytest.approx(1.451e-5 * 2e5))

@@ -1,0 +1,104 @@
+"""The valves' own dynamics, against closed forms."""
+
+import math
+
+import pytest
+
+from ppafo.model.valves import proportional, solenoid
+
+SPOOL = {"dead_band": 0.0, "delay": 0.0, "spool_frequency": 50.0, "spool_damping_ratio": 0.5, "slew_limit": 0.0}
+PAIR = {"opening_delay": 0.003, "closing_delay": 0.005, "switching_interval": 0.05}
+
+
+def test_dead_band_hides_small_commands_and_leaves_full_command_full() -> None:
+    assert proportional.opening_of_command(0.04, 0.05) == 0.0
+    assert proportional.opening_of_command(-1.0, 0.05) == -1.0
+    assert proportional.opening_of_command(0.525, 0.05) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("damping_ratio", [0.2, 0.7, 1.0, 2.5])
+def test_spool_step_is_exact_whatever_its_length(damping_ratio: float) -> None:
+    settings = {**SPOOL, "spool_damping_ratio": damping_ratio}
+    fine, coarse = proportional.prepare_moving(settings, 1e-4), proportional.prepare_moving(settings, 4e-3)
+    state = proportional.SpoolState(0.1, 3.0)
+    shares = []
+    after = state
+    for _ in range(40):
+        openings, after = proportional.advance_moving(fine, after, 0.8, 0.0, 1e-4)
+        shares.append(openings.source_1)
+    openings, at_once = proportional.advance_moving(coarse, state, 0.8, 0.0, 4e-3)
+    assert at_once.opening == pytest.approx(after.opening, rel=1e-9)
+    assert at_once.rate == pytest.approx(after.rate, rel=1e-9)
+    if damping_ratio >= 1.0:
+        assert openings.source_1 == pytest.approx(sum(shares) / 40, rel=1e-9)
+
+
+def test_spool_answers_a_step_as_a_second_order_system() -> None:
+    settings = {**SPOOL, "spool_damping_ratio": 0.2}
+    valve = proportional.prepare_moving(settings, 1e-4)
+    state, highest = proportional.closed_at_rest(), 0.0
+    for _ in range(1000):
+        _, state = proportional.advance_moving(valve, state, 0.5, 0.0, 1e-4)
+        highest = max(highest, state.opening)
+    overshoot = math.exp(-math.pi * 0.2 / math.sqrt(1 - 0.04))
+    assert highest == pytest.approx(0.5 * (1 + overshoot), rel=1e-3)
+
+
+def test_slew_limit_bounds_the_rate_of_the_opening() -> None:
+    valve = proportional.prepare_moving({**SPOOL, "spool_frequency": 0.0, "slew_limit": 20.0}, 1e-3)
+    state = proportional.closed_at_rest()
+    for _ in range(25):
+        _, state = proportional.advance_moving(valve, state, 0.6, 0.0, 1e-3)
+    assert state.opening == pytest.approx(0.5)
+
+
+def run_pair(
+    settings: dict[str, float], command_at: dict[float, float], until: float
+) -> list[tuple[float, str, float]]:
+    """Switchings (time, valve, position) of a pair whose command changes at given times."""
+    valve = solenoid.prepare_timed(settings, 1e-3)
+    state, command, time, seen = solenoid.both_off_long_ago(), 0.0, 0.0, []
+    while time < until:
+        command = command_at.get(round(time, 6), command)
+        before = state
+        state = solenoid.settle_timed(valve, state, command, time)
+        for name, old, new in (("A", before.coil_a, state.coil_a), ("B", before.coil_b, state.coil_b)):
+            if old.position != new.position:
+                seen.append((time, name, new.position))
+        waiting = [moment for moment in command_at if moment > time]
+        time = min([solenoid.next_timed_event(valve, state, command, time), until, *waiting])
+    return seen
+
+
+def test_opening_and_closing_take_their_delays() -> None:
+    assert run_pair(PAIR, {0.0: 1.0, 0.1: 0.0}, 0.2) == [
+        (pytest.approx(0.003), "A", 1.0),
+        (pytest.approx(0.105), "A", 0.0),
+    ]
+
+
+def test_coil_accepts_a_second_order_only_after_the_switching_interval() -> None:
+    assert run_pair(PAIR, {0.0: 1.0, 0.01: 0.0}, 0.2)[-1] == (pytest.approx(0.055), "A", 0.0)
+
+
+def test_pulse_shorter_than_the_opening_delay_never_reaches_the_flow() -> None:
+    settings = {**PAIR, "switching_interval": 0.0}
+    assert run_pair(settings, {0.0: 1.0, 0.002: 0.0}, 0.2) == []
+
+
+def test_no_command_vents_both_chambers() -> None:
+    openings = solenoid.instant_ideal(solenoid.prepare_ideal({}, 1e-3), solenoid.both_off(), 0.0)
+    assert openings == (0.0, 1.0, 0.0, 1.0)
+
+
+def test_command_above_zero_feeds_chamber_1_and_vents_chamber_2() -> None:
+    openings = solenoid.instant_ideal(solenoid.prepare_ideal({}, 1e-3), solenoid.both_off(), 1.0)
+    assert openings == (1.0, 0.0, 0.0, 1.0)
+
+
+def test_cuts_are_the_switchings_inside_a_step() -> None:
+    valve = solenoid.prepare_timed({"opening_delay": 0.0003, "closing_delay": 0.0007, "switching_interval": 0.0}, 1e-3)
+    both = solenoid.settle_timed(valve, solenoid.both_off_long_ago(), 1.0, 0.0)
+    both = solenoid.settle_timed(valve, both, 1.0, 0.5)
+    assert solenoid.switching_cuts(valve, both, -1.0, 1.0, 1e-3) == pytest.approx((0.0003, 0.0007))
+    assert solenoid.switching_cuts(valve, both, 1.0, 1.0, 1e-3) == (0.0, 0.0)

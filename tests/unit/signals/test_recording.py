@@ -1,0 +1,141 @@
+"""Recordings."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.signals import Channel, Recording
+from ppafo.signals.recording import aligned
+
+
+def recording(label: str = "bench", start: float = 0.0) -> Recording:
+    time = start + np.arange(5.0)
+    channels = {
+        "angle": Channel(np.array([0.0, 1.0, 2.0, 3.0, 4.0]), "rad"),
+        "command": Channel(np.array([1.0, -1.0, 1.0, -1.0, 1.0]), "-"),
+    }
+    return Recording(label, time, channels)
+
+
+def test_a_channel_is_found_by_name_with_its_unit() -> None:
+    assert recording()["angle"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert recording().unit("command") == "-"
+    assert recording().names == ("angle", "command")
+
+
+def test_an_unknown_channel_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(DataError, match="no channel 'angel', did you mean 'angle'"):
+        recording()["angel"]
+
+
+def test_a_recording_cannot_be_changed() -> None:
+    given = recording()
+    with pytest.raises(ValueError, match="read-only"):
+        given["angle"][0] = 5.0
+    with pytest.raises(ValueError, match="read-only"):
+        given.time[0] = 5.0
+    with pytest.raises(TypeError):
+        given.channels["angle"] = given.channels["command"]  # type: ignore[index]
+
+
+def test_a_recording_does_not_follow_the_arrays_it_was_made_of() -> None:
+    values = np.array([0.0, 1.0])
+    given = Recording("bench", np.array([0.0, 1.0]), {"angle": Channel(values, "rad")})
+    values[0] = 9.0
+    assert given["angle"][0] == 0.0
+
+
+@pytest.mark.parametrize("times", [[0.0, 1.0, 1.0], [0.0, 2.0, 1.0]])
+def test_time_that_does_not_grow_is_refused(times: list[float]) -> None:
+    with pytest.raises(DataError, match=r"bench: time must grow from sample to sample, .* \(sample 3\)"):
+        Recording("bench", np.array(times), {})
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_value_that_is_not_finite_is_refused_by_channel_and_sample(bad: float) -> None:
+    with pytest.raises(DataError, match=r"channel 'angle' is (nan|inf) at sample 3"):
+        recording().with_channel("angle", [0.0, 1.0, bad, 3.0, 4.0], "rad")
+
+
+def test_a_known_channel_in_another_unit_is_refused() -> None:
+    with pytest.raises(DataError, match="channel 'angle' is in 'deg', it is always kept in 'rad'"):
+        recording().with_channel("angle", np.zeros(5), "deg")
+
+
+def test_a_channel_of_another_length_is_refused() -> None:
+    with pytest.raises(DataError, match="channel 'torque' has 3 values for 5 times"):
+        recording().with_channel("torque", [1.0, 2.0, 3.0], "N m")
+
+
+@pytest.mark.parametrize("name", ["time", "Angle (deg)", "", "1st"])
+def test_a_name_that_no_file_could_hold_is_refused(name: str) -> None:
+    with pytest.raises(DataError, match="cannot name a channel"):
+        recording().with_channel(name, np.zeros(5), "N m")
+
+
+@pytest.mark.parametrize("unit", ["", "N [m]", "N\nm"])
+def test_a_unit_that_no_header_could_hold_is_refused(unit: str) -> None:
+    with pytest.raises(DataError, match="no usable unit"):
+        recording().with_channel("residual", np.zeros(5), unit)
+
+
+def test_a_recording_without_samples_is_refused() -> None:
+    with pytest.raises(DataError, match="bench: has no samples"):
+        Recording("bench", np.array([]), {})
+
+
+def test_a_channel_can_be_added_and_replaced_without_touching_the_original() -> None:
+    given = recording()
+    changed = given.with_channel("angle", np.ones(5), "rad").with_channel("torque", np.ones(5), "N m")
+    assert changed["angle"].tolist() == [1.0] * 5
+    assert changed.names == ("angle", "command", "torque")
+    assert given == recording()
+
+
+def test_a_part_keeps_the_samples_at_both_ends() -> None:
+    part = recording().between(1.0, 3.0)
+    assert part.time.tolist() == [1.0, 2.0, 3.0]
+    assert part["angle"].tolist() == [1.0, 2.0, 3.0]
+
+
+def test_a_part_without_samples_is_refused() -> None:
+    with pytest.raises(DataError, match=r"no sample between 1.2 s and 1.8 s; bench goes from 0 s to 4 s"):
+        recording().between(1.2, 1.8)
+
+
+def test_between_samples_a_command_is_held_and_everything_else_runs_straight() -> None:
+    moved = recording().resampled([0.5, 1.75, 4.0])
+    assert moved["angle"].tolist() == [0.5, 1.75, 4.0]
+    assert moved["command"].tolist() == [1.0, -1.0, 1.0]
+
+
+def test_nothing_is_made_up_outside_a_recording() -> None:
+    with pytest.raises(DataError, match="nothing is known"):
+        recording().resampled([3.0, 4.5])
+
+
+def test_two_recordings_are_brought_to_the_times_they_share() -> None:
+    first, second = aligned(recording(), recording("other", start=1.5))
+    assert first.time.tolist() == second.time.tolist() == [2.0, 3.0, 4.0]
+    assert second["angle"].tolist() == [0.5, 1.5, 2.5]
+
+
+def test_recordings_without_a_common_time_are_refused() -> None:
+    with pytest.raises(DataError, match="no time in common"):
+        aligned(recording(), recording("other", start=10.0))
+
+
+def test_copies_are_equal_and_stay_read_only() -> None:
+    for twin in (pickle.loads(pickle.dumps(recording())), copy.deepcopy(recording())):
+        assert twin == recording()
+        assert not twin["angle"].flags.writeable
+
+
+def test_recordings_that_differ_in_one_bit_are_not_equal() -> None:
+    changed = recording()["angle"].copy()
+    changed[3] = np.nextafter(changed[3], 9.0)
+    assert recording().with_channel("angle", changed, "rad") != recording()
+    assert recording("other") != recording()

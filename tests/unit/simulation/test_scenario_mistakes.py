@@ -1,0 +1,313 @@
+"""Every mistake in a scenario is one line: the file, the key, the value, what is allowed, the nearest name."""
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.errors import ParameterError, PpafoError, ScenarioError
+from ppafo.simulation.loading import load_scenario, parse_scenario, scenario_from_dict
+
+TEXT = """
+schema_version = 1
+name = "task"
+
+[device]
+set = "ppafo2011"
+valve = "proportional"
+
+[run]
+duration = "3 s"
+step = "1 ms"
+output_interval = "1 ms"
+
+[motion]
+kind = "held"
+angle = "75 deg"
+
+[initial]
+pressure_1 = "0 psi_g"
+pressure_2 = "atmosphere"
+
+[controller]
+kind = "pid"
+rate = "1 kHz"
+proportional_gain = "0.095 1/(N m)"
+
+[reference]
+kind = "ramp_hold"
+level = "6 N m"
+
+[sensors]
+delay = "0 s"
+seed = 1
+"""
+
+
+def problem_with(content: bytes, kind: type[PpafoError] = ScenarioError) -> str:
+    with pytest.raises(kind) as caught:
+        parse_scenario(content, "task.toml")
+    message = str(caught.value)
+    assert message.startswith("task.toml: ")
+    assert "\n" not in message
+    return message
+
+
+def problem_after(old: str, new: str, kind: type[PpafoError] = ScenarioError) -> str:
+    assert old in TEXT
+    return problem_with(TEXT.replace(old, new).encode(), kind)
+
+
+def test_the_text_that_these_tests_damage_is_itself_a_scenario() -> None:
+    assert parse_scenario(TEXT.encode(), "task.toml").name == "task"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "nearest"),
+    [
+        ("[controller]", "[controler]", "controler", "controller"),
+        ("proportional_gain", "proportionl_gain", "controller.proportionl_gain", "proportional_gain"),
+        ("angle =", "angel =", "motion.angel", "angle"),
+        ("duration", "durration", "run.durration", "duration"),
+        ("pressure_2", "presure_2", "initial.presure_2", "pressure_2"),
+        ("delay", "dellay", "sensors.dellay", "delay"),
+        ("valve =", "valvee =", "device.valvee", "valve"),
+        ("level", "levell", "reference.levell", "level"),
+    ],
+)
+def test_a_misspelt_key_is_answered_with_the_nearest(old: str, new: str, key: str, nearest: str) -> None:
+    assert f"unknown key '{key}', did you mean '{nearest}'?" in problem_after(old, new)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "nearest"),
+    [
+        ('"pid"', '"pdi"', "controller.kind = 'pdi' is not known, did you mean 'pid'?"),
+        ('"held"', '"hold"', "motion.kind = 'hold' is not known, did you mean 'held'?"),
+        ('"ramp_hold"', '"ramp"', "reference.kind = 'ramp' is not known"),
+    ],
+)
+def test_an_unknown_kind_is_answered_with_what_there_is(old: str, new: str, nearest: str) -> None:
+    assert nearest in problem_after(old, new)
+
+
+def test_a_setting_of_another_kind_of_controller_is_unknown() -> None:
+    assert "unknown key 'controller.proportional_gain'" in problem_after('"pid"', '"on_off"')
+
+
+@pytest.mark.parametrize(
+    ("line", "missing"),
+    [
+        ('duration = "3 s"', "'run.duration' is missing"),
+        ('kind = "pid"', "'controller.kind' is missing"),
+        ('set = "ppafo2011"', "'device.set' is missing"),
+        ('angle = "75 deg"', "'motion.angle' is missing"),
+        ('rate = "1 kHz"', "'controller.rate' is missing"),
+        ('name = "task"', "'name' is missing"),
+        ("schema_version = 1", "'schema_version' is missing"),
+        ('level = "6 N m"', "'reference.level' is missing"),
+    ],
+)
+def test_what_is_missing_is_named(line: str, missing: str) -> None:
+    assert missing in problem_after(line, "")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        (
+            '"75 deg"',
+            "75",
+            "motion.angle = 75: a number without a unit; must be a text with its unit, for example '75 deg'",
+        ),
+        ('"75 deg"', '"75"', "an angle is needed, for example '75 deg'"),
+        ('"75 deg"', '"75 N m"', "an angle is needed"),
+        ('"75 deg"', '"75 degg"', "'degg' is not a known unit, did you mean 'deg'?"),
+        ('"75 deg"', '"warm"', "does not start with a number"),
+        ('"75 deg"', "true", "motion.angle = True: must be a text with its unit"),
+        ('"75 deg"', '["75 deg"]', "must be a text with its unit"),
+        ('"75 deg"', "1979-05-27", "must be a text with its unit"),
+        ('"75 deg"', '"1e400 deg"', "not a finite number"),
+        ('"0.095 1/(N m)"', "0.095", "for example '0.095 1/(N m)'"),
+        ('"0.095 1/(N m)"', '"0.095 N m"', "a unit like '1/(N m)' is needed"),
+        ('"0.095 1/(N m)"', '"-1 1/(N m)"', "k_p must be at least 0 1/(N m) and at most 1000 1/(N m)"),
+        ('"0 psi_g"', '"50 psi"', "'psi' does not say which pressure"),
+        ('"0 psi_g"', '"50 psi_d"', "a pressure level is needed"),
+        ('"0 psi_g"', "50", "for example '50 psi_g'"),
+        (
+            '"0 psi_g"',
+            '"-20 psi_g"',
+            "initial.pressure_1 = '-20 psi_g': pressure in chamber 1 at the start must be at least",
+        ),
+        ('"0 psi_g"', '"0 Pa_a"', "at least 1000 Pa_a"),
+        (
+            '"atmosphere"',
+            '"atmosphre"',
+            "nor one of supply, dorsiflexion_supply, atmosphere, did you mean 'atmosphere'?",
+        ),
+        ('"6 N m"', '"6 deg"', "a unit like 'N m' is needed"),
+        ('"6 N m"', '"1e9 N m"', "the hold must be at least -10000 N m and at most 10000 N m"),
+        ('"1 kHz"', '"1 ms"', "a unit like 'Hz' is needed"),
+        ('"1 kHz"', '"0 Hz"', "samples per second"),
+        ("seed = 1", "seed = 1.5", "sensors.seed = 1.5"),
+        ("seed = 1", "seed = -1", "sensors.seed = -1"),
+        ("schema_version = 1", "schema_version = 2", "schema_version = 2 is not allowed; allowed: 1"),
+        ('"task"', '"My Task"', "name = 'My Task' must consist of small letters, digits, '-' and '_'"),
+        ('[sensors]\ndelay = "0 s"\nseed = 1', "", ""),
+        ("[sensors]", "[[sensors]]", "must be a table"),
+    ],
+)
+def test_a_value_that_does_not_fit_says_what_would(old: str, new: str, reason: str) -> None:
+    if reason:
+        assert reason in problem_after(old, new)
+    else:
+        assert parse_scenario(TEXT.replace(old, new).encode(), "task.toml").sensors.seed == 1
+
+
+@pytest.mark.parametrize("angle", ["19.9 deg", "130.1 deg", "-1 rad"])
+def test_an_angle_outside_the_stops_is_refused_with_the_stops(angle: str) -> None:
+    assert "must be between the stops of ppafo2011, 20 deg to 130 deg" in problem_after('"75 deg"', f'"{angle}"')
+
+
+@pytest.mark.parametrize("angle", ["20 deg", "130 deg"])
+def test_an_angle_on_a_stop_is_allowed(angle: str) -> None:
+    assert parse_scenario(TEXT.replace("75 deg", angle).encode(), "task.toml")
+
+
+LED = 'kind = "led"\n[motion.profile]\n'
+
+
+@pytest.mark.parametrize(
+    "profile",
+    [
+        'kind = "sine"\nlevel = "75 deg"\namplitude = "55.1 deg"\nfrequency = "0.7 Hz"',
+        'kind = "sine"\nlevel = "75 deg"\namplitude = "-56 deg"\nfrequency = "97.3 Hz"',
+        'kind = "ramp_hold"\nstart_level = "75 deg"\nlevel = "131 deg"',
+        'kind = "ramp_hold"\nstart_level = "0 deg"\nlevel = "75 deg"\nramp_time = "1 us"',
+        'kind = "constant"\nlevel = "140 deg"',
+    ],
+)
+def test_a_led_vane_that_leaves_the_stops_is_refused_with_the_time(profile: str) -> None:
+    message = problem_after('kind = "held"\nangle = "75 deg"', LED + profile)
+    assert "[motion.profile] leaves the stops of ppafo2011, 20 deg to 130 deg: it is at " in message
+    assert message.endswith(" s")
+
+
+def test_a_led_vane_may_touch_the_stops() -> None:
+    profile = 'kind = "sine"\nlevel = "75 deg"\namplitude = "55 deg"\nfrequency = "0.7 Hz"'
+    assert parse_scenario(TEXT.replace('kind = "held"\nangle = "75 deg"', LED + profile).encode(), "task.toml")
+
+
+def test_a_ramp_that_would_leave_the_stops_after_the_run_is_allowed() -> None:
+    profile = 'kind = "ramp_hold"\nstart_level = "75 deg"\nlevel = "131 deg"\nramp_time = "4 s"'
+    assert parse_scenario(TEXT.replace('kind = "held"\nangle = "75 deg"', LED + profile).encode(), "task.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ('"3 s"', '"0 s"', "run.duration = '0 s': length of the run must be more than 0 s"),
+        ('"3 s"', '"-1 s"', "length of the run must be more than 0 s"),
+        ('"3 s"', '"2 min^2"', "a unit like 's' is needed"),
+        ('step = "1 ms"', 'step = "2 ms"', "run.step = '2 ms': must not be above 0.001 s, which controller.rate gives"),
+        ('output_interval = "1 ms"', 'output_interval = "0.5 ms"', "must not be below run.step = 0.001 s"),
+        ('output_interval = "1 ms"', 'output_interval = "4 s"', "must not be above 3 s, which run.duration gives"),
+        (
+            'output_interval = "1 ms"',
+            'output_interval = "0.7 s"',
+            "must divide run.duration = 3 s, it fits 4.28571 times",
+        ),
+        ('"1 kHz"', '"29.97 Hz"', "no step near run.step = 0.001 s divides all of controller.rate (0.0333667 s)"),
+        ('"3 s"', '"1e6 s"', "1e+09 steps, at most 1e+08 are allowed: shorten the run or take a larger run.step"),
+        (
+            'rate = "1 kHz"',
+            'rate = "1 kHz"\nperiod = "1 ms"',
+            "give either controller.rate or controller.period, not both",
+        ),
+        ('delay = "0 s"', 'delay = "-1 ms"', "must be at least 0 s"),
+        ('delay = "0 s"', 'delay = "3.1 s"', "must not be longer than run.duration"),
+    ],
+)
+def test_times_that_do_not_go_together_are_refused(old: str, new: str, reason: str) -> None:
+    assert reason in problem_after(old, new)
+
+
+def test_too_many_recorded_samples_are_refused_with_the_remedy() -> None:
+    text = TEXT.replace('"3 s"', '"60000 s"')
+    assert "samples, at most 1e+07 are allowed: take a larger run.output_interval" in problem_with(text.encode())
+
+
+def test_a_mistake_in_the_device_names_scenario_and_set() -> None:
+    message = problem_after('valve = "proportional"', 'valve = "solnoid"', ParameterError)
+    assert "[device]: ppafo2011: there is no valve 'solnoid', did you mean 'solenoid'?" in message
+    message = problem_after("[run]", 'overrides = ["valve.aera=1mm^2"]\n[run]', ParameterError)
+    assert "[device]: override 'valves.proportional.aera=1mm^2'" in message
+    message = problem_after('"ppafo2011"', '"ppafo2012"', ParameterError)
+    assert "there is no parameter set 'ppafo2012', did you mean 'ppafo2011'?" in message
+
+
+def test_a_set_that_is_not_complete_says_which_one_is() -> None:
+    assert "use 'ppafo2011', which completes it" in problem_after('"ppafo2011"', '"ppafo2011-printed"', ParameterError)
+
+
+@pytest.mark.parametrize("name", ["a" * 300, "a/" * 3000 + "b"])
+def test_a_name_of_a_set_that_is_too_long_is_a_clean_error(name: str) -> None:
+    assert "device" in problem_after('"ppafo2011"', f'"{name}"', PpafoError)
+
+
+def test_empty_binary_and_foreign_encodings_are_named() -> None:
+    for content, reason in ((b" \n", "is empty"), (b"\x00\xff\x80", "UTF-8"), ("é".encode("latin-1"), "UTF-8")):
+        assert reason in problem_with(content)
+
+
+def test_a_duplicate_key_and_a_duplicate_table_are_errors_with_their_line() -> None:
+    assert "line 4" in problem_after('name = "task"', 'name = "task"\nname = "task"')
+    assert "line" in problem_with((TEXT + "\n[run]\n").encode())
+
+
+def test_deep_nesting_is_a_clean_error() -> None:
+    assert "nested too deeply" in problem_with(b"a = " + b"[" * 20000)
+
+
+def test_an_unknown_name_is_answered_with_the_nearest() -> None:
+    with pytest.raises(ScenarioError, match="no scenario 'step-respnse', did you mean 'step-response'"):
+        load_scenario("step-respnse")
+
+
+def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"gone.toml: cannot be read: No such file"):
+        load_scenario(tmp_path / "gone.toml")
+    with pytest.raises(ScenarioError, match="directory"):
+        load_scenario(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["a\0b.toml", "a\0b", "a" * 300, "a\nb.toml", "a\nb", "\ud800"])
+def test_a_name_that_no_file_can_have_is_a_clean_error(name: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(name)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [None, [], "torque-task", 3])
+def test_only_a_dictionary_is_taken_for_a_scenario(content: Any) -> None:
+    with pytest.raises(ScenarioError, match="a scenario is a dictionary"):
+        scenario_from_dict(content)
+
+
+@pytest.mark.parametrize(
+    "change", [{1: 2}, {"run": None}, {"run": 3}, {"assumed": {"run.step": 3}}, {"assumed": {1: ""}}, {"name": "a\nb"}]
+)
+def test_plain_values_of_a_wrong_type_are_clean_errors(change: dict[Any, Any]) -> None:
+    content: dict[Any, Any] = {
+        "schema_version": 1,
+        "name": "small",
+        "device": {"set": "ppafo2011"},
+        "run": {"duration": "1 s"},
+        "motion": {"kind": "held", "angle": "75 deg"},
+        "controller": {"kind": "pid", "rate": "1 kHz"},
+    }
+    with pytest.raises(ScenarioError) as caught:
+        scenario_from_dict({**copy.deepcopy(content), **change})
+    assert str(caught.value).startswith("scenario ")
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,151 @@
+"""Changing single values of a scenario and of its device by dotted path."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ppafo.errors import ParameterError, PpafoError, ScenarioError
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.overriding import device_paths, scenario_paths, split_override
+from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice
+
+TASK = "torque-task-proportional"
+
+
+def problem_of(*overrides: str, kind: type[PpafoError] = ScenarioError) -> str:
+    with pytest.raises(kind) as caught:
+        load_scenario(TASK, overrides)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_values_of_scenario_and_device_are_changed_together() -> None:
+    scenario = load_scenario(TASK, ["valve.area=12.6mm^2", "reference.level=5 N m", "motion.angle=80 deg"])
+    assert scenario.device.valve.orifice.area == 12.6e-6  # type: ignore[union-attr]
+    assert scenario.reference.settings["level"] == 5.0
+    assert scenario.motion == LedMotion(ProfileChoice("constant", {"level": math.radians(80.0)}))
+
+
+def test_the_overrides_stay_visible_and_the_file_is_kept_as_it_was() -> None:
+    origin = load_scenario(TASK, ["run.duration=1 s"]).origin
+    assert origin.overrides == ("run.duration=1 s",)
+    assert origin.content["run"]["duration"] == "3 s"
+
+
+def test_the_overrides_of_the_caller_come_after_those_of_the_file() -> None:
+    assert load_scenario("step-response", ["supply.pressure=300 kPa_a"]).device.supply.pressure == 3.0e5
+
+
+def test_another_valve_is_chosen_and_then_changed() -> None:
+    device = load_scenario(TASK, ["valve.opening_delay=3 ms", "device.valve=solenoid"]).device
+    assert (device.valve.kind, device.valve.settings["opening_delay"]) == ("solenoid", 0.003)
+
+
+def test_a_section_that_the_file_leaves_out_can_be_set() -> None:
+    sensors = load_scenario(TASK, ["sensors.delay=2 ms", "sensors.seed=5"]).sensors
+    assert (sensors.delay, sensors.seed) == (0.002, 5)
+
+
+def test_another_kind_of_controller_drops_the_settings_of_the_old_one() -> None:
+    scenario = load_scenario(TASK, ["controller.kind=on_off"])
+    assert (scenario.control.kind, scenario.control.settings, scenario.control.period) == ("on_off", {}, 0.001)
+    assert not [item for item in scenario.assumptions if item.path.endswith("_gain")]
+
+
+def test_another_kind_of_motion_keeps_what_both_have() -> None:
+    assert load_scenario(TASK, ["motion.kind=free"]).motion == FreeMotion(math.radians(75.0))
+
+
+def test_a_profile_can_be_built_from_nothing() -> None:
+    overrides = ["motion.kind=led", "motion.profile.kind=sine", "motion.profile.level=75 deg"]
+    motion = load_scenario(TASK, [*overrides, "motion.profile.amplitude=5 deg"]).motion
+    assert isinstance(motion, LedMotion)
+    assert motion.profile.settings["amplitude"] == math.radians(5.0)
+
+
+def test_a_period_takes_the_place_of_the_rate() -> None:
+    scenario = load_scenario(TASK, ["controller.period=2 ms"])
+    assert scenario.control.period == 0.002
+    assert "controller.rate" not in [item.path for item in scenario.assumptions]
+
+
+def test_a_gain_may_leave_out_its_unit_as_the_paper_does() -> None:
+    bare = load_scenario(TASK, ["controller.proportional_gain=0.1"]).control
+    assert bare == load_scenario(TASK, ["controller.proportional_gain=0.1 1/(N m)"]).control
+    assert bare.settings["proportional_gain"] == 0.1
+
+
+@pytest.mark.parametrize("override", ["motion.angle=80", "run.duration=2", "reference.level=5", "sensors.delay=1"])
+def test_any_other_value_must_say_its_unit(override: str) -> None:
+    assert "a number without a unit" in problem_of(override)
+
+
+def test_an_assumption_that_was_replaced_says_so() -> None:
+    assumptions = {item.path: item for item in load_scenario(TASK, ["motion.angle=80 deg"]).assumptions}
+    assert assumptions["motion.angle"].value == "80 deg"
+    assert assumptions["motion.angle"].note.startswith("set by an override; the scenario has 75 deg: not printed")
+    assert "override" not in assumptions["reference.level"].note
+
+
+@pytest.mark.parametrize(
+    ("override", "nearest"),
+    [
+        ("motion.angel=3 deg", "motion.angle"),
+        ("controller.integral_gian=1", "controller.integral_gain"),
+        ("moton.angle=3 deg", "motion.angle"),
+        ("suply.pressure=3 psi_g", "supply.pressure"),
+        ("vlave.area=3 mm^2", "valve.area"),
+    ],
+)
+def test_an_unknown_path_is_answered_with_the_nearest_of_scenario_and_device(override: str, nearest: str) -> None:
+    assert f"did you mean '{nearest}'?" in problem_of(override)
+
+
+def test_an_unknown_value_of_the_device_is_answered_by_the_set() -> None:
+    assert "did you mean 'supply.pressure'" in problem_of("supply.presure=3 psi_g", kind=ParameterError)
+
+
+def test_a_path_that_resembles_nothing_is_answered_with_examples() -> None:
+    assert "for example run.duration, run.step, run.output_interval" in problem_of("run.zzzzzzzzzzzz=1")
+
+
+@pytest.mark.parametrize("override", ["run.duration", "=3", "run.duration=", "", "run.duration 3"])
+def test_what_is_not_path_and_value_is_refused(override: str) -> None:
+    assert "is not of the form PATH=VALUE" in problem_of(override)
+
+
+def test_a_value_that_does_not_fit_names_the_override() -> None:
+    message = problem_of("motion.angle=200 deg")
+    assert message.startswith("torque-task-proportional: override motion.angle=200 deg: must be between the stops")
+
+
+def test_a_seed_that_is_no_whole_number_is_refused() -> None:
+    assert problem_of("sensors.seed=1.5") == "override 'sensors.seed=1.5': must be a whole number"
+
+
+def test_overrides_of_the_file_and_lists_are_not_paths() -> None:
+    assert "has no value 'device.overrides'" in problem_of("device.overrides=[]")
+    assert "has no value 'assumed'" in problem_of("assumed=x")
+
+
+def test_an_override_is_split_at_its_first_equals_sign() -> None:
+    assert split_override("  run.duration =  1\n s ") == ("run.duration", "1 s")
+    assert split_override("description=a = b") == ("description", "a = b")
+
+
+PATHS = [*scenario_paths(load_scenario(TASK).origin.content), *device_paths()]
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    path=st.sampled_from(PATHS), text=st.one_of(st.text(max_size=20), st.sampled_from(["1 s", "1e300 N m", "0", "-1"]))
+)
+def test_any_override_text_is_taken_or_refused_cleanly(path: str, text: str) -> None:
+    message = ""
+    try:
+        load_scenario(TASK, [f"{path}={text}"])
+    except PpafoError as error:
+        message = str(error)
+    assert len(message.splitlines()) <= 1

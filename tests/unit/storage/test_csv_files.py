@@ -1,0 +1,102 @@
+"""Recordings as CSV."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.signals import Channel, Recording
+from ppafo.storage import read_csv, write_csv
+
+
+def recording(is_synthetic: bool = False) -> Recording:
+    channels = {"angle": Channel(np.array([1.0 / 3.0, 1e-17, -2.0]), "rad"), "command": Channel(np.ones(3), "-")}
+    return Recording("bench", np.array([0.0, 0.1, 0.30000000000000004]), channels, is_synthetic)
+
+
+def written(folder: Path, content: str | bytes) -> Path:
+    path = folder / "given.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def test_the_first_line_names_channels_with_units(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "bench.csv", recording())
+    assert path.read_text().splitlines()[0] == "time [s],angle [rad],command [-]"
+
+
+def test_a_file_is_read_back_exactly(tmp_path: Path) -> None:
+    assert read_csv(write_csv(tmp_path / "bench.csv", recording())) == recording()
+
+
+def test_a_recording_that_nobody_measured_says_so_in_the_file(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "bench.csv", recording(is_synthetic=True))
+    assert path.read_text().startswith("# synthetic")
+    assert read_csv(path) == recording(is_synthetic=True)
+
+
+def test_other_units_become_si_on_the_way_in(tmp_path: Path) -> None:
+    path = written(tmp_path, "time [ms],angle [deg],pressure_1 [psi_g],command [%]\n0,90,0,50\n1,180,10,-100\n")
+    found = read_csv(path, atmosphere=1e5)
+    assert found.time.tolist() == [0.0, 0.001]
+    assert found["angle"].tolist() == pytest.approx([np.pi / 2.0, np.pi])
+    assert found["pressure_1"].tolist() == pytest.approx([1e5, 1e5 + 68947.57293168361])
+    assert found["command"].tolist() == [0.5, -1.0]
+
+
+def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Path) -> None:
+    path = written(tmp_path, b"\xef\xbb\xbf# bench 3\r\ntime [s],angle [rad]\r\n0,1\r\n1,2\r\n")
+    assert read_csv(path)["angle"].tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "is empty"),
+        ("\n\n", "the header must name columns"),
+        ("# only a remark\n", "has no header"),
+        ("time [s],angle [rad]\n", "has a header but no samples"),
+        (b"\x89HDF\r\n\x1a\n\x00\xff\xfe", r"not a text file in UTF-8 \(byte 0\)"),
+        (b"time [s]\x00\n0\n", "not a text file"),
+        ("time [s],angle [rad]\n0,1\n1,2", "cut off"),
+        ("time [s],angle [rad]\n0,1\n1\n", "line 3 has 1 values for 2 columns"),
+        ("time [s],angle [rad]\n0,1\n1,fast\n", "line 3 holds something that is not a number.*fast"),
+        ("time [s],angle [rad]\n0,1\n1,nan\n", "channel 'angle' is nan at sample 2"),
+        ("time [s],angle [rad]\n0,1\n0,2\n", "time must grow"),
+        ("time,angle\n0,1\n", "name columns as 'name \\[unit\\]', parted by commas; 'time' is none"),
+        ("time [s];angle [rad]\n0;1\n", "parted by commas"),
+        ("angle [rad],time [s]\n0,1\n", "the first column must be 'time \\[s\\]', it is 'angle'"),
+        ("time [s],angle [rad],angle [deg]\n0,1,1\n", "two columns 'angle'"),
+        ("time [s],angle [m]\n0,1\n", "column 'angle \\[m\\]': unit 'm' does not fit: an angle is needed"),
+        ("time [s],pressure_1 [psi]\n0,1\n", "column 'pressure_1 \\[psi\\]': 'psi' does not say which pressure"),
+        ("time [s],pressure_1 [psi_d]\n0,1\n", "a pressure level is needed"),
+        ("time [s],residual [Nm2]\n0,1\n", "column 'residual \\[Nm2\\]'"),
+        ('time [s],angle [rad]\n0,"1\n', "not a CSV file|not a number"),
+    ],
+)
+def test_an_unusable_file_is_one_line_that_names_it(tmp_path: Path, content: str | bytes, message: str) -> None:
+    path = written(tmp_path, content)
+    with pytest.raises(DataError, match=message) as caught:
+        read_csv(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path: Path) -> None:
+    for path in (tmp_path / "nothing.csv", tmp_path):
+        with pytest.raises(DataError, match="cannot be read"):
+            read_csv(path)
+
+
+def test_an_earlier_file_stays_where_writing_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_csv(tmp_path / "bench.csv", recording())
+
+    def interrupted(self: Path, target: Path) -> Path:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_csv(path, recording().with_channel("torque", np.zeros(3), "N m"))
+    assert read_csv(path) == recording()
+    assert list(tmp_path.iterdir()) == [path]

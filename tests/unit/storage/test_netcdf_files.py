@@ -1,0 +1,93 @@
+"""Recordings as NetCDF."""
+
+from pathlib import Path
+
+import h5netcdf
+import numpy as np
+import pytest
+import xarray
+
+from ppafo.errors import DataError
+from ppafo.signals import Channel, Recording
+from ppafo.storage import dataset_of, read_netcdf, write_netcdf
+from ppafo.storage.netcdf import netcdf_bytes
+
+
+def recording() -> Recording:
+    channels = {"angle": Channel(np.array([1.0 / 3.0, 1e-17]), "rad"), "command": Channel(np.ones(2), "-")}
+    return Recording("bench é", np.array([0.0, 0.1]), channels, is_synthetic=True)
+
+
+def test_a_file_is_read_back_exactly(tmp_path: Path) -> None:
+    assert read_netcdf(write_netcdf(tmp_path / "bench.nc", recording())) == recording()
+
+
+def test_the_same_recording_gives_the_same_bytes() -> None:
+    assert netcdf_bytes(recording(), {"name": "task"}) == netcdf_bytes(recording(), {"name": "task"})
+
+
+def test_xarray_opens_the_file_as_the_dataset_that_python_gets(tmp_path: Path) -> None:
+    path = write_netcdf(tmp_path / "bench.nc", recording(), {"name": "task", "note": "x" * 200_000})
+    with xarray.open_dataset(path, engine="h5netcdf") as opened:
+        xarray.testing.assert_identical(opened.load(), dataset_of(recording(), {"name": "task", "note": "x" * 200_000}))
+
+
+def test_attributes_hold_units_long_names_and_the_scenario() -> None:
+    dataset = dataset_of(recording(), {"name": "task"})
+    assert dataset["angle"].attrs == {"units": "rad", "long_name": "ankle angle, growing in plantarflexion"}
+    assert dataset["command"].attrs["units"] == "1"
+    assert dataset["time"].attrs["units"] == "s"
+    assert dataset.attrs == {"title": "bench é", "synthetic": "yes", "scenario": '{"name": "task"}'}
+
+
+def test_a_file_cut_off_anywhere_is_refused_by_name(tmp_path: Path) -> None:
+    whole = netcdf_bytes(recording())
+    path = tmp_path / "cut.nc"
+    for share in (0.001, 0.2, 0.5, 0.9, 0.999):
+        path.write_bytes(whole[: int(len(whole) * share)])
+        with pytest.raises(DataError, match="not a whole NetCDF file of a recording"):
+            read_netcdf(path)
+
+
+@pytest.mark.parametrize("content", [b"time [s],angle [rad]\n0,1\n", b"\x00" * 100, b"CDF\x01" + b"\x00" * 60])
+def test_a_file_of_another_kind_is_refused_by_name(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "other.nc"
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=r"other\.nc: is not a whole NetCDF file"):
+        read_netcdf(path)
+
+
+def test_an_empty_file_is_refused_as_empty(tmp_path: Path) -> None:
+    path = tmp_path / "empty.nc"
+    path.touch()
+    with pytest.raises(DataError, match="is empty"):
+        read_netcdf(path)
+
+
+def changed(path: Path, variable: str, units: str) -> Path:
+    write_netcdf(path, recording())
+    with h5netcdf.File(path, "a") as file:
+        file.variables[variable].attrs["units"] = units
+    return path
+
+
+def test_a_wrong_unit_is_refused_by_file_and_channel(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"bench\.nc: .*channel 'angle' is in 'deg', it is always kept in 'rad'"):
+        read_netcdf(changed(tmp_path / "bench.nc", "angle", "deg"))
+    with pytest.raises(DataError, match=r"'time' is in 'ms', it must be in 's'"):
+        read_netcdf(changed(tmp_path / "bench.nc", "time", "ms"))
+
+
+def test_a_dataset_of_something_else_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "map.nc"
+    xarray.Dataset({"height": (("x", "y"), np.zeros((2, 3)))}).to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(DataError, match="there is no variable 'time'"):
+        read_netcdf(path)
+
+
+def test_a_channel_of_two_dimensions_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "two.nc"
+    made = xarray.Dataset({"angle": (("time", "y"), np.zeros((2, 3)))}, {"time": ("time", [0.0, 1.0], {"units": "s"})})
+    made.to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(DataError, match="'angle' must run over 'time' alone, not over time, y"):
+        read_netcdf(path)

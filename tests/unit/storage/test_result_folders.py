@@ -1,0 +1,195 @@
+"""Result folders: complete, or not there."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.signals import Channel, Recording
+from ppafo.storage import check_result_folder, read_recording, read_result, write_result
+
+DOCUMENT = {"status": {"kind": "completed"}, "scenario": {"name": "task"}}
+
+
+def recording(level: float = 1.0) -> Recording:
+    return Recording("task", np.array([0.0, 0.1]), {"angle": Channel(np.full(2, level), "rad")}, is_synthetic=True)
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+def test_a_folder_holds_both_recordings_the_document_and_the_attachments(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "new" / "task", recording(), DOCUMENT, {"figure.png": b"png"})
+    assert names(folder) == ["figure.png", "recording.csv", "recording.nc", "run.json"]
+    assert names(folder.parent) == ["task"]
+    assert (folder / "figure.png").read_bytes() == b"png"
+
+
+def test_a_folder_is_read_back_exactly_from_either_file(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    stored = read_result(folder)
+    assert stored.recording == recording()
+    assert stored.document["scenario"] == {"name": "task"}
+    for place in (folder, folder / "recording.nc", folder / "recording.csv"):
+        assert read_recording(place) == recording()
+
+
+def test_the_table_begins_with_its_header_so_that_any_program_can_read_it(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    assert (folder / "recording.csv").read_text().startswith("time [s],angle [rad]\n")
+
+
+def test_the_document_names_its_format_files_and_channels(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    document = json.loads((folder / "run.json").read_text())
+    assert (document["format"], document["schema_version"]) == ("ppafo result", 1)
+    assert document["files"] == names(folder)
+    assert document["recording"]["channels"] == {"angle": "rad"}
+
+
+def test_an_empty_folder_is_filled_and_an_earlier_result_is_replaced_whole(tmp_path: Path) -> None:
+    folder = tmp_path / "task"
+    folder.mkdir()
+    write_result(folder, recording(1.0), DOCUMENT, {"figure.pdf": b"old"})
+    write_result(folder, recording(2.0), DOCUMENT, {})
+    assert read_result(folder).recording == recording(2.0)
+    assert names(folder) == ["recording.csv", "recording.nc", "run.json"]
+    assert names(tmp_path) == ["task"]
+
+
+def filled_with_something_else(folder: Path) -> str:
+    (folder / "thesis.txt").write_text("years of work")
+    return "is not empty and not a ppafo result"
+
+
+def filled_with_a_run_file_of_another_program(folder: Path) -> str:
+    (folder / "run.json").write_text('{"format": "other"}')
+    return "is not of a ppafo result"
+
+
+def filled_with_a_result_and_something_else(folder: Path) -> str:
+    write_result(folder, recording(), DOCUMENT, {})
+    (folder / "notes.txt").write_text("keep me")
+    return r"holds files that are not of its result \(notes.txt\)"
+
+
+def filled_with_a_result_and_a_folder_by_the_name_of_a_file(folder: Path) -> str:
+    write_result(folder, recording(), DOCUMENT, {})
+    (folder / "figure.png").mkdir()
+    return r"holds files that are not of its result \(figure.png\)"
+
+
+@pytest.mark.parametrize(
+    "fill",
+    [
+        filled_with_something_else,
+        filled_with_a_run_file_of_another_program,
+        filled_with_a_result_and_something_else,
+        filled_with_a_result_and_a_folder_by_the_name_of_a_file,
+    ],
+)
+def test_a_folder_with_anything_of_somebody_elses_is_refused_and_left_alone(
+    tmp_path: Path, fill: Callable[[Path], str]
+) -> None:
+    folder = tmp_path / "task"
+    folder.mkdir()
+    message = fill(folder)
+    before = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.is_file()}
+    with pytest.raises(DataError, match=message):
+        write_result(folder, recording(3.0), DOCUMENT, {})
+    assert {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.is_file()} == before
+
+
+def test_a_file_in_the_place_of_the_folder_or_above_it_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(DataError, match="is a file; a result needs a folder"):
+        check_result_folder(file)
+    with pytest.raises(DataError, match="is not a folder that can be written to"):
+        check_result_folder(file / "task")
+
+
+def interrupt_at(monkeypatch: pytest.MonkeyPatch, method: str, call: int) -> None:
+    """Raise KeyboardInterrupt at the given call of a method of Path."""
+    original = getattr(Path, method)
+    calls = iter(range(1, 1000))
+
+    def interrupted(self: Path, *arguments: object) -> object:
+        if next(calls) == call:
+            raise KeyboardInterrupt
+        return original(self, *arguments)
+
+    monkeypatch.setattr(Path, method, interrupted)
+
+
+@pytest.mark.parametrize(
+    ("method", "call"), [("write_bytes", 1), ("write_bytes", 2), ("write_bytes", 3), ("rename", 1), ("mkdir", 2)]
+)
+def test_an_interrupt_leaves_no_folder_and_nothing_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str, call: int
+) -> None:
+    interrupt_at(monkeypatch, method, call)
+    with pytest.raises(KeyboardInterrupt):
+        write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize(("method", "call"), [("write_bytes", 2), ("rename", 1), ("rename", 2)])
+def test_an_interrupt_leaves_an_earlier_result_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str, call: int
+) -> None:
+    folder = write_result(tmp_path / "task", recording(1.0), DOCUMENT, {})
+    interrupt_at(monkeypatch, method, call)
+    with pytest.raises(KeyboardInterrupt):
+        write_result(folder, recording(2.0), DOCUMENT, {})
+    monkeypatch.undo()
+    assert read_result(folder).recording == recording(1.0)
+    assert names(tmp_path) == ["task"]
+
+
+def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: Path, content: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(DataError, match="task: cannot be written: no space left on device"):
+        write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "is empty"),
+        ("{", "is not JSON"),
+        ("[" * 100_000, "is not JSON"),
+        ("[]", "is not of a ppafo result"),
+        ('{"format": "ppafo result", "schema_version": 99}', "has schema_version 99, this version of ppafo reads 1"),
+        ('{"format": "ppafo result", "schema_version": 1}', "does not say what its recording and its files are"),
+    ],
+)
+def test_an_unusable_document_is_one_line_that_names_it(tmp_path: Path, content: str, message: str) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    (folder / "run.json").write_text(content)
+    with pytest.raises(DataError, match=message) as caught:
+        read_result(folder)
+    assert str(caught.value).startswith(f"{folder / 'run.json'}: ")
+
+
+def test_a_result_without_its_recording_is_refused_by_file(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    (folder / "recording.nc").unlink()
+    with pytest.raises(DataError, match=r"recording\.nc: cannot be read"):
+        read_result(folder)
+
+
+def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
+    for place in (tmp_path / "a.xlsx", tmp_path / "nothing"):
+        with pytest.raises(DataError, match="neither a .nc or .csv file nor a result folder"):
+            read_recording(place)
+    with pytest.raises(DataError, match=r"run\.json: cannot be read"):
+        read_recording(tmp_path)
