@@ -113,7 +113,7 @@ def assert_can_be_run(scenario: Scenario) -> None:
         assert round(count) >= 1
         assert abs(count - round(count)) < 1e-5
     assert scenario.duration / scenario.time_step <= 1.0001e8
-    assert 0.0 <= scenario.sensors.delay <= scenario.duration
+    assert 0.0 <= scenario.sensors.delay <= min(scenario.duration, 1.0001e5 * scenario.time_step)
     assert (
         scenario.device.actuator.angle_min - 1e-6 <= start_angle(scenario) <= scenario.device.actuator.angle_max + 1e-6
     )

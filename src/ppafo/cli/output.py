@@ -51,13 +51,13 @@ def print_text(text: str) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def write_files(folder: Path, contents: Mapping[str, str]) -> None:
-    """Write text files into a folder, made if need be: all of them aside first, then renamed."""
+def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> None:
+    """Write files into a folder, made if need be: all of them aside first, then renamed. A text is written as UTF-8."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as aside:
             for name, content in contents.items():
-                (Path(aside) / name).write_text(content, encoding="utf-8")
+                (Path(aside) / name).write_bytes(content if isinstance(content, bytes) else content.encode())
             for name in contents:
                 (Path(aside) / name).replace(folder / name)
     except OSError as error:

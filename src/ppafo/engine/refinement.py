@@ -1,6 +1,6 @@
 """How many times a step must be divided so that the fastest chamber is followed: one number for a whole run.
 
-A chamber fills or empties in about V / (conductance R T / M), and the gas is a spring for the vane. A step of 1/25 of
+A chamber fills or empties in about V / (conductance R T / M), and the gas is a spring for the vane. A step of 1/70 of
 the first time and 1/10 of a radian of the second keeps the error of the scheme below 2e-4 of the angle range and 1e-3
 of the pressure range (docs/decisions/0002).
 """
@@ -9,7 +9,7 @@ import math
 
 from ppafo.model.plant import PlantParameters, chamber_volumes
 
-STEPS_PER_FILLING = 25.0
+STEPS_PER_FILLING = 70.0
 RADIANS_PER_STEP = 0.1
 MOST_DIVISIONS = 1000
 

@@ -2,8 +2,10 @@
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ppafo.reporting.figures import GRAMS_PER_KILOGRAM
-from ppafo.reporting.style import ACTUAL, BLUE, GREY, VERMILION, WANTED, house_style
+from ppafo.reporting.style import BLUE, GREY, VERMILION, WANTED, house_style
 from ppafo.signals import Recording
 
 if TYPE_CHECKING:
@@ -29,13 +31,16 @@ def torque_task_figure(
 
         figure = Figure(figsize=_SIZE, layout="constrained")
         grid = figure.subplots(5, 1, sharex=True, height_ratios=_HEIGHTS)
-        _torque(grid[0], solenoid, "Solenoid valves: on or off, decided every 50 ms", _SOLENOID, ceiling)
+        _torque(grid[0], solenoid, "Solenoid valves, on or off", _SOLENOID, ceiling)
         _states(grid[1], solenoid)
-        _torque(grid[2], proportional, "Proportional valve: PID controller", _PROPORTIONAL, ceiling)
+        _torque(grid[2], proportional, "Proportional valve", _PROPORTIONAL, ceiling)
         _opening(grid[3], proportional)
         _gas(grid[4], solenoid, proportional, gas_in_paper)
         grid[4].set_xlabel("Time (s)")
         grid[4].set_xlim(float(solenoid.time[0]), float(solenoid.time[-1]))
+        limits = [axes.get_ylim() for axes in (grid[0], grid[2])]
+        for axes in (grid[0], grid[2]):
+            axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
         figure.align_ylabels(grid)
         return figure
 
@@ -62,20 +67,24 @@ def _torque(axes: "Axes", recording: Recording, title: str, colour: str, ceiling
 
 def _states(axes: "Axes", recording: Recording) -> None:
     """Show which of the two valves is on, as bars."""
-    command = recording["command"]
-    for row, is_on, colour in ((1, command > 0.0, _SOLENOID), (0, command < 0.0, GREY)):
-        axes.fill_between(
-            recording.time, row + 0.12, row + 0.88, where=list(is_on), step="post", color=colour, linewidth=0.0
-        )
+    for row, valve, colour in ((1, 1.0, _SOLENOID), (0, -1.0, GREY)):
+        axes.broken_barh(_spans(recording, valve), (row + 0.12, 0.76), color=colour, linewidth=0.0)
     axes.set_ylim(0.0, 2.0)
     axes.set_yticks((0.5, 1.5), ("B on", "A on"))
     axes.tick_params(axis="y", length=0.0, labelsize=8.5)
     axes.grid(visible=False)
-    axes.set_ylabel("Valve", rotation=90)
+    axes.set_ylabel("Valve")
+
+
+def _spans(recording: Recording, command: float) -> list[tuple[float, float]]:
+    """Return beginning and length [s] of every time with a command of this sign."""
+    is_on = np.concatenate(([False], np.sign(recording["command"][:-1]) == command, [False]))
+    edges = recording.time[np.flatnonzero(np.diff(is_on))]
+    return [(float(start), float(end - start)) for start, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _opening(axes: "Axes", recording: Recording) -> None:
-    axes.plot(recording.time, recording["command"], color=_PROPORTIONAL, drawstyle="steps-post")
+    axes.plot(recording.time, recording["command"], color=_PROPORTIONAL)
     axes.set_ylim(-0.08, 1.08) if recording["command"].min() >= 0.0 else axes.set_ylim(-1.1, 1.1)
     axes.set_ylabel("Opening")
 

@@ -10,7 +10,7 @@ from ppafo.parameters import build_device, list_sets, load_parameter_set
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.parameter_set import chosen_valve
 from ppafo.simulation.assumptions import Hardware, read_assumptions
-from ppafo.simulation.clock import read_clock
+from ppafo.simulation.clock import MOST_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
     AT_REST,
     INITIAL,
@@ -24,7 +24,7 @@ from ppafo.simulation.declaration import (
 )
 from ppafo.simulation.motion import read_motion, read_profile
 from ppafo.simulation.overriding import Changed
-from ppafo.simulation.reading import Reading
+from ppafo.simulation.reading import Reading, written
 from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors
 
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
@@ -65,7 +65,7 @@ def build_scenario(given: Given, changed: Changed) -> Scenario:
         initial_pressure_2=_initial_pressure(reading, 1, device.supply),
         control=_control(reading, clock.period),
         reference=read_profile(reading, "reference", TORQUE_LEVEL) if "reference" in document else _NOTHING_TO_FOLLOW,
-        sensors=_sensors(reading, clock.duration),
+        sensors=_sensors(reading, clock),
         assumptions=read_assumptions(before, reading, hardware, given.overrides),
         origin=Origin(given.path, document["device"]["set"], hardware.valve, given.overrides, given.content),
     )
@@ -124,10 +124,13 @@ def _control(reading: Reading, period: float) -> Control:
     return Control(kind, reading.section("controller", controller_settings(kind)), period)
 
 
-def _sensors(reading: Reading, duration: float) -> Sensors:
+def _sensors(reading: Reading, clock: Clock) -> Sensors:
     values = reading.section("sensors", SENSORS)
-    if values["delay"] > duration:
+    if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
+    if values["delay"] / clock.step > MOST_STEPS_OF_DELAY:
+        most = written(MOST_STEPS_OF_DELAY * clock.step, "s")
+        raise reading.refusal("sensors.delay", f"must be at most {most}, {MOST_STEPS_OF_DELAY:.0e} steps")
     return Sensors(
         delay=values["delay"],
         angle_noise=values["angle_noise"],

@@ -9,7 +9,8 @@ from ppafo.simulation.declaration import PERIOD, RATE, RUN, value_at
 from ppafo.simulation.reading import Reading, written
 
 MOST_STEPS = 1.0e8
-MOST_OUTPUTS = 1.0e7
+MOST_OUTPUTS = 5.0e6
+MOST_STEPS_OF_DELAY = 1.0e5
 SMALLEST_SHARE = 1.0e-3
 """The step is not made smaller than this share of the one asked for just to make times fit each other."""
 

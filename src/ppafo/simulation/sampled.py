@@ -13,9 +13,16 @@ from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
 from ppafo.model.vane import actuator_torque
 
+MOST_STEPS = 5_000_000
+
 
 def run_sampled(run: Run, controller: PythonController) -> BatchResult:
     """Run with a Python controller; SimulationError where it returns no finite number."""
+    if run.step_count > MOST_STEPS:
+        raise SimulationError(
+            f"a Python controller needs every step in memory: {run.step_count} steps are more than {MOST_STEPS}; "
+            "shorten run.duration, or write the controller as a catalogue entry (docs/how-to/add-a-controller.md)"
+        )
     batch = batch_of(run)
     block = LaneBlock(load_program(run.program), batch.clock, batch.parameters, batch.states)
     rows = state_row_numbers(run)

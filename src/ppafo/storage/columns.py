@@ -31,6 +31,8 @@ class Column:
 
 def parse_header(cells: list[str]) -> list[Column]:
     """Return the columns of a header such as ``time [s]``, ``pressure_1 [psi_g]``; time comes first."""
+    if not cells:
+        raise DataError("the header must come first, line 1 is empty")
     columns = [_column(cell) for cell in cells]
     names = [column.name for column in columns]
     if names[0] != TIME:

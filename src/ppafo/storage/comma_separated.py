@@ -45,7 +45,7 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
     is_synthetic = SYNTHETIC_MARK in lines
     first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
     try:
-        rows = list(csv.reader(lines[first:], strict=True))
+        rows = _without_blank_end(list(csv.reader(lines[first:], strict=True)))
         if len(rows) < 2:
             raise DataError("has a header but no samples" if rows else "has no header")
         columns = parse_header(rows[0])
@@ -70,6 +70,11 @@ def _lines(path: str | Path) -> list[str]:
     if not text.endswith(("\n", "\r")):
         raise DataError(f"{path}: the last line has no end: the file is cut off, or lacks its final line break")
     return text.splitlines()
+
+
+def _without_blank_end(rows: list[list[str]]) -> list[list[str]]:
+    filled = next((count for count in range(len(rows), 0, -1) if rows[count - 1]), 0)
+    return rows[:filled]
 
 
 def _table(rows: list[list[str]], width: int, skipped: int) -> Floats:

@@ -1,4 +1,7 @@
-"""Recordings as NetCDF files. Written and read by h5netcdf alone: loading xarray takes longer than a whole run."""
+"""Recordings as NetCDF files, which xarray opens too; loading xarray itself takes longer than a whole run.
+
+Read as the HDF5 files that they are: h5netcdf prints a traceback of its own where it meets a damaged one.
+"""
 
 import io
 from collections.abc import Mapping
@@ -12,6 +15,9 @@ from ppafo.signals import Channel, Recording
 from ppafo.signals.channels import TIME, TIME_UNIT
 from ppafo.storage.dataset import channel_attributes, global_attributes, time_attributes, unit_of_attribute
 from ppafo.storage.files import read_bytes, write_file
+
+_DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowError, MemoryError)
+"""What h5py raises where a file is cut off or damaged."""
 
 
 def write_netcdf(path: str | Path, recording: Recording, scenario: Mapping[str, Any] | None = None) -> Path:
@@ -40,33 +46,34 @@ def read_netcdf(path: str | Path) -> Recording:
     content = read_bytes(path)
     try:
         return _recording(content, path)
-    except (OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
+    except _DAMAGED as error:
         raise DataError(f"{path}: is not a whole NetCDF file of a recording: {' '.join(str(error).split())}") from error
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
 
 
 def _recording(content: bytes, path: str | Path) -> Recording:
-    import h5netcdf
+    import h5py
 
-    with h5netcdf.File(io.BytesIO(content), "r") as file:
-        if TIME not in file.variables:
+    with h5py.File(io.BytesIO(content), "r") as file:
+        if TIME not in file:
             raise DataError(f"there is no variable '{TIME}'")
-        unit = str(file.variables[TIME].attrs.get("units", ""))
-        if unit != TIME_UNIT:
-            raise DataError(f"'{TIME}' is in '{unit}', it must be in '{TIME_UNIT}'")
-        channels = {
-            str(name): _channel(str(name), variable) for name, variable in file.variables.items() if name != TIME
-        }
-        label = str(file.attrs.get("title", Path(path).stem))
-        is_synthetic = str(file.attrs.get("synthetic", "no")) == "yes"
-        return Recording(label, np.asarray(file.variables[TIME][:], dtype=np.float64), channels, is_synthetic)
+        time = _channel(TIME, file[TIME])
+        if time.unit != TIME_UNIT:
+            raise DataError(f"'{TIME}' is in '{time.unit}', it must be in '{TIME_UNIT}'")
+        channels = {str(name): _channel(name, variable) for name, variable in file.items() if name != TIME}
+        label = _attribute(file, "title") or Path(path).stem
+        return Recording(label, time.values, channels, _attribute(file, "synthetic") == "yes")
 
 
 def _channel(name: str, variable: Any) -> Channel:
-    if variable.dimensions != (TIME,):
-        raise DataError(
-            f"'{name}' must run over '{TIME}' alone, not over {', '.join(variable.dimensions) or 'nothing'}"
-        )
-    unit = unit_of_attribute(str(variable.attrs.get("units", "")))
+    if len(getattr(variable, "shape", ())) != 1:
+        raise DataError(f"'{name}' must be numbers over '{TIME}' alone")
+    unit = unit_of_attribute(_attribute(variable, "units"))
     return Channel(np.asarray(variable[:], dtype=np.float64), unit)
+
+
+def _attribute(place: Any, name: str) -> str:
+    """Return an attribute as text, empty where there is none; other programs write texts as bytes."""
+    value = place.attrs.get(name, "")
+    return value.decode("utf-8") if isinstance(value, bytes) else str(value)

@@ -7,14 +7,14 @@ from ppafo.errors import DataError
 from ppafo.signals import Recording
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.netcdf import read_netcdf
-from ppafo.storage.result_folder import CSV_FILE, NETCDF_FILE, RUN_FILE, read_document
+from ppafo.storage.result_folder import CSV_FILE, RUN_FILE, read_document, read_result
 
 
 def read_recording(path: str | Path) -> Recording:
     """Return the recording in a ``.nc`` or ``.csv`` file or in a result folder."""
     place = Path(path)
     if place.is_dir():
-        return read_netcdf(place / NETCDF_FILE)
+        return read_result(place).recording
     if place.suffix == ".nc":
         return read_netcdf(place)
     if place.suffix == ".csv":

@@ -111,7 +111,7 @@ def test_a_command_that_rests_at_zero_between_two_signs_switches_once() -> None:
     command = np.zeros(3001)
     command[:1000], command[2000:] = 1.0, -1.0
     assert value("switchings", command=command) == 1.0
-    assert value("switchings", command=np.sign(np.sin(2.0 * math.pi * (TIME + 0.0001)))) == 5.0
+    assert value("switchings", command=np.sign(np.cos(2.0 * math.pi * TIME))) == 6.0
 
 
 def test_oscillation_on_the_ramp_is_counted_there_and_not_on_the_hold() -> None:

@@ -235,7 +235,12 @@ def test_times_that_do_not_go_together_are_refused(old: str, new: str, reason: s
 
 def test_too_many_recorded_samples_are_refused_with_the_remedy() -> None:
     text = TEXT.replace('"3 s"', '"60000 s"')
-    assert "samples, at most 1e+07 are allowed: take a larger run.output_interval" in problem_with(text.encode())
+    assert "samples, at most 5e+06 are allowed: take a larger run.output_interval" in problem_with(text.encode())
+
+
+def test_a_delay_of_too_many_steps_is_refused() -> None:
+    text = TEXT.replace('"3 s"', '"300 s"').replace('delay = "0 s"', 'delay = "101 s"')
+    assert "sensors.delay = '101 s': must be at most 100 s" in problem_with(text.encode())
 
 
 def test_a_mistake_in_the_device_names_scenario_and_set() -> None:

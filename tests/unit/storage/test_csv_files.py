@@ -46,7 +46,7 @@ def test_other_units_become_si_on_the_way_in(tmp_path: Path) -> None:
 
 
 def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Path) -> None:
-    path = written(tmp_path, b"\xef\xbb\xbf# bench 3\r\ntime [s],angle [rad]\r\n0,1\r\n1,2\r\n")
+    path = written(tmp_path, b"\xef\xbb\xbf# bench 3\r\ntime [s],angle [rad]\r\n0,1\r\n1,2\r\n\r\n")
     assert read_csv(path)["angle"].tolist() == [1.0, 2.0]
 
 
@@ -54,7 +54,7 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
     ("content", "message"),
     [
         ("", "is empty"),
-        ("\n\n", "the header must name columns"),
+        ("\n\n", "has no header"),
         ("# only a remark\n", "has no header"),
         ("time [s],angle [rad]\n", "has a header but no samples"),
         (b"\x89HDF\r\n\x1a\n\x00\xff\xfe", r"not a text file in UTF-8 \(byte 0\)"),
@@ -65,6 +65,8 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("time [s],angle [rad]\n0,1\n1,nan\n", "channel 'angle' is nan at sample 2"),
         ("time [s],angle [rad]\n0,1\n0,2\n", "time must grow"),
         ("time,angle\n0,1\n", "name columns as 'name \\[unit\\]', parted by commas; 'time' is none"),
+        ("\ntime [s]\n0\n", "the header must come first, line 1 is empty"),
+        ("time [s],angle [rad]\n0,1\n\n1,2\n", "line 3 has 0 values for 2 columns"),
         ("time [s];angle [rad]\n0;1\n", "parted by commas"),
         ("angle [rad],time [s]\n0,1\n", "the first column must be 'time \\[s\\]', it is 'angle'"),
         ("time [s],angle [rad],angle [deg]\n0,1,1\n", "two columns 'angle'"),

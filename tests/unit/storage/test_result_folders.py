@@ -118,10 +118,10 @@ def interrupt_at(monkeypatch: pytest.MonkeyPatch, method: str, call: int) -> Non
     original = getattr(Path, method)
     calls = iter(range(1, 1000))
 
-    def interrupted(self: Path, *arguments: object) -> object:
+    def interrupted(self: Path, *arguments: object, **options: object) -> object:
         if next(calls) == call:
             raise KeyboardInterrupt
-        return original(self, *arguments)
+        return original(self, *arguments, **options)
 
     monkeypatch.setattr(Path, method, interrupted)
 
@@ -189,7 +189,7 @@ def test_a_result_without_its_recording_is_refused_by_file(tmp_path: Path) -> No
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     for place in (tmp_path / "a.xlsx", tmp_path / "nothing"):
-        with pytest.raises(DataError, match="neither a .nc or .csv file nor a result folder"):
+        with pytest.raises(DataError, match=r"neither a \.nc or \.csv file nor a result folder"):
             read_recording(place)
     with pytest.raises(DataError, match=r"run\.json: cannot be read"):
         read_recording(tmp_path)

@@ -59,7 +59,7 @@ KIND = ProfileKind(
         Quantity("level", "", "mean level", 0.0),
         Quantity("amplitude", "", "amplitude"),
         Quantity("frequency", "Hz", "frequency", 1.0, 0.0, 100.0),
-        Quantity("phase", "", "phase in turns; 0.25 starts at the crest", 0.0, -1.0, 1.0),
+        Quantity("phase", "1", "phase in turns; 0.25 starts at the crest", 0.0, -1.0, 1.0),
     ),
     parameters=Sine,
     value=value,

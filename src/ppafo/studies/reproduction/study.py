@@ -126,7 +126,7 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
 
 
 def _run(scenario: Scenario, tell: Callable[[str], None]) -> Result:
-    tell(f"simulating {scenario.name}: {scenario.description}")
+    tell(f"simulating {scenario.name}")
     result = simulate(scenario)
     if not result.status.is_completed:
         raise SimulationError(f"{scenario.name}: {result.status.message}")

@@ -1,0 +1,161 @@
+"""The page that tells a reader of the paper what came of running it again; one file, no scripts, nothing to fetch."""
+
+import base64
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ppafo.metrics import Metric
+from ppafo.parameters import load_parameter_set
+from ppafo.parameters.audit import Finding
+from ppafo.reporting.claims_table import count_sentence
+from ppafo.reporting.metrics_table import in_shown_unit
+from ppafo.reporting.typesetting import quantity, sentence, typeset
+from ppafo.simulation.result import Result
+from ppafo.studies.reproduction import Claim, Reproduction
+from ppafo.studies.reproduction.assumed import AssumedValue
+from ppafo.studies.reproduction.claim import VERDICTS, verdict_counts
+from ppafo.studies.reproduction.study import PROPORTIONAL, SOLENOID, STEP
+
+TEMPLATE = "reproduction.html.jinja"
+
+_EXPERIMENTS = {STEP: "step response", SOLENOID: "torque task, solenoid", PROPORTIONAL: "torque task, proportional"}
+_SYMBOLS = {"reproduced": "✓", "reproduced_with_assumptions": "≈", "contradicted": "✗", "not_testable": "○"}
+_TASK_METRICS = (
+    "rms_error",
+    "rms_error_ramp",
+    "rms_error_hold",
+    "peak_error",
+    "gas_supplied",
+    "gas_vented",
+    "gas_leaked",
+    "switchings",
+    "oscillations_ramp",
+    "oscillations_hold",
+    "mechanical_work",
+)
+
+
+def reproduction_report(reproduction: Reproduction, step_figure: bytes, torque_figure: bytes) -> str:
+    """Return the report as HTML; figures are the contents of SVG files and become part of the page."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("ppafo.reporting"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["typeset"] = typeset
+    environment.filters["sentence"] = sentence
+    page = environment.get_template(TEMPLATE)
+    return page.render(
+        **_summary(reproduction),
+        **_findings(reproduction),
+        step_figure=_inline(step_figure),
+        torque_figure=_inline(torque_figure),
+        task_rows=_task_rows(reproduction.solenoid.metrics, reproduction.proportional.metrics),
+        ceiling=f"{holding_torque(reproduction.solenoid):.1f}",
+        assumed_groups=_assumed_groups(reproduction.assumed),
+        versions=", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
+        steps=_steps((reproduction.step, reproduction.solenoid, reproduction.proportional)),
+        command=shlex.join(_command(reproduction.overrides)),
+    )
+
+
+def holding_torque(result: Result) -> float:
+    """Largest torque that a result's supply can hold [N m]; equation (2) with atmosphere in the other chamber."""
+    device = result.scenario.device
+    return device.actuator.torque_constant * (device.supply.pressure - device.supply.atmospheric_pressure)
+
+
+def _summary(reproduction: Reproduction) -> dict[str, Any]:
+    citation = load_parameter_set(reproduction.printed_set).citation
+    counts = verdict_counts(reproduction.claims)
+    return {
+        "paper": citation,
+        "count_sentence": count_sentence(reproduction.claims),
+        "counts": [(verdict, VERDICTS[verdict], _SYMBOLS[verdict], count) for verdict, count in counts.items()],
+        "claims": [_claim_row(claim) for claim in reproduction.claims],
+        "missed": [claim.id for claim in reproduction.missed],
+        "overrides": reproduction.overrides,
+        "step_observations": reproduction.step_observations,
+        "torque_observations": reproduction.torque_observations,
+    }
+
+
+def _claim_row(claim: Claim) -> dict[str, Any]:
+    return {
+        "id": claim.id,
+        "statement": claim.statement,
+        "source": claim.source,
+        "paper": quantity(claim.paper, claim.unit),
+        "ours": quantity(claim.value, claim.unit),
+        "verdict": claim.verdict,
+        "word": VERDICTS[claim.verdict],
+        "symbol": _SYMBOLS[claim.verdict],
+        "note": claim.note,
+        "is_assumed": claim.verdict == "reproduced_with_assumptions",
+    }
+
+
+def _findings(reproduction: Reproduction) -> dict[str, Any]:
+    """Sort the findings: those of the printed numbers by weight, and those that the completed set keeps."""
+    printed = reproduction.printed_findings
+    return {
+        "printed_set": reproduction.printed_set,
+        "completed_set": reproduction.completed_set,
+        "contradictions": _of_severity(printed, "error"),
+        "remarks": _of_severity(printed, "warning"),
+        "notes": _of_severity(printed, "note"),
+        "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
+    }
+
+
+def _of_severity(findings: Sequence[Finding], severity: str) -> list[Finding]:
+    return [finding for finding in findings if finding.severity == severity]
+
+
+def _task_rows(solenoid: Mapping[str, Metric], proportional: Mapping[str, Metric]) -> list[tuple[str, str, str]]:
+    """Return meaning and both values of each metric of the task that both runs have."""
+    rows = []
+    for name in _TASK_METRICS:
+        if name in solenoid and name in proportional:
+            first, second = in_shown_unit(solenoid[name]), in_shown_unit(proportional[name])
+            shown = quantity(first.value, first.unit, 3), quantity(second.value, second.unit, 3)
+            rows.append((first.summary, *shown))
+    return rows
+
+
+def _assumed_groups(assumed: Sequence[AssumedValue]) -> list[tuple[str, list[AssumedValue]]]:
+    """Group the values by the experiments that use them, those that all use first."""
+    groups: dict[tuple[str, ...], list[AssumedValue]] = {}
+    for value in assumed:
+        groups.setdefault(value.used_by, []).append(value)
+    ordered = sorted(groups.items(), key=lambda item: -len(item[0]))
+    return [(_users(users), values) for users, values in ordered]
+
+
+def _users(names: tuple[str, ...]) -> str:
+    if set(names) == set(_EXPERIMENTS):
+        return "All experiments"
+    if set(names) == {SOLENOID, PROPORTIONAL}:
+        return "Torque task, both valves"
+    return sentence(" and ".join(_EXPERIMENTS.get(name, name) for name in names)).rstrip(".")
+
+
+def _steps(results: Sequence[Result]) -> str:
+    """Return the time steps that the engine used, for example ``0.125 to 1 ms``."""
+    steps = sorted({1e3 * float(result.engine["step"]) for result in results})
+    return f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms"
+
+
+def _command(overrides: Sequence[str]) -> list[str]:
+    changed = [word for override in overrides for word in ("--set", override)]
+    return ["ppafo", "reproduce", "--out", "out/reproduce", *changed]
+
+
+def _inline(svg: bytes) -> str:
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"

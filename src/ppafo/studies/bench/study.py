@@ -1,0 +1,2 @@
+class BenchSize: pass
+FULL=QUICK=measure_speed=None

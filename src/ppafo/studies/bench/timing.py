@@ -1,0 +1,63 @@
+"""Times contenders in turn, so that a busy machine is busy for all of them alike."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from statistics import median
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Durations [s] of all repetitions of one contender."""
+
+    seconds: tuple[float, ...]
+
+    @property
+    def best(self) -> float:
+        """The shortest duration [s]: the one that other work on the machine disturbed least."""
+        return min(self.seconds)
+
+    @property
+    def median(self) -> float:
+        """The middle duration [s]."""
+        return median(self.seconds)
+
+    @property
+    def worst(self) -> float:
+        """The longest duration [s]."""
+        return max(self.seconds)
+
+    def joined(self, other: "Timing") -> "Timing":
+        """Durations of both."""
+        return Timing(self.seconds + other.seconds)
+
+
+def no_preparation() -> None:
+    """Nothing to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contender:
+    """Something to time, and what must be done before each time without being timed."""
+
+    run: Callable[[], object]
+    prepare: Callable[[], None] = no_preparation
+
+
+def time_once(contender: Contender) -> float:
+    """Duration [s] of one run."""
+    contender.prepare()
+    start = time.perf_counter()
+    contender.run()
+    return time.perf_counter() - start
+
+
+def time_in_turn(contenders: Mapping[str, Contender], repetitions: int) -> dict[str, Timing]:
+    """Durations [s] by name; every round runs each contender once, and the rounds begin with another one in turn."""
+    names = list(contenders)
+    seconds: dict[str, list[float]] = {name: [] for name in names}
+    for repetition in range(repetitions):
+        first = repetition % max(1, len(names))
+        for name in names[first:] + names[:first]:
+            seconds[name].append(time_once(contenders[name]))
+    return {name: Timing(tuple(values)) for name, values in seconds.items()}

@@ -1,0 +1,178 @@
+"""``ppafo simulate`` and ``ppafo plot``."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.storage import read_result
+
+FILES = ["figure.png", "figure.svg", "recording.csv", "recording.nc", "run.json"]
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result folder of a run that is shared by the tests below; they do not change its files."""
+    folder = tmp_path_factory.mktemp("results") / "step"
+    assert main(["simulate", "step-response", "--out", str(folder)]) == 0
+    return folder
+
+
+def test_a_run_prints_its_metrics_and_where_the_files_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "step-response", "--out", str(tmp_path / "step")]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("step-response: completed\n")
+    assert "angle_range" in printed
+    assert str(tmp_path / "step") in printed.splitlines()[-1]
+
+
+def test_a_run_writes_a_whole_result_folder_and_nothing_else(saved: Path) -> None:
+    assert names(saved) == FILES
+    assert names(saved.parent) == ["step"]
+    assert read_result(saved).document["status"]["kind"] == "completed"
+
+
+def test_without_a_folder_the_result_goes_to_out_and_the_name_of_the_scenario(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", "step-response"]) == 0
+    assert names(tmp_path / "out" / "step-response") == FILES
+
+
+def test_json_is_the_only_thing_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "step-response", "--json", "--out", str(tmp_path / "step")]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["metrics"]["gas_supplied"]["unit"] == "kg"
+    assert document["folder"] == str(tmp_path / "step")
+
+
+def test_an_override_reaches_the_device_of_the_saved_scenario(tmp_path: Path) -> None:
+    folder = tmp_path / "step"
+    assert main(["simulate", "step-response", "--set", "valve.area=12.6mm^2", "--out", str(folder)]) == 0
+    scenario = read_result(folder).document["scenario"]
+    assert scenario["device"]["valve"]["orifice"]["area"] == 12.6e-6
+    assert scenario["origin"]["overrides"] == ["valve.area=12.6mm^2"]
+
+
+def test_the_same_command_gives_the_same_files(saved: Path, tmp_path: Path) -> None:
+    assert main(["simulate", "step-response", "--out", str(tmp_path / "again")]) == 0
+    for name in FILES:
+        assert (tmp_path / "again" / name).read_bytes() == (saved / name).read_bytes(), name
+
+
+def test_the_list_names_every_scenario_with_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "--list"]) == 0
+    assert "step-response " in capsys.readouterr().out
+    assert main(["simulate", "--list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["scenarios"]
+    assert all(item["description"] for item in listed)
+    assert "torque-task-solenoid" in [item["name"] for item in listed]
+
+
+def test_a_folder_with_other_files_is_refused_before_anything_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*arguments: object) -> None:
+        raise AssertionError("it ran")
+
+    monkeypatch.setattr("ppafo.simulation.simulate.simulate", never)
+    (tmp_path / "thesis.txt").write_text("years of work")
+    assert main(["simulate", "step-response", "--out", str(tmp_path)]) == 2
+    assert "is not empty and not a ppafo result" in capsys.readouterr().err
+    assert names(tmp_path) == ["thesis.txt"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["simulate"], "no scenario was given"),
+        (["simulate", "step-respons"], "did you mean 'step-response'"),
+        (["simulate", "step-response", "--set", "valve.area=3"], "area"),
+        (["plot", "nowhere"], "nowhere: is not a folder"),
+        (["plot", "nowhere", "--out", "figure.jpg"], r"must end in one of .png, .svg, .pdf"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("ppafo: ")
+    assert message in error
+    assert error.count("\n") == 1
+    assert names(tmp_path) == []
+
+
+def test_a_saved_result_is_drawn_again_without_running_it(
+    saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*arguments: object) -> None:
+        raise AssertionError("it ran")
+
+    monkeypatch.setattr("ppafo.simulation.simulate.simulate", never)
+    assert main(["plot", str(saved), "--out", str(tmp_path / "new" / "again.png")]) == 0
+    assert (tmp_path / "new" / "again.png").read_bytes() == (saved / "figure.png").read_bytes()
+
+
+def test_without_a_file_the_figures_in_the_folder_are_drawn_again(
+    saved: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = (saved / "figure.svg").read_bytes()
+    (saved / "figure.svg").unlink()
+    assert main(["plot", str(saved), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == [str(saved / "figure.png"), str(saved / "figure.svg")]
+    assert (saved / "figure.svg").read_bytes() == before
+    assert names(saved) == FILES
+
+
+def test_a_damaged_result_is_one_line_and_exit_code_2(
+    saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in FILES:
+        (tmp_path / name).write_bytes((saved / name).read_bytes())
+    (tmp_path / "recording.nc").write_bytes((saved / "recording.nc").read_bytes()[:5000])
+    assert main(["plot", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert "recording.nc: is not a whole NetCDF file" in error
+    assert error.count("\n") == 1
+
+
+HELD_UP = """
+import sys, time
+from pathlib import Path
+write = Path.write_bytes
+def slow(self, content):
+    written = write(self, content)
+    print("writing", flush=True)
+    time.sleep(60)
+    return written
+Path.write_bytes = slow
+from ppafo.cli.main import main
+sys.exit(main(["simulate", "step-response", "--out", sys.argv[1]]))
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals work differently there")
+def test_an_interrupt_while_writing_ends_with_130_and_leaves_nothing(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", HELD_UP, str(tmp_path / "step")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "writing\n"
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert error == "ppafo: interrupted; nothing was written\n"
+    assert names(tmp_path) == []

@@ -1,0 +1,84 @@
+"""Results: what a run gives back, in Python and on disk."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.metrics import Metric
+from ppafo.signals import Channel, Recording
+from ppafo.simulation.document import plain, result_document, scenario_document
+from ppafo.simulation.result import Result, Status
+from ppafo.simulation.scenario import Scenario
+from ppafo.storage import read_result
+
+
+@pytest.fixture
+def result(step_response: Scenario) -> Result:
+    """A result made by hand, so that no model is compiled."""
+    channels = {"angle": Channel(np.array([0.3, 0.4]), "rad"), "pressure_1": Channel(np.array([1e5, 2e5]), "Pa")}
+    recording = Recording("step-response", np.array([0.0, 0.1]), channels, is_synthetic=True)
+    metrics = {"angle_range": Metric(0.1, "rad", "range"), "broken": Metric(float("inf"), "N m", "no number")}
+    return Result(step_response, recording, metrics, Status("completed"), {"ppafo": "0"}, {"step": 1e-3, "steps": 100})
+
+
+def test_the_document_holds_every_number_of_the_device_in_si(result: Result) -> None:
+    device = result_document(result)["scenario"]["device"]
+    scenario = result.scenario
+    assert device["actuator"]["torque_constant"] == scenario.device.actuator.torque_constant
+    assert device["supply"]["pressure"] == scenario.device.supply.pressure
+    assert device["valve"]["settings"] == dict(scenario.device.valve.settings)
+
+
+def test_the_document_holds_assumptions_seed_versions_and_engine(result: Result) -> None:
+    document = result_document(result)
+    assert document["seed"] == result.scenario.sensors.seed
+    assert document["versions"] == {"ppafo": "0"}
+    assert document["engine"] == {"step": 1e-3, "steps": 100}
+    assert len(document["scenario"]["assumptions"]) == len(result.scenario.assumptions)
+
+
+def test_a_number_that_json_does_not_know_becomes_null(result: Result) -> None:
+    document = json.loads(json.dumps(result_document(result), allow_nan=False))
+    assert document["metrics"]["broken"]["value"] is None
+    assert document["metrics"]["angle_range"] == {"value": 0.1, "unit": "rad", "summary": "range"}
+
+
+def test_plain_data_has_python_numbers_and_the_type_of_what_is_not_data() -> None:
+    assert plain({"a": (np.int64(3), np.float64(0.5), True, None)}) == {"a": [3, 0.5, True, None]}
+    assert type(plain(np.int64(3))) is int
+    assert plain(Path) == "builtins.type"
+
+
+def test_a_controller_written_in_python_is_named_in_the_document(step_response: Scenario) -> None:
+    class Law:
+        def reset(self) -> None: ...
+
+        def update(self, *seen: object) -> float:
+            return float(len(seen))
+
+    control = dataclasses.replace(step_response.control, custom=Law())
+    document = scenario_document(dataclasses.replace(step_response, control=control))
+    assert document["control"]["custom"].endswith("Law")
+
+
+def test_a_saved_result_is_read_back(result: Result, tmp_path: Path) -> None:
+    stored = read_result(result.save(tmp_path / "task", {"figure.png": b"png"}))
+    assert stored.recording == result.recording
+    assert stored.document["scenario"] == json.loads(json.dumps(scenario_document(result.scenario)))
+    assert (tmp_path / "task" / "figure.png").read_bytes() == b"png"
+
+
+def test_the_dataset_carries_the_scenario(result: Result) -> None:
+    dataset = result.dataset()
+    assert dataset["angle"].values.tolist() == [0.3, 0.4]
+    assert json.loads(dataset.attrs["scenario"])["name"] == "step-response"
+
+
+def test_a_plot_of_a_completed_run_has_no_remark_and_one_of_a_diverged_run_has(result: Result) -> None:
+    diverged = dataclasses.replace(result, status=Status("diverged", 0.05, "diverged at t = 0.05 s"))
+    assert "diverged at t = 0.05 s" not in [text.get_text() for text in result.plot().texts]
+    assert "diverged at t = 0.05 s" in [text.get_text() for text in diverged.plot().texts]
+    assert not diverged.status.is_completed
