@@ -45,14 +45,14 @@ _UNITS = {
     "J": "joule = newton * metre = J",
     "W": "watt = joule / second = W",
     "Pa": "pascal = newton / metre ** 2 = Pa",
-    "bar": "bar = 1e5 * pascal = bar",
+    "bar": "bar = 1e5 * pascal",
     "psi": "pound_per_square_inch = 6894.757293168361 * pascal = psi",
     "L": "litre = 1e-3 * metre ** 3 = L = l",
     "in": "inch = 0.0254 * metre = in",
     "ft": "foot = 0.3048 * metre = ft",
     "lb": "pound = 0.45359237 * kilogram = lb",
     "lbf": "pound_force = 4.4482216152605 * newton = lbf",
-    "percent": "percent = 0.01 = percent",
+    "percent": "percent = 0.01",
 }
 _LEVEL, _DIFFERENCE = "Pa_a", "Pa_d"
 _KINDS = {"g": "gauge pressure", "a": "absolute pressure", "d": "pressure difference"}

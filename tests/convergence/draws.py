@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import random
+from functools import lru_cache
 
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import (
@@ -17,12 +18,13 @@ from ppafo.parameters.device import (
     Supply,
     Valve,
 )
-from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.loading import load_scenario as load_from_file
 from ppafo.simulation.scenario import Control, FreeMotion, LedMotion, ProfileChoice, Scenario, Sensors
 
 PSI = 6894.757293168361
 ATMOSPHERE = 101325.0
 GASES = (("CO2", 0.044, 1.3), ("air", 0.028965, 1.4), ("N2", 0.028013, 1.401))
+load_scenario = lru_cache(load_from_file)
 EXPERIMENTS = ("step", "step", "proportional", "solenoid")
 
 

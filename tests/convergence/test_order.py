@@ -1,6 +1,7 @@
 """Order of the scheme, and what happens to mass and to the numbers themselves in ten thousand random devices."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable
 from types import ModuleType
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.reference.agreement import measure_agreement
+from ppafo.engine.reference.agreement import Agreement, measure_agreement
 from ppafo.engine.reference.solver import solve_reference
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together
+from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
@@ -19,50 +21,47 @@ from ppafo.simulation.scenario import Scenario
 MANY = 10_000
 
 
-def with_steps(run: Run, factor: int) -> Run:
-    """The same run with a step ``factor`` times as short, recorded at the same times."""
+def at_step(run: Run, parts: int) -> Run:
+    """The same run with steps of 1 ms divided into ``parts``, recorded every millisecond."""
+    duration = run.step * run.step_count
     return dataclasses.replace(
         run,
-        step=run.step / factor,
-        step_count=run.step_count * factor,
-        steps_per_sample=run.steps_per_sample * factor,
-        record_every=run.record_every * factor,
+        step=1e-3 / parts,
+        step_count=round(duration * 1e3) * parts,
+        steps_per_sample=round(run.period * 1e3) * parts,
+        record_every=parts,
     )
 
 
-def observed_orders(run: Run, factors: tuple[int, ...]) -> tuple[list[float], list[float]]:
-    """Orders seen in the root-mean-square errors of angle and pressure between successive step sizes."""
-    reference = solve_reference(run)
-    errors = [
-        measure_agreement(with_steps(run, factor), run_batch(batch_of(with_steps(run, factor))), reference)
-        for factor in factors
+def errors_by_step(run: Run, parts: tuple[int, ...]) -> list[Agreement]:
+    """Differences from the reference for steps of 1 ms divided into ``parts``."""
+    reference = solve_reference(at_step(run, 1))
+    return [
+        measure_agreement(at_step(run, count), run_batch(batch_of(at_step(run, count))), reference) for count in parts
     ]
-    ratios = [math.log2(b / a) for a, b in zip(factors, factors[1:], strict=False)]
-    angle = [math.log2(a.angle_rms / b.angle_rms) / r for a, b, r in zip(errors, errors[1:], ratios, strict=False)]
-    pressure = [
-        math.log2(a.pressure_1_rms / b.pressure_1_rms) / r for a, b, r in zip(errors, errors[1:], ratios, strict=False)
-    ]
-    return angle, pressure
 
 
-def test_step_response_converges_with_second_order(step_response: Scenario) -> None:
-    angle, pressure = observed_orders(plan_run(step_response), (1, 4, 16))
-    assert sum(angle) / len(angle) > 1.7, angle
-    assert sum(pressure) / len(pressure) > 1.7, pressure
+def mean_order(errors: list[float], parts: tuple[int, ...]) -> float:
+    """Mean order of convergence between the coarsest and the finest step."""
+    return math.log(errors[0] / errors[-1]) / math.log(parts[-1] / parts[0])
 
 
-def test_smooth_flow_into_a_led_chamber_converges_with_second_order(
+def test_step_response_converges_with_second_order() -> None:
+    overrides = ("actuator.dead_volume_1=8cm^3", "actuator.dead_volume_2=8cm^3")
+    parts = (1, 2, 4, 8)
+    errors = errors_by_step(plan_run(load_scenario("step-response", overrides)), parts)
+    for values in ([error.angle_rms for error in errors], [error.pressure_1_rms for error in errors]):
+        assert mean_order(values, parts) > 1.9, values
+        assert all(fine < 0.5 * coarse for coarse, fine in itertools.pairwise(values)), values
+
+
+def test_flow_into_a_held_chamber_converges_with_second_order(
     torque_task: Callable[[str], Scenario], shorter: Callable[[Scenario, float], Scenario]
 ) -> None:
-    scenario = shorter(torque_task("solenoid"), 0.05)
-    reference = solve_reference(plan_run(scenario))
-    coarse = plan_run(scenario)
-    errors = []
-    for factor in (1, 2, 4, 8):
-        run = with_steps(coarse, factor)
-        errors.append(measure_agreement(run, run_batch(batch_of(run)), reference).pressure_2_rms)
-    assert errors[0] > errors[1] > errors[2]
-    assert math.log2(errors[0] / errors[2]) / 2.0 > 1.7, errors
+    parts = (1, 2, 4, 8)
+    errors = errors_by_step(plan_run(shorter(torque_task("solenoid"), 0.4)), parts)
+    values = [error.pressure_1_rms for error in errors]
+    assert mean_order(values, parts) > 1.7, values
 
 
 @pytest.mark.parametrize("name", ["step", "proportional", "solenoid"])

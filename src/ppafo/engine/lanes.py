@@ -8,6 +8,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from types import ModuleType
 
 import numpy as np
@@ -49,6 +50,7 @@ class BatchResult:
     record: Floats
 
 
+@lru_cache(maxsize=64)
 def load_program(program: Program) -> ModuleType:
     """The compiled module of a program, from the disk cache where it is there."""
     return load_generated("lanes", lane_source(program))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ppafo.reporting.typesetting import quantity
+from ppafo.reporting.typesetting import printed_quantity, quantity
 from ppafo.studies.reproduction.claim import VERDICTS, Claim, verdict_counts
 
 _HEAD = ("claim", "paper", "ours", "verdict")
@@ -30,4 +30,4 @@ def count_sentence(claims: Sequence[Claim]) -> str:
 
 def _row(claim: Claim) -> tuple[str, ...]:
     ours = _NOTHING if claim.value is None else quantity(claim.value, claim.unit)
-    return claim.id, quantity(claim.paper, claim.unit), ours, VERDICTS[claim.verdict]
+    return claim.id, printed_quantity(claim.paper, claim.unit), ours, VERDICTS[claim.verdict]

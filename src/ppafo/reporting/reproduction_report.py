@@ -10,7 +10,7 @@ from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding
 from ppafo.reporting.claims_table import count_sentence
 from ppafo.reporting.metrics_table import in_shown_unit
-from ppafo.reporting.typesetting import quantity, sentence, typeset
+from ppafo.reporting.typesetting import printed_quantity, quantity, sentence, typeset, with_paths_as_code
 from ppafo.simulation.result import Result
 from ppafo.studies.reproduction import Claim, Reproduction
 from ppafo.studies.reproduction.assumed import AssumedValue
@@ -50,6 +50,7 @@ def reproduction_report(reproduction: Reproduction, step_figure: bytes, torque_f
     )
     environment.filters["typeset"] = typeset
     environment.filters["sentence"] = sentence
+    environment.filters["coded"] = with_paths_as_code
     page = environment.get_template(TEMPLATE)
     return page.render(
         **_summary(reproduction),
@@ -91,7 +92,7 @@ def _claim_row(claim: Claim) -> dict[str, Any]:
         "id": claim.id,
         "statement": claim.statement,
         "source": claim.source,
-        "paper": quantity(claim.paper, claim.unit),
+        "paper": printed_quantity(claim.paper, claim.unit),
         "ours": quantity(claim.value, claim.unit),
         "verdict": claim.verdict,
         "word": VERDICTS[claim.verdict],

@@ -62,7 +62,7 @@ def step_response_figure(recording: Recording, levels: Levels, events: StepEvent
         if events is not None:
             _mark(list(grid.flat), events)
         figure.align_ylabels(grid)
-        grid[0, 1].set_title("simulated", loc="right", fontsize=9, style="italic", color=GREY)
+        grid[0, 0].set_title("simulated", loc="right", fontsize=9, style="italic", color=GREY)
         return figure
 
 

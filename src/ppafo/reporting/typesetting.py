@@ -1,45 +1,85 @@
 """Numbers, units and sentences as a printed text has them: powers of ten and superscripts, not 1.451e-05 m^3."""
 
 import re
+from typing import TYPE_CHECKING
 
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+UNKNOWN = "\N{EN DASH}"
+
+_DIGITS = "-0123456789"
+_SUPERSCRIPTS = str.maketrans(_DIGITS, "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUBSCRIPTS = str.maketrans(_DIGITS, "₋₀₁₂₃₄₅₆₇₈₉")
+_TIMES, _MINUS = "\N{MULTIPLICATION SIGN}", "\N{MINUS SIGN}"
+_APOSTROPHE, _NO_BREAK = "\N{RIGHT SINGLE QUOTATION MARK}", "\N{NO-BREAK SPACE}"
+_QUOTED = "\N{LEFT DOUBLE QUOTATION MARK}\\1\N{RIGHT DOUBLE QUOTATION MARK}"
 _PRESSURE_UNITS = {"Pa_a": "Pa (absolute)", "Pa_d": "Pa", "psi_g": "psig", "psi_a": "psia", "psi_d": "psi"}
 
 _POWER_OF_TEN = re.compile(r"(?<=\d)e([+-]?\d+)\b")
 _EXPONENT = re.compile(r"\^(-?\d+)")
+_INDEX = re.compile(r"\b(C|P|V|CO)([12])\b")
 _PRESSURE = re.compile(rf"\b({'|'.join(_PRESSURE_UNITS)})\b")
-_TIMES = re.compile(r"(?<=\d) x (?=\d)")
-_MINUS = re.compile(r"(?<![\w.)⁰¹²³⁴⁵⁶⁷⁸⁹])-(?=\d)")
+_PRODUCT = re.compile(r"(?<=\d) x (?=\d)")
+_NEGATIVE = re.compile(r"(?<![\w.)-])-(?=[\dA-Z])")
 _DIFFERENCE = re.compile(r"(?<=[\w)]) - (?=[\w(])")
-
-UNKNOWN = "\N{EN DASH}"
-_TIMES_SIGN, _MINUS_SIGN = "\N{MULTIPLICATION SIGN}", "\N{MINUS SIGN}"
+_WORD_APOSTROPHE = re.compile(r"(?<=\w)'(?=\w)")
+_QUOTATION = re.compile(r"'([^']+)'")
+_BEFORE_UNIT = re.compile(
+    r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:%|deg|psi[ga]?|ms|s|mm²|cm³|m³|m|kg|g|J|K|N|Hz|kHz|Pa|rad|1)(?![\w]))"
+)
+_IN_UNIT = re.compile(r"(?<=[\d\s](?:N|g)) (?=m)")
+_PATH = re.compile(r"\b[a-z_]+(?:\.[a-z0-9_]+)+\b")
 
 
 def typeset(text: str) -> str:
-    """Return a plain text with superscripts, minus and multiplication signs, and psig instead of psi_g."""
-    text = _POWER_OF_TEN.sub(lambda found: f" {_TIMES_SIGN} 10{_superscript(str(int(found[1])))}", text)
-    text = _EXPONENT.sub(lambda found: _superscript(found[1]), text)
+    """Return a plain text with superscripts and indices, signs, quotation marks, and psig instead of psi_g."""
+    text = _POWER_OF_TEN.sub(lambda found: f" {_TIMES} 10{str(int(found[1])).translate(_SUPERSCRIPTS)}", text)
+    text = _EXPONENT.sub(lambda found: found[1].translate(_SUPERSCRIPTS), text)
+    text = _INDEX.sub(lambda found: found[1] + found[2].translate(_SUBSCRIPTS), text)
     text = _PRESSURE.sub(lambda found: _PRESSURE_UNITS[found[1]], text)
-    text = _TIMES.sub(f" {_TIMES_SIGN} ", text)
-    return _DIFFERENCE.sub(f" {_MINUS_SIGN} ", _MINUS.sub(_MINUS_SIGN, text))
+    text = _PRODUCT.sub(f" {_TIMES} ", text)
+    text = _DIFFERENCE.sub(f" {_MINUS} ", _NEGATIVE.sub(_MINUS, text))
+    text = _QUOTATION.sub(_QUOTED, _WORD_APOSTROPHE.sub(_APOSTROPHE, text))
+    return _unbroken(text)
+
+
+def with_paths_as_code(text: str) -> "Markup":
+    """Return a text as HTML in which every dotted path of a value, such as ``valve.area``, is marked as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(_PATH.sub(lambda found: f"<code>{found[0]}</code>", str(escape(text))))
 
 
 def sentence(text: str) -> str:
-    """Return a text with a capital at its beginning and a full stop at its end."""
+    """Return a text with a capital at its beginning and a full stop at its end; a path or symbol stays as it is."""
     stripped = text.strip()
     if not stripped:
         return ""
-    capital = stripped if stripped.partition(" ")[0].find(".") > 0 else stripped[0].upper() + stripped[1:]
+    is_symbol = any(mark in stripped.partition(" ")[0].rstrip(".:,") for mark in "._")
+    capital = stripped if is_symbol else stripped[0].upper() + stripped[1:]
     return capital if capital.endswith((".", "!", "?")) else f"{capital}."
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
-    """Return number and unit in plain text, ``0.1 N m``; a dash where there is no number. A plain number has unit -."""
+    """Return number and unit in plain text, ``0.1000 N m``; a dash where there is no number.
+
+    A plain number has the unit ``-`` and, where it is whole, is written as a whole number.
+    """
     if value is None:
         return UNKNOWN
-    return f"{value:.{digits}g} {'' if unit == '-' else unit}".rstrip()
+    if value == 0.0 or (unit == "-" and value == int(value)):
+        number = f"{value:.0f}"
+    else:
+        number = f"{value:#.{digits}g}".removesuffix(".")
+    return f"{number} {'' if unit == '-' else unit}".rstrip()
 
 
-def _superscript(digits: str) -> str:
-    return digits.translate(_SUPERSCRIPTS)
+def printed_quantity(value: float, unit: str) -> str:
+    """Return number and unit with no more digits than the number was printed with."""
+    return f"{value:g} {'' if unit == '-' else unit}".rstrip()
+
+
+def _unbroken(text: str) -> str:
+    """Return a text in which no line break can part a number from its unit."""
+    return _IN_UNIT.sub(_NO_BREAK, _BEFORE_UNIT.sub(_NO_BREAK, text))

@@ -20,6 +20,9 @@ from ppafo.simulation.result import Result, Status
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import LedMotion, Scenario
 
+OPEN_LOOP = "constant"
+"""The controller that follows no reference: its recordings have none, so that no tracking error is made of it."""
+
 REMEDY = (
     "the step may be too long for this device, or a value far from any real one: try a smaller run.step, "
     "and look at the inertia, the volumes and the valve area (ppafo audit)"
@@ -95,7 +98,6 @@ def _recording(scenario: Scenario, run: Run, times: Floats, record: Floats, rows
         "pressure_1": (pressure_1, "Pa"),
         "pressure_2": (pressure_2, "Pa"),
         "torque": (torque, "N m"),
-        "reference": (profile_values(scenario.reference, times)[0] if times.size else times, "N m"),
         "command": (row("result.command"), "-"),
         "supplied_mass": (row("state.supplied_mass"), "kg"),
         "vented_mass": (row("state.vented_mass"), "kg"),
@@ -104,6 +106,8 @@ def _recording(scenario: Scenario, run: Run, times: Floats, record: Floats, rows
         "mass_1": (row("state.mass_1"), "kg"),
         "mass_2": (row("state.mass_2"), "kg"),
     }
+    if scenario.control.kind != OPEN_LOOP:
+        channels["reference"] = (profile_values(scenario.reference, times)[0] if times.size else times, "N m")
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(scenario.name, times, values, is_synthetic=True)
 

@@ -89,7 +89,7 @@ NUMBERS = [1.0, 2.0]
 
 
 def test_function_that_cannot_be_compiled_is_refused_by_name() -> None:
-    with pytest.raises(SimulationError, match="uses_a_list.*NUMBERS"):
+    with pytest.raises(SimulationError, match=r"uses_a_list.*NUMBERS"):
         SourceCollector("@njit").add(uses_a_list)
 
 

@@ -71,7 +71,7 @@ def test_runs_of_different_programs_and_clocks_can_be_asked_for_together() -> No
 
 def test_lane_that_fails_does_not_disturb_its_neighbours() -> None:
     runs = different_runs("step-response", 3)
-    broken = dataclasses.replace(runs[1], plant=runs[1].plant._replace(inertia=1e-12))
+    broken = dataclasses.replace(runs[1], initial=runs[1].initial._replace(mass_1=-1e-5))
     results = run_together([runs[0], broken, runs[2]])
     assert results[1].states[1, 0] < 1.0, "the broken run reports the time of its failure"
     assert np.array_equal(results[2].record, run_batch(batch_of(runs[2])).record)

@@ -20,7 +20,7 @@ def test_dead_band_hides_small_commands_and_leaves_full_command_full() -> None:
 def test_spool_step_is_exact_whatever_its_length(damping_ratio: float) -> None:
     settings = {**SPOOL, "spool_damping_ratio": damping_ratio}
     fine, coarse = proportional.prepare_moving(settings, 1e-4), proportional.prepare_moving(settings, 4e-3)
-    state = proportional.SpoolState(0.1, 3.0)
+    state = proportional.SpoolState(0.8, 0.1, 3.0)
     shares = []
     after = state
     for _ in range(40):

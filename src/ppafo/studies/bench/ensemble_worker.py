@@ -49,9 +49,14 @@ class Order:
     def read(text: str) -> "Order":
         """The order that ``text`` wrote."""
         plain = json.loads(text)
-        variants = tuple(Variant(**variant) for variant in plain.pop("variants"))
-        lists = {name: tuple(plain.pop(name)) for name in ("cores", "threads")}
-        return Order(variants=variants, **lists, **plain)
+        return Order(
+            runs=plain["runs"],
+            duration=plain["duration"],
+            repetitions=plain["repetitions"],
+            cores=tuple(plain["cores"]),
+            threads=tuple(plain["threads"]),
+            variants=tuple(Variant(**variant) for variant in plain["variants"]),
+        )
 
 
 class JaxEnsemble:

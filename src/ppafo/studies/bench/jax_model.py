@@ -155,9 +155,7 @@ def flow(pressure_a: Array, pressure_b: Array, conductance: Array, curve: Curve)
     return jnp.where(pressure_a >= pressure_b, size, -size)
 
 
-def flow_slopes(
-    pressure_a: Array, pressure_b: Array, conductance: Array, curve: Curve
-) -> tuple[Array, Array, Array]:
+def flow_slopes(pressure_a: Array, pressure_b: Array, conductance: Array, curve: Curve) -> tuple[Array, Array, Array]:
     """As ``flow``, with the derivatives with respect to both pressures [kg/(s Pa)]."""
     import jax.numpy as jnp
 
@@ -188,9 +186,7 @@ def control(task: Task, state: State, time: Array) -> State:
     wanted = task.proportional_gain * error + integral + task.derivative_gain * slope
     command = jnp.clip(wanted, -1.0, 1.0)
     integral = integral + task.anti_windup * task.step * (command - wanted)
-    return state._replace(
-        integral=integral, error=error, slope=slope, started=jnp.ones_like(error), command=command
-    )
+    return state._replace(integral=integral, error=error, slope=slope, started=jnp.ones_like(error), command=command)
 
 
 class Connection(NamedTuple):

@@ -1,5 +1,6 @@
 """What the numbers were measured on."""
 
+import importlib
 import os
 import platform
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ PACKAGES = ("ppafo", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae", "ja
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """Processor, cores that this process may use, width of its vectors, and versions; None for what is not installed."""
+    """Processor, cores that this process may use, width of its vectors, and versions (None: not installed)."""
 
     processor: str
     system: str
@@ -42,9 +43,8 @@ def describe_machine() -> Machine:
 
 def has_avx512() -> bool:
     """True where the compiler may use vectors of eight doubles."""
-    import llvmlite.binding as llvm
-
-    return bool(llvm.get_host_cpu_features().get("avx512f", False))
+    codegen = importlib.import_module("numba.core.codegen")
+    return "+avx512f" in str(codegen.get_host_cpu_features()).split(",")
 
 
 def _processor() -> str:

@@ -100,8 +100,8 @@ def machine_text(machine: Machine) -> str:
     versions = ", ".join(f"{name} {version or 'not installed'}" for name, version in machine.packages.items())
     vectors = "AVX-512" if machine.has_avx512 else "no AVX-512"
     return (
-        f"{machine.processor}, {machine.cores} cores, {vectors}, {machine.system}; Python {machine.python}, {versions}. "
-        "Best of all repetitions; spread: worst to best."
+        f"{machine.processor}, {machine.cores} cores, {vectors}, {machine.system}; "
+        f"Python {machine.python}, {versions}. Best of all repetitions; spread: worst to best."
     )
 
 

@@ -113,6 +113,13 @@ def _error_lines(run: Run, states: dict[str, Floats], say: Callable[[str], None]
     judge = solve_reference(run).states
     errors = {name: pressure_error(run, values, judge) for name, values in states.items()}
     return [
-        Line(f"single_run_error_{name}", GROUP, what[name], errors.get(name), "of the range", note="" if name in errors else MISSING_EXTRA)
+        Line(
+            f"single_run_error_{name}",
+            GROUP,
+            what[name],
+            errors.get(name),
+            "of the range",
+            note="" if name in errors else MISSING_EXTRA,
+        )
         for name in names
     ]

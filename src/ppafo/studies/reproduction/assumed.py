@@ -18,18 +18,22 @@ _ONLY_FOR_A_FREE_VANE = frozenset({"actuator.restitution", "foot_plate.gravity_t
 
 @dataclass(frozen=True, slots=True)
 class AssumedValue:
-    """A value that the paper does not print as it is used: path, meaning, value with unit, reason, and who uses it."""
+    """A value that the paper does not print as it is used: path, meaning, value with unit, reason, and who uses it.
+
+    ``source`` is what the reason goes by, empty where the reason says it all.
+    """
 
     path: str
     meaning: str
     value: str
     origin: str
     reason: str
+    source: str
     used_by: tuple[str, ...]
 
     def sentence(self) -> str:
         """Return the value and its reason on one line."""
-        return f"{self.path} = {self.value}: {self.reason}"
+        return f"{self.path} = {self.value}: {self.reason}{f' ({self.source})' if self.source else ''}"
 
 
 def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...]:
@@ -56,12 +60,12 @@ def _of_scenario(scenario: Scenario, name: str) -> list[AssumedValue]:
     summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
     summaries |= {path: quantity.summary for path, quantity in in_force.declared().items()}
     own = [
-        AssumedValue(item.path, summaries.get(item.path, ""), item.value, "assumed", item.note, (name,))
+        AssumedValue(item.path, summaries.get(item.path, ""), item.value, "assumed", item.note, "", (name,))
         for item in scenario.assumptions
     ]
     settled = {item.path for item in own} | _without_effect(scenario, in_force)
     from_set = [
-        AssumedValue(path, summaries[path], shown(entry), entry.origin, _reason(entry), (name,))
+        AssumedValue(path, summaries[path], shown(entry), entry.origin, *_reason(entry), (name,))
         for path, entry in in_force.numbers.items()
         if path not in settled and entry.origin in _NOT_OF_THE_PAPER and not _is_of_file(of_file, path, entry)
     ]
@@ -87,5 +91,6 @@ def _without_effect(scenario: Scenario, parameter_set: ParameterSet) -> set[str]
     return reported | others | (_ONLY_FOR_A_FREE_VANE if isinstance(scenario.motion, LedMotion) else frozenset())
 
 
-def _reason(entry: Entry) -> str:
-    return f"set for this run; {entry.note}" if entry.source == OVERRIDE else f"{entry.note} ({entry.source})"
+def _reason(entry: Entry) -> tuple[str, str]:
+    """Return reason and source; what was set for this run says what it replaces."""
+    return (f"set for this run; {entry.note}", "") if entry.source == OVERRIDE else (entry.note, entry.source)

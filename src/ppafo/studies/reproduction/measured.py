@@ -61,7 +61,5 @@ def _parameter(printed: Printed, identifier: str, path: str, statement: str, rea
 
 
 def _step_error(error: _StepError) -> Claim:
-    statement = (
-        f"In the step response, simulated and measured {error.quantity} differ by {error.paper:g} {error.unit} RMS."
-    )
+    statement = f"Step response, simulated against measured: RMS error of the {error.quantity}."
     return Claim(error.id, statement, error.paper, None, error.unit, "not_testable", _VALIDATION, _NO_CURVES)

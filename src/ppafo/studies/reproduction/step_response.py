@@ -117,11 +117,11 @@ class _Step:
         return self.recording[name][self.events.stop :]
 
     def is_same(self, pressure: float, other: float) -> bool:
-        return abs(pressure - other) < _SAME * self.levels.range
+        return bool(abs(pressure - other) < _SAME * self.levels.range)
 
     def only_rises(self, pressure: Floats) -> bool:
         fallen_back = float(np.max(np.maximum.accumulate(pressure) - pressure))
-        return pressure[-1] > pressure[0] and fallen_back < _SAME * self.levels.range
+        return bool(pressure[-1] > pressure[0] and fallen_back < _SAME * self.levels.range)
 
 
 def _turns(step: _Step) -> tuple[bool, str]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from ppafo.errors import SimulationError
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding, audit
+from ppafo.simulation.declaration import value_at
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.overriding import scenario_paths, split_override
+from ppafo.simulation.overriding import apply_overrides, scenario_paths, split_override
 from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
@@ -115,14 +116,21 @@ def reproduce(overrides: Sequence[str] = (), tell: Callable[[str], None] = _sile
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     """Return the experiments, each with the overrides that are meant for it."""
-    known = {name: scenario_paths(load_scenario(name).origin.content) for name in EXPERIMENTS if overrides}
     meant: dict[str, list[str]] = {name: [] for name in EXPERIMENTS}
     for override in overrides:
         path, _ = split_override(override)
-        having = [name for name, paths in known.items() if path in paths]
+        having = [name for name, earlier in meant.items() if _has(name, earlier, path)]
         for name in having or EXPERIMENTS:
             meant[name].append(override)
     return {name: load_scenario(name, chosen) for name, chosen in meant.items()}
+
+
+def _has(name: str, earlier: Sequence[str], path: str) -> bool:
+    """Tell whether a scenario, with the overrides before this one, has a value of its own at a path."""
+    document = apply_overrides(load_scenario(name).origin.content, earlier, name).document
+    section = path.rpartition(".")[0]
+    has_section = not section or value_at(document, section) is not None
+    return has_section and path in scenario_paths(document)
 
 
 def _run(scenario: Scenario, tell: Callable[[str], None]) -> Result:

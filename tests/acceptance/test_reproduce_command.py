@@ -1,0 +1,184 @@
+"""``ppafo reproduce`` from beginning to end."""
+
+import dataclasses
+import json
+import re
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.storage import read_csv
+from ppafo.studies import reproduction as study
+
+IDS = [
+    "c1",
+    "c2",
+    "critical_pressure_ratio",
+    "k_actuator",
+    "static_friction",
+    "rotary_damping",
+    "dynamic_friction",
+    "discharge_coefficient_solenoid",
+    "discharge_coefficient_proportional",
+    "leak_area",
+    "step_rms_position",
+    "step_rms_pressure_1",
+    "step_rms_pressure_2",
+    "step_rms_pressure_difference",
+    "torque_rms_improvement",
+    "co2_solenoid",
+    "co2_proportional",
+    "co2_saving",
+]
+FIGURES = ("figure-7-step-response", "figure-8-torque-task")
+RECORDINGS = ("step-response", "torque-task-solenoid", "torque-task-proportional")
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of one run, which the tests below only read."""
+    folder = tmp_path_factory.mktemp("reproduce") / "out"
+    assert main(["reproduce", "--out", str(folder)]) == 0
+    return folder
+
+
+def test_the_folder_holds_report_claims_figures_and_recordings_and_nothing_else(out: Path) -> None:
+    expected = {"report.html", "claims.json", *(f"{name}.csv" for name in RECORDINGS)}
+    expected |= {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
+    assert {entry.name for entry in out.iterdir()} == expected
+
+
+def test_the_claims_file_has_every_claim_in_the_agreed_form(out: Path) -> None:
+    claims = json.loads((out / "claims.json").read_text(encoding="utf-8"))["claims"]
+    assert [claim["id"] for claim in claims] == IDS
+    for claim in claims:
+        assert {"statement", "paper", "value", "unit", "verdict", "assumptions", "source"} <= set(claim)
+        assert (claim["value"] is None) == (claim["verdict"] == "not_testable")
+
+
+def test_the_report_is_one_file_that_fetches_nothing(out: Path) -> None:
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    assert "http://" not in page
+    assert "https://" not in page
+    assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []
+    assert "url(" not in page
+
+
+def test_every_figure_is_a_picture_of_some_size(out: Path) -> None:
+    for name in FIGURES:
+        content = (out / f"{name}.png").read_bytes()
+        width, height = struct.unpack(">II", content[16:24])
+        assert content.startswith(b"\x89PNG")
+        assert min(width, height) > 600
+        drawing = (out / f"{name}.svg").read_text(encoding="utf-8")
+        assert drawing.count("<path") > 50
+
+
+def test_the_recordings_can_be_read_again(out: Path) -> None:
+    for name in RECORDINGS:
+        recording = read_csv(out / f"{name}.csv")
+        assert len(recording) > 100
+        assert {"angle", "pressure_1", "pressure_2", "torque", "supplied_mass"} <= set(recording.names)
+
+
+def test_a_second_run_gives_the_same_files(out: Path, tmp_path: Path) -> None:
+    assert main(["reproduce", "--out", str(tmp_path)]) == 0
+    different = [file.name for file in out.iterdir() if file.read_bytes() != (tmp_path / file.name).read_bytes()]
+    assert different == []
+
+
+def test_the_table_and_the_path_of_the_report_are_printed_and_progress_goes_aside(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["reproduce", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr()
+    assert all(any(line.startswith(f"{name} ") for line in printed.out.splitlines()) for name in IDS)
+    assert printed.out.splitlines()[-1] == f"report: {tmp_path / 'report.html'}"
+    assert max(len(line) for line in printed.out.splitlines()[:-1]) <= 100
+    assert "simulating step-response" in printed.err
+    assert "simulating" not in printed.out
+
+
+def test_json_is_the_same_as_the_claims_file(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads((out / "claims.json").read_text(encoding="utf-8"))
+
+
+def missed_claims(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the solenoid valves take three times the gas."""
+    honest = study.reproduce()
+    claims = tuple(
+        dataclasses.replace(claim, value=3.3, verdict="contradicted") if claim.id == "co2_solenoid" else claim
+        for claim in honest.claims
+    )
+    monkeypatch.setattr(study, "reproduce", lambda *_: dataclasses.replace(honest, claims=claims))
+
+
+def test_a_missed_window_is_named_and_makes_the_command_fail(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missed_claims(monkeypatch)
+    assert main(["reproduce"]) == 1
+    assert "missed: co2_solenoid is outside 1 to 1.2 g" in capsys.readouterr().out
+
+
+def test_with_changed_values_a_missed_window_is_no_failure(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missed_claims(monkeypatch)
+    assert main(["reproduce", "--set", "valves.solenoid.area=31.6 mm^2"]) == 0
+    assert "missed: co2_solenoid" in capsys.readouterr().out
+
+
+def test_a_changed_value_is_on_record(tmp_path: Path) -> None:
+    assert main(["reproduce", "--out", str(tmp_path), "--set", "reference.level=4 N m"]) == 0
+    assert json.loads((tmp_path / "claims.json").read_text(encoding="utf-8"))["overrides"] == ["reference.level=4 N m"]
+    assert "reference.level=4 N m" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--set", "supply.presure=60 psi_g"], "did you mean 'supply.pressure'"),
+        (["--set", "valve.area=-1 mm^2"], "valve"),
+        (["--set", "nonsense"], "PATH=VALUE"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(
+    words: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["reproduce", "--out", str(tmp_path / "out"), *words]) == 2
+    complaint = [line for line in capsys.readouterr().err.splitlines() if not line.endswith(" ...")]
+    assert len(complaint) == 1
+    assert told in complaint[0]
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_place_that_cannot_be_written_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    assert main(["reproduce", "--out", str(tmp_path / "file")]) == 2
+    assert "cannot be written" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_what_else_is_in_the_folder_stays(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    assert main(["reproduce", "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
+    assert [entry.name for entry in tmp_path.iterdir() if entry.name.startswith(".")] == []
+
+
+def test_heavy_packages_are_not_loaded_to_show_the_help() -> None:
+    code = (
+        "import sys\nfrom ppafo.cli.main import main\n"
+        "try:\n    main(['reproduce', '--help'])\nexcept SystemExit:\n    pass\n"
+        "print([name for name in ('numpy', 'numba', 'matplotlib', 'jinja2') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"

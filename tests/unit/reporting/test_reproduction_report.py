@@ -1,0 +1,136 @@
+"""The claims as a table, figures 7 and 8, and the page around them."""
+
+import dataclasses
+import html
+import re
+
+import pytest
+
+from ppafo.reporting.claims_table import claims_table
+from ppafo.reporting.reproduction_report import holding_torque, reproduction_report
+from ppafo.reporting.step_response_figure import step_response_figure
+from ppafo.reporting.torque_task_figure import torque_task_figure
+from ppafo.reporting.typesetting import typeset
+from ppafo.studies.reproduction import Reproduction, reproduce
+from ppafo.studies.reproduction.step_response import Levels
+
+LEVELS = Levels(480536.0, 101325.0)
+
+
+@pytest.fixture(scope="module")
+def reproduction() -> Reproduction:
+    return reproduce()
+
+
+@pytest.fixture(scope="module")
+def page(reproduction: Reproduction) -> str:
+    return reproduction_report(reproduction, b"<svg>seven</svg>", b"<svg>eight</svg>")
+
+
+def words(page: str) -> str:
+    """The text of a page without its tags, on one line."""
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
+
+
+def test_the_table_has_a_line_for_every_claim_and_fits_a_terminal(reproduction: Reproduction) -> None:
+    lines = claims_table(reproduction.claims)
+    for claim in reproduction.claims:
+        assert sum(line.startswith(f"{claim.id} ") for line in lines) == 1
+    assert max(len(line) for line in lines) <= 100
+
+
+def test_the_table_aligns_its_columns(reproduction: Reproduction) -> None:
+    head, rule, *rows = claims_table(reproduction.claims)[: 2 + len(reproduction.claims)]
+    column = head.index("verdict")
+    assert rule[column - 2 : column] == "  "
+    assert all(row[column - 1] == " " and row[column] != " " for row in rows)
+
+
+def test_the_last_line_of_the_table_counts_the_verdicts(reproduction: Reproduction) -> None:
+    assert claims_table(reproduction.claims)[-1].startswith(f"{len(reproduction.claims)} claims: ")
+
+
+def test_figure_7_has_the_four_panels_of_the_paper_in_its_units(reproduction: Reproduction) -> None:
+    figure = step_response_figure(reproduction.step.recording, LEVELS, reproduction.step_events)
+    assert [axes.get_ylabel() for axes in figure.axes] == ["deg", "psi", "psig", "psig"]
+    angle, difference, pressure_1, pressure_2 = (axes.lines[0].get_ydata() for axes in figure.axes)
+    assert (angle[0], angle[-1]) == pytest.approx((20.0, 130.0), abs=0.1)
+    assert pressure_1[-1] - pressure_2[-1] == pytest.approx(difference[-1])
+    assert pressure_2[-1] == pytest.approx(0.0, abs=0.1)
+
+
+def test_figure_7_marks_breakaway_and_stop_in_every_panel(reproduction: Reproduction) -> None:
+    marked = step_response_figure(reproduction.step.recording, LEVELS, reproduction.step_events)
+    plain = step_response_figure(reproduction.step.recording, LEVELS, None)
+    assert [len(axes.lines) for axes in marked.axes] == [3] * 4
+    assert [len(axes.lines) for axes in plain.axes] == [1] * 4
+
+
+def test_figure_8_shows_torque_and_reference_of_both_valves_on_one_scale(reproduction: Reproduction) -> None:
+    solenoid, proportional = reproduction.solenoid.recording, reproduction.proportional.recording
+    figure = torque_task_figure(solenoid, proportional, 5.0, (1.1, 0.4))
+    top, bottom = figure.axes[0], figure.axes[2]
+    assert top.get_ylim() == bottom.get_ylim()
+    for axes, recording in ((top, solenoid), (bottom, proportional)):
+        drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
+        assert list(drawn["torque, simulated"]) == list(recording["torque"])
+        assert list(drawn["reference"]) == list(recording["reference"])
+
+
+def test_figure_8_shows_when_each_solenoid_valve_is_on(reproduction: Reproduction) -> None:
+    solenoid = reproduction.solenoid.recording
+    figure = torque_task_figure(solenoid, reproduction.proportional.recording, 5.0, (1.1, 0.4))
+    spans = [
+        sum(path.get_extents().width for path in collection.get_paths()) for collection in figure.axes[1].collections
+    ]
+    assert len(spans) == 2
+    assert sum(spans) == pytest.approx(solenoid.duration)
+
+
+def test_the_supply_holds_its_pressure_times_the_torque_constant(reproduction: Reproduction) -> None:
+    assert holding_torque(reproduction.solenoid) == pytest.approx(5.0, abs=0.01)
+
+
+def test_the_page_states_every_claim_with_both_numbers_and_the_verdict(reproduction: Reproduction, page: str) -> None:
+    text = words(page)
+    for claim in reproduction.claims:
+        assert words(typeset(claim.statement)) in text
+        assert words(typeset(claim.note)) in text
+    assert "contradicted" in text
+    assert "not testable" in text
+
+
+def test_the_page_holds_both_figures_and_fetches_nothing(page: str) -> None:
+    assert page.count("data:image/svg+xml;base64,") == 2
+    assert "http" not in page
+    assert "<script" not in page
+    assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []
+
+
+def test_the_page_tells_every_observation_assumption_and_finding(reproduction: Reproduction, page: str) -> None:
+    text = words(page)
+    for observation in (*reproduction.step_observations, *reproduction.torque_observations):
+        assert words(typeset(observation.statement)) in text
+        assert words(typeset(observation.evidence)) in text
+    for value in reproduction.assumed:
+        assert value.path in text
+        assert words(typeset(value.value)) in text
+    for finding in reproduction.printed_findings:
+        assert words(typeset(finding.paragraph)) in text.replace(" )", ")").replace("( ", "(").replace(" ,", ",")
+
+
+def test_every_tag_of_the_page_is_closed(page: str) -> None:
+    for tag in ("table", "tbody", "tr", "td", "ul", "li", "p", "h2", "h3", "figure", "div", "dl", "main"):
+        assert len(re.findall(rf"<{tag}[ >]", page)) == page.count(f"</{tag}>"), tag
+
+
+def test_a_run_with_overrides_says_so_and_gives_the_command(reproduction: Reproduction, page: str) -> None:
+    changed = dataclasses.replace(reproduction, overrides=("reference.level=5 N m",))
+    told = words(reproduction_report(changed, b"", b""))
+    assert "departs from the paper" in told
+    assert "--set 'reference.level=5 N m'" in told
+    assert "departs from the paper" not in words(page)
+
+
+def test_the_same_reproduction_gives_the_same_page(reproduction: Reproduction, page: str) -> None:
+    assert reproduction_report(reproduction, b"<svg>seven</svg>", b"<svg>eight</svg>") == page
