@@ -1,5 +1,8 @@
 """Writes the source of the lane loop of one program: loads, calls and stores, with the rows as literals."""
 
+from collections.abc import Callable
+from typing import Any
+
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme import motion
@@ -178,7 +181,7 @@ class _Writer:
         if self.program.late_commands:
             return self.late_loop()
         if self.program.valve.cuts is not None:
-            return self.cut_loop()
+            return self.cut_loop(self.program.valve.cuts)
         return [f"for lane in range({LANES}):", *_indent([*self.opening(), "length = timing.step", *self.part()])]
 
     def opening(self) -> list[str]:
@@ -186,11 +189,10 @@ class _Writer:
         names = ("timing", "plant", "valve", "result", "state", "valve_state")
         return [*[self.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
 
-    def cut_loop(self) -> list[str]:
+    def cut_loop(self, cuts: Callable[..., Any]) -> list[str]:
         """Three parts, between the switchings of the valve; parts that no lane needs are passed over."""
-        add = self.collector.add
         cut = [
-            f"first, second = {add(self.program.valve.cuts)}(valve, valve_state, command, time, timing.step)",
+            f"first, second = {self.collector.add(cuts)}(valve, valve_state, command, time, timing.step)",
             "whole = first <= 0.0",
             "lengths[0, lane] = timing.step if whole else first",
             "lengths[1, lane] = 0.0 if whole else (second - first if second > first else timing.step - first)",

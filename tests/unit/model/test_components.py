@@ -1,5 +1,6 @@
 """Chambers, vane, friction and sensors."""
 
+import itertools
 import math
 
 import pytest
@@ -57,7 +58,7 @@ def test_noise_has_mean_zero_and_variance_one_and_no_memory() -> None:
     values = [standard_noise(7, sample, 1) for sample in range(20_000)]
     mean = sum(values) / len(values)
     variance = sum(value * value for value in values) / len(values) - mean * mean
-    neighbours = sum(a * b for a, b in zip(values, values[1:], strict=False)) / len(values)
+    neighbours = sum(a * b for a, b in itertools.pairwise(values)) / len(values)
     assert abs(mean) < 0.025
     assert abs(variance - 1.0) < 0.04
     assert abs(neighbours) < 0.025

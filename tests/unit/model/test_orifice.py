@@ -11,12 +11,12 @@ from ppafo.model.gas import SPECIES, choked_flow_constant, critical_pressure_rat
 from ppafo.model.orifice import (
     fitted_flow_function,
     fitted_flow_slope,
-    iso6358_flow_function,
     isentropic_flow_function,
+    iso6358_flow_function,
     orifice_flow,
     orifice_flow_slopes,
 )
-from ppafo.model.orifice_curves import area_conductance, iso6358_curve, isentropic_curve, sonic_conductance_mass
+from ppafo.model.orifice_curves import area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 
 CO2 = SPECIES["CO2"]
 CO2_CONSTANT = UNIVERSAL_GAS_CONSTANT / CO2.molar_mass
