@@ -3,6 +3,7 @@
 A folder is complete or not there. Only an empty folder or an earlier result is ever replaced.
 """
 
+import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -40,8 +41,9 @@ def write_result(
     """Write a result folder with ``document`` in ``run.json`` and attachments by file name; returns the folder."""
     place = Path(folder)
     check_result_folder(place)
+    netcdf = netcdf_bytes(recording, document.get("scenario"))
     contents = {
-        NETCDF_FILE: netcdf_bytes(recording, document.get("scenario")),
+        NETCDF_FILE: netcdf,
         CSV_FILE: csv_bytes(recording),
         **attachments,
     }
@@ -49,7 +51,7 @@ def write_result(
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
         "files": sorted([*contents, RUN_FILE]),
-        "recording": _description(recording),
+        "recording": {**_description(recording), "sha256": _checksum(netcdf)},
         **document,
     }
     encoded = json.dumps(described, indent=2, ensure_ascii=False, allow_nan=False)
@@ -75,7 +77,18 @@ def read_result(folder: str | Path) -> StoredResult:
     if not place.is_dir():
         raise DataError(f"{folder}: is not a folder")
     document = read_document(place)
+    _check_unchanged(place / NETCDF_FILE, document["recording"].get("sha256"))
     return StoredResult(place, read_netcdf(place / NETCDF_FILE), document)
+
+
+def _check_unchanged(path: Path, checksum: object) -> None:
+    """Refuse a damaged recording before it is opened: the HDF5 library can hang on one."""
+    if _checksum(read_bytes(path)) != checksum:
+        raise DataError(f"{path}: is not the file that was written with {RUN_FILE}; run the scenario again")
+
+
+def _checksum(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def _check_replaceable(place: Path) -> None:

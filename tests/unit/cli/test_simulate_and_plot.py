@@ -145,7 +145,7 @@ def test_a_damaged_result_is_one_line_and_exit_code_2(
     (tmp_path / "recording.nc").write_bytes((saved / "recording.nc").read_bytes()[:5000])
     assert main(["plot", str(tmp_path)]) == 2
     error = capsys.readouterr().err
-    assert "recording.nc: is not a whole NetCDF file" in error
+    assert "recording.nc: is not the file that was written" in error
     assert error.count("\n") == 1
 
 

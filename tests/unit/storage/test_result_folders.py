@@ -187,6 +187,15 @@ def test_a_result_without_its_recording_is_refused_by_file(tmp_path: Path) -> No
         read_result(folder)
 
 
+def test_a_recording_that_changed_on_disk_is_refused_before_it_is_opened(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    damaged = bytearray((folder / "recording.nc").read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    (folder / "recording.nc").write_bytes(damaged)
+    with pytest.raises(DataError, match=r"recording\.nc: is not the file that was written with run\.json"):
+        read_result(folder)
+
+
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     for place in (tmp_path / "a.xlsx", tmp_path / "nothing"):
         with pytest.raises(DataError, match=r"neither a \.nc or \.csv file nor a result folder"):

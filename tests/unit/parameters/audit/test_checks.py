@@ -91,7 +91,7 @@ def test_dead_volume_makes_the_volumes_positive() -> None:
 
 def test_chamber_1_is_checked_at_the_lower_end() -> None:
     finding = findings("reported.smallest_angle=0 deg")["volume-1"]
-    assert side(finding, "V1 at the end of the range") == pytest.approx(8e-6 - 51e-6 * 20 / 57.29578, rel=1e-6)
+    assert side(finding, "V1 at the end of the range") == pytest.approx(2e-6 - 51e-6 * 20 / 57.29578, rel=1e-6)
 
 
 def test_a_demand_above_the_ceiling_is_a_warning_with_the_pressure_that_is_needed() -> None:
