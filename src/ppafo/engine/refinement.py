@@ -32,4 +32,4 @@ def divisions(plant: PlantParameters, step: float, lowest_angle: float, highest_
     parts = step * STEPS_PER_FILLING / filling_time(plant, volume)
     if is_free:
         parts = max(parts, step * gas_spring_frequency(plant, volume) / RADIANS_PER_STEP)
-    return min(max(1, math.ceil(parts - 1e-9)), MOST_DIVISIONS)
+    return max(1, math.ceil(parts - 1e-9))

@@ -8,8 +8,9 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ProfileKind
 from ppafo.engine.program import Program
 from ppafo.engine.reference.derivative import ExactOrifice
-from ppafo.engine.refinement import divisions
+from ppafo.engine.refinement import MOST_DIVISIONS, divisions
 from ppafo.engine.run import Run, whole_and_rest
+from ppafo.errors import ScenarioError
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
 from ppafo.model.sensors import SensorParameters
@@ -105,6 +106,12 @@ def divided_step(scenario: Scenario, plant: PlantParameters) -> tuple[int, float
     coarse = max(1, math.ceil(period / scenario.time_step - WHOLE))
     lowest, highest = angle_range(scenario, plant)
     parts = divisions(plant, period / coarse, lowest, highest, isinstance(scenario.motion, FreeMotion))
+    if parts > MOST_DIVISIONS:
+        raise ScenarioError(
+            f"{scenario.name}: run.step = {scenario.time_step:.3g} s would have to be divided into {parts} parts "
+            f"(at most {MOST_DIVISIONS}), because a chamber fills that fast: look at the dead volumes and the valve's "
+            f"area, or give run.step = {MOST_DIVISIONS * period / (coarse * parts):.1g} s or less"
+        )
     return coarse * parts, period / (coarse * parts)
 
 

@@ -59,7 +59,8 @@ def _result(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)
     thin = max(1, round(scenario.output_interval / (run.step * run.record_every)))
-    kept = times < status.time if status.time is not None else np.ones(times.size, dtype=bool)
+    kept = times < (np.inf if status.time is None else status.time)
+    kept[0] = True
     recording = _recording(scenario, run, times[kept][::thin], record[kept][::thin], rows)
     return Result(
         scenario=scenario,
@@ -107,7 +108,7 @@ def _recording(scenario: Scenario, run: Run, times: Floats, record: Floats, rows
         "mass_2": (row("state.mass_2"), "kg"),
     }
     if scenario.control.kind != OPEN_LOOP:
-        channels["reference"] = (profile_values(scenario.reference, times)[0] if times.size else times, "N m")
+        channels["reference"] = (profile_values(scenario.reference, times)[0], "N m")
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(scenario.name, times, values, is_synthetic=True)
 
@@ -117,7 +118,7 @@ def _external_torque(
 ) -> Floats:
     """T_ex of equation (1) [N m]: what was prescribed, or what holds a led vane to its path."""
     plant = run.plant
-    if not isinstance(scenario.motion, LedMotion) or not times.size:
+    if not isinstance(scenario.motion, LedMotion):
         return np.full(times.size, plant.external_torque)
     acceleration = profile_values(scenario.motion.profile, times)[2]
     friction = np.array([sliding_friction(float(value), plant.dynamic_torque) for value in rate])

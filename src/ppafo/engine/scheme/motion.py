@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from ppafo.engine.scheme.pneumatics import GasChange, advance_gas
 from ppafo.model.friction import holds_still
-from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, driving_torque
+from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, driving_torque
 
 
 class Departure(NamedTuple):
@@ -82,6 +82,34 @@ def depart(
     return bounded(plant, angle), (0.0 if hits else rate)
 
 
+def first_event(
+    plant: PlantParameters,
+    state: PlantState,
+    free_angle: float,
+    acceleration: float,
+    full_velocity: float,
+    step: float,
+) -> Departure:
+    """Where the rest of a step begins: at a stop, at a reversal, or, for a vane at rest, at once.
+
+    ``free_angle`` [rad] and ``full_velocity`` [rad/s] are what the whole step would lead to without the event.
+    """
+    velocity = state.angular_velocity
+    way = direction_of(velocity)
+    fall = velocity - full_velocity
+    reverses = way != 0.0 and full_velocity * way <= 0.0
+    reversal = velocity / (fall if reverses else 1.0)
+    stop = plant.angle_max if velocity > 0.0 else plant.angle_min
+    hits = way != 0.0 and free_angle != bounded(plant, free_angle)
+    impact = min(time_to_stop(abs(stop - state.angle), abs(velocity), acceleration * way) / step, 1.0)
+    hits_first = hits and not (reverses and reversal < impact)
+    turning_angle = bounded(plant, state.angle + 0.5 * reversal * step * velocity)
+    share = impact if hits_first else (reversal if reverses else 0.0)
+    angle = stop if hits_first else (turning_angle if reverses else state.angle)
+    rebound = -plant.restitution * (velocity - impact * fall)
+    return Departure(share, angle, rebound if hits_first else 0.0)
+
+
 def advance_free(
     plant: PlantParameters,
     state: PlantState,
@@ -92,51 +120,25 @@ def advance_free(
     port_flow_slopes: Callable[..., Any],
 ) -> PlantState:
     """State one step [s] later of a vane that is free between its stops. Equations (1) to (10)."""
-    angle = state.angle
     velocity = state.angular_velocity
     way = direction_of(velocity)
     moving = way != 0.0
     sliding = way * plant.dynamic_torque
-    pressure_1, pressure_2 = chamber_pressures(plant, angle, state.mass_1, state.mass_2)
-    torque = driving_torque(plant, angle, pressure_1, pressure_2)
-    acceleration = (torque - sliding - plant.viscous_damping * velocity) / plant.inertia
-    acceleration = acceleration if moving else 0.0
-    free_angle = angle + step * (velocity + 0.5 * step * acceleration)
+    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
+    torque = driving_torque(plant, state.angle, pressure_1, pressure_2)
+    sliding_acceleration = (torque - sliding - plant.viscous_damping * velocity) / plant.inertia
+    acceleration = sliding_acceleration if moving else 0.0
+    free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
     predicted = bounded(plant, free_angle)
-    gas = advance_gas(
-        plant,
-        state.mass_1,
-        state.mass_2,
-        chamber_volumes(plant, angle),
-        chamber_volumes(plant, predicted),
-        port_1,
-        port_2,
-        step,
-        port_flow,
-        port_flow_slopes,
-    )
-    mass_1 = state.mass_1 + gas.mass_1
-    mass_2 = state.mass_2 + gas.mass_2
-    next_1, next_2 = chamber_pressures(plant, predicted, mass_1, mass_2)
+    gas = advance_gas(plant, state, predicted, port_1, port_2, step, port_flow, port_flow_slopes)
+    next_1, next_2 = chamber_pressures(plant, predicted, state.mass_1 + gas.mass_1, state.mass_2 + gas.mass_2)
     next_torque = driving_torque(plant, predicted, next_1, next_2)
     full_velocity = next_velocity(plant, velocity, acceleration, next_torque - sliding, step)
 
-    reverses = moving and full_velocity * way <= 0.0
-    fall = velocity - full_velocity
-    reversal = velocity / (fall if reverses else 1.0)
-    stop = plant.angle_max if velocity > 0.0 else plant.angle_min
-    hits = moving and free_angle != predicted
-    impact = min(time_to_stop(abs(stop - angle), abs(velocity), acceleration * way) / step, 1.0)
-    hits_first = hits and not (reverses and reversal < impact)
-    rebound = -plant.restitution * (velocity - impact * fall)
-    turning_angle = bounded(plant, angle + 0.5 * reversal * step * velocity)
-    share = impact if hits_first else (reversal if reverses else 0.0)
-    start_angle = stop if hits_first else (turning_angle if reverses else angle)
-    departure = Departure(share, start_angle, rebound if hits_first else 0.0)
-    share_torque = torque + share * (next_torque - torque)
-    left_angle, left_velocity = depart(plant, departure, share_torque, next_torque, step)
-
-    slides_through = moving and not reverses and not hits
+    departure = first_event(plant, state, free_angle, acceleration, full_velocity, step)
+    departure_torque = torque + departure.share * (next_torque - torque)
+    left_angle, left_velocity = depart(plant, departure, departure_torque, next_torque, step)
+    slides_through = moving and full_velocity * way > 0.0 and free_angle == predicted
     next_angle = predicted if slides_through else left_angle
     next_rate = full_velocity if slides_through else left_velocity
     return after_gas(state, next_angle, next_rate, gas)
@@ -154,18 +156,7 @@ def advance_led(
     port_flow_slopes: Callable[..., Any],
 ) -> PlantState:
     """State one step [s] later of a vane that is led to ``next_angle`` [rad]. Equations (3) to (9)."""
-    gas = advance_gas(
-        plant,
-        state.mass_1,
-        state.mass_2,
-        chamber_volumes(plant, state.angle),
-        chamber_volumes(plant, next_angle),
-        port_1,
-        port_2,
-        step,
-        port_flow,
-        port_flow_slopes,
-    )
+    gas = advance_gas(plant, state, next_angle, port_1, port_2, step, port_flow, port_flow_slopes)
     return after_gas(state, next_angle, next_rate, gas)
 
 

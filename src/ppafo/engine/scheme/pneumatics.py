@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
-from ppafo.model.plant import PlantParameters
+from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
 
 GAMMA = 0.2928932188134524
 
@@ -66,17 +66,21 @@ def solve_stage(
 
 def advance_gas(
     plant: PlantParameters,
-    mass_1: float,
-    mass_2: float,
-    volumes: tuple[float, float],
-    next_volumes: tuple[float, float],
+    state: PlantState,
+    next_angle: float,
     port_1: Any,
     port_2: Any,
     step: float,
     port_flow: Callable[..., Any],
     port_flow_slopes: Callable[..., Any],
 ) -> GasChange:
-    """Changes of mass [kg] in one step [s] in which the volumes [m^3] run linearly. Equations (3), (6) to (9)."""
+    """Changes of mass [kg] in one step [s] in which the volumes run linearly to those of ``next_angle`` [rad].
+
+    Equations (3) to (9).
+    """
+    mass_1, mass_2 = state.mass_1, state.mass_2
+    volumes = chamber_volumes(plant, state.angle)
+    next_volumes = chamber_volumes(plant, next_angle)
     per_mass_1 = plant.gas_product / volumes[0]
     per_mass_2 = plant.gas_product / volumes[1]
     pressure_1 = mass_1 * per_mass_1

@@ -1,0 +1,58 @@
+"""Every example runs from beginning to end and writes what it says."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
+WRITTEN = {
+    "first_steps": {
+        "first-steps/torque-task.png",
+        "first-steps/own-controller.png",
+        "first-steps/own-controller/recording.nc",
+        "first-steps/own-controller/recording.csv",
+        "first-steps/own-controller/run.json",
+    },
+    "compare_controllers": {"compare-controllers/error-against-gas.png"},
+}
+
+
+def run(example: Path, folder: Path) -> str:
+    """What an example prints when it is run in a folder, where there is no screen."""
+    environment = {**os.environ, "MPLBACKEND": "agg"}
+    done = subprocess.run(
+        [sys.executable, str(example)], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_every_example_is_tested() -> None:
+    assert {example.stem for example in EXAMPLES} == set(WRITTEN)
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.stem)
+def test_an_example_runs_and_writes_its_files_under_out_and_nowhere_else(example: Path, tmp_path: Path) -> None:
+    run(example, tmp_path)
+    written = {str(path.relative_to(tmp_path / "out")) for path in tmp_path.rglob("*") if path.is_file()}
+    assert written == WRITTEN[example.stem]
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.stem)
+def test_an_example_is_a_notebook_of_cells_with_headings(example: Path) -> None:
+    headings = re.findall(r"^# %%(.*)$", example.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(headings) >= 4
+    assert [heading for heading in headings if not heading.strip()] == []
+
+
+def test_faster_switching_mends_the_error_and_not_the_gas_as_the_example_says(tmp_path: Path) -> None:
+    printed = run(next(item for item in EXAMPLES if item.stem == "compare_controllers"), tmp_path)
+    pair = re.findall(r"^solenoid pair +(\d+) Hz +RMS error +(\S+) N m, CO2 +(\S+) g", printed, re.MULTILINE)
+    errors, gases = [float(error) for _, error, _ in pair], [float(gas) for *_, gas in pair]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[0] > 10.0 * errors[-1]
+    assert max(gases) < 1.2 * min(gases)

@@ -1,0 +1,122 @@
+"""What the README shows runs as printed, and the numbers in it are those of a run."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.catalog import COMMANDS
+from ppafo.cli.main import build_parser, main
+from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.reporting.claims_table import claims_table
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.studies.reproduction import Reproduction, reproduce
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+CHECK_FAILED = 1
+MEASURED = {
+    "step response (figure 7)": "step-response",
+    "torque task, solenoid pair": "torque-task-solenoid",
+    "torque task, proportional valve": "torque-task-proportional",
+}
+"""Rows of the README's table of accuracy and their scenarios."""
+
+
+def blocks(language: str) -> list[str]:
+    """The code blocks of the README in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
+
+
+def commands() -> list[list[str]]:
+    """The words of every command that the README shows, without the name of the program."""
+    lines = [line for block in blocks("sh") for line in block.splitlines()]
+    words = [shlex.split(line) for line in lines]
+    assert all(line[0] == "ppafo" for line in words)
+    return [line[1:] for line in words]
+
+
+def shown_claims() -> dict[str, list[str]]:
+    """The cells of the README's table of claims by claim: paper, here, verdict."""
+    rows = re.findall(r"^\| [^|]+ \| `(\w+)` \| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", TEXT, re.MULTILINE)
+    return {name: cells for name, *cells in rows}
+
+
+@pytest.fixture(scope="module")
+def reproduction() -> Reproduction:
+    """One run of the paper's experiments, which the tests below only read."""
+    return reproduce()
+
+
+@pytest.mark.parametrize("block", blocks("python"))
+def test_the_python_of_the_readme_runs_as_printed(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(block, {})
+    pictures = re.findall(r'savefig\("(.+?)"\)', block)
+    assert [name for name in pictures if (tmp_path / name).stat().st_size < 10_000] == []
+
+
+def test_there_are_three_lines_of_python() -> None:
+    (block,) = blocks("python")
+    assert len([line for line in block.splitlines() if line]) == 3
+    assert block in f"\n{TEXT}"
+
+
+@pytest.mark.parametrize("words", commands(), ids=" ".join)
+def test_a_command_of_the_readme_is_understood(words: list[str]) -> None:
+    parsed = build_parser(words[0]).parse_args(words)
+    assert callable(parsed.run)
+
+
+def test_the_commands_of_the_readme_run_one_after_the_other_with_the_exit_codes_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    codes = {" ".join(words): main(words) for words in commands()}
+    assert capsys.readouterr().out
+    failed = {command: code for command, code in codes.items() if code}
+    assert failed == {"audit ppafo2011-printed": CHECK_FAILED}
+    assert (tmp_path / "out" / "solenoid" / "figure.png").is_file()
+    assert (tmp_path / "out" / "reproduce" / "report.html").is_file()
+
+
+def test_every_command_is_shown_or_named() -> None:
+    assert [name for name in COMMANDS if f"ppafo {name}" not in TEXT] == []
+
+
+def test_the_make_targets_of_the_readme_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"make (\w+)", "\n".join(re.findall(r"^    make.*|`make \w+`", TEXT, re.MULTILINE))))
+    assert {"reproduce", "test", "bench"} <= targets
+    assert [target for target in targets if f"\n{target}:" not in makefile] == []
+
+
+def test_the_table_of_claims_is_that_of_a_run(reproduction: Reproduction) -> None:
+    printed = {line.split()[0]: re.split(r" {2,}", line)[1:] for line in claims_table(reproduction.claims)[2:-2]}
+    testable = {name: cells for name, cells in printed.items() if cells[-1] != "not testable"}
+    assert shown_claims() == testable
+
+
+def test_every_claim_that_is_not_testable_is_named(reproduction: Reproduction) -> None:
+    untestable = [claim.id for claim in reproduction.claims if claim.verdict == "not_testable"]
+    assert untestable
+    assert [name for name in untestable if f"`{name}`" not in TEXT] == []
+    assert [name for name in shown_claims() if name in untestable] == []
+
+
+def test_the_limits_of_accuracy_are_those_of_the_tests() -> None:
+    tests = (ROOT / "tests" / "convergence" / "test_accuracy.py").read_text(encoding="utf-8")
+    names = ("LARGEST_ANGLE", "LARGEST_PRESSURE", "LARGEST_RMS")
+    held = [float(re.findall(rf"^{name} = (\S+)", tests, re.MULTILINE)[0]) for name in names]
+    (row,) = re.findall(r"^\| limit \| (\S+) \| (\S+) \| (\S+) \|$", TEXT, re.MULTILINE)
+    assert [float(cell) for cell in row] == held
+
+
+@pytest.mark.parametrize("row", MEASURED)
+def test_the_accuracy_that_the_readme_shows_is_about_what_is_measured(row: str) -> None:
+    (cells,) = re.findall(rf"^\| {re.escape(row)} \| \S+ \| (\S+) \| (\S+) \|$", TEXT, re.MULTILINE)
+    agreement = compare_with_reference(plan_run(load_scenario(MEASURED[row])))
+    for shown, measured in zip(cells, (agreement.worst_pressure, agreement.worst_rms), strict=True):
+        assert float(shown) / 3.0 < measured < float(shown) * 3.0

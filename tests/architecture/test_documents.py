@@ -1,0 +1,226 @@
+"""The documents agree with the code: equations, names, units, paths and links."""
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.model import plant, sensors
+from ppafo.model.declaration import Quantity
+from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters import declaration, device
+from ppafo.signals.channels import CHANNELS
+
+ROOT = Path(__file__).parents[2]
+SOURCE = ROOT / "src" / "ppafo"
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAPER_EQUATIONS = (*range(1, 11), 13, 14)
+LEG_EQUATIONS = (11, 12)
+
+GROUPS_OF_NUMBERS = (plant.PlantParameters, plant.PlantState, plant.Openings, sensors.Measurement)
+DEVICE_PARTS = [part for _, part in inspect.getmembers(device, dataclasses.is_dataclass)]
+
+MACHINE_TRACES = (
+    r"(?<!no-emit-)index[-]url",
+    r"find[-]links",
+    r"pypi[.]",
+    r"[:]//\S+/simp[l]e",
+    r"/wor[k]/",
+    r"/roo[t]/",
+    r"/hom[e]/",
+)
+"""Registry addresses and machine paths, written so that this file does not match itself."""
+
+
+def sections_of_equations() -> dict[int, list[str]]:
+    """Equation number to the dotted names of its section."""
+    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+    parts = re.split(r"^## \((\d+)\).*$", text, flags=re.MULTILINE)
+    bodies = zip(parts[1::2], parts[2::2], strict=True)
+    return {int(number): re.findall(r"`(ppafo\.[\w.]+)`", body) for number, body in bodies}
+
+
+def equations_of(docstring: str) -> set[int]:
+    """Equation numbers that a docstring names, with ranges such as (6) to (9) written out."""
+    numbers: set[int] = set()
+    for clause in re.findall(r"(?:[Ee]quations?|Eqs)\s+((?:\(\d+\)(?:,? (?:and|to) |, )?)+)", docstring):
+        for first, last in re.findall(r"\((\d+)\)(?: to \((\d+)\))?", clause):
+            numbers |= set(range(int(first), int(last or first) + 1))
+    return numbers
+
+
+def found(dotted: str) -> Any:
+    """What a dotted name stands for, or None."""
+    module, _, name = dotted.rpartition(".")
+    try:
+        return getattr(importlib.import_module(module), name, None)
+    except ModuleNotFoundError:
+        return None
+
+
+def dotted_names(page: str) -> list[str]:
+    """Every dotted name of the package on a page."""
+    return re.findall(r"`(ppafo\.[\w.]+)`", (ROOT / "docs" / page).read_text(encoding="utf-8"))
+
+
+def nomenclature() -> Iterator[tuple[str, str]]:
+    """Name and unit of every row of the nomenclature; a row may have several names, and a unit for each."""
+    for line in (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        names = re.findall(r"`(\w+)`", cells[1]) if line.startswith("| ") and len(cells) == 4 else []
+        units = cells[2].split(", ") if names else []
+        units = units * len(names) if len(units) == 1 else units
+        yield from zip(names, units, strict=True)
+
+
+def is_number(annotation: ast.expr | None) -> bool:
+    """True for a parameter or field that is a float or a whole number."""
+    return isinstance(annotation, ast.Name) and annotation.id in {"float", "int"}
+
+
+def names_of(folder: Path, only_numbers: bool) -> set[str]:
+    """Names of parameters of public functions and of fields of classes in a folder, at the top of their modules."""
+    names: set[str] = set()
+    for path in folder.rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                names |= {item.arg for item in node.args.args if not only_numbers or is_number(item.annotation)}
+            if isinstance(node, ast.ClassDef):
+                fields = [item for item in node.body if isinstance(item, ast.AnnAssign)]
+                targets = {item.target for item in fields if not only_numbers or is_number(item.annotation)}
+                names |= {target.id for target in targets if isinstance(target, ast.Name)}
+    return names
+
+
+def declared_units() -> dict[str, str]:
+    """Unit of every declared value and channel by name, as the nomenclature writes it."""
+    quantities: list[Quantity] = [item for section in declaration.SECTIONS.values() for item in section]
+    quantities += [item for kind in VALVES.values() for item in kind.quantities]
+    units = {item.name: item.unit.removesuffix("_a") or "-" for item in quantities}
+    return units | {name: kind.unit for name, kind in CHANNELS.items()}
+
+
+def repository_files() -> list[Path]:
+    """Files that are tracked, or would be."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("this is no git repository, so its files are not known")
+    words = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
+    listed = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return [ROOT / name for name in listed.split("\0") if name and (ROOT / name).is_file()]
+
+
+def test_every_equation_of_the_paper_has_a_section_with_functions() -> None:
+    sections = sections_of_equations()
+    assert tuple(sections) == PAPER_EQUATIONS
+    assert [number for number, names in sections.items() if not names] == []
+
+
+def test_the_equations_of_the_leg_are_said_to_come() -> None:
+    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+    assert all(f"({number})" in text.partition("## ")[0] for number in LEG_EQUATIONS)
+
+
+def test_every_dotted_name_on_the_page_of_equations_is_a_function() -> None:
+    names = dotted_names("equations.md")
+    assert len(names) > 30
+    assert [name for name in names if not inspect.isfunction(inspect.unwrap(found(name) or str))] == []
+
+
+@pytest.mark.parametrize("number", PAPER_EQUATIONS)
+def test_the_functions_of_an_equation_name_it_in_their_docstrings(number: int) -> None:
+    silent = [name for name in sections_of_equations()[number] if number not in equations_of(found(name).__doc__ or "")]
+    assert silent == []
+
+
+def test_numbers_of_equations_are_read_from_every_way_of_writing_them() -> None:
+    assert equations_of("Eqs (6), (7). At step (2).") == {6, 7}
+    assert equations_of("Equations (3), (6) to (9).") == {3, 6, 7, 8, 9}
+    assert equations_of("of equation (1), and equation (14)'s rule") == {1, 14}
+
+
+def test_no_name_of_the_nomenclature_is_listed_twice() -> None:
+    names = [name for name, _ in nomenclature()]
+    assert len(names) > 100
+    assert sorted({name for name in names if names.count(name) > 1}) == []
+
+
+def test_every_name_of_the_nomenclature_is_a_parameter_or_field_or_declared_value() -> None:
+    used = set(declared_units())
+    for package in ("model", "parameters", "control"):
+        used |= names_of(SOURCE / package, only_numbers=False)
+    assert sorted({name for name, _ in nomenclature()} - used) == []
+
+
+@pytest.mark.parametrize("group", [*GROUPS_OF_NUMBERS, *DEVICE_PARTS], ids=lambda group: group.__name__)
+def test_every_field_of_plant_state_and_device_is_in_the_nomenclature(group: Any) -> None:
+    fields = [item.name for item in dataclasses.fields(group)] if dataclasses.is_dataclass(group) else group._fields
+    assert [name for name in fields if name not in dict(nomenclature())] == []
+
+
+def test_every_number_that_the_physics_takes_or_keeps_is_in_the_nomenclature() -> None:
+    data_only = {"default", "minimum", "maximum"}
+    assert sorted(names_of(SOURCE / "model", only_numbers=True) - data_only - set(dict(nomenclature()))) == []
+
+
+def test_units_of_the_nomenclature_are_the_declared_ones() -> None:
+    declared = declared_units()
+    listed = {name: unit for name, unit in nomenclature() if name in declared}
+    assert len(listed) > 40
+    assert {name: unit for name, unit in listed.items() if unit != declared[name]} == {}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_relative_link_leads_to_a_file(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    targets = [target for target in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in target]
+    assert [target for target in targets if not (page.parent / target.partition("#")[0]).is_file()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_path_that_a_page_names_exists(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    paths = re.findall(r"`((?:[\w.-]+/)+(?:[\w-]+\.(?:py|toml|md))?)`", text)
+    homes = (ROOT, SOURCE, page.parent)
+    assert [path for path in paths if not any((home / path).exists() for home in homes)] == []
+
+
+def test_every_entry_of_the_house_exists() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    house = text.partition("## The house")[2].partition("## Layers")[0]
+    parents: dict[int, Path] = {4: ROOT}
+    listed = []
+    for spaces, entry in re.findall(r"^( {4,})([\w./-]+)", house, re.MULTILINE):
+        path = parents[len(spaces)] / entry
+        listed.append(path)
+        parents[len(spaces) + 2] = path
+    assert [str(path) for path in listed if not path.exists()] == []
+    packages = {path.parent for path in SOURCE.glob("*/__init__.py")}
+    assert {path.name for path in packages - set(listed)} == set()
+
+
+def test_pictures_of_the_documents_are_small_enough_for_a_repository() -> None:
+    pictures = sorted((ROOT / "docs" / "images").iterdir())
+    assert {picture.name for picture in pictures} >= {"figure-7.png", "figure-8.png"}
+    assert {picture.name: picture.stat().st_size for picture in pictures if picture.stat().st_size > 150_000} == {}
+
+
+def test_no_file_of_the_repository_names_a_registry_or_a_place_on_one_machine() -> None:
+    traces = []
+    for file in repository_files():
+        text = file.read_bytes().decode("utf-8", errors="replace")
+        traces += [f"{file.relative_to(ROOT)}: {hit}" for rule in MACHINE_TRACES for hit in re.findall(rule, text)]
+    assert traces == []
+
+
+def test_lock_files_have_no_address_at_all() -> None:
+    locks = sorted(ROOT.glob("*.lock"))
+    assert len(locks) >= 2
+    assert [lock.name for lock in locks if "://" in lock.read_text(encoding="utf-8")] == []

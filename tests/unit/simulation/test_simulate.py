@@ -1,0 +1,179 @@
+"""From a scenario to a result: recordings, status, Python controllers, many at once."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ppafo.errors import ScenarioError, SimulationError
+from ppafo.model.sensors import Measurement
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.scenario import LedMotion, ProfileChoice, Scenario
+from ppafo.simulation.simulate import simulate, simulate_many
+
+CHANNELS = {
+    "angle",
+    "angular_velocity",
+    "pressure_1",
+    "pressure_2",
+    "torque",
+    "reference",
+    "command",
+    "supplied_mass",
+    "vented_mass",
+    "leaked_mass",
+    "external_torque",
+    "mass_1",
+    "mass_2",
+}
+
+
+class Proportional:
+    """A controller as a user would write it."""
+
+    def __init__(self, gain: float = 0.2) -> None:
+        self.gain = gain
+        self.calls: list[tuple[float, float, Measurement]] = []
+
+    def reset(self) -> None:
+        self.calls.clear()
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+        self.calls.append((time, reference, measurement))
+        return self.gain * (reference - measurement.torque)
+
+
+def test_recording_has_every_channel_at_every_output_time(torque_task: Callable[[str], Scenario]) -> None:
+    result = simulate(torque_task("proportional"))
+    assert set(result.recording.names) == CHANNELS
+    assert result.recording.time[0] == 0.0
+    assert result.recording.time[-1] == pytest.approx(3.0)
+    assert np.diff(result.recording.time) == pytest.approx(1e-3)
+    assert result.status.kind == "completed"
+
+
+def test_open_loop_run_has_no_reference_and_so_no_tracking_error(step_response: Scenario) -> None:
+    result = simulate(step_response)
+    assert "reference" not in result.recording.names
+    assert "rms_error" not in result.metrics
+
+
+def test_same_scenario_gives_the_same_bits_every_time(step_response: Scenario) -> None:
+    first, second = simulate(step_response), simulate(step_response)
+    assert all(np.array_equal(first.recording[name], second.recording[name]) for name in first.recording.names)
+
+
+def test_many_scenarios_give_what_each_gives_alone(torque_task: Callable[[str], Scenario]) -> None:
+    scenarios = [torque_task("proportional"), torque_task("solenoid"), load_scenario("step-response")]
+    for together, scenario in zip(simulate_many(scenarios), scenarios, strict=True):
+        alone = simulate(scenario)
+        assert np.array_equal(together.recording["torque"], alone.recording["torque"])
+
+
+def test_python_controller_gives_what_the_same_law_in_the_catalogue_gives(
+    torque_task: Callable[[str], Scenario],
+) -> None:
+    base = torque_task("proportional")
+    settings = dict.fromkeys(base.control.settings, 0.0) | {"proportional_gain": 0.2}
+    compiled = simulate(dataclasses.replace(base, control=dataclasses.replace(base.control, settings=settings)))
+    python = simulate(base.controlled_by(Proportional(0.2)))
+    assert python.recording["torque"] == pytest.approx(compiled.recording["torque"], abs=1e-9)
+    assert np.array_equal(python.recording.time, compiled.recording.time)
+
+
+def test_python_controller_is_reset_and_then_asked_once_for_every_sample(
+    torque_task: Callable[[str], Scenario], shorter: Callable[[Scenario, float], Scenario]
+) -> None:
+    controller = Proportional()
+    scenario = shorter(torque_task("solenoid"), 0.2).controlled_by(controller)
+    simulate(scenario)
+    simulate(scenario)
+    assert [call[0] for call in controller.calls] == pytest.approx([0.0, 0.05, 0.1, 0.15])
+    assert [call[1] for call in controller.calls] == pytest.approx([0.0, 0.3, 0.6, 0.9])
+
+
+def test_python_controller_sees_the_same_late_and_noisy_signals_as_a_compiled_one() -> None:
+    base = dataclasses.replace(load_scenario("torque-task-slow-valve"), duration=0.3)
+    settings = dict.fromkeys(base.control.settings, 0.0) | {"proportional_gain": 0.2}
+    compiled = simulate(dataclasses.replace(base, control=dataclasses.replace(base.control, settings=settings)))
+    python = simulate(base.controlled_by(Proportional(0.2)))
+    assert base.sensors.delay > 0.0
+    assert python.recording["command"] == pytest.approx(compiled.recording["command"], abs=1e-9)
+
+
+@pytest.mark.parametrize("answer", [math.nan, None, "open", math.inf, True])
+def test_python_controller_that_returns_no_finite_number_is_refused_with_the_time(
+    torque_task: Callable[[str], Scenario], answer: object
+) -> None:
+    class Broken(Proportional):
+        def update(self, time: float, reference: float, measurement: Measurement) -> float:
+            return answer if time > 0.0105 else 0.0  # type: ignore[return-value]
+
+    with pytest.raises(SimulationError, match=r"Broken.update returned .* at t = 0.011 s"):
+        simulate(torque_task("proportional").controlled_by(Broken()))
+
+
+def test_commands_of_a_python_controller_are_clipped(torque_task: Callable[[str], Scenario]) -> None:
+    result = simulate(torque_task("proportional").controlled_by(Proportional(1e6)))
+    assert float(np.abs(result.recording["command"]).max()) == 1.0
+
+
+def test_diverging_run_is_a_status_with_time_state_and_remedy(step_response: Scenario) -> None:
+    impossible = dataclasses.replace(step_response, initial_pressure_1=-2.0e5)
+    result = simulate(impossible)
+    assert result.status.kind == "diverged"
+    assert result.status.time is not None
+    assert result.status.time < 0.01
+    for part in ("diverged at t =", "angle", "mass 1", "smaller run.step"):
+        assert part in result.status.message
+    assert all(np.isfinite(result.recording[name]).all() for name in result.recording.names)
+
+
+def test_chamber_too_fast_for_any_sensible_step_is_refused_with_the_remedy() -> None:
+    scenario = load_scenario("step-response", ["actuator.dead_volume_1=1e-12 m^3"])
+    with pytest.raises(ScenarioError, match=r"divided into \d+ parts.*dead volumes"):
+        simulate(scenario)
+
+
+def test_led_vane_follows_its_path_and_reports_the_torque_that_it_takes(
+    torque_task: Callable[[str], Scenario],
+) -> None:
+    sine = ProfileChoice("sine", {"level": 1.3, "amplitude": 0.2, "frequency": 1.0, "phase": 0.0})
+    result = simulate(dataclasses.replace(torque_task("proportional"), motion=LedMotion(sine)))
+    time = result.recording.time
+    assert result.recording["angle"] == pytest.approx(1.3 + 0.2 * np.sin(2 * np.pi * time), abs=1e-8)
+    device = result.scenario.device
+    rate = result.recording["angular_velocity"]
+    acceleration = -0.2 * (2 * np.pi) ** 2 * np.sin(2 * np.pi * time)
+    expected = (
+        result.recording["torque"]
+        - device.friction.viscous_damping * rate
+        - device.friction.dynamic_torque * np.sign(rate)
+        - device.foot_plate.inertia * acceleration
+    )
+    assert result.recording["external_torque"] == pytest.approx(expected, abs=1e-6)
+
+
+def test_separate_dorsiflexion_pressure_is_what_chamber_2_gets() -> None:
+    overrides = ["supply.dorsiflexion_pressure=30 psi_g", "controller.command=-1", "motion.angle=90 deg"]
+    result = simulate(load_scenario("step-response", [*overrides, "run.duration=1 s", "initial.pressure_2=0 psi_g"]))
+    assert result.recording["pressure_2"][-1] == pytest.approx(101325.0 + 30.0 * 6894.757, rel=1e-3)
+    assert result.recording["angle"][-1] == pytest.approx(result.scenario.device.actuator.angle_min)
+
+
+def test_external_torque_holds_the_vane_back() -> None:
+    held = simulate(load_scenario("step-response", ["motion.external_torque=6 N m"]))
+    assert held.recording["angle"][-1] == pytest.approx(held.recording["angle"][0])
+    free = simulate(load_scenario("step-response"))
+    assert free.recording["angle"][-1] > free.recording["angle"][0] + 1.5
+
+
+def test_restitution_makes_the_vane_rebound() -> None:
+    def largest_backward_speed(restitution: float) -> float:
+        result = simulate(load_scenario("step-response", [f"actuator.restitution={restitution}"]))
+        return float(-result.recording["angular_velocity"].min())
+
+    assert largest_backward_speed(0.0) < 0.5
+    assert largest_backward_speed(0.5) > 1.0
