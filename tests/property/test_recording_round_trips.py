@@ -2,12 +2,13 @@
 
 import tempfile
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ppafo.signals import CHANNELS, Channel, Recording
+from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.storage import read_csv, read_netcdf, write_csv, write_netcdf
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -26,7 +27,7 @@ def recordings(draw: st.DrawFn) -> Recording:
     names = draw(st.lists(st.sampled_from(sorted(UNITS)), unique=True, max_size=5))
     columns = st.lists(FINITE, min_size=len(times), max_size=len(times))
     channels = {name: Channel(np.array(draw(columns)), UNITS[name]) for name in names}
-    return Recording(draw(LABELS), np.array(times), channels, draw(st.booleans()))
+    return Recording(draw(LABELS), np.array(times), channels, draw(st.sampled_from(get_args(RecordingKind))))
 
 
 @given(recordings())

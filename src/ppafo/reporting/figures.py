@@ -19,7 +19,7 @@ from ppafo.reporting.style import (
     WANTED,
     house_style,
     label_lines,
-    mark_synthetic,
+    mark_kind,
     rendered,
 )
 from ppafo.signals import Recording
@@ -132,8 +132,7 @@ def recording_figure(
         for panel, axes in zip(panels, grid, strict=True):
             _draw(axes, panel, recording, atmosphere)
         grid[-1].set_xlabel("Time (s)")
-        if recording.is_synthetic:
-            mark_synthetic(figure)
+        mark_kind(figure, recording.kind)
         if recording.duration > 0.0:
             grid[-1].set_xlim(recording.time[0], recording.time[-1])
         return figure

@@ -7,7 +7,7 @@ from ppafo.reporting.reproduction_report import holding_torque, reproduction_rep
 from ppafo.reporting.step_response_figure import step_response_figure
 from ppafo.reporting.style import rendered
 from ppafo.reporting.torque_task_figure import torque_task_figure
-from ppafo.storage.comma_separated import csv_bytes
+from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.studies.reproduction import Reproduction
 from ppafo.studies.reproduction.step_response import Levels
 
@@ -24,7 +24,7 @@ def reproduction_files(reproduction: Reproduction) -> dict[str, bytes]:
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
     claims = json.dumps(claims_document(reproduction), indent=2, ensure_ascii=False, allow_nan=False)
     return {
-        **{f"{run.scenario.name}.csv": csv_bytes(run.recording) for run in runs},
+        **{f"{run.scenario.name}.csv": marked_csv_bytes(run.recording) for run in runs},
         **{f"{STEP_FIGURE}.{file_format}": content for file_format, content in step.items()},
         **{f"{TORQUE_FIGURE}.{file_format}": content for file_format, content in torque.items()},
         CLAIMS: f"{claims}\n".encode(),

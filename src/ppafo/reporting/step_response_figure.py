@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.reporting.figures import PASCALS_PER_PSI
-from ppafo.reporting.style import ACTUAL, CHAMBER_1, CHAMBER_2, GREY, house_style
+from ppafo.reporting.style import ACTUAL, CHAMBER_1, CHAMBER_2, GREY, house_style, mark_kind
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.studies.reproduction.step_response import Levels, StepEvents
@@ -62,7 +62,7 @@ def step_response_figure(recording: Recording, levels: Levels, events: StepEvent
         if events is not None:
             _mark(list(grid.flat), events)
         figure.align_ylabels(grid)
-        grid[0, 0].set_title("simulated", loc="right", fontsize=9, style="italic", color=GREY)
+        mark_kind(figure, recording.kind)
         return figure
 
 

@@ -6,6 +6,8 @@ from contextlib import contextmanager
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from ppafo.signals import RecordingKind
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -86,10 +88,12 @@ def _saved(figure: "Figure", file_format: str) -> bytes:
     return buffer.getvalue()
 
 
-def mark_synthetic(figure: "Figure") -> None:
-    """Say at the top right of a figure that what it shows was made by a model and not measured."""
+def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
+    """Say at the top right of a figure that what it shows is simulated or synthetic; nothing where it was measured."""
+    if kind == "measured":
+        return
     inch = 1.0 / figure.get_figheight()
-    figure.text(0.972, 1.0 - 0.16 * inch, "synthetic", ha="right", va="top", color=GREY, fontsize=9, style="italic")
+    figure.text(0.972, 1.0 - 0.16 * inch, kind, ha="right", va="top", color=GREY, fontsize=9, style="italic")
 
 
 def label_lines(axes: "Axes") -> None:

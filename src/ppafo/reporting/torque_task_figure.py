@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.reporting.figures import GRAMS_PER_KILOGRAM
-from ppafo.reporting.style import BLUE, GREY, VERMILION, WANTED, house_style
+from ppafo.reporting.style import BLUE, GREY, VERMILION, WANTED, house_style, mark_kind
 from ppafo.signals import Recording
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ def torque_task_figure(
         for axes in (grid[0], grid[2]):
             axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
         figure.align_ylabels(grid)
+        mark_kind(figure, solenoid.kind)
         return figure
 
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,11 @@ from ppafo.signals.channels import CHANNELS, TIME
 
 Floats = NDArray[np.float64]
 
+RecordingKind = Literal["measured", "simulated", "synthetic"]
+"""Where a recording comes from: sensors, a model's own output, or the virtual rig that stands in for sensors."""
+
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
+_KINDS: tuple[RecordingKind, ...] = get_args(RecordingKind)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,19 +45,20 @@ class Channel:
 class Recording:
     """Channels over a common, strictly increasing time [s]; all values are finite.
 
-    ``is_synthetic`` marks a recording that a model made and nobody measured; figures and reports say so.
+    ``kind`` says where it comes from; figures and files say so where nobody measured it.
     """
 
     label: str
     time: Floats
     channels: Mapping[str, Channel]
-    is_synthetic: bool = False
+    kind: RecordingKind = "measured"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", _read_only(self.time))
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
         if not self.label or not self.label.isprintable():
             raise DataError(f"the label of a recording is one line of text, not {self.label!r}")
+        recording_kind(self.kind)
         _check_time(self)
         for name in self.channels:
             _check_channel(self, name)
@@ -61,7 +66,7 @@ class Recording:
     def __eq__(self, other: object) -> bool:
         return (
             isinstance(other, Recording)
-            and (self.label, self.is_synthetic) == (other.label, other.is_synthetic)
+            and (self.label, self.kind) == (other.label, other.kind)
             and np.array_equal(self.time, other.time)
             and dict(self.channels) == dict(other.channels)
         )
@@ -70,7 +75,7 @@ class Recording:
 
     def __reduce__(self) -> tuple[Callable[..., "Recording"], tuple[Any, ...]]:
         """Copy and unpickle through the constructor: a read-only mapping cannot be pickled."""
-        return Recording, (self.label, self.time, dict(self.channels), self.is_synthetic)
+        return Recording, (self.label, self.time, dict(self.channels), self.kind)
 
     def __getitem__(self, name: str) -> Floats:
         """Return the values of a channel, read-only, in its SI unit."""
@@ -100,7 +105,7 @@ class Recording:
     def with_channel(self, name: str, values: ArrayLike, unit: str) -> "Recording":
         """Return the recording with one channel added or replaced."""
         channel = Channel(np.asarray(values, dtype=np.float64), unit)
-        return Recording(self.label, self.time, {**self.channels, name: channel}, self.is_synthetic)
+        return Recording(self.label, self.time, {**self.channels, name: channel}, self.kind)
 
     def between(self, start: float, end: float) -> "Recording":
         """Return the samples with ``start`` <= time <= ``end`` [s]; times stay as they are."""
@@ -108,7 +113,7 @@ class Recording:
         if not inside.any():
             raise DataError(f"{self.label}: there is no sample between {start:g} s and {end:g} s; {_span(self)}")
         kept = {name: Channel(channel.values[inside], channel.unit) for name, channel in self.channels.items()}
-        return Recording(self.label, self.time[inside], kept, self.is_synthetic)
+        return Recording(self.label, self.time[inside], kept, self.kind)
 
     def resampled(self, times: ArrayLike) -> "Recording":
         """Return the recording at other times [s] within its own: the last value of a held channel, else a line."""
@@ -118,13 +123,21 @@ class Recording:
                 f"{self.label}: nothing is known from {wanted.min():g} s to {wanted.max():g} s; {_span(self)}"
             )
         moved = {name: Channel(_values_at(self, name, wanted), self.unit(name)) for name in self.names}
-        return Recording(self.label, wanted, moved, self.is_synthetic)
+        return Recording(self.label, wanted, moved, self.kind)
 
     def _channel(self, name: str) -> Channel:
         if name not in self.channels:
             hint = nearest_name(name, self.names)
             raise DataError(f"{self.label}: there is no channel '{name}'{hint}; there are {', '.join(self.names)}")
         return self.channels[name]
+
+
+def recording_kind(name: str) -> RecordingKind:
+    """Return the kind of recording with this name."""
+    for kind in _KINDS:
+        if kind == name:
+            return kind
+    raise DataError(f"{name!r} is no kind of recording{nearest_name(name, _KINDS)}; there are {', '.join(_KINDS)}")
 
 
 def aligned(first: Recording, second: Recording) -> tuple[Recording, Recording]:

@@ -110,7 +110,7 @@ def _recording(scenario: Scenario, run: Run, times: Floats, record: Floats, rows
     if scenario.control.kind != OPEN_LOOP:
         channels["reference"] = (profile_values(scenario.reference, times)[0], "N m")
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
-    return Recording(scenario.name, times, values, is_synthetic=True)
+    return Recording(scenario.name, times, values, kind="simulated")
 
 
 def _external_torque(

@@ -4,30 +4,46 @@ Files from elsewhere may use other units (``angle [deg]``, ``pressure_1 [psi_g]`
 """
 
 import csv
+import difflib
 import io
+import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
-from ppafo.signals import Channel, Recording
+from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.signals.channels import TIME, TIME_UNIT
 from ppafo.signals.recording import Floats
 from ppafo.storage.columns import Column, in_si, parse_header
 from ppafo.storage.files import read_bytes, write_file
 
-SYNTHETIC_MARK = "# synthetic: made by a model, not measured"
+_MARKS: dict[RecordingKind, str] = {
+    "simulated": "# simulated: a model's own output, not measured",
+    "synthetic": "# synthetic: made by a model to stand for a measurement",
+}
+"""Lines of comment; when read, the word before the colon counts."""
+
+_MARK = re.compile(r"#\s*(\w+):.*")
+_SIMILAR = 0.8
+"""How near a word has to be to a kind to be a misspelling of it; 'measurement: run 3' is a remark like any other."""
 
 
 def write_csv(path: str | Path, recording: Recording) -> Path:
     """Write a recording as CSV in SI units; one that no one measured says so in a line of comment. Returns the path."""
-    mark = f"{SYNTHETIC_MARK}\n" if recording.is_synthetic else ""
-    return write_file(path, mark.encode() + csv_bytes(recording))
+    return write_file(path, marked_csv_bytes(recording))
+
+
+def marked_csv_bytes(recording: Recording) -> bytes:
+    """Return the table of a recording for a file that stands alone: where no one measured it, it begins by saying so."""
+    mark = f"{_MARKS[recording.kind]}\n" if recording.kind in _MARKS else ""
+    return mark.encode() + csv_bytes(recording)
 
 
 def csv_bytes(recording: Recording) -> bytes:
-    """Return the bare table of a recording; its label, and whether it is synthetic, are not in it."""
+    """Return the bare table of a recording; its label and its kind are not in it."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([f"{TIME} [{TIME_UNIT}]", *(f"{name} [{recording.unit(name)}]" for name in recording.names)])
@@ -42,7 +58,6 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
     Gauge pressure counts from ``atmosphere`` [Pa absolute].
     """
     lines = _lines(path)
-    is_synthetic = SYNTHETIC_MARK in lines
     first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
     try:
         rows = _without_blank_end(list(csv.reader(lines[first:], strict=True)))
@@ -52,11 +67,24 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         values = _table(rows, len(columns), first)
         time, *channels = (_channel(column, values[:, index], atmosphere) for index, column in enumerate(columns))
         named = {column.name: channel for column, channel in zip(columns[1:], channels, strict=True)}
-        return Recording(label or Path(path).stem, time.values, named, is_synthetic)
+        return Recording(label or Path(path).stem, time.values, named, _kind(lines[:first]))
     except csv.Error as error:
         raise DataError(f"{path}: is not a CSV file: {error}") from error
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
+
+
+def _kind(comments: Iterable[str]) -> RecordingKind:
+    """Return the kind that a comment names; a misspelt one must not let a simulation pass for a measurement."""
+    named: list[RecordingKind] = []
+    for match in filter(None, map(_MARK.fullmatch, comments)):
+        near = difflib.get_close_matches(match[1], _MARKS, n=1, cutoff=_SIMILAR)
+        if near and match[1] not in _MARKS:
+            raise DataError(f"the comment '# {match[1]}:' names no kind of recording, did you mean '{near[0]}'?")
+        named += [kind for kind in _MARKS if kind == match[1]]
+    if len(set(named)) > 1:
+        raise DataError(f"the comments name two kinds of recording: {' and '.join(named)}")
+    return named[0] if named else "measured"
 
 
 def _lines(path: str | Path) -> list[str]:

@@ -24,7 +24,7 @@ def dataset_of(recording: Recording, scenario: Mapping[str, Any] | None = None) 
 
 def global_attributes(recording: Recording, scenario: Mapping[str, Any] | None) -> dict[str, str]:
     """Return what a NetCDF file says of the whole recording."""
-    attributes = {"title": recording.label, "synthetic": "yes" if recording.is_synthetic else "no"}
+    attributes = {"title": recording.label, "kind": recording.kind}
     if scenario is not None:
         attributes["scenario"] = json.dumps(scenario, ensure_ascii=False, allow_nan=False)
     return attributes

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.signals import Channel, Recording
+from ppafo.signals import Channel, Recording, recording_kind
 from ppafo.signals.channels import TIME, TIME_UNIT
 from ppafo.storage.dataset import channel_attributes, global_attributes, time_attributes, unit_of_attribute
 from ppafo.storage.files import read_bytes, write_file
@@ -63,7 +63,8 @@ def _recording(content: bytes, path: str | Path) -> Recording:
             raise DataError(f"'{TIME}' is in '{time.unit}', it must be in '{TIME_UNIT}'")
         channels = {str(name): _channel(name, variable) for name, variable in file.items() if name != TIME}
         label = _attribute(file, "title") or Path(path).stem
-        return Recording(label, time.values, channels, _attribute(file, "synthetic") == "yes")
+        kind = recording_kind(_attribute(file, "kind") or "measured")
+        return Recording(label, time.values, channels, kind)
 
 
 def _channel(name: str, variable: Any) -> Channel:

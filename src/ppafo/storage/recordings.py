@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ppafo.errors import DataError
-from ppafo.signals import Recording
+from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.netcdf import read_netcdf
 from ppafo.storage.result_folder import CSV_FILE, RUN_FILE, read_document, read_result
@@ -27,5 +27,8 @@ def _of_its_folder(recording: Recording, path: Path) -> Recording:
     if path.name != CSV_FILE or not (path.parent / RUN_FILE).exists():
         return recording
     described = read_document(path.parent)["recording"]
-    label = str(described.get("label", recording.label))
-    return replace(recording, label=label, is_synthetic=bool(described.get("synthetic", False)))
+    try:
+        kind = recording_kind(str(described.get("kind", recording.kind)))
+    except DataError as error:
+        raise DataError(f"{path.parent / RUN_FILE}: {error}") from error
+    return replace(recording, label=str(described.get("label", recording.label)), kind=kind)

@@ -127,6 +127,6 @@ def _description(recording: Recording) -> dict[str, Any]:
     return {
         "label": recording.label,
         "samples": len(recording),
-        "synthetic": recording.is_synthetic,
+        "kind": recording.kind,
         "channels": {name: recording.unit(name) for name in recording.names},
     }

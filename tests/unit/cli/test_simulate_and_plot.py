@@ -40,6 +40,7 @@ def test_a_run_writes_a_whole_result_folder_and_nothing_else(saved: Path) -> Non
     assert names(saved) == FILES
     assert names(saved.parent) == ["step"]
     assert read_result(saved).document["status"]["kind"] == "completed"
+    assert read_result(saved).recording.kind == "simulated"
 
 
 def test_without_a_folder_the_result_goes_to_out_and_the_name_of_the_scenario(

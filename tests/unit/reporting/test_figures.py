@@ -12,14 +12,14 @@ from ppafo.metrics import Metric
 from ppafo.reporting.figures import figure_files, recording_figure
 from ppafo.reporting.metrics_table import metrics_table
 from ppafo.reporting.style import house_style, rendered
-from ppafo.signals import CHANNELS, Channel, Recording
+from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 
 TIME = np.linspace(0.0, 1.0, 11)
 
 
-def recording(is_synthetic: bool = False, **channels: float) -> Recording:
+def recording(kind: RecordingKind = "measured", **channels: float) -> Recording:
     made = {name: Channel(np.full(11, level), CHANNELS[name].unit) for name, level in channels.items()}
-    return Recording("task", TIME, made, is_synthetic)
+    return Recording("task", TIME, made, kind)
 
 
 def titles(figure: Figure) -> list[str]:
@@ -70,9 +70,13 @@ def test_a_panel_with_two_lines_names_them() -> None:
     assert [text.get_text() for text in legend.get_texts()] == ["chamber 1", "chamber 2"]
 
 
-def test_what_nobody_measured_is_marked_synthetic() -> None:
-    assert "synthetic" in texts(recording_figure(recording(is_synthetic=True, angle=1.0)))
-    assert "synthetic" not in texts(recording_figure(recording(angle=1.0)))
+@pytest.mark.parametrize("kind", ["simulated", "synthetic"])
+def test_what_nobody_measured_says_so_in_the_corner(kind: RecordingKind) -> None:
+    assert kind in texts(recording_figure(recording(kind, angle=1.0)))
+
+
+def test_a_measurement_needs_no_word_in_the_corner() -> None:
+    assert not {"measured", "simulated", "synthetic"} & set(texts(recording_figure(recording("measured", angle=1.0))))
 
 
 def test_a_remark_stands_whole_below_the_panels() -> None:

@@ -31,6 +31,24 @@ def test_an_unknown_channel_is_refused_with_the_nearest_name() -> None:
         recording()["angel"]
 
 
+def test_an_unknown_kind_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(DataError, match="'simulatd' is no kind of recording, did you mean 'simulated'"):
+        Recording("bench", np.array([0.0]), {}, "simulatd")  # type: ignore[arg-type]
+
+
+def test_what_is_made_of_a_recording_is_of_its_kind() -> None:
+    given = Recording("bench", np.arange(3.0), {"angle": Channel(np.arange(3.0), "rad")}, "synthetic")
+    made = (
+        given.between(0.0, 1.0),
+        given.resampled([0.5, 1.5]),
+        given.with_channel("command", [1.0, 0.0, 1.0], "-"),
+        pickle.loads(pickle.dumps(given)),
+        copy.deepcopy(given),
+    )
+    assert {item.kind for item in made} == {"synthetic"}
+    assert given != Recording(given.label, given.time, given.channels, "simulated")
+
+
 def test_a_recording_cannot_be_changed() -> None:
     given = recording()
     with pytest.raises(ValueError, match="read-only"):

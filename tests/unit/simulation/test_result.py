@@ -19,7 +19,7 @@ from ppafo.storage import read_result
 def result(step_response: Scenario) -> Result:
     """A result made by hand, so that no model is compiled."""
     channels = {"angle": Channel(np.array([0.3, 0.4]), "rad"), "pressure_1": Channel(np.array([1e5, 2e5]), "Pa")}
-    recording = Recording("step-response", np.array([0.0, 0.1]), channels, is_synthetic=True)
+    recording = Recording("step-response", np.array([0.0, 0.1]), channels, kind="simulated")
     metrics = {"angle_range": Metric(0.1, "rad", "range"), "broken": Metric(float("inf"), "N m", "no number")}
     return Result(step_response, recording, metrics, Status("completed"), {"ppafo": "0"}, {"step": 1e-3, "steps": 100})
 

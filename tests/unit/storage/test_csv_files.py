@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.signals import Channel, Recording
+from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.storage import read_csv, write_csv
 
 
-def recording(is_synthetic: bool = False) -> Recording:
+def recording(kind: RecordingKind = "measured") -> Recording:
     channels = {"angle": Channel(np.array([1.0 / 3.0, 1e-17, -2.0]), "rad"), "command": Channel(np.ones(3), "-")}
-    return Recording("bench", np.array([0.0, 0.1, 0.30000000000000004]), channels, is_synthetic)
+    return Recording("bench", np.array([0.0, 0.1, 0.30000000000000004]), channels, kind)
 
 
 def written(folder: Path, content: str | bytes) -> Path:
@@ -30,10 +30,25 @@ def test_a_file_is_read_back_exactly(tmp_path: Path) -> None:
     assert read_csv(write_csv(tmp_path / "bench.csv", recording())) == recording()
 
 
-def test_a_recording_that_nobody_measured_says_so_in_the_file(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "bench.csv", recording(is_synthetic=True))
-    assert path.read_text().startswith("# synthetic")
-    assert read_csv(path) == recording(is_synthetic=True)
+@pytest.mark.parametrize("kind", ["simulated", "synthetic"])
+def test_a_recording_that_nobody_measured_says_so_in_the_file(tmp_path: Path, kind: RecordingKind) -> None:
+    path = write_csv(tmp_path / "bench.csv", recording(kind))
+    assert path.read_text().startswith(f"# {kind}: ")
+    assert read_csv(path) == recording(kind)
+
+
+@pytest.mark.parametrize(
+    ("comment", "kind"),
+    [
+        ("# synthetic: by hand", "synthetic"),
+        ("#simulated:", "simulated"),
+        ("# measurement: run 3", "measured"),
+        ("# measured: in May", "measured"),
+        ("# not simulated: an honest file", "measured"),
+    ],
+)
+def test_only_a_comment_that_begins_with_a_kind_names_one(tmp_path: Path, comment: str, kind: RecordingKind) -> None:
+    assert read_csv(written(tmp_path, f"# bench 3\n{comment}\ntime [s],angle [rad]\n0,1\n")).kind == kind
 
 
 def test_other_units_become_si_on_the_way_in(tmp_path: Path) -> None:
@@ -74,6 +89,8 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("time [s],pressure_1 [psi]\n0,1\n", "column 'pressure_1 \\[psi\\]': 'psi' does not say which pressure"),
         ("time [s],pressure_1 [psi_d]\n0,1\n", "a pressure level is needed"),
         ("time [s],residual [Nm2]\n0,1\n", "column 'residual \\[Nm2\\]'"),
+        ("# sythetic: by hand\ntime [s]\n0\n", "'# sythetic:' names no kind of recording, did you mean 'synthetic'\\?"),
+        ("# synthetic: a\n# simulated: b\ntime [s]\n0\n", "name two kinds of recording: synthetic and simulated"),
         ('time [s],angle [rad]\n0,"1\n', "not a CSV file|not a number"),
     ],
 )

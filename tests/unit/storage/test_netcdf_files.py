@@ -1,5 +1,6 @@
 """Recordings as NetCDF."""
 
+import dataclasses
 from pathlib import Path
 
 import h5netcdf
@@ -8,14 +9,14 @@ import pytest
 import xarray
 
 from ppafo.errors import DataError
-from ppafo.signals import Channel, Recording
+from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.storage import dataset_of, read_netcdf, write_netcdf
 from ppafo.storage.netcdf import netcdf_bytes
 
 
 def recording() -> Recording:
     channels = {"angle": Channel(np.array([1.0 / 3.0, 1e-17]), "rad"), "command": Channel(np.ones(2), "-")}
-    return Recording("bench é", np.array([0.0, 0.1]), channels, is_synthetic=True)
+    return Recording("bench é", np.array([0.0, 0.1]), channels, "synthetic")
 
 
 def test_a_file_is_read_back_exactly(tmp_path: Path) -> None:
@@ -37,7 +38,7 @@ def test_attributes_hold_units_long_names_and_the_scenario() -> None:
     assert dataset["angle"].attrs == {"units": "rad", "long_name": "ankle angle, growing in plantarflexion"}
     assert dataset["command"].attrs["units"] == "1"
     assert dataset["time"].attrs["units"] == "s"
-    assert dataset.attrs == {"title": "bench é", "synthetic": "yes", "scenario": '{"name": "task"}'}
+    assert dataset.attrs == {"title": "bench é", "kind": "synthetic", "scenario": '{"name": "task"}'}
 
 
 @pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
@@ -70,6 +71,27 @@ def changed(path: Path, variable: str, units: str) -> Path:
     with h5netcdf.File(path, "a") as file:
         file.variables[variable].attrs["units"] = units
     return path
+
+
+@pytest.mark.parametrize("kind", ["measured", "simulated", "synthetic"])
+def test_the_kind_of_a_recording_is_kept(tmp_path: Path, kind: RecordingKind) -> None:
+    path = write_netcdf(tmp_path / "bench.nc", dataclasses.replace(recording(), kind=kind))
+    assert read_netcdf(path).kind == kind
+
+
+def test_a_file_that_names_no_kind_was_measured(tmp_path: Path) -> None:
+    path = write_netcdf(tmp_path / "bench.nc", recording())
+    with h5netcdf.File(path, "a") as file:
+        del file.attrs["kind"]
+    assert read_netcdf(path).kind == "measured"
+
+
+def test_an_unknown_kind_is_refused_by_file_with_the_nearest(tmp_path: Path) -> None:
+    path = write_netcdf(tmp_path / "bench.nc", recording())
+    with h5netcdf.File(path, "a") as file:
+        file.attrs["kind"] = "simulatd"
+    with pytest.raises(DataError, match=r"bench\.nc: 'simulatd' is no kind of recording, did you mean 'simulated'\?"):
+        read_netcdf(path)
 
 
 def test_a_wrong_unit_is_refused_by_file_and_channel(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ DOCUMENT = {"status": {"kind": "completed"}, "scenario": {"name": "task"}}
 
 
 def recording(level: float = 1.0) -> Recording:
-    return Recording("task", np.array([0.0, 0.1]), {"angle": Channel(np.full(2, level), "rad")}, is_synthetic=True)
+    return Recording("task", np.array([0.0, 0.1]), {"angle": Channel(np.full(2, level), "rad")}, "simulated")
 
 
 def names(folder: Path) -> list[str]:
@@ -36,6 +36,19 @@ def test_a_folder_is_read_back_exactly_from_either_file(tmp_path: Path) -> None:
     assert stored.document["scenario"] == {"name": "task"}
     for place in (folder, folder / "recording.nc", folder / "recording.csv"):
         assert read_recording(place) == recording()
+
+
+def test_the_document_says_of_what_kind_the_recording_is(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    assert json.loads((folder / "run.json").read_text())["recording"]["kind"] == "simulated"
+
+
+def test_an_unknown_kind_in_the_document_is_refused_with_the_nearest(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
+    text = (folder / "run.json").read_text()
+    (folder / "run.json").write_text(text.replace('"simulated"', '"synthtic"'))
+    with pytest.raises(DataError, match=r"run\.json: 'synthtic' is no kind of recording, did you mean 'synthetic'\?"):
+        read_recording(folder / "recording.csv")
 
 
 def test_the_table_begins_with_its_header_so_that_any_program_can_read_it(tmp_path: Path) -> None:

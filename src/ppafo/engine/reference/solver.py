@@ -9,17 +9,15 @@ from numpy.typing import NDArray
 
 from ppafo.engine.cache import load_generated
 from ppafo.engine.reference import vane_mode
+from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals
 from ppafo.engine.reference.source import PLANT_UNKNOWNS, right_hand_side_source
 from ppafo.engine.rows import numbers, rebuild
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
-from ppafo.model.plant import PlantState, chamber_pressures
-from ppafo.model.sensors import Measurement, measure
-from ppafo.model.vane import actuator_torque
+from ppafo.model.plant import chamber_pressures
 
 Floats = NDArray[np.float64]
 
-SAME_TIME = 1.0e-12
 TOLERANCES = (1e-11, 1e-10, 1e-15, 1e-15, 1e-15, 1e-15, 1e-15)
 VALVE_TOLERANCE = 1e-11
 MOST_STEPS = 200_000
@@ -70,10 +68,7 @@ class _Solution:
         if self.y[1] != 0.0 and run.program.angle is None:
             self.way = float(np.sign(self.y[1]))
         self.time = 0.0
-        self.controller_state = None if run.program.controller is None else run.program.controller.initial
-        self.signals: dict[int, tuple[float, float, float]] = {}
-        self.first_signals = self.present_signals()
-        self.pending: list[tuple[float, float]] = []
+        self.control = SampledControl(run, self.present_signals())
         count = run.step_count // run.record_every + 1
         times = np.arange(count, dtype=np.float64) * (run.step * run.record_every)
         self.result = ReferenceResult(times, np.empty((count, PLANT_UNKNOWNS)), np.zeros(count))
@@ -126,37 +121,13 @@ class _Solution:
         end = run.step * run.step_count
         sample = 0
         while self.time < end - SAME_TIME:
-            self.control(sample)
+            self.control.decide(sample, self.time, self.present_signals())
             sample += 1
             self.advance_to(min(sample * run.period, end), sample)
         self.record_until(end + 1.0, None)
         return self.result
 
-    def control(self, sample: int) -> None:
-        """Take a sample and queue the new command."""
-        run = self.run
-        if run.program.controller is None:
-            raise SimulationError("the reference solver runs controllers of the catalogue only")
-        seen = self.measurement(sample)
-        wanted = run.program.reference.value(run.reference, self.time)[0]
-        command, self.controller_state = run.program.controller.update(
-            run.controller, self.controller_state, wanted, seen, run.period
-        )
-        self.decided = command
-        self.pending.append((self.time + run.command_delay, command))
-
-    def measurement(self, sample: int) -> Measurement:
-        """What the controller sees: the present, or what was kept of the past."""
-        run = self.run
-        before_start = sample * run.period < run.signal_delay - SAME_TIME
-        signals = self.signals.pop(sample, None) or (self.first_signals if before_start else self.present_signals())
-        if run.program.ideal_sensors:
-            angle, pressure_1, pressure_2 = signals
-            torque = actuator_torque(pressure_1, pressure_2, run.plant.torque_constant)
-            return Measurement(angle, pressure_1, pressure_2, torque)
-        return measure(run.sensors, *signals, run.plant.torque_constant, sample)
-
-    def present_signals(self) -> tuple[float, float, float]:
+    def present_signals(self) -> Signals:
         """Angle and pressures now."""
         run = self.run
         angle = self.y[0] if run.program.angle is None else run.program.angle.value(run.path, self.time)[0]
@@ -165,24 +136,18 @@ class _Solution:
 
     def advance_to(self, end: float, next_sample: int) -> None:
         """Integrate to the next sample over all that happens on the way."""
-        run = self.run
-        looks = [
-            (index * run.period - run.signal_delay, index)
-            for index in range(next_sample, next_sample + int(run.signal_delay / run.period) + 2)
-            if run.signal_delay > 0.0
-        ]
+        looks = self.control.looks(next_sample)
         while self.time < end - SAME_TIME:
-            for moment, index in looks:
+            for moment, sample in looks.items():
                 if abs(moment - self.time) <= SAME_TIME:
-                    self.signals[index] = self.present_signals()
-            self.apply_commands()
-            stops = [moment for moment, _ in [*looks, *self.pending] if moment > self.time + SAME_TIME]
-            self.integrate(min([end, self.next_valve_event(), *stops]))
+                    self.control.keep(sample, self.present_signals())
+            self.command = self.control.arriving(self.time, self.command)
+            self.settle_valve()
+            events = [*looks, *self.control.arrivals(), self.next_valve_event()]
+            self.integrate(min([end, *(moment for moment in events if moment > self.time + SAME_TIME)]))
 
-    def apply_commands(self) -> None:
-        """Give the valve the commands that are due, and let it settle."""
-        while self.pending and self.pending[0][0] <= self.time + SAME_TIME:
-            self.command = self.pending.pop(0)[1]
+    def settle_valve(self) -> None:
+        """Let the valve make the abrupt changes that are due."""
         valve = self.run.program.valve
         state = valve.settle(self.run.valve, self.valve_state(), self.command, self.time)
         self.y[PLANT_UNKNOWNS:] = numbers(state)
@@ -194,9 +159,8 @@ class _Solution:
     def next_valve_event(self) -> float:
         """When the valve next changes by itself."""
         valve = self.run.program.valve
-        return max(
-            valve.next_event(self.run.valve, self.valve_state(), self.command, self.time), self.time + 2 * SAME_TIME
-        )
+        event = valve.next_event(self.run.valve, self.valve_state(), self.command, self.time)
+        return float(max(event, self.time + 2 * SAME_TIME))
 
     def integrate(self, end: float) -> None:
         """Integrate to ``end`` or to the next event of the vane, and change the mode there."""
@@ -226,7 +190,7 @@ class _Solution:
             moment = times[self.records]
             state = self.y if solution is None else solution.y[np.argmin(np.abs(solution.t - moment))]
             self.result.states[self.records] = self.led(state[:PLANT_UNKNOWNS], moment)
-            self.result.commands[self.records] = self.decided
+            self.result.commands[self.records] = self.control.decided
             self.records += 1
 
     def led(self, state: Floats, time: float) -> Floats:
@@ -240,25 +204,15 @@ class _Solution:
         """The vane breaks away, comes to rest, or meets a stop."""
         plant = self.run.plant
         if self.way == 0.0:
-            self.way = self.rest_mode_after_breakaway()
+            # The torque equals the static limit to rounding here, so its sign alone says which way the vane goes.
+            self.way = 1.0 if vane_mode.torque_on_vane(plant, self.y[0], self.y[2], self.y[3]) > 0.0 else -1.0
             self.result.breakaways.append(self.time)
             return
         roots = self.roots(self.y)
-        if roots.second < roots.first * 1e-3 or roots.second <= 0.0:
+        if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
             self.y[0] = plant.angle_max if self.way > 0.0 else plant.angle_min
             self.y[1] = vane_mode.after_stop(plant, self.y[1])
         else:
             self.y[1] = 0.0
         self.way = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()
-
-    def rest_mode_after_breakaway(self) -> float:
-        """Way of the vane at the instant of breakaway, where the torque equals the static limit to rounding."""
-        plant = self.run.plant
-        torque = vane_mode.torque_on_vane(plant, self.y[0], self.y[2], self.y[3])
-        return 1.0 if torque > 0.0 else -1.0
-
-
-def final_state(result: ReferenceResult) -> PlantState:
-    """The last recorded state."""
-    return PlantState(*(float(value) for value in result.states[-1]))

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
-from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
+from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
+from ppafo.model.ports import PortFlowSlopes
 
 GAMMA = 0.2928932188134524
 
@@ -64,41 +65,30 @@ def solve_stage(
     return Stage(slope_1, slope_2, supplied_slope, leaked_slope)
 
 
-def advance_gas(
+def linearised(
     plant: PlantParameters,
     state: PlantState,
-    next_angle: float,
-    port_1: Any,
-    port_2: Any,
+    volumes: tuple[float, float],
+    next_volumes: tuple[float, float],
+    in_1: PortFlowSlopes,
+    in_2: PortFlowSlopes,
+    leak_by_1: float,
+    leak_by_2: float,
     step: float,
-    port_flow: Callable[..., Any],
-    port_flow_slopes: Callable[..., Any],
-) -> GasChange:
-    """Changes of mass [kg] in one step [s] in which the volumes run linearly to those of ``next_angle`` [rad].
-
-    Equations (3) to (9).
-    """
-    mass_1, mass_2 = state.mass_1, state.mass_2
-    volumes = chamber_volumes(plant, state.angle)
-    next_volumes = chamber_volumes(plant, next_angle)
+) -> Linearisation:
+    """Derivatives of all flows at the beginning of a step, and the inverse that both stages use."""
     per_mass_1 = plant.gas_product / volumes[0]
     per_mass_2 = plant.gas_product / volumes[1]
-    pressure_1 = mass_1 * per_mass_1
-    pressure_2 = mass_2 * per_mass_2
-    in_1 = port_flow_slopes(pressure_1, port_1, plant.valve_curve)
-    in_2 = port_flow_slopes(pressure_2, port_2, plant.valve_curve)
-    leak, leak_by_1, leak_by_2 = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
-
     weight = GAMMA * step
     a = 1.0 - weight * (in_1.total_slope - leak_by_1) * per_mass_1
     b = weight * leak_by_2 * per_mass_2
     c = -weight * leak_by_1 * per_mass_1
     d = 1.0 - weight * (in_2.total_slope + leak_by_2) * per_mass_2
     # Pressure change that the moving volumes alone would make in this step, times gamma.
-    drift_1 = -GAMMA * mass_1 * per_mass_1 * (next_volumes[0] - volumes[0]) / volumes[0]
-    drift_2 = -GAMMA * mass_2 * per_mass_2 * (next_volumes[1] - volumes[1]) / volumes[1]
+    drift_1 = -GAMMA * state.mass_1 * per_mass_1 * (next_volumes[0] - volumes[0]) / volumes[0]
+    drift_2 = -GAMMA * state.mass_2 * per_mass_2 * (next_volumes[1] - volumes[1]) / volumes[1]
     leaked_drift = leak_by_1 * drift_1 + leak_by_2 * drift_2
-    linear = Linearisation(
+    return Linearisation(
         a,
         b,
         c,
@@ -113,17 +103,41 @@ def advance_gas(
         in_1.source_slope * drift_1 + in_2.source_slope * drift_2,
         leaked_drift,
     )
+
+
+def advance_gas(
+    plant: PlantParameters,
+    state: PlantState,
+    next_angle: float,
+    port_1: Any,
+    port_2: Any,
+    step: float,
+    port_flow: Callable[..., Any],
+    port_flow_slopes: Callable[..., Any],
+) -> GasChange:
+    """Changes of mass [kg] in one step [s] in which the volumes run linearly to those of ``next_angle`` [rad].
+
+    Equations (3) to (9).
+    """
+    volumes = chamber_volumes(plant, state.angle)
+    next_volumes = chamber_volumes(plant, next_angle)
+    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
+    in_1 = port_flow_slopes(pressure_1, port_1, plant.valve_curve)
+    in_2 = port_flow_slopes(pressure_2, port_2, plant.valve_curve)
+    leak, leak_by_1, leak_by_2 = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
+    linear = linearised(plant, state, volumes, next_volumes, in_1, in_2, leak_by_1, leak_by_2, step)
     first = solve_stage(
         linear,
         in_1.total - leak + linear.drift_1,
         in_2.total + leak + linear.drift_2,
         in_1.from_source + in_2.from_source + linear.supplied_drift,
         leak + linear.leaked_drift,
-        weight,
+        GAMMA * step,
     )
 
-    end_1 = (mass_1 + step * first.mass_1) * (plant.gas_product / next_volumes[0])
-    end_2 = (mass_2 + step * first.mass_2) * (plant.gas_product / next_volumes[1])
+    end_1, end_2 = chamber_pressures(
+        plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
+    )
     flow_1 = port_flow(end_1, port_1, plant.valve_curve)
     flow_2 = port_flow(end_2, port_2, plant.valve_curve)
     leak_end = orifice_flow(end_1, end_2, plant.leak_conductance, plant.leak_curve)
@@ -133,7 +147,7 @@ def advance_gas(
         flow_2.total + leak_end - 2.0 * first.mass_2 - linear.drift_2,
         flow_1.from_source + flow_2.from_source - 2.0 * first.supplied - linear.supplied_drift,
         leak_end - 2.0 * first.leaked - linear.leaked_drift,
-        weight,
+        GAMMA * step,
     )
     return GasChange(
         step * (1.5 * first.mass_1 + 0.5 * second.mass_1),
