@@ -1,4 +1,4 @@
-"""Physical constants, in SI units."""
+"""Physical constants in SI units, and what the units of the field are in SI."""
 
 UNIVERSAL_GAS_CONSTANT = 8.314
 """J/(mol K), as the paper prints it; the exact value is 8.314462618 (CODATA 2018), 0.006 % more."""
@@ -11,3 +11,8 @@ STANDARD_REFERENCE_DENSITY_AIR = 1.185
 
 STANDARD_REFERENCE_TEMPERATURE = 293.15
 """K, the reference temperature of ISO 6358."""
+
+PASCALS_PER_PSI = 6894.757293168361
+"""Pa in one pound-force per square inch, 4.4482216152605 N on (25.4 mm)^2."""
+
+GRAMS_PER_KILOGRAM = 1.0e3

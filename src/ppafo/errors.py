@@ -36,3 +36,15 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
     """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near."""
     near = difflib.get_close_matches(str(name), list(allowed), n=1, cutoff=0.6)
     return f", did you mean '{near[0]}'?" if near else ""
+
+
+def one_line(text: object) -> str:
+    """Return a text for a message: on one line, with a mark for whatever cannot be printed."""
+    words = " ".join(str(text).split())
+    return "".join(character if character.isprintable() else "\N{REPLACEMENT CHARACTER}" for character in words)
+
+
+def reason(error: OSError | ValueError) -> str:
+    """Return why a file could not be read or written, as the end of a sentence."""
+    text = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error)
+    return text[:1].lower() + text[1:]

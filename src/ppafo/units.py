@@ -15,7 +15,7 @@ import re
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
-from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import UnitError, nearest_name
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ _UNITS = {
     "W": "watt = joule / second = W",
     "Pa": "pascal = newton / metre ** 2 = Pa",
     "bar": "bar = 1e5 * pascal",
-    "psi": "pound_per_square_inch = 6894.757293168361 * pascal = psi",
+    "psi": f"pound_per_square_inch = {PASCALS_PER_PSI!r} * pascal = psi",
     "L": "litre = 1e-3 * metre ** 3 = L = l",
     "in": "inch = 0.0254 * metre = in",
     "ft": "foot = 0.3048 * metre = ft",

@@ -11,9 +11,11 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.reporting.reproduction_files import FILES
 from ppafo.storage import read_csv
 from ppafo.studies import reproduction as study
 
+# Spelled out once more on purpose: other programs read these identifiers and this order.
 IDS = [
     "c1",
     "c2",
@@ -49,7 +51,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_folder_holds_report_claims_figures_and_recordings_and_nothing_else(out: Path) -> None:
     expected = {"report.html", "claims.json", *(f"{name}.csv" for name in RECORDINGS)}
     expected |= {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
-    assert {entry.name for entry in out.iterdir()} == expected
+    assert {entry.name for entry in out.iterdir()} == expected == set(FILES)
 
 
 def test_the_claims_file_has_every_claim_in_the_agreed_form(out: Path) -> None:

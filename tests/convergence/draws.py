@@ -25,7 +25,7 @@ PSI = 6894.757293168361
 ATMOSPHERE = 101325.0
 GASES = (("CO2", 0.044, 1.3), ("air", 0.028965, 1.4), ("N2", 0.028013, 1.401))
 load_scenario = lru_cache(load_from_file)
-EXPERIMENTS = ("step", "step", "proportional", "solenoid")
+EXPERIMENTS = ("step", "step with solenoids", "proportional", "solenoid")
 
 
 def logarithmic(chance: random.Random, low: float, high: float) -> float:
@@ -88,8 +88,8 @@ def random_scenario(seed: int) -> Scenario:
     """A step response or a torque task with either valve."""
     chance = random.Random(seed)
     experiment = chance.choice(EXPERIMENTS)
-    if experiment == "step":
-        device = random_device(chance, "proportional")
+    if experiment.startswith("step"):
+        device = random_device(chance, "solenoid" if "solenoids" in experiment else "proportional")
         return dataclasses.replace(
             load_scenario("step-response"),
             device=device,

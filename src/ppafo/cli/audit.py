@@ -4,14 +4,18 @@ import argparse
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import add_output_arguments, add_override_argument, deliver
+from ppafo.cli.output import (
+    EXIT_CHECK_FAILED,
+    EXIT_GOOD,
+    add_output_arguments,
+    add_override_argument,
+    check_output,
+    deliver,
+)
 
 if TYPE_CHECKING:
     from ppafo.parameters import ParameterSet
     from ppafo.parameters.audit import Finding
-
-EXIT_GOOD = 0
-EXIT_CHECK_FAILED = 1
 
 _WIDTH = 100
 _INDENT = "    "
@@ -30,6 +34,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.parameters import apply_overrides, load_parameter_set
     from ppafo.parameters.audit import audit
 
+    check_output(parsed.out)
     parameter_set = apply_overrides(load_parameter_set(parsed.name), parsed.overrides)
     findings = audit(parameter_set)
     counts = {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}

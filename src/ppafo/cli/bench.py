@@ -1,40 +1,39 @@
 """``ppafo bench``: speed as ratios to other solvers, measured here and now."""
 
 import argparse
-import sys
 from pathlib import Path
 
-from ppafo.cli.output import print_result, write_files
+from ppafo.cli.output import (
+    EXIT_CHECK_FAILED,
+    EXIT_GOOD,
+    add_json_argument,
+    check_output,
+    print_result,
+    tell,
+    write_files,
+)
+from ppafo.documents.json_text import json_text
 
-EXIT_GOOD = 0
-EXIT_CHECK_FAILED = 1
+FILES = ("bench.txt", "bench.md", "bench.json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("--quick", action="store_true", help="a small version, about a minute")
     parser.add_argument("--check", action="store_true", help="exit 1 where a target is not met")
-    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="also write bench.txt, bench.md and bench.json here")
+    add_json_argument(parser)
+    parser.add_argument("--out", metavar="DIR", type=Path, help=f"also write {', '.join(FILES)} here")
 
 
 def run(parsed: argparse.Namespace) -> int:
     """Measure, print and write; 1 where a target is not met and ``--check`` asks."""
-    import json
-
     from ppafo.studies.bench import FULL, QUICK, measure_speed
 
-    if parsed.out is not None:
-        write_files(parsed.out, {})
-    report = measure_speed(QUICK if parsed.quick else FULL, _say)
+    check_output(parsed.out, FILES)
+    report = measure_speed(QUICK if parsed.quick else FULL, tell)
     document = report.document()
     if parsed.out is not None:
-        encoded = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-        files = {"bench.txt": report.text() + "\n", "bench.md": report.markdown(), "bench.json": encoded}
-        write_files(parsed.out, files)
+        texts = (f"{report.text()}\n", report.markdown(), f"{json_text(document)}\n")
+        write_files(parsed.out, {name: text.encode() for name, text in zip(FILES, texts, strict=True)})
     print_result(report.text(), document, parsed.json)
     return EXIT_CHECK_FAILED if parsed.check and report.missed else EXIT_GOOD
-
-
-def _say(message: str) -> None:
-    print(f"ppafo bench: {message} ...", file=sys.stderr, flush=True)

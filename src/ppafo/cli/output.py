@@ -1,21 +1,28 @@
-"""Prints a result as text or JSON, and writes result files so that none is ever half written."""
+"""Arguments that commands share, printing as text or JSON, and files that are never half written."""
 
 import argparse
-import json
 import os
 import sys
-import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError
+
+EXIT_GOOD = 0
+EXIT_CHECK_FAILED = 1
 
 
 def add_output_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--json`` and ``--out``, which every command takes."""
-    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+    add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, help="also write the result as files into this folder")
+
+
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json``, for a command whose ``--out`` is another one."""
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def add_override_argument(parser: argparse.ArgumentParser) -> None:
@@ -30,35 +37,43 @@ def add_override_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def check_output(folder: Path | None, names: Iterable[str] = ()) -> None:
+    """Refuse, before anything runs, a folder into which files of these names cannot be written later."""
+    if folder is not None:
+        from ppafo.storage.files import check_files_can_be_added
+
+        try:
+            check_files_can_be_added(folder, names)
+        except DataError as error:
+            raise DataError(f"--out {error}") from error
+
+
 def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.Namespace) -> None:
-    """Print the text or the JSON document, and write both as ``NAME.txt`` and ``NAME.json`` where asked."""
-    encoded = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where asked, and print one of them."""
     if parsed.out is not None:
-        write_files(parsed.out, {f"{name}.txt": text + "\n", f"{name}.json": encoded + "\n"})
-    print_text(encoded if parsed.json else text)
+        contents = {f"{name}.txt": text, f"{name}.json": json_text(document)}
+        write_files(parsed.out, {file: f"{content}\n".encode() for file, content in contents.items()})
+    print_result(text, document, parsed.json)
 
 
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
-    """Print the text, or the document as JSON; for commands that write files of their own."""
-    print_text(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) if as_json else text)
-
-
-def print_text(text: str) -> None:
-    """Print, and end quietly where the reader has gone, as in ``ppafo sets show X | head``."""
+    """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``ppafo sets | head``."""
     try:
-        print(text, flush=True)
+        print(json_text(document) if as_json else text, flush=True)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> None:
-    """Write files into a folder, made if need be: all of them aside first, then renamed. A text is written as UTF-8."""
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files into the folder of ``--out``, made if need be: all of them or none."""
+    from ppafo.storage.files import add_files
+
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as aside:
-            for name, content in contents.items():
-                (Path(aside) / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-            for name in contents:
-                (Path(aside) / name).replace(folder / name)
-    except OSError as error:
-        raise DataError(f"--out {folder}: cannot be written: {error.strerror or error}") from error
+        add_files(folder, contents)
+    except DataError as error:
+        raise DataError(f"--out {error}") from error
+
+
+def tell(text: str) -> None:
+    """Say on the side, where it does not mix with the result, what is being done."""
+    print(f"ppafo: {text} ...", file=sys.stderr, flush=True)

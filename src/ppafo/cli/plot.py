@@ -3,14 +3,14 @@
 import argparse
 from pathlib import Path
 
-from ppafo.cli.output import print_result
+from ppafo.cli.output import EXIT_GOOD, add_json_argument, print_result
 from ppafo.errors import DataError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("folder", metavar="DIR", type=Path, help="a result folder")
-    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+    add_json_argument(parser)
     parser.add_argument(
         "--out", metavar="FILE", type=Path, help="a .png, .svg or .pdf file; default figure.png and figure.svg in DIR"
     )
@@ -34,4 +34,4 @@ def run(parsed: argparse.Namespace) -> int:
         contents = {parsed.out: content}
     written = [str(write_file(path, content)) for path, content in contents.items()]
     print_result(f"written: {', '.join(written)}", {"files": written}, parsed.json)
-    return 0
+    return EXIT_GOOD

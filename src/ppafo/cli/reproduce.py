@@ -1,16 +1,22 @@
 """``ppafo reproduce``: runs the paper's experiments and reports against its claims."""
 
 import argparse
-import sys
 from typing import TYPE_CHECKING
 
-from ppafo.cli.output import add_output_arguments, add_override_argument, print_result, write_files
+from ppafo.cli.output import (
+    EXIT_CHECK_FAILED,
+    EXIT_GOOD,
+    add_output_arguments,
+    add_override_argument,
+    check_output,
+    print_result,
+    tell,
+    write_files,
+)
+from ppafo.cli.quick_imports import load_compiler, load_drawing
 
 if TYPE_CHECKING:
     from ppafo.studies.reproduction import Reproduction
-
-EXIT_GOOD = 0
-EXIT_CHECK_FAILED = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,22 +27,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(parsed: argparse.Namespace) -> int:
     """Print the claims; 1 where a number misses the window that it has to meet, unless values were changed."""
+    load_compiler()
     from ppafo.reporting.claims_table import claims_table
-    from ppafo.reporting.reproduction_files import REPORT, claims_document, reproduction_files
+    from ppafo.reporting.reproduction_files import FILES, REPORT, claims_document, reproduction_files
     from ppafo.studies.reproduction import reproduce
 
-    reproduction = reproduce(parsed.overrides, _tell)
+    check_output(parsed.out, FILES)
+    reproduction = reproduce(parsed.overrides, tell)
     lines = [*claims_table(reproduction.claims), *_missed(reproduction)]
     if parsed.out is not None:
-        _tell("drawing the figures and writing the report")
+        tell("drawing the figures and writing the report")
+        load_drawing()
         write_files(parsed.out, reproduction_files(reproduction))
         lines += ["", f"report: {parsed.out / REPORT}"]
     print_result("\n".join(lines), claims_document(reproduction), parsed.json)
     return EXIT_CHECK_FAILED if reproduction.missed and not parsed.overrides else EXIT_GOOD
-
-
-def _tell(text: str) -> None:
-    print(f"ppafo: {text} ...", file=sys.stderr, flush=True)
 
 
 def _missed(reproduction: "Reproduction") -> list[str]:

@@ -3,7 +3,7 @@
 import argparse
 import importlib
 
-from ppafo.cli.output import add_output_arguments, deliver
+from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_output, deliver
 from ppafo.errors import DataError, nearest_name
 
 FORMATS: dict[str, str] = {
@@ -24,7 +24,8 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.format not in FORMATS:
         hint = nearest_name(parsed.format, FORMATS)
         raise DataError(f"there is no file format '{parsed.format}'{hint}; known are {', '.join(FORMATS)}")
+    check_output(parsed.out)
     document = importlib.import_module(FORMATS[parsed.format]).json_schema()
     parsed.json = True
     deliver(f"{parsed.format}.schema", "", document, parsed)
-    return 0
+    return EXIT_GOOD

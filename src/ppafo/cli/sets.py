@@ -4,7 +4,7 @@ import argparse
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import add_output_arguments, add_override_argument, deliver
+from ppafo.cli.output import EXIT_GOOD, add_output_arguments, add_override_argument, check_output, deliver
 
 if TYPE_CHECKING:
     from ppafo.parameters import ParameterSet
@@ -31,11 +31,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(parsed: argparse.Namespace) -> int:
     """List the sets, or show one."""
+    check_output(parsed.out)
     if parsed.action == "show":
         _show(parsed)
     else:
         _list(parsed)
-    return 0
+    return EXIT_GOOD
 
 
 def _list(parsed: argparse.Namespace) -> None:

@@ -1,17 +1,17 @@
 """``ppafo simulate SCENARIO``: runs a scenario and writes a result folder."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import add_override_argument, print_result
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, add_json_argument, add_override_argument, print_result
+from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
     from ppafo.simulation.result import Result
-
-EXIT_GOOD = 0
-EXIT_CHECK_FAILED = 1
+    from ppafo.simulation.scenario import Scenario
 
 DEFAULT_FOLDER = Path("out")
 
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help="name of a scenario, or a .toml file")
     add_override_argument(parser)
     parser.add_argument("--list", action="store_true", help="list the scenarios that come with the package")
-    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+    add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, help="result folder; default out/NAME of the scenario")
 
 
@@ -32,19 +32,29 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.scenario is None:
         raise ScenarioError("no scenario was given: name one or give a .toml file; 'ppafo simulate --list' shows them")
     from ppafo.simulation.loading import load_scenario
-    from ppafo.simulation.simulate import simulate
     from ppafo.storage import check_result_folder
 
     scenario = load_scenario(parsed.scenario, parsed.overrides)
     folder = parsed.out if parsed.out is not None else DEFAULT_FOLDER / scenario.name
     check_result_folder(folder)
-    result = simulate(scenario)
+    result = _simulated(scenario)
     _save(result, folder)
     print_result(_text(result, folder), _document(result, folder), parsed.json)
-    return EXIT_GOOD if result.status.is_completed else EXIT_CHECK_FAILED
+    if result.status.is_completed:
+        return EXIT_GOOD
+    print(f"ppafo: {scenario.name}: {result.status.message}", file=sys.stderr)
+    return EXIT_CHECK_FAILED
+
+
+def _simulated(scenario: "Scenario") -> "Result":
+    load_compiler()
+    from ppafo.simulation.simulate import simulate
+
+    return simulate(scenario)
 
 
 def _save(result: "Result", folder: Path) -> None:
+    load_drawing()
     from ppafo.reporting.figures import figure_files
 
     result.save(folder, figure_files(result.plot()))
@@ -64,7 +74,7 @@ def _list(parsed: argparse.Namespace) -> int:
 def _text(result: "Result", folder: Path) -> str:
     from ppafo.reporting.metrics_table import metrics_table
 
-    head = f"{result.scenario.name}: {result.status.message or result.status.kind}"
+    head = f"{result.scenario.name}: {result.status.kind}"
     tail = f"written: {folder} (recording.nc, recording.csv, run.json, figure.png, figure.svg)"
     return "\n".join([head, "", *metrics_table(result.metrics), "", tail])
 

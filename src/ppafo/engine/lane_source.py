@@ -5,7 +5,7 @@ from typing import Any
 
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
-from ppafo.engine.scheme import motion
+from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.source_text import SourceCollector
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
@@ -50,7 +50,9 @@ def lane_source(program: Program) -> str:
             [
                 f"x = np.empty(({writer.state_count}, {LANES}))",
                 f"p = np.empty(({writer.parameter_count}, {LANES}))",
+                f"t = np.empty(({writer.step_row_count}, {LANES}))",
                 f"lengths = np.empty((3, {LANES}))",
+                "width = states.shape[1]",
                 *_copy("x", "states", writer.state_count),
                 *_copy("p", "parameters", writer.parameter_count),
                 "for step_index in range(first_step, first_step + step_count):",
@@ -72,7 +74,7 @@ RECORD = [
 
 SKIP_EMPTY = [
     "longest = 0.0",
-    f"for lane in range({LANES}):",
+    "for lane in range(width):",
     "    longest = max(longest, lengths[part, lane])",
     "if longest == 0.0:",
     "    break",
@@ -86,7 +88,7 @@ def _indent(lines: list[str], levels: int = 1) -> list[str]:
 def _copy(target: str, source: str, rows: int) -> list[str]:
     return [
         f"for row in range({rows}):",
-        f"    for lane in range({LANES}):",
+        "    for lane in range(width):",
         f"        {target}[row, lane] = {source}[row, lane]",
     ]
 
@@ -103,6 +105,9 @@ class _Writer:
         self.state_count = len(self.state_at)
         self.cells = {path: f"p[{row}, lane]" for path, row in self.parameter_at.items()}
         self.cells |= {path: f"x[{row}, lane]" for path, row in self.state_at.items()}
+        step_at = _row_numbers(program.step_rows())
+        self.step_row_count = len(step_at)
+        self.cells |= {path: f"t[{row}, lane]" for path, row in step_at.items()}
 
     def control_loop(self) -> list[str]:
         """Sense and control, at every sample; nothing where the caller sets the command."""
@@ -119,7 +124,7 @@ class _Writer:
             *self.store("controller_state"),
             f"x[{self.state_at['result.command']}, lane] = command",
         ]
-        loop = [f"for lane in range({LANES}):", *_indent(lines)]
+        loop = ["for lane in range(width):", *_indent(lines)]
         return ["if step_index % steps_per_sample == 0:", *_indent(loop)]
 
     def sense(self) -> list[str]:
@@ -164,7 +169,7 @@ class _Writer:
             "    for slot in range(1, signal_history.shape[1]):",
             "        signal_history[:, slot, :] = signal_history[:, 0, :]",
         ]
-        return [f"for lane in range({LANES}):", *_indent(lines), *before_start]
+        return ["for lane in range(width):", *_indent(lines), *before_start]
 
     def remember_commands(self) -> list[str]:
         """Keeps the command of every step, where the valve gets it late."""
@@ -174,7 +179,7 @@ class _Writer:
             "command_history[step_index % command_history.shape[0], lane] = "
             f"x[{self.state_at['result.command']}, lane]",
         ]
-        return [f"for lane in range({LANES}):", *_indent(lines)]
+        return ["for lane in range(width):", *_indent(lines)]
 
     def plant_loop(self) -> list[str]:
         """Valve, gas and vane, one step: whole, or in parts where something changes abruptly inside it."""
@@ -182,7 +187,7 @@ class _Writer:
             return self.late_loop()
         if self.program.valve.cuts is not None:
             return self.cut_loop(self.program.valve.cuts)
-        return [f"for lane in range({LANES}):", *_indent([*self.opening(), "length = timing.step", *self.part()])]
+        return self.part([*self.opening(), "length = timing.step"])
 
     def opening(self) -> list[str]:
         """Lines that load what a step needs."""
@@ -203,12 +208,11 @@ class _Writer:
             "time += (lengths[0, lane] if part > 0 else 0.0) + (lengths[1, lane] if part > 1 else 0.0)",
         ]
         return [
-            f"for lane in range({LANES}):",
+            "for lane in range(width):",
             *_indent([*self.opening(), *cut]),
             "for part in range(3):",
             *_indent(SKIP_EMPTY),
-            f"    for lane in range({LANES}):",
-            *_indent([*self.opening(), *begin, *self.part()], 2),
+            *_indent(self.part([*self.opening(), *begin])),
         ]
 
     def late_loop(self) -> list[str]:
@@ -220,59 +224,92 @@ class _Writer:
             "valve = early_valve",
             "length = lengths[part, lane]",
             "command = command_history[(step_index - command_delay - 1) % command_history.shape[0], lane]",
-            *self.part(),
         ]
         after = [
             *self.opening(),
             "time += timing.command_lag * timing.step",
             "length = timing.step - timing.command_lag * timing.step",
             "command = command_history[(step_index - command_delay) % command_history.shape[0], lane]",
-            *self.part(),
         ]
         return [
-            f"for lane in range({LANES}):",
+            "for lane in range(width):",
             f"    lengths[0, lane] = {lag}",
             "for part in range(1):",
             *_indent(SKIP_EMPTY),
-            f"    for lane in range({LANES}):",
-            *_indent(before, 2),
-            f"for lane in range({LANES}):",
-            *_indent(after),
+            *_indent(self.part(before)),
+            *self.part(after),
         ]
 
-    def part(self) -> list[str]:
-        """Valve, gas and vane over ``length`` [s] from ``time`` [s]."""
-        valve = self.program.valve
-        add = self.collector.add
-        return [
+    def part(self, prelude: list[str]) -> list[str]:
+        """Valve, gas and vane over ``length`` [s] from ``time`` [s], both set by ``prelude``.
+
+        Each phase is a loop of its own: loops this short let the processor work on several lanes at once.
+        """
+        phases = [[*self.begin(), *self.keep(), *self.store("valve_state")], [*self.feed(), *self.store("state")]]
+        if self.program.angle is None:
+            phases.append([*self.load_step(), *self.end_free(), *self.store("state")])
+        phases[-1] += self.judge()
+        return [line for phase in phases for line in ("for lane in range(width):", *_indent([*prelude, *phase]))]
+
+    def begin(self) -> list[str]:
+        """The valve, and the first stage of the step."""
+        valve, add = self.program.valve, self.collector.add
+        lines = [
             f"shown, valve_state = {add(valve.advance)}(valve, valve_state, command, time, length)",
             f"port_1, port_2 = {add(valve.connect)}(plant, shown)",
-            *self.move(),
-            f"possible = (abs(state.angular_velocity) < {IMPOSSIBLE_RATE} and state.mass_1 > 0.0 "
-            f"and state.mass_2 > 0.0 and state.mass_1 < {IMPOSSIBLE_MASS} and state.mass_2 < {IMPOSSIBLE_MASS})",
-            "failed = result.failure_time if possible else min(result.failure_time, time + length)",
-            f"x[{self.state_at['result.failure_time']}, lane] = failed",
-            *self.store("state"),
-            *self.store("valve_state"),
         ]
-
-    def move(self) -> list[str]:
-        """The step of gas and vane."""
-        add = self.collector.add
-        valve = self.program.valve
-        flows = f"{add(valve.port_flow)}, {add(valve.port_flow_slopes)}"
+        given = f"port_1, port_2, length, {add(valve.port_flow_slopes)}"
         if self.program.angle is None:
-            return [f"state = {add(motion.advance_free)}(plant, state, port_1, port_2, length, {flows})"]
+            return [*lines, f"begun = {add(motion.begin_free)}(plant, state, {given})"]
+        if self.program.is_held:
+            return [*lines, f"begun = {add(pneumatics.begin_still_gas)}(plant, state, {given})"]
         return [
+            *lines,
             self.load("path"),
             f"next_angle, next_rate, _ = {add(self.program.angle.value)}(path, time + length)",
-            f"state = {add(motion.advance_led)}(plant, state, next_angle, next_rate, port_1, port_2, length, {flows})",
+            f"begun = {add(motion.begin_led)}(plant, state, next_angle, next_rate, {given})",
         ]
+
+    def feed(self) -> list[str]:
+        """The second stage: the gas of the step, and where a led vane is at its end."""
+        valve, add = self.program.valve, self.collector.add
+        lines = [*self.load_step(), f"port_1, port_2 = {add(valve.connect)}(plant, shown)"]
+        given = f"port_1, port_2, length, {add(valve.port_flow)}"
+        if self.program.is_held:
+            lines.append(f"gas = {add(pneumatics.end_still_gas)}(plant, begun, {given})")
+        else:
+            lines.append(f"gas = {add(pneumatics.end_moving_gas)}(plant, begun.gas, {given})")
+        lines.append(f"state = {add(motion.with_gas)}(state, gas)")
+        if self.program.angle is not None and not self.program.is_held:
+            lines.append(f"state = {add(motion.with_motion)}(state, begun.next_angle, begun.next_rate)")
+        return lines
+
+    def end_free(self) -> list[str]:
+        """Where a free vane is at the end."""
+        return [f"state = {self.collector.add(motion.end_free)}(plant, state, begun, length)"]
+
+    def judge(self) -> list[str]:
+        """The first time at which a run left what is possible."""
+        return [
+            f"possible = (abs(state.angular_velocity) < {IMPOSSIBLE_RATE} and min(state.mass_1, state.mass_2) > 0.0 "
+            f"and max(state.mass_1, state.mass_2) < {IMPOSSIBLE_MASS})",
+            "failed = result.failure_time if possible else min(result.failure_time, time + length)",
+            f"x[{self.state_at['result.failure_time']}, lane] = failed",
+        ]
+
+    def keep(self) -> list[str]:
+        """Lines that keep what the first stage hands on."""
+        groups = self.program.step_rows().items()
+        return [f"{self.cells[path]} = {path}" for name, row in groups for path in leaf_paths(row, name)]
+
+    def load_step(self) -> list[str]:
+        """Lines that load what the first stage handed on."""
+        return [self.load(name) for name in self.program.step_rows()]
 
     def load(self, group: str) -> str:
         """Line that makes the NamedTuple ``group`` from its rows."""
-        states = self.program.state_rows()
-        row = states[group] if group in states else self.program.parameter_rows()[group]
+        groups = self.program.parameter_rows() | self.program.state_rows() | self.program.step_rows()
+        row = groups[group]
         return f"{group} = {row_expression(row, group, self.cells, self.collector.add)}"
 
     def store(self, group: str) -> list[str]:

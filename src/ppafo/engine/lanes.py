@@ -20,6 +20,9 @@ from ppafo.engine.program import Program
 
 Floats = NDArray[np.float64]
 
+VECTOR = 8
+"""Lanes that the widest processors take at once; a block is a whole number of these."""
+
 
 @dataclass(frozen=True, slots=True)
 class Clock:
@@ -63,13 +66,20 @@ def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
     starts = range(0, runs, LANES)
     workers = min(len(starts), threads or os.cpu_count() or 1)
 
-    def run_block(start: int) -> BatchResult:
-        return _run_block(module, batch, slice(start, min(start + LANES, runs)))
+    waiting = iter(starts)
+    results: dict[int, BatchResult] = {}
+
+    def work() -> None:
+        for start in waiting:
+            results[start] = _run_block(module, batch, slice(start, min(start + LANES, runs)))
 
     if workers == 1:
-        return _joined([run_block(start) for start in starts])
-    with ThreadPoolExecutor(workers) as pool:
-        return _joined(list(pool.map(run_block, starts)))
+        work()
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            for done in [pool.submit(work) for _ in range(workers)]:
+                done.result()
+    return _joined([results[start] for start in starts])
 
 
 def _joined(results: Sequence[BatchResult]) -> BatchResult:
@@ -97,8 +107,8 @@ class LaneBlock:
         self.states = _filled(states)
         records = clock.step_count // clock.record_every + 1 if clock.record_every else 0
         self._record = np.empty((records, states.shape[0], self._width))
-        self._signals = np.zeros((3, clock.signal_delay + 2, LANES))
-        self._commands = np.zeros((clock.command_delay + 2, LANES))
+        self._signals = np.zeros((3, clock.signal_delay + 2, self.states.shape[1]))
+        self._commands = np.zeros((clock.command_delay + 2, self.states.shape[1]))
 
     def advance(self, step_count: int) -> None:
         """Go ``step_count`` steps on."""
@@ -132,6 +142,8 @@ class LaneBlock:
 
 
 def _filled(columns: Floats) -> Floats:
-    """A contiguous copy with exactly 32 columns; the last one repeated where there are fewer."""
-    missing = LANES - columns.shape[1]
+    """A contiguous copy with a whole number of vectors of columns; the last one repeated where there are fewer."""
+    missing = -columns.shape[1] % VECTOR
+    if missing == 0:
+        return np.array(columns, dtype=np.float64, order="C")
     return np.ascontiguousarray(np.pad(columns, ((0, 0), (0, missing)), mode="edge"), dtype=np.float64)

@@ -1,9 +1,12 @@
 """Which compiled pieces a run is made of."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, get_type_hints
 
 from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.control.profiles import constant
+from ppafo.engine.scheme.motion import FreeStep, LedStep
+from ppafo.engine.scheme.pneumatics import StillGas
 from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
@@ -67,3 +70,14 @@ class Program:
             "valve_state": self.valve.state,
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
         }
+
+    @property
+    def is_held(self) -> bool:
+        """True where the vane is led along a profile that never changes."""
+        return self.angle is constant.KIND
+
+    def step_rows(self) -> dict[str, type]:
+        """Groups of numbers that the first stage of a step hands to the later phases, in order."""
+        begun = FreeStep if self.angle is None else (StillGas if self.is_held else LedStep)
+        _, shown, _ = get_type_hints(self.valve.connect).values()
+        return {"begun": begun, "shown": shown}

@@ -9,7 +9,9 @@ from ppafo.engine.source_text import is_row
 
 
 def leaf_paths(row: type, prefix: str) -> list[str]:
-    """Attribute paths of all numbers in a NamedTuple class, in order, each beginning with ``prefix``."""
+    """Attribute paths of all numbers in a NamedTuple class (or a float), in order, each beginning with ``prefix``."""
+    if not is_row(row):
+        return [prefix]
     paths = []
     hints = get_type_hints(row)
     for name in row._fields:  # type: ignore[attr-defined]
@@ -19,7 +21,9 @@ def leaf_paths(row: type, prefix: str) -> list[str]:
 
 
 def row_expression(row: type, path: str, cells: dict[str, str], name_of: Callable[[type], str]) -> str:
-    """Source text that makes a NamedTuple from the cells that hold its numbers; an empty one is ``()``."""
+    """Source text that makes a NamedTuple (or a float) from the cells that hold its numbers; an empty one is ``()``."""
+    if not is_row(row):
+        return cells[path]
     fields = row._fields  # type: ignore[attr-defined]
     if not fields:
         return "()"

@@ -18,6 +18,7 @@ class FlowCurve(NamedTuple):
 
     critical_ratio: float
     linear_ratio: float
+    linear_slope: float
     c0: float
     c1: float
     c2: float
@@ -63,7 +64,7 @@ def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
     polynomial = polynomial * inside + curve.c2
     polynomial = polynomial * inside + curve.c1
     polynomial = polynomial * inside + curve.c0
-    return math.sqrt(inside) * polynomial * min(gap / linear_gap, 1.0)
+    return math.sqrt(inside) * polynomial * min(gap * curve.linear_slope, 1.0)
 
 
 def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:
@@ -87,11 +88,11 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
     polynomial = polynomial * inside + curve.c0
     root = math.sqrt(inside)
     value = root * polynomial
-    line = value / linear_gap
+    line = value * curve.linear_slope
     curved = (0.5 * polynomial + inside * derivative) / root
     slope = line if gap < linear_gap else curved
     slope = 0.0 if gap > choked_gap else slope
-    return value * min(gap / linear_gap, 1.0), -slope
+    return value * min(gap * curve.linear_slope, 1.0), -slope
 
 
 def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve) -> float:

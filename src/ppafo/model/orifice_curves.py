@@ -65,4 +65,6 @@ def _fitted(
     target = exact / np.sqrt(gaps)
     powers = np.vander(gaps, DEGREE + 1, increasing=True)
     coefficients = np.linalg.lstsq(powers / target[:, None], np.ones_like(target), rcond=None)[0]
-    return FlowCurve(critical_ratio, linear_ratio, *(float(value) for value in coefficients))
+    return FlowCurve(
+        critical_ratio, linear_ratio, 1.0 / (1.0 - linear_ratio), *(float(value) for value in coefficients)
+    )

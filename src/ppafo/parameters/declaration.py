@@ -4,8 +4,10 @@ The schema, the conversion to SI, the messages and the table of ``ppafo sets sho
 ``Pa_a`` (a level, absolute in SI). Limits are wide: they exclude slips of the pen and what no solver could handle.
 """
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
@@ -102,15 +104,20 @@ def is_within(value: float, quantity: Quantity) -> bool:
     return above and value <= quantity.maximum
 
 
-def quantities(valve_kinds: dict[str, str]) -> dict[str, Quantity]:
+def quantities(valve_kinds: Mapping[str, str]) -> Mapping[str, Quantity]:
     """Return every number's declaration by dotted path, for a set whose valves have the given names and kinds."""
-    return {quantity.name: quantity for quantity in _declared(valve_kinds)}
+    return _by_path(tuple(valve_kinds.items()))
 
 
-def _declared(valve_kinds: dict[str, str]) -> Iterator[Quantity]:
+@functools.lru_cache(maxsize=32)
+def _by_path(valve_kinds: tuple[tuple[str, str], ...]) -> Mapping[str, Quantity]:
+    return MappingProxyType({quantity.name: quantity for quantity in _declared(valve_kinds)})
+
+
+def _declared(valve_kinds: Iterable[tuple[str, str]]) -> Iterator[Quantity]:
     for section, members in SECTIONS.items():
         yield from (_at(section, member) for member in members)
-    for name, kind in valve_kinds.items():
+    for name, kind in valve_kinds:
         yield from (_at(f"valves.{name}", member) for member in ORIFICE + VALVES[kind].quantities)
         yield from (_at(f"reported.valves.{name}", member) for member in REPORTED_OF_A_VALVE)
 

@@ -1,6 +1,5 @@
 """From a name or a file to a parameter set; every mistake in a file is one clear line."""
 
-import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import resources
 from pathlib import Path
@@ -8,24 +7,23 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from ppafo.documents.problems import first_problem
+from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import apply_overrides
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve
-from ppafo.parameters.problems import first_problem
 from ppafo.parameters.provenance import Entry, TextEntry
 from ppafo.parameters.schema import PARAMETER_FILE
 from ppafo.units import check_unit
 
-_SETS = resources.files("ppafo.parameters") / "sets"
-_SUFFIX = ".toml"
+_FILE = TomlKind("parameter set", "parameters", resources.files("ppafo.parameters") / "sets", ParameterError)
 
 
 def list_sets() -> tuple[str, ...]:
     """Return the names of the parameter sets that come with the package."""
-    names = (Path(item.name) for item in _SETS.iterdir())
-    return tuple(sorted(name.stem for name in names if name.suffix == _SUFFIX))
+    return _FILE.names()
 
 
 def load_device(name_or_path: str | Path, valve: str | None = None, overrides: Iterable[str] = ()) -> Device:
@@ -39,47 +37,20 @@ def load_device(name_or_path: str | Path, valve: str | None = None, overrides: I
 
 def load_parameter_set(name_or_path: str | Path) -> ParameterSet:
     """Return a parameter set by its name in the package or by the path of a TOML file."""
-    name = str(name_or_path)
-    if name in list_sets():
-        return parse_parameter_set((_SETS / (name + _SUFFIX)).read_bytes(), name)
-    path = Path(name_or_path)
-    if path.suffix != _SUFFIX and not path.exists():
-        known = ", ".join(list_sets())
-        hint = nearest_name(name, list_sets())
-        raise ParameterError(f"there is no parameter set '{name}'{hint}; known are {known}, or give a .toml file")
-    try:
-        content = path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise ParameterError(f"{name}: cannot be read: {reason}") from error
-    return parse_parameter_set(content, name)
+    return parse_parameter_set(_FILE.read(name_or_path), label(str(name_or_path)))
 
 
 def parse_parameter_set(content: bytes, file: str) -> ParameterSet:
     """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it."""
-    document = _toml(content, file)
+    document = _FILE.parse(content, file)
     try:
         parsed = PARAMETER_FILE.model_validate(document)
     except ValidationError as error:
-        raise ParameterError(f"{file}: {first_problem(error, PARAMETER_FILE)}") from error
+        problem = first_problem(error.errors(include_url=False), PARAMETER_FILE)
+        raise ParameterError(f"{file}: {problem}") from error
     parameter_set = _flattened(parsed, file)
     _check(parameter_set)
     return parameter_set
-
-
-def _toml(content: bytes, file: str) -> dict[str, Any]:
-    try:
-        text = content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
-    if not text.strip():
-        raise ParameterError(f"{file}: is empty; 'ppafo schema parameters' prints what belongs in it")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ParameterError(f"{file}: is not valid TOML: {' '.join(str(error).split())}") from error
-    except (RecursionError, ValueError) as error:
-        raise ParameterError(f"{file}: is not usable TOML: nested too deeply or a number too long") from error
 
 
 def _flattened(parsed: Any, file: str) -> ParameterSet:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, SPECIES_PATH
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, entry_in_si, shown
@@ -25,7 +25,7 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
     """
     chosen = chosen_valve(parameter_set, valve)
     for override in overrides:
-        on_one_line = " ".join(override.split())
+        on_one_line = one_line(override)
         path, separator, text = (part.strip() for part in on_one_line.partition("="))
         if not separator or not path or not text:
             raise ParameterError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")

@@ -33,9 +33,9 @@ class ParameterSet:
     texts: Mapping[str, TextEntry]
     accepted: Mapping[str, str]
 
-    def declared(self) -> dict[str, Quantity]:
+    def declared(self) -> Mapping[str, Quantity]:
         """Return the declaration of every number that this set may hold, by path."""
-        return quantities(dict(self.valve_kinds))
+        return quantities(self.valve_kinds)
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
+from ppafo.reporting.layout import Margins, figure_of_panels
 from ppafo.reporting.style import (
     ACTUAL,
     CHAMBER_1,
@@ -30,14 +31,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PASCALS_PER_PSI = 6894.757293168361
-GRAMS_PER_KILOGRAM = 1.0e3
-
 FIGURE_FORMATS = ("png", "svg", "pdf")
 
 _WIDTH, _LEFT, _RIGHT = 7.2, 0.62, 0.2
 _PANEL, _GAP, _TOP, _BOTTOM, _REMARK_LINE = 1.15, 0.42, 0.75, 0.55, 0.17
-"""Inches. Laid out by hand: matplotlib's automatic layouts draw the figure several times over."""
+"""Inches."""
 
 _REMARK_WIDTH = 100
 _HEADROOM = 0.06
@@ -155,18 +153,13 @@ def figure_files(figure: "Figure") -> dict[str, bytes]:
 
 def _grid(count: int, title: str, remark: str) -> "tuple[Figure, list[Axes]]":
     """Return a figure with a title, an optional remark below the time axis and ``count`` panels over one time axis."""
-    from matplotlib.figure import Figure
-
     remarks = textwrap.wrap(remark, _REMARK_WIDTH)
     bottom = _BOTTOM + _REMARK_LINE * len(remarks)
     height = _TOP + count * _PANEL + (count - 1) * _GAP + bottom
-    figure = Figure(figsize=(_WIDTH, height))
-    figure.subplots_adjust(
-        _LEFT / _WIDTH, bottom / height, 1.0 - _RIGHT / _WIDTH, 1.0 - _TOP / height, 0.0, _GAP / _PANEL
-    )
+    figure, rows = figure_of_panels((_WIDTH, height), Margins(_LEFT, _RIGHT, _TOP, bottom, _GAP), count)
     figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, ha="left", va="top", fontsize=13, fontweight="bold")
     figure.text(0.12 / _WIDTH, 0.1 / height, "\n".join(remarks), ha="left", va="bottom", fontsize=9, color=VERMILION)
-    return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+    return figure, [axes for (axes,) in rows]
 
 
 def _draw(axes: "Axes", panel: Panel, recording: Recording, atmosphere: float) -> None:

@@ -1,8 +1,8 @@
 """Everything that ``ppafo reproduce`` writes, as file contents by name."""
 
-import json
 from typing import Any
 
+from ppafo.documents.json_text import json_text
 from ppafo.reporting.reproduction_report import holding_torque, reproduction_report
 from ppafo.reporting.step_response_figure import step_response_figure
 from ppafo.reporting.style import rendered
@@ -10,6 +10,7 @@ from ppafo.reporting.torque_task_figure import torque_task_figure
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.studies.reproduction import Reproduction
 from ppafo.studies.reproduction.step_response import Levels
+from ppafo.studies.reproduction.study import EXPERIMENTS
 
 REPORT = "report.html"
 CLAIMS = "claims.json"
@@ -17,17 +18,24 @@ STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
 _FORMATS = ("png", "svg")
 
+FILES = (
+    *(f"{name}.csv" for name in EXPERIMENTS),
+    *(f"{figure}.{file_format}" for figure in (STEP_FIGURE, TORQUE_FIGURE) for file_format in _FORMATS),
+    CLAIMS,
+    REPORT,
+)
+"""Names of all files, in the order of writing; the report comes last."""
+
 
 def reproduction_files(reproduction: Reproduction) -> dict[str, bytes]:
-    """Return report, claims, both figures as PNG and SVG, and the three recordings as CSV; the report comes last."""
+    """Return every one of ``FILES``: recordings as CSV, both figures as PNG and SVG, claims and report."""
     step, torque = _step_figure(reproduction), _torque_figure(reproduction)
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
-    claims = json.dumps(claims_document(reproduction), indent=2, ensure_ascii=False, allow_nan=False)
     return {
         **{f"{run.scenario.name}.csv": marked_csv_bytes(run.recording) for run in runs},
         **{f"{STEP_FIGURE}.{file_format}": content for file_format, content in step.items()},
         **{f"{TORQUE_FIGURE}.{file_format}": content for file_format, content in torque.items()},
-        CLAIMS: f"{claims}\n".encode(),
+        CLAIMS: f"{json_text(claims_document(reproduction))}\n".encode(),
         REPORT: reproduction_report(reproduction, step["svg"], torque["svg"]).encode(),
     }
 

@@ -1,10 +1,12 @@
 """Figure 7 of the paper: the step response in four panels, as simulated."""
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.reporting.figures import PASCALS_PER_PSI
+from ppafo.constants import PASCALS_PER_PSI
+from ppafo.reporting.layout import Margins, figure_of_panels
 from ppafo.reporting.style import ACTUAL, CHAMBER_1, CHAMBER_2, GREY, house_style, mark_kind
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
@@ -14,7 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SIZE = (7.6, 5.4)
+_SIZE = (7.6, 5.6)
+_MARGINS = Margins(left=0.68, right=0.15, top=0.58, bottom=0.52, row_gap=0.42, column_gap=0.78)
 """Inches."""
 _SHOWN_BEFORE_STEP = 0.03
 """Share of the time axis before the step, so that a rise within the first milliseconds does not hide in the axis."""
@@ -26,44 +29,43 @@ _MILLISECONDS = 1.0e3
 def step_response_figure(recording: Recording, levels: Levels, events: StepEvents | None) -> "Figure":
     """Return figure 7: angle, pressure difference, and both pressures over time; ``events`` are marked where known."""
     with house_style():
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=_SIZE, layout="constrained")
-        grid = figure.subplots(2, 2, sharex=True, gridspec_kw={"wspace": 0.06, "hspace": 0.06})
-        difference = (recording["pressure_1"] - recording["pressure_2"]) / PASCALS_PER_PSI
-        for axes, letter, name, unit, values, colour in (
-            (grid[0, 0], "A", "Vane angle", "deg", np.degrees(recording["angle"]), ACTUAL),
-            (grid[0, 1], "B", "Pressure difference, $P_1 - P_2$", "psi", difference, ACTUAL),
-            (
-                grid[1, 0],
-                "C",
-                "Pressure in chamber 1, $P_1$",
-                "psig",
-                _gauge(recording, "pressure_1", levels),
-                CHAMBER_1,
-            ),
-            (
-                grid[1, 1],
-                "D",
-                "Pressure in chamber 2, $P_2$",
-                "psig",
-                _gauge(recording, "pressure_2", levels),
-                CHAMBER_2,
-            ),
-        ):
-            axes.plot(_MILLISECONDS * recording.time, values, color=colour)
-            axes.set_title(f"$\\bf{{{letter}}}$   {name}")
-            axes.set_ylabel(unit)
+        figure, grid = figure_of_panels(_SIZE, _MARGINS, rows=2, columns=2)
+        panels = [axes for row in grid for axes in row]
+        for axes, curve in zip(panels, _curves(recording, levels), strict=True):
+            axes.plot(_MILLISECONDS * recording.time, curve.values, color=curve.colour)
+            axes.set_title(f"$\\bf{{{curve.letter}}}$   {curve.name}")
+            axes.set_ylabel(curve.unit)
             axes.margins(y=0.06)
-        for axes in grid[1]:
+        for axes in grid[-1]:
             axes.set_xlabel("Time after the step (ms)")
         last = _MILLISECONDS * _last_time(recording, events)
-        grid[0, 0].set_xlim(-_SHOWN_BEFORE_STEP * last, last)
+        panels[0].set_xlim(-_SHOWN_BEFORE_STEP * last, last)
         if events is not None:
-            _mark(list(grid.flat), events)
-        figure.align_ylabels(grid)
+            _mark(panels, events)
         mark_kind(figure, recording.kind)
         return figure
+
+
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    """What one panel shows."""
+
+    letter: str
+    name: str
+    unit: str
+    values: Floats
+    colour: str
+
+
+def _curves(recording: Recording, levels: Levels) -> tuple[_Curve, ...]:
+    difference = (recording["pressure_1"] - recording["pressure_2"]) / PASCALS_PER_PSI
+    pressure_1, pressure_2 = (_gauge(recording, name, levels) for name in ("pressure_1", "pressure_2"))
+    return (
+        _Curve("A", "Vane angle", "deg", np.degrees(recording["angle"]), ACTUAL),
+        _Curve("B", "Pressure difference, $P_1 - P_2$", "psi", difference, ACTUAL),
+        _Curve("C", "Pressure in chamber 1, $P_1$", "psig", pressure_1, CHAMBER_1),
+        _Curve("D", "Pressure in chamber 2, $P_2$", "psig", pressure_2, CHAMBER_2),
+    )
 
 
 def _gauge(recording: Recording, name: str, levels: Levels) -> Floats:

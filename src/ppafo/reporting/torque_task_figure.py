@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.reporting.figures import GRAMS_PER_KILOGRAM
+from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.reporting.layout import Margins, figure_of_panels
 from ppafo.reporting.style import BLUE, GREY, VERMILION, WANTED, house_style, mark_kind
 from ppafo.signals import Recording
 
@@ -12,7 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SIZE = (7.6, 8.2)
+_SIZE = (7.6, 8.5)
+_MARGINS = Margins(left=0.68, right=0.15, top=0.42, bottom=0.52, row_gap=0.36)
 """Inches."""
 _HEIGHTS = (3.0, 0.9, 3.0, 0.9, 2.0)
 _SOLENOID, _PROPORTIONAL = VERMILION, BLUE
@@ -27,10 +29,8 @@ def torque_task_figure(
     valves and for the proportional valve [g].
     """
     with house_style():
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=_SIZE, layout="constrained")
-        grid = figure.subplots(5, 1, sharex=True, height_ratios=_HEIGHTS)
+        figure, rows = figure_of_panels(_SIZE, _MARGINS, rows=len(_HEIGHTS), heights=_HEIGHTS)
+        grid = [axes for (axes,) in rows]
         _torque(grid[0], solenoid, "Solenoid valves, on or off", _SOLENOID, ceiling)
         _states(grid[1], solenoid)
         _torque(grid[2], proportional, "Proportional valve", _PROPORTIONAL, ceiling)
@@ -41,7 +41,6 @@ def torque_task_figure(
         limits = [axes.get_ylim() for axes in (grid[0], grid[2])]
         for axes in (grid[0], grid[2]):
             axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-        figure.align_ylabels(grid)
         mark_kind(figure, solenoid.kind)
         return figure
 

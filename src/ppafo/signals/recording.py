@@ -161,7 +161,7 @@ def _check_time(recording: Recording) -> None:
     if time.size == 0:
         raise DataError(f"{recording.label}: has no samples")
     _check_finite(recording, "time", time)
-    stalled = np.flatnonzero(np.diff(time) <= 0.0)
+    stalled = np.flatnonzero(time[1:] <= time[:-1])
     if stalled.size:
         index = int(stalled[0]) + 1
         raise DataError(

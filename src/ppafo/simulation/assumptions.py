@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.declaration import SPECIES_PATH
@@ -74,7 +74,6 @@ def _default(quantity: Quantity) -> str | None:
 
 def _unknown(reading: Reading, path: str) -> ScenarioError:
     hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
-    on_one_line = " ".join(path.split())
     return ScenarioError(
-        f"{reading.file}: [{_SECTION}] names '{on_one_line}', which has no value in this scenario{hint}"
+        f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
     )

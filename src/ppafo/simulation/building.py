@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ppafo.errors import ParameterError, nearest_name
+from ppafo.errors import ParameterError, nearest_name, one_line
 from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters import build_device, list_sets, load_parameter_set
 from ppafo.parameters.device import Device, Supply
@@ -81,8 +81,6 @@ def _hardware(reading: Reading, folder: Path, overrides: tuple[str, ...]) -> Har
         parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
     except ParameterError as error:
         raise _of_device(reading, error) from error
-    except OSError as error:
-        raise reading.refusal("device.set", f"cannot be looked up: {error.strerror or error}") from error
     return Hardware(apply_device_overrides(parameter_set, overrides, valve), name)
 
 
@@ -101,7 +99,7 @@ def _device(reading: Reading, hardware: Hardware) -> Device:
 
 def _of_device(reading: Reading, error: ParameterError) -> ParameterError:
     """Return the error with the scenario it happened in, on one line whatever the names are."""
-    return ParameterError(f"{reading.file}: [device]: {' '.join(str(error).split())}")
+    return ParameterError(f"{reading.file}: [device]: {one_line(error)}")
 
 
 def _initial_pressure(reading: Reading, chamber: int, supply: Supply) -> float:

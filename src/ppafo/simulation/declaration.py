@@ -12,6 +12,8 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.model.declaration import Quantity
 
 LARGEST_SEED = 2**32 - 1
+PLAIN = ("", "1")
+"""Units of a plain number."""
 
 RUN = (
     Quantity("duration", "s", "length of the run", None, 0.0, 1.0e6, minimum_allowed=False),

@@ -9,22 +9,20 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.documents.problems import first_problem, is_gap
+from ppafo.documents.toml_text import TomlKind, label
+from ppafo.errors import ScenarioError
 from ppafo.simulation.building import Given, build_scenario
 from ppafo.simulation.overriding import apply_overrides
-from ppafo.simulation.problems import first_problem, is_gap
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.schema import scenario_file
-from ppafo.simulation.toml_text import parse_toml, read_bytes
 
-_SCENARIOS = resources.files("ppafo") / "scenarios"
-_SUFFIX = ".toml"
+_FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)
 
 
 def list_scenarios() -> tuple[str, ...]:
     """Return the names of the scenarios that come with the package."""
-    names = (Path(item.name) for item in _SCENARIOS.iterdir())
-    return tuple(sorted(name.stem for name in names if name.suffix == _SUFFIX))
+    return _FILE.names()
 
 
 def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -33,22 +31,14 @@ def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Sc
     ``overrides`` are texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
     ``valve.area=12.6mm^2``.
     """
-    name = str(name_or_path)
-    if name in list_scenarios():
-        return parse_scenario((_SCENARIOS / (name + _SUFFIX)).read_bytes(), name, overrides)
     path = Path(name_or_path)
-    if path.suffix != _SUFFIX and not _exists(path):
-        hint = nearest_name(name, list_scenarios())
-        known = ", ".join(list_scenarios())
-        on_one_line = " ".join(name.split())
-        raise ScenarioError(f"there is no scenario '{on_one_line}'{hint}; known are {known}, or give a .toml file")
-    return parse_scenario(read_bytes(path, _label(name)), name, overrides, path.parent)
+    return parse_scenario(_FILE.read(name_or_path), str(name_or_path), overrides, path.parent)
 
 
 def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
     """Return the scenario in the bytes of a TOML file; relative paths in it begin in ``folder``."""
-    document = parse_toml(content, _label(file))
-    return _scenario(Given(_label(file), file, folder or Path(), document, tuple(overrides)))
+    document = _FILE.parse(content, label(file))
+    return _scenario(Given(label(file), file, folder or Path(), document, tuple(overrides)))
 
 
 def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()) -> Scenario:
@@ -59,7 +49,7 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()
     if not isinstance(content, Mapping):
         raise ScenarioError(f"a scenario is a dictionary laid out as a scenario file, not a {type(content).__name__}")
     name = content.get("name")
-    file = f"scenario '{_label(name)}'" if isinstance(name, str) else "scenario"
+    file = f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
     return _scenario(Given(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides)))
 
 
@@ -85,15 +75,3 @@ def _problems(document: dict[str, Any]) -> list[ErrorDetails]:
 def _refuse(problems: list[ErrorDetails], file: str) -> None:
     if problems:
         raise ScenarioError(f"{file}: {first_problem(problems, scenario_file())}")
-
-
-def _exists(path: Path) -> bool:
-    try:
-        return path.exists()
-    except (OSError, ValueError):
-        return False
-
-
-def _label(file: str) -> str:
-    """Return what messages call a file, on one line."""
-    return " ".join(file.split())

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import ORIFICE, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
@@ -51,7 +51,7 @@ def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file:
 
 def split_override(override: str) -> tuple[str, str]:
     """Return path and value of a text such as ``run.duration=1 s``."""
-    on_one_line = " ".join(override.split())
+    on_one_line = one_line(override)
     path, separator, text = (part.strip() for part in on_one_line.partition("="))
     if not separator or not path or not text:
         raise ScenarioError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
@@ -79,7 +79,7 @@ def _unknown(override: str, path: str, known: tuple[str, ...], file: str) -> Sce
     section = path.partition(".")[0]
     near = [name for name in known if name.startswith(f"{section}.")]
     hint = nearest_name(path, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
-    return ScenarioError(f"override '{' '.join(override.split())}': {file} has no value '{path}'{hint}")
+    return ScenarioError(f"override '{one_line(override)}': {file} has no value '{path}'{hint}")
 
 
 def _set(document: dict[str, Any], path: str, text: str, file: str) -> None:

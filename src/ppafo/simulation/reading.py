@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import ScenarioError, UnitError
+from ppafo.documents.problems import shown
+from ppafo.errors import ScenarioError, UnitError, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import is_within
-from ppafo.simulation.declaration import value_at
-from ppafo.simulation.problems import shown
+from ppafo.simulation.declaration import PLAIN, value_at
 from ppafo.units import format_quantity, from_si, parse_quantity
 
-PLAIN = ("", "1")
 WRITTEN_UNITS = {"rad": "deg", "rad/s": "deg/s", "Pa_a": "psi_g", "Pa_d": "psi_d"}
 _ROUND = 1.0e-9
 
@@ -30,7 +29,7 @@ class Reading:
         """Return file, key and value as they were given."""
         value = value_at(self.document, path)
         if path in self.overridden:
-            return f"{self.file}: override {path}={' '.join(str(value).split())}"
+            return f"{self.file}: override {path}={one_line(value)}"
         return f"{self.file}: {path} = {shown(value)}"
 
     def refusal(self, path: str, reason: str) -> ScenarioError:

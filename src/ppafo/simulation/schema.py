@@ -5,34 +5,24 @@ which keys there can be.
 """
 
 import functools
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, create_model
+from pydantic import BaseModel, Field, WithJsonSchema
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.documents.models import NAME, one_of, optional, published_schema, table
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
 
-_CONFIG = ConfigDict(strict=True, extra="forbid", frozen=True)
-_NAME = r"^[a-z0-9][a-z0-9_-]*$"
 _LONGEST_NAME = 100
 _STARTS_WITH_NUMBER = r"^\s*[+-]?(\d|\.\d)"
 _QUANTITY_TEXT = {"type": "string", "pattern": _STARTS_WITH_NUMBER}
-_PLAIN = ("", "1")
-
-
-def _left_out() -> None:
-    """Stand in for a value that a file may leave out; keeps 'null' out of the published schema."""
-
-
-def _optional(annotation: Any, description: str) -> Any:
-    return annotation, Field(default_factory=_left_out, description=description)
 
 
 def _number(quantity: Quantity, words: tuple[str, ...] = ()) -> Any:
     """Return the type of a value: a text with its unit, a plain number where there is no unit, or one of some words."""
     forms: list[dict[str, Any]] = [_QUANTITY_TEXT]
-    forms += [{"type": "number"}] if quantity.unit in _PLAIN else []
+    forms += [{"type": "number"}] if quantity.unit in declaration.PLAIN else []
     forms += [{"enum": list(words)}] if words else []
     return Annotated[Any, WithJsonSchema({"anyOf": forms} if len(forms) > 1 else forms[0])]
 
@@ -49,21 +39,12 @@ def _fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = ()) -> di
         kind = _number(item, words)
         required = item.default is None and not words
         text = _described(item)
-        fields[item.name] = (kind, Field(description=text)) if required else _optional(kind, text)
+        fields[item.name] = (kind, Field(description=text)) if required else optional(kind, text)
     return fields
-
-
-def _section(name: str, fields: dict[str, Any]) -> Any:
-    return create_model(name, __config__=_CONFIG, **fields)
 
 
 def _kind(kind: str, summary: str) -> dict[str, Any]:
     return {"kind": (Literal[kind], Field(description=summary))}
-
-
-def _one_of(models: list[Any]) -> Any:
-    """Return the union of models that are told apart by their kind."""
-    return Annotated[Union[tuple(models)], Field(discriminator="kind")]  # noqa: UP007
 
 
 def _title(name: str) -> str:
@@ -71,9 +52,9 @@ def _title(name: str) -> str:
 
 
 def _profile(prescribed: Quantity, purpose: str) -> Any:
-    return _one_of(
+    return one_of(
         [
-            _section(
+            table(
                 f"{_title(kind.name)}{purpose}",
                 _kind(kind.name, kind.summary) | _fields(declaration.profile_settings(kind.name, prescribed)),
             )
@@ -84,20 +65,20 @@ def _profile(prescribed: Quantity, purpose: str) -> Any:
 
 def _motion() -> Any:
     led = {"profile": (_profile(declaration.ANGLE_LEVEL, "Angle"), Field(description="angle in time"))}
-    return _one_of(
+    return one_of(
         [
-            _section("FreeMotion", _kind("free", "the vane moves as the torques demand") | _fields(declaration.FREE)),
-            _section("HeldMotion", _kind("held", "the vane stays at one angle") | _fields((declaration.ANGLE,))),
-            _section("LedMotion", _kind("led", "the vane is led along an angle in time") | led),
+            table("FreeMotion", _kind("free", "the vane moves as the torques demand") | _fields(declaration.FREE)),
+            table("HeldMotion", _kind("held", "the vane stays at one angle") | _fields((declaration.ANGLE,))),
+            table("LedMotion", _kind("led", "the vane is led along an angle in time") | led),
         ]
     )
 
 
 def _controller() -> Any:
-    sampling = {item.name: _optional(_number(item), _described(item)) for item in declaration.SAMPLING}
-    return _one_of(
+    sampling = {item.name: optional(_number(item), _described(item)) for item in declaration.SAMPLING}
+    return one_of(
         [
-            _section(
+            table(
                 f"{_title(kind.name)}Controller", _kind(kind.name, kind.summary) | sampling | _fields(kind.quantities)
             )
             for kind in CONTROLLERS.values()
@@ -108,7 +89,7 @@ def _controller() -> Any:
 def _device() -> dict[str, Any]:
     return {
         "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
-        "valve": _optional(str, "name of one of the set's valves; its default valve unless given"),
+        "valve": optional(str, "name of one of the set's valves; its default valve unless given"),
         "overrides": (list[str], Field(default_factory=list, description="such as 'valve.area=12.6mm^2'")),
     }
 
@@ -123,24 +104,23 @@ def scenario_file() -> type[BaseModel]:
     """Return the model of a scenario file, for the controllers and profiles that are in the catalogues."""
     words = tuple(declaration.PRESSURE_WORDS)
     reference = _profile(declaration.TORQUE_LEVEL, "Reference")
-    initial = _section("Initial", _fields(declaration.INITIAL, words))
+    initial = table("Initial", _fields(declaration.INITIAL, words))
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
-        "name": (str, Field(pattern=_NAME, max_length=_LONGEST_NAME)),
+        "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),
         "description": (str, Field("", description="what is tried here, and why")),
-        "device": (_section("Device", _device()), Field(description="the hardware")),
-        "run": (_section("Run", _fields(declaration.RUN)), Field(description="times of the run")),
+        "device": (table("Device", _device()), Field(description="the hardware")),
+        "run": (table("Run", _fields(declaration.RUN)), Field(description="times of the run")),
         "motion": (_motion(), Field(description="what the vane does")),
-        "initial": _optional(initial, "state of the gas at the start; atmosphere unless given"),
+        "initial": optional(initial, "state of the gas at the start; atmosphere unless given"),
         "controller": (_controller(), Field(description="what sets the valve")),
-        "reference": _optional(reference, "torque that the controller follows; 0 N m unless given"),
-        "sensors": _optional(_section("Sensors", _sensors()), "what the controller sees; ideal unless given"),
+        "reference": optional(reference, "torque that the controller follows; 0 N m unless given"),
+        "sensors": optional(table("Sensors", _sensors()), "what the controller sees; ideal unless given"),
         "assumed": (dict[str, str], Field(default_factory=dict, description="values that no source gives, and why")),
     }
-    return create_model("ScenarioFile", __config__=_CONFIG, **fields)
+    return table("ScenarioFile", fields)
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file."""
-    schema = scenario_file().model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "ppafo scenario"}
+    return published_schema(scenario_file(), "ppafo scenario")

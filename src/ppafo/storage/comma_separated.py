@@ -37,7 +37,7 @@ def write_csv(path: str | Path, recording: Recording) -> Path:
 
 
 def marked_csv_bytes(recording: Recording) -> bytes:
-    """Return the table of a recording for a file that stands alone: where no one measured it, it begins by saying so."""
+    """Return the table of a recording for a file that stands alone; it begins with its kind unless it was measured."""
     mark = f"{_MARKS[recording.kind]}\n" if recording.kind in _MARKS else ""
     return mark.encode() + csv_bytes(recording)
 

@@ -3,10 +3,10 @@
 import contextlib
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, reason
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -14,7 +14,7 @@ def read_bytes(path: str | Path) -> bytes:
     try:
         content = Path(path).read_bytes()
     except (OSError, ValueError) as error:
-        raise DataError(f"{path}: cannot be read: {_reason(error)}") from error
+        raise DataError(f"{path}: cannot be read: {reason(error)}") from error
     if not content:
         raise DataError(f"{path}: is empty")
     return content
@@ -23,8 +23,7 @@ def read_bytes(path: str | Path) -> bytes:
 def write_file(path: str | Path, content: bytes) -> Path:
     """Write a file, replacing an earlier one; folders are made if need be. Returns the path."""
     target = Path(path)
-    with _written_errors(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
+    with _written_errors(target), _made(target.parent):
         aside = _sibling(target, "writing")
         try:
             aside.write_bytes(content)
@@ -34,11 +33,25 @@ def write_file(path: str | Path, content: bytes) -> Path:
     return target
 
 
+def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files into a folder, replacing those of the same names: all of them aside first, then renamed."""
+    with _written_errors(folder), _made(folder):
+        _check_no_folder(folder, contents)
+        aside = _sibling(folder / "files", "writing")
+        try:
+            aside.mkdir()
+            for name, content in contents.items():
+                (aside / name).write_bytes(content)
+            for name in contents:
+                (aside / name).replace(folder / name)
+        finally:
+            shutil.rmtree(aside, ignore_errors=True)
+
+
 def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
     """Make ``folder`` hold exactly these files; an earlier folder stays as it was until the new one is whole."""
-    with _written_errors(folder):
+    with _written_errors(folder), _made(folder.resolve().parent):
         target = folder.resolve()
-        target.parent.mkdir(parents=True, exist_ok=True)
         aside = _sibling(target, "writing")
         try:
             aside.mkdir()
@@ -47,6 +60,50 @@ def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
             _swap(aside, target)
         finally:
             shutil.rmtree(aside, ignore_errors=True)
+
+
+def check_folder_can_be_replaced(folder: Path) -> None:
+    """Refuse a folder beside which nothing can be written, by trying; nothing is left of the trial."""
+    with _written_errors(folder), _made(folder.resolve().parent):
+        _try_folder(_sibling(folder.resolve(), "trial"))
+
+
+def check_files_can_be_added(folder: Path, names: Iterable[str]) -> None:
+    """Refuse a folder into which files of these names cannot be written, by trying; nothing is left of the trial."""
+    with _written_errors(folder), _made(folder):
+        _check_no_folder(folder, names)
+        _try_folder(_sibling(folder / "files", "trial"))
+
+
+def _try_folder(trial: Path) -> None:
+    try:
+        trial.mkdir()
+    finally:
+        with contextlib.suppress(OSError):
+            trial.rmdir()
+
+
+@contextlib.contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """Make a folder and those above it; at the end the new ones that hold nothing go away again."""
+    new = [place for place in (folder, *folder.parents) if not place.exists()]
+    nearest = folder if folder.exists() else new[-1].parent
+    if not nearest.is_dir():
+        raise NotADirectoryError(None, f"there is a file '{nearest}' in the place of a folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    finally:
+        for place in new:
+            with contextlib.suppress(OSError):
+                place.rmdir()
+
+
+def _check_no_folder(folder: Path, names: Iterable[str]) -> None:
+    """Refuse a folder in the place of a file before the first file is written, not when its turn comes."""
+    for name in names:
+        if (folder / name).is_dir():
+            raise IsADirectoryError(None, f"there is a folder '{name}' in it, in the place of a file")
 
 
 def _swap(new: Path, target: Path) -> None:
@@ -74,9 +131,4 @@ def _written_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError) as error:
-        raise DataError(f"{path}: cannot be written: {_reason(error)}") from error
-
-
-def _reason(error: OSError | ValueError) -> str:
-    text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return text[:1].lower() + text[1:]
+        raise DataError(f"{path}: cannot be written: {reason(error)}") from error

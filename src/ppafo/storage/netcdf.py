@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, one_line
 from ppafo.signals import Channel, Recording, recording_kind
 from ppafo.signals.channels import TIME, TIME_UNIT
 from ppafo.storage.dataset import channel_attributes, global_attributes, time_attributes, unit_of_attribute
@@ -47,7 +47,7 @@ def read_netcdf(path: str | Path) -> Recording:
     try:
         return _recording(content, path)
     except _DAMAGED as error:
-        raise DataError(f"{path}: is not a whole NetCDF file of a recording: {' '.join(str(error).split())}") from error
+        raise DataError(f"{path}: is not a whole NetCDF file of a recording: {one_line(error)}") from error
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
 

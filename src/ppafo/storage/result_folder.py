@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ppafo.errors import DataError
+from ppafo.documents.json_text import json_text
+from ppafo.errors import DataError, one_line
 from ppafo.signals import Recording
 from ppafo.storage.comma_separated import csv_bytes
-from ppafo.storage.files import read_bytes, replace_folder
+from ppafo.storage.files import check_folder_can_be_replaced, read_bytes, replace_folder
 from ppafo.storage.netcdf import netcdf_bytes, read_netcdf
 
 RUN_FILE = "run.json"
@@ -54,21 +55,18 @@ def write_result(
         "recording": {**_description(recording), "sha256": _checksum(netcdf)},
         **document,
     }
-    encoded = json.dumps(described, indent=2, ensure_ascii=False, allow_nan=False)
-    replace_folder(place, {**contents, RUN_FILE: (encoded + "\n").encode()})
+    replace_folder(place, {**contents, RUN_FILE: f"{json_text(described)}\n".encode()})
     return place
 
 
 def check_result_folder(folder: str | Path) -> None:
     """Refuse a folder that holds anything but an earlier result, or that cannot be made."""
     place = Path(folder)
-    if place.is_dir():
+    if os.path.isdir(place):  # noqa: PTH112  # Path.is_dir raises where no file can have the name
         _check_replaceable(place)
     elif os.path.lexists(place):
         raise DataError(f"{folder}: is a file; a result needs a folder")
-    nearest = next(parent for parent in place.absolute().parents if parent.exists())
-    if not nearest.is_dir() or not os.access(nearest, os.W_OK | os.X_OK):
-        raise DataError(f"{folder}: cannot be written: {nearest} is not a folder that can be written to")
+    check_folder_can_be_replaced(place)
 
 
 def read_result(folder: str | Path) -> StoredResult:
@@ -112,7 +110,7 @@ def read_document(folder: str | Path) -> dict[str, Any]:
     try:
         document = json.loads(read_bytes(path).decode("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise DataError(f"{path}: is not JSON: {' '.join(str(error).split())}") from error
+        raise DataError(f"{path}: is not JSON: {one_line(error)}") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{path}: is not of a ppafo result (its 'format' is not '{FORMAT}')")
     if document.get("schema_version") != SCHEMA_VERSION:

@@ -1,5 +1,6 @@
 """``ppafo sets``, ``ppafo audit`` and ``ppafo schema``."""
 
+import importlib
 import json
 from pathlib import Path
 
@@ -56,6 +57,56 @@ def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys
     assert captured.err.startswith(f"ppafo: --out {file}: cannot be written")
     assert captured.err.count("\n") == 1
     assert captured.out == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "work"),
+    [
+        (["audit", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
+        (["sets"], "ppafo.parameters.load_parameter_set"),
+        (["sets", "show", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
+        (["schema", "scenario"], "ppafo.simulation.schema.json_schema"),
+        (["reproduce"], "ppafo.studies.reproduction.reproduce"),
+        (["bench"], "ppafo.studies.bench.measure_speed"),
+        (["simulate", "step-response"], "ppafo.simulation.simulate.simulate"),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_found_before_any_work(
+    words: list[str], work: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def never(*arguments: object) -> None:
+        raise AssertionError("it ran")
+
+    importlib.import_module(work.rpartition(".")[0])
+    monkeypatch.setattr(work, never)
+    file = tmp_path / "file"
+    file.write_text("mine")
+    assert main([*words, "--out", str(file / "deeper")]) == 2
+    captured = capsys.readouterr()
+    assert f"{file / 'deeper'}: cannot be written: there is a file '{file}' in the place of a folder" in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+    assert file.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("command", "name"), [(["reproduce"], "report.html"), (["bench"], "bench.md"), (["simulate", "step-response"], "x")]
+)
+def test_a_folder_in_the_place_of_a_file_is_found_before_any_work(
+    command: list[str], name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / name).mkdir()
+    assert main([*command, "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert [entry.name for entry in tmp_path.iterdir()] == [name]
+
+
+def test_a_line_break_in_a_name_does_not_break_the_line_of_the_message(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["plot", "a\nb"], ["audit", "a\nb"], ["simulate", "a\nb.toml"], ["schema", "a\nb"]):
+        assert main(words) == 2
+        error = capsys.readouterr().err
+        assert "a b" in error
+        assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """``ppafo simulate`` and ``ppafo plot``."""
 
+import dataclasses
 import json
 import os
 import signal
@@ -11,6 +12,9 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.simulation.result import Result, Status
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate
 from ppafo.storage import read_result
 
 FILES = ["figure.png", "figure.svg", "recording.csv", "recording.nc", "run.json"]
@@ -148,6 +152,23 @@ def test_a_damaged_result_is_one_line_and_exit_code_2(
     error = capsys.readouterr().err
     assert "recording.nc: is not the file that was written" in error
     assert error.count("\n") == 1
+
+
+def test_a_diverged_run_is_written_and_told_on_the_side_with_exit_code_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def diverging(scenario: Scenario) -> Result:
+        status = Status("diverged", 0.01, "diverged at t = 0.01 s; try a smaller run.step")
+        return dataclasses.replace(simulate(scenario), status=status)
+
+    monkeypatch.setattr("ppafo.simulation.simulate.simulate", diverging)
+    folder = tmp_path / "step"
+    assert main(["simulate", "step-response", "--json", "--out", str(folder)]) == 1
+    printed = capsys.readouterr()
+    assert printed.err == "ppafo: step-response: diverged at t = 0.01 s; try a smaller run.step\n"
+    assert json.loads(printed.out)["status"]["kind"] == "diverged"
+    assert names(folder) == FILES
+    assert read_result(folder).document["status"]["kind"] == "diverged"
 
 
 HELD_UP = """

@@ -71,15 +71,35 @@ def test_an_unknown_name_is_answered_with_the_nearest_one() -> None:
 
 
 def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="No such file"):
+    with pytest.raises(ParameterError, match="no such file"):
         load_parameter_set(tmp_path / "gone.toml")
     with pytest.raises(ParameterError, match="directory"):
         load_parameter_set(tmp_path)
 
 
-def test_a_name_with_a_null_character_is_a_clean_error() -> None:
-    with pytest.raises(ParameterError):
-        load_parameter_set("a\0b.toml")
+@pytest.mark.parametrize(
+    "name", ["a\0b.toml", "a\0b", "a" * 300, "a/" * 3000 + "b", "a" * 300 + ".toml", "a\nb.toml", "a\nb", "\ud800"]
+)
+def test_a_name_that_no_file_can_have_is_one_short_line(name: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        load_parameter_set(name)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 400
+
+
+def test_a_value_in_the_place_of_a_table_names_the_keys_of_the_table() -> None:
+    message = problem_of(SMALL + "\n[friction]\nstatic_torque = 3\n")
+    assert "friction.static_torque = 3 must be a table with the keys value, unit, origin, source" in message
+    assert "friction = 3 must be a table, [friction]" in problem_of("friction = 3\n" + SMALL)
+
+
+def test_a_name_of_another_form_says_which_form() -> None:
+    assert "name = 'My Bench' must consist of small letters" in problem_of(changed('"bench"', '"My Bench"'))
+
+
+def test_a_mistake_inside_a_list_is_found_by_its_number() -> None:
+    message = problem_of(SMALL.replace("\n[actuator", '\naccepted = [{ finding = "x", reson = "y" }]\n[actuator', 1))
+    assert "unknown key 'accepted.0.reson', did you mean 'reason'?" in message
 
 
 def test_empty_binary_and_foreign_encodings_are_named() -> None:

@@ -72,6 +72,10 @@ def test_time_that_does_not_grow_is_refused(times: list[float]) -> None:
         Recording("bench", np.array(times), {})
 
 
+def test_times_may_be_as_far_apart_as_numbers_go() -> None:
+    assert Recording("bench", np.array([-1.7e308, 1.7e308]), {}).time[1] == 1.7e308
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_value_that_is_not_finite_is_refused_by_channel_and_sample(bad: float) -> None:
     with pytest.raises(DataError, match=r"channel 'angle' is (nan|inf) at sample 3"):

@@ -1,6 +1,6 @@
 """Every mistake in a scenario is one line: the file, the key, the value, what is allowed, the nearest name."""
 
-import copy
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -258,7 +258,9 @@ def test_a_set_that_is_not_complete_says_which_one_is() -> None:
 
 @pytest.mark.parametrize("name", ["a" * 300, "a/" * 3000 + "b"])
 def test_a_name_of_a_set_that_is_too_long_is_a_clean_error(name: str) -> None:
-    assert "device" in problem_after('"ppafo2011"', f'"{name}"', PpafoError)
+    message = problem_after('"ppafo2011"', f'"{name}"', ParameterError)
+    assert "[device]: there is no parameter set 'aa" in message or "[device]: there is no parameter set 'a/a" in message
+    assert len(message) < 400
 
 
 def test_empty_binary_and_foreign_encodings_are_named() -> None:
@@ -281,17 +283,18 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
 
 
 def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"gone.toml: cannot be read: No such file"):
+    with pytest.raises(ScenarioError, match=r"gone.toml: cannot be read: no such file"):
         load_scenario(tmp_path / "gone.toml")
     with pytest.raises(ScenarioError, match="directory"):
         load_scenario(tmp_path)
 
 
-@pytest.mark.parametrize("name", ["a\0b.toml", "a\0b", "a" * 300, "a\nb.toml", "a\nb", "\ud800"])
+@pytest.mark.parametrize("name", ["a\0b.toml", "a\0b", "a" * 300, "a" * 300 + ".toml", "a\nb.toml", "a\nb", "\ud800"])
 def test_a_name_that_no_file_can_have_is_a_clean_error(name: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(name)
-    assert "\n" not in str(caught.value)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 400
 
 
 @pytest.mark.parametrize("content", [None, [], "torque-task", 3])
@@ -304,15 +307,8 @@ def test_only_a_dictionary_is_taken_for_a_scenario(content: Any) -> None:
     "change", [{1: 2}, {"run": None}, {"run": 3}, {"assumed": {"run.step": 3}}, {"assumed": {1: ""}}, {"name": "a\nb"}]
 )
 def test_plain_values_of_a_wrong_type_are_clean_errors(change: dict[Any, Any]) -> None:
-    content: dict[Any, Any] = {
-        "schema_version": 1,
-        "name": "small",
-        "device": {"set": "ppafo2011"},
-        "run": {"duration": "1 s"},
-        "motion": {"kind": "held", "angle": "75 deg"},
-        "controller": {"kind": "pid", "rate": "1 kHz"},
-    }
+    content: dict[Any, Any] = tomllib.loads(TEXT)
     with pytest.raises(ScenarioError) as caught:
-        scenario_from_dict({**copy.deepcopy(content), **change})
+        scenario_from_dict({**content, **change})
     assert str(caught.value).startswith("scenario ")
     assert "\n" not in str(caught.value)

@@ -122,8 +122,31 @@ def test_a_file_in_the_place_of_the_folder_or_above_it_is_refused(tmp_path: Path
     file.write_text("")
     with pytest.raises(DataError, match="is a file; a result needs a folder"):
         check_result_folder(file)
-    with pytest.raises(DataError, match="is not a folder that can be written to"):
+    with pytest.raises(DataError, match=r"task: cannot be written: there is a file '.*file' in the place of a folder"):
         check_result_folder(file / "task")
+
+
+@pytest.mark.parametrize("name", ["a" * 250, "a" * 300, "new/" + "a" * 300, "a\0b"])
+def test_a_name_that_no_folder_can_have_is_refused_without_a_trace(tmp_path: Path, name: str) -> None:
+    with pytest.raises(DataError, match="cannot be written"):
+        check_result_folder(tmp_path / name)
+    assert names(tmp_path) == []
+
+
+def test_a_check_leaves_no_trace(tmp_path: Path) -> None:
+    check_result_folder(tmp_path / "new" / "task")
+    assert names(tmp_path) == []
+
+
+def test_a_place_where_the_system_lets_nobody_write_is_found_by_trying(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(self: Path, *arguments: object, **options: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(Path, "mkdir", refused)
+    with pytest.raises(DataError, match="task: cannot be written: read-only file system"):
+        check_result_folder(tmp_path / "task")
 
 
 def interrupt_at(monkeypatch: pytest.MonkeyPatch, method: str, call: int) -> None:

@@ -13,7 +13,8 @@ from ppafo.studies.bench import single_run, start_up
 from ppafo.studies.bench.children import run_python
 from ppafo.studies.bench.ensemble import Findings, _scaling_line, _variants
 from ppafo.studies.bench.ensemble_worker import JaxEnsemble, Order, largest_difference
-from ppafo.studies.bench.jax_model import Variant, state_of, task_of
+from ppafo.studies.bench.jax_model import state_of, task_of
+from ppafo.studies.bench.jax_program import Variant
 from ppafo.studies.bench.machine import Machine, describe_machine
 from ppafo.studies.bench.report import MISSING_EXTRA, BenchReport, Line, Target, number_text
 from ppafo.studies.bench.sampled_solvers import solve_by_samples
@@ -149,6 +150,7 @@ def test_the_best_of_jax_is_taken_over_all_flags_and_the_worst_difference():
     findings.add({"seconds": {"lanes 1": [0.9], "a": [4.0, 6.0]}, "difference": 1e-14}, "fast")
     name, timing = findings.best_jax()
     assert (name, timing.best) == ("a, fast", 4.0)
+    assert findings.best_jax("default")[0] == "a, default"
     assert findings.timings["lanes 1"].best == 0.9
     assert findings.difference == 1e-12
 

@@ -31,9 +31,8 @@ def update(
 ) -> tuple[float, PidState]:
     """Command from -1 to 1 of the torque error; integral by rectangles, slope by backward difference. Equation (13)."""
     error = reference - measurement.torque
-    raw_slope = (error - state.error) / period * state.started
-    share = period / (period + parameters.derivative_filter)
-    slope = state.slope + share * (raw_slope - state.slope)
+    change = (error - state.error) * state.started
+    slope = state.slope + (change - period * state.slope) / (period + parameters.derivative_filter)
     integral = state.integral + parameters.integral_gain * error * period
     wanted = parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
     command = max(-1.0, min(1.0, wanted))

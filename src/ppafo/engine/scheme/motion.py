@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ppafo.engine.scheme.pneumatics import GasChange, advance_gas
+from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, begin_moving_gas
 from ppafo.model.friction import holds_still
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, driving_torque
 
@@ -21,6 +21,23 @@ class Departure(NamedTuple):
     share: float
     angle: float
     angular_velocity: float
+
+
+class FreeStep(NamedTuple):
+    """First stage of a free step: angle without stops [rad], acceleration [rad/s^2], driving torque [N m], gas."""
+
+    free_angle: float
+    acceleration: float
+    torque: float
+    gas: MovingGas
+
+
+class LedStep(NamedTuple):
+    """First stage of a led step: where it leads [rad], [rad/s], and the gas."""
+
+    next_angle: float
+    next_rate: float
+    gas: MovingGas
 
 
 def direction_of(value: float) -> float:
@@ -110,41 +127,47 @@ def first_event(
     return Departure(share, angle, rebound if hits_first else 0.0)
 
 
-def advance_free(
+def begin_free(
     plant: PlantParameters,
     state: PlantState,
     port_1: Any,
     port_2: Any,
     step: float,
-    port_flow: Callable[..., Any],
     port_flow_slopes: Callable[..., Any],
-) -> PlantState:
-    """State one step [s] later of a vane that is free between its stops. Equations (1) to (10)."""
+) -> FreeStep:
+    """First stage of one step [s] of a vane that is free between its stops. Equations (1) to (10)."""
+    velocity = state.angular_velocity
+    way = direction_of(velocity)
+    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
+    torque = driving_torque(plant, state.angle, pressure_1, pressure_2)
+    sliding = (torque - way * plant.dynamic_torque - plant.viscous_damping * velocity) / plant.inertia
+    acceleration = sliding if way != 0.0 else 0.0
+    free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
+    gas = begin_moving_gas(plant, state, bounded(plant, free_angle), port_1, port_2, step, port_flow_slopes)
+    return FreeStep(free_angle, acceleration, torque, gas)
+
+
+def end_free(plant: PlantParameters, state: PlantState, begun: FreeStep, step: float) -> PlantState:
+    """State at the end of the step [s] of a free vane, from ``state`` with the new gas and the angle of the begin."""
     velocity = state.angular_velocity
     way = direction_of(velocity)
     moving = way != 0.0
-    sliding = way * plant.dynamic_torque
-    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
-    torque = driving_torque(plant, state.angle, pressure_1, pressure_2)
-    sliding_acceleration = (torque - sliding - plant.viscous_damping * velocity) / plant.inertia
-    acceleration = sliding_acceleration if moving else 0.0
-    free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
-    predicted = bounded(plant, free_angle)
-    gas = advance_gas(plant, state, predicted, port_1, port_2, step, port_flow, port_flow_slopes)
-    next_1, next_2 = chamber_pressures(plant, predicted, state.mass_1 + gas.mass_1, state.mass_2 + gas.mass_2)
+    predicted = bounded(plant, begun.free_angle)
+    next_1, next_2 = chamber_pressures(plant, predicted, state.mass_1, state.mass_2)
     next_torque = driving_torque(plant, predicted, next_1, next_2)
-    full_velocity = next_velocity(plant, velocity, acceleration, next_torque - sliding, step)
+    sliding_torque = next_torque - way * plant.dynamic_torque
+    full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
 
-    departure = first_event(plant, state, free_angle, acceleration, full_velocity, step)
-    departure_torque = torque + departure.share * (next_torque - torque)
+    departure = first_event(plant, state, begun.free_angle, begun.acceleration, full_velocity, step)
+    departure_torque = begun.torque + departure.share * (next_torque - begun.torque)
     left_angle, left_velocity = depart(plant, departure, departure_torque, next_torque, step)
-    slides_through = moving and full_velocity * way > 0.0 and free_angle == predicted
+    slides_through = moving and full_velocity * way > 0.0 and begun.free_angle == predicted
     next_angle = predicted if slides_through else left_angle
     next_rate = full_velocity if slides_through else left_velocity
-    return after_gas(state, next_angle, next_rate, gas)
+    return with_motion(state, next_angle, next_rate)
 
 
-def advance_led(
+def begin_led(
     plant: PlantParameters,
     state: PlantState,
     next_angle: float,
@@ -152,20 +175,32 @@ def advance_led(
     port_1: Any,
     port_2: Any,
     step: float,
-    port_flow: Callable[..., Any],
     port_flow_slopes: Callable[..., Any],
-) -> PlantState:
-    """State one step [s] later of a vane that is led to ``next_angle`` [rad]. Equations (3) to (9)."""
-    gas = advance_gas(plant, state, next_angle, port_1, port_2, step, port_flow, port_flow_slopes)
-    return after_gas(state, next_angle, next_rate, gas)
+) -> LedStep:
+    """First stage of one step [s] of a vane that is led to ``next_angle`` [rad]. Equations (3) to (9)."""
+    gas = begin_moving_gas(plant, state, next_angle, port_1, port_2, step, port_flow_slopes)
+    return LedStep(next_angle, next_rate, gas)
 
 
-def after_gas(state: PlantState, angle: float, angular_velocity: float, gas: GasChange) -> PlantState:
-    """State with a new angle [rad], angular velocity [rad/s] and the gas of one step added."""
-    vented = gas.supplied - gas.mass_1 - gas.mass_2
+def with_motion(state: PlantState, angle: float, angular_velocity: float) -> PlantState:
+    """State with a new angle [rad] and angular velocity [rad/s]."""
     return PlantState(
         angle,
         angular_velocity,
+        state.mass_1,
+        state.mass_2,
+        state.supplied_mass,
+        state.vented_mass,
+        state.leaked_mass,
+    )
+
+
+def with_gas(state: PlantState, gas: GasChange) -> PlantState:
+    """State with the gas of one step added."""
+    vented = gas.supplied - gas.mass_1 - gas.mass_2
+    return PlantState(
+        state.angle,
+        state.angular_velocity,
         state.mass_1 + gas.mass_1,
         state.mass_2 + gas.mass_2,
         state.supplied_mass + gas.supplied,

@@ -2,7 +2,8 @@
 
 The method is ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), gamma = 1 - 1/sqrt(2), with
 the exact Jacobian and the time derivative that comes from the moving volumes, which run linearly through the step.
-Gas totals are integrated by the same method as further unknowns, so that mass is conserved to rounding.
+Gas totals are integrated by the same method as further unknowns, so that mass is conserved to rounding. A step is two
+functions, one for each stage, because the lanes take each stage in a loop of its own.
 """
 
 from collections.abc import Callable
@@ -10,9 +11,9 @@ from typing import Any, NamedTuple
 
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
-from ppafo.model.ports import PortFlowSlopes
 
 GAMMA = 0.2928932188134524
+SHORTEST = 1.0e-30
 
 
 class GasChange(NamedTuple):
@@ -24,8 +25,8 @@ class GasChange(NamedTuple):
     leaked: float
 
 
-class Stage(NamedTuple):
-    """Stage slopes of the four unknowns [kg/s]."""
+class Flows(NamedTuple):
+    """Rates of both masses and both totals [kg/s]."""
 
     mass_1: float
     mass_2: float
@@ -34,9 +35,9 @@ class Stage(NamedTuple):
 
 
 class Linearisation(NamedTuple):
-    """Derivatives of the flows with respect to both masses [1/s], their drift in time over gamma h, and the inverse.
+    """The matrix 1 - gamma h J of both masses by rows, one over its determinant, and gamma h times the source's slopes.
 
-    ``a`` to ``d`` is the matrix 1 - gamma h J by rows, ``scale`` one over its determinant.
+    The leak has no entries of its own: gamma h times its slopes are ``-c`` and ``b``.
     """
 
     a: float
@@ -46,112 +47,170 @@ class Linearisation(NamedTuple):
     scale: float
     supplied_by_1: float
     supplied_by_2: float
-    leaked_by_1: float
-    leaked_by_2: float
-    drift_1: float
-    drift_2: float
-    supplied_drift: float
-    leaked_drift: float
 
 
-def solve_stage(
-    linear: Linearisation, flow_1: float, flow_2: float, supplied: float, leaked: float, weight: float
-) -> Stage:
-    """Stage slopes from the right-hand sides of both chambers and both totals [kg/s]; ``weight`` is gamma h [s]."""
-    slope_1 = (linear.d * flow_1 - linear.b * flow_2) * linear.scale
-    slope_2 = (linear.a * flow_2 - linear.c * flow_1) * linear.scale
-    supplied_slope = supplied + weight * (linear.supplied_by_1 * slope_1 + linear.supplied_by_2 * slope_2)
-    leaked_slope = leaked + weight * (linear.leaked_by_1 * slope_1 + linear.leaked_by_2 * slope_2)
-    return Stage(slope_1, slope_2, supplied_slope, leaked_slope)
+class StillGas(NamedTuple):
+    """First stage of a step with fixed volumes: the linearised flows, the stage, the pressures it leads to [Pa]."""
+
+    linear: Linearisation
+    first: Flows
+    end_1: float
+    end_2: float
 
 
-def linearised(
-    plant: PlantParameters,
-    state: PlantState,
-    volumes: tuple[float, float],
-    next_volumes: tuple[float, float],
-    in_1: PortFlowSlopes,
-    in_2: PortFlowSlopes,
-    leak_by_1: float,
-    leak_by_2: float,
-    step: float,
-) -> Linearisation:
-    """Derivatives of all flows at the beginning of a step, and the inverse that both stages use."""
-    per_mass_1 = plant.gas_product / volumes[0]
-    per_mass_2 = plant.gas_product / volumes[1]
-    weight = GAMMA * step
-    a = 1.0 - weight * (in_1.total_slope - leak_by_1) * per_mass_1
-    b = weight * leak_by_2 * per_mass_2
-    c = -weight * leak_by_1 * per_mass_1
-    d = 1.0 - weight * (in_2.total_slope + leak_by_2) * per_mass_2
-    # Pressure change that the moving volumes alone would make in this step, times gamma.
-    drift_1 = -GAMMA * state.mass_1 * per_mass_1 * (next_volumes[0] - volumes[0]) / volumes[0]
-    drift_2 = -GAMMA * state.mass_2 * per_mass_2 * (next_volumes[1] - volumes[1]) / volumes[1]
-    leaked_drift = leak_by_1 * drift_1 + leak_by_2 * drift_2
-    return Linearisation(
-        a,
-        b,
-        c,
-        d,
-        1.0 / (a * d - b * c),
-        in_1.source_slope * per_mass_1,
-        in_2.source_slope * per_mass_2,
-        leak_by_1 * per_mass_1,
-        leak_by_2 * per_mass_2,
-        in_1.total_slope * drift_1 - leaked_drift,
-        in_2.total_slope * drift_2 + leaked_drift,
-        in_1.source_slope * drift_1 + in_2.source_slope * drift_2,
-        leaked_drift,
+class MovingGas(NamedTuple):
+    """First stage with moving volumes: as ``StillGas``, and gamma h times the change of all flows in time [kg/s]."""
+
+    still: StillGas
+    drift: Flows
+
+
+def response(linear: Linearisation, rate_1: float, rate_2: float) -> Flows:
+    """Gamma h times the change of all flows in time [kg/s] while the masses change at two rates [kg/s]."""
+    return Flows(
+        (1.0 - linear.a) * rate_1 - linear.b * rate_2,
+        (1.0 - linear.d) * rate_2 - linear.c * rate_1,
+        linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
+        linear.b * rate_2 - linear.c * rate_1,
     )
 
 
-def advance_gas(
+def solve_stage(linear: Linearisation, flow_1: float, flow_2: float, supplied: float, leaked: float) -> Flows:
+    """Stage slopes [kg/s] from the right-hand sides of both chambers and both totals [kg/s]."""
+    rate_1 = (linear.d * flow_1 - linear.b * flow_2) * linear.scale
+    rate_2 = (linear.a * flow_2 - linear.c * flow_1) * linear.scale
+    return Flows(
+        rate_1,
+        rate_2,
+        supplied + linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
+        leaked + linear.b * rate_2 - linear.c * rate_1,
+    )
+
+
+def linearise(
+    plant: PlantParameters,
+    state: PlantState,
+    port_1: Any,
+    port_2: Any,
+    step: float,
+    port_flow_slopes: Callable[..., Any],
+) -> tuple[Linearisation, Flows]:
+    """All flows at the beginning of a step [s], and their linearisation. Equations (3), (6) to (9)."""
+    volumes = chamber_volumes(plant, state.angle)
+    per_mass_1 = plant.gas_product / volumes[0]
+    per_mass_2 = plant.gas_product / volumes[1]
+    pressure_1 = state.mass_1 * per_mass_1
+    pressure_2 = state.mass_2 * per_mass_2
+    in_1 = port_flow_slopes(pressure_1, port_1, plant.valve_curve)
+    in_2 = port_flow_slopes(pressure_2, port_2, plant.valve_curve)
+    leak, leak_by_1, leak_by_2 = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
+    weight_1 = GAMMA * step * per_mass_1
+    weight_2 = GAMMA * step * per_mass_2
+    a = 1.0 - (in_1.total_slope - leak_by_1) * weight_1
+    b = leak_by_2 * weight_2
+    c = -leak_by_1 * weight_1
+    d = 1.0 - (in_2.total_slope + leak_by_2) * weight_2
+    scale = 1.0 / (a * d - b * c)
+    linear = Linearisation(a, b, c, d, scale, in_1.source_slope * weight_1, in_2.source_slope * weight_2)
+    return linear, Flows(in_1.total - leak, in_2.total + leak, in_1.from_source + in_2.from_source, leak)
+
+
+def begin_still_gas(
+    plant: PlantParameters,
+    state: PlantState,
+    port_1: Any,
+    port_2: Any,
+    step: float,
+    port_flow_slopes: Callable[..., Any],
+) -> StillGas:
+    """First stage of one step [s] in which the vane stands still."""
+    linear, flows = linearise(plant, state, port_1, port_2, step, port_flow_slopes)
+    first = solve_stage(linear, flows.mass_1, flows.mass_2, flows.supplied, flows.leaked)
+    end_1, end_2 = chamber_pressures(
+        plant, state.angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
+    )
+    return StillGas(linear, first, end_1, end_2)
+
+
+def begin_moving_gas(
     plant: PlantParameters,
     state: PlantState,
     next_angle: float,
     port_1: Any,
     port_2: Any,
     step: float,
-    port_flow: Callable[..., Any],
     port_flow_slopes: Callable[..., Any],
-) -> GasChange:
-    """Changes of mass [kg] in one step [s] in which the volumes run linearly to those of ``next_angle`` [rad].
-
-    Equations (3) to (9).
-    """
+) -> MovingGas:
+    """First stage of one step [s] in which the volumes run linearly to those of ``next_angle`` [rad]."""
+    linear, flows = linearise(plant, state, port_1, port_2, step, port_flow_slopes)
     volumes = chamber_volumes(plant, state.angle)
     next_volumes = chamber_volumes(plant, next_angle)
-    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
-    in_1 = port_flow_slopes(pressure_1, port_1, plant.valve_curve)
-    in_2 = port_flow_slopes(pressure_2, port_2, plant.valve_curve)
-    leak, leak_by_1, leak_by_2 = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
-    linear = linearised(plant, state, volumes, next_volumes, in_1, in_2, leak_by_1, leak_by_2, step)
+    # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
+    duration = max(step, SHORTEST)
+    drift = response(
+        linear,
+        state.mass_1 * (volumes[0] - next_volumes[0]) / (volumes[0] * duration),
+        state.mass_2 * (volumes[1] - next_volumes[1]) / (volumes[1] * duration),
+    )
     first = solve_stage(
         linear,
-        in_1.total - leak + linear.drift_1,
-        in_2.total + leak + linear.drift_2,
-        in_1.from_source + in_2.from_source + linear.supplied_drift,
-        leak + linear.leaked_drift,
-        GAMMA * step,
+        flows.mass_1 + drift.mass_1,
+        flows.mass_2 + drift.mass_2,
+        flows.supplied + drift.supplied,
+        flows.leaked + drift.leaked,
     )
-
     end_1, end_2 = chamber_pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
-    flow_1 = port_flow(end_1, port_1, plant.valve_curve)
-    flow_2 = port_flow(end_2, port_2, plant.valve_curve)
-    leak_end = orifice_flow(end_1, end_2, plant.leak_conductance, plant.leak_curve)
-    second = solve_stage(
-        linear,
-        flow_1.total - leak_end - 2.0 * first.mass_1 - linear.drift_1,
-        flow_2.total + leak_end - 2.0 * first.mass_2 - linear.drift_2,
-        flow_1.from_source + flow_2.from_source - 2.0 * first.supplied - linear.supplied_drift,
-        leak_end - 2.0 * first.leaked - linear.leaked_drift,
-        GAMMA * step,
+    return MovingGas(StillGas(linear, first, end_1, end_2), drift)
+
+
+def second_right_sides(
+    plant: PlantParameters, begun: StillGas, port_1: Any, port_2: Any, port_flow: Callable[..., Any]
+) -> Flows:
+    """Right-hand sides of the second stage [kg/s] with fixed volumes. Equations (6) to (9)."""
+    flow_1 = port_flow(begun.end_1, port_1, plant.valve_curve)
+    flow_2 = port_flow(begun.end_2, port_2, plant.valve_curve)
+    leak = orifice_flow(begun.end_1, begun.end_2, plant.leak_conductance, plant.leak_curve)
+    first = begun.first
+    return Flows(
+        flow_1.total - leak - 2.0 * first.mass_1,
+        flow_2.total + leak - 2.0 * first.mass_2,
+        flow_1.from_source + flow_2.from_source - 2.0 * first.supplied,
+        leak - 2.0 * first.leaked,
     )
+
+
+def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
+    """Changes of mass [kg] in one step [s]."""
     return GasChange(
         step * (1.5 * first.mass_1 + 0.5 * second.mass_1),
         step * (1.5 * first.mass_2 + 0.5 * second.mass_2),
         step * (1.5 * first.supplied + 0.5 * second.supplied),
         step * (1.5 * first.leaked + 0.5 * second.leaked),
     )
+
+
+def end_still_gas(
+    plant: PlantParameters, begun: StillGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
+) -> GasChange:
+    """Changes of mass [kg] in one step [s] in which the vane stands still, from its first stage."""
+    right = second_right_sides(plant, begun, port_1, port_2, port_flow)
+    second = solve_stage(begun.linear, right.mass_1, right.mass_2, right.supplied, right.leaked)
+    return both_stages(begun.first, second, step)
+
+
+def end_moving_gas(
+    plant: PlantParameters, begun: MovingGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
+) -> GasChange:
+    """Changes of mass [kg] in one step [s] with moving volumes, from its first stage."""
+    right = second_right_sides(plant, begun.still, port_1, port_2, port_flow)
+    drift = begun.drift
+    second = solve_stage(
+        begun.still.linear,
+        right.mass_1 - drift.mass_1,
+        right.mass_2 - drift.mass_2,
+        right.supplied - drift.supplied,
+        right.leaked - drift.leaked,
+    )
+    return both_stages(begun.still.first, second, step)

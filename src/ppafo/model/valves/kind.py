@@ -14,7 +14,8 @@ class ValveModel:
     ``parameters`` and ``state`` are NamedTuple classes of floats; ``prepare(settings, step)`` makes the first from
     the declared settings and the step [s]; ``initial()`` the second. ``advance(parameters, state, command, time,
     step)`` returns what the valve shows the plant during the step, and the next state. ``connect(plant, shown)``
-    turns that into ports, and ``port_flow`` and ``port_flow_slopes`` are the functions of that kind of port.
+    turns that into ports (the engine reads its annotation of ``shown``, a float or a NamedTuple); ``port_flow`` and
+    ``port_flow_slopes`` are the functions of that kind of port.
     ``cuts(parameters, state, command, time, step)`` returns two lengths [s], the times from the beginning of the step
     to the first and to the last abrupt change inside it (both 0 for none): the step is done in parts there. None
     for a valve that does not jump by itself. ``command_delay(settings)`` is the dead time [s] before a command reaches

@@ -25,9 +25,10 @@ TINY = 1.0e-300
 
 
 class IdealProportional(NamedTuple):
-    """Parameters of a valve that follows its command at once: the dead band [-]."""
+    """Parameters of a valve that follows its command at once: dead band [-], opening per command beyond it [-]."""
 
     dead_band: float
+    gain: float
 
 
 class NoValveState(NamedTuple):
@@ -72,7 +73,8 @@ def advance_ideal(
     valve: IdealProportional, state: NoValveState, command: float, time: float, step: float
 ) -> tuple[float, NoValveState]:
     """Opening during the step [-], -1 to 1, of a valve without dynamics."""
-    opening = opening_of_command(command, valve.dead_band)
+    size = max(min(abs(command), 1.0) - valve.dead_band, 0.0) * valve.gain
+    opening = size if command >= 0.0 else -size
     return opening, NoValveState(opening)
 
 
@@ -179,7 +181,7 @@ def settle_moving(valve: MovingProportional, state: SpoolState, command: float, 
 
 def prepare_ideal(settings: Mapping[str, float], step: float) -> IdealProportional:
     """Parameters of the ideal valve."""
-    return IdealProportional(settings["dead_band"])
+    return IdealProportional(settings["dead_band"], 1.0 / (1.0 - settings["dead_band"]))
 
 
 def prepare_moving(settings: Mapping[str, float], step: float) -> MovingProportional:

@@ -1,5 +1,6 @@
 """What the checks read: the numbers of a set in SI, how exactly they were printed, and how to write them again."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import NamedTuple
@@ -49,7 +50,7 @@ class Evidence:
     """Read access to a set for the checks."""
 
     parameter_set: ParameterSet
-    declared: dict[str, Quantity]
+    declared: Mapping[str, Quantity]
 
     def number(self, path: str) -> float | None:
         """Return the value at a path in SI, None where the set does not have it or it is beyond all measure."""

@@ -15,14 +15,8 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.lanes import Batch, Floats, run_batch
-from ppafo.studies.bench.jax_model import (
-    State,
-    Variant,
-    compile_model,
-    differing_parameters,
-    state_of,
-    task_of,
-)
+from ppafo.studies.bench.jax_model import State, state_of, task_of
+from ppafo.studies.bench.jax_program import Variant, compile_model, differing_parameters
 from ppafo.studies.bench.task import ensemble
 from ppafo.studies.bench.timing import Contender, time_in_turn, time_once
 

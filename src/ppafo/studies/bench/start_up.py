@@ -44,7 +44,11 @@ def _simulation(folder: Path, times: int) -> Timing | str:
 
 def _timed(words: Sequence[str], folder: Path, times: int) -> Timing | str:
     """Durations of a command whose caches (compiled models, fonts) are in ``folder``, or why it failed."""
-    environment = {CACHE_VARIABLE: str(folder / "programs"), "MPLCONFIGDIR": str(folder / "matplotlib")}
+    environment = {
+        CACHE_VARIABLE: str(folder / "programs"),
+        "MPLCONFIGDIR": str(folder / "matplotlib"),
+        "PYTHONDONTWRITEBYTECODE": "",  # as on a user's machine, where Python keeps its own compiled files
+    }
 
     def call() -> None:
         outcome = run_python([*ENTRY, *words], environment)

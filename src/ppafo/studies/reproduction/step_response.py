@@ -8,11 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ppafo.constants import PASCALS_PER_PSI
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.studies.reproduction.observation import Observation
-
-PASCALS_PER_PSI = 6894.757293168361
 
 RESOLUTION = 1.0e-6
 """Smallest part of the travel that counts as motion in a simulated recording; a measured one needs more."""

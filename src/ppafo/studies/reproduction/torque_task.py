@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.simulation.result import Result
 from ppafo.studies.reproduction.assumed import AssumedValue
 from ppafo.studies.reproduction.claim import Claim, Verdict
@@ -10,7 +11,6 @@ from ppafo.studies.reproduction.observation import Observation
 
 _TASK = "section 'Task Assessments'"
 _MEASURED = "The paper measured its number."
-_GRAMS_PER_KILOGRAM = 1.0e3
 _PERCENT = 100.0
 _FEWEST_OSCILLATIONS = 4
 """Fewer torque reversals than two to and fro on the ramp are no oscillation but a single overshoot."""
@@ -49,7 +49,7 @@ def torque_task_claims(solenoid: Result, proportional: Result, assumed: Sequence
     gas_solenoid, gas_proportional = (run.metrics["gas_supplied"].value for run in (solenoid, proportional))
     errors = f"Simulated: {error_proportional:.3f} against {error_solenoid:.3f} N m over the whole task."
     supplied = f"Simulated: gas taken from the supply over the whole task. {_MEASURED}"
-    grams_solenoid, grams_proportional = (_GRAMS_PER_KILOGRAM * gas for gas in (gas_solenoid, gas_proportional))
+    grams_solenoid, grams_proportional = (GRAMS_PER_KILOGRAM * gas for gas in (gas_solenoid, gas_proportional))
     saved = f"Simulated: {grams_proportional:.3g} instead of {grams_solenoid:.3g} g. {_MEASURED}"
     rests_on = tuple(value.sentence() for value in assumed)
     return [

@@ -1,0 +1,42 @@
+"""Loads the compiler and the drawing library without what they do at import for other programs: a quarter of a start.
+
+Called before the first import of either; what was imported earlier stays as it is.
+"""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+
+_LINEAR_ALGEBRA = "scipy.linalg"
+
+
+def load_compiler() -> None:
+    """Import Numba without SciPy's linear algebra, which it looks for at import; compiled models have none."""
+    if "numba" in sys.modules or _LINEAR_ALGEBRA in sys.modules:
+        return
+    sys.modules[_LINEAR_ALGEBRA] = None  # type: ignore[assignment]  # as where it is not installed: the import fails
+    try:
+        import numba.np.arraymath  # noqa: F401
+    finally:
+        del sys.modules[_LINEAR_ALGEBRA]
+
+
+def load_drawing() -> None:
+    """Import matplotlib without the tables of settings that it writes into its own documentation at import."""
+    if "matplotlib.artist" in sys.modules:
+        return
+    import matplotlib.artist
+
+    with _replaced(matplotlib.artist, "kwdoc", lambda _artist: ""):
+        import matplotlib.figure
+
+
+@contextmanager
+def _replaced(module: ModuleType, name: str, stand_in: object) -> Iterator[None]:
+    original = getattr(module, name)
+    setattr(module, name, stand_in)
+    try:
+        yield
+    finally:
+        setattr(module, name, original)

@@ -1,0 +1,35 @@
+"""The pieces of which the layouts of files are made: strict tables, values that may be left out, unions of kinds."""
+
+from typing import Annotated, Any, Union
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+NAME = r"^[a-z0-9][a-z0-9_-]*$"
+"""What the name of a set or scenario looks like."""
+
+_CONFIG = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+def table(name: str, fields: dict[str, Any]) -> type[BaseModel]:
+    """Return the model of a table with these keys and no others."""
+    model: type[BaseModel] = create_model(name, __config__=_CONFIG, **fields)
+    return model
+
+
+def optional(annotation: Any, description: str) -> Any:
+    """Return the field of a value that a file may leave out."""
+    return annotation, Field(default_factory=_left_out, description=description)
+
+
+def one_of(models: list[Any]) -> Any:
+    """Return the union of tables that are told apart by their ``kind``."""
+    return Annotated[Union[tuple(models)], Field(discriminator="kind")]  # noqa: UP007
+
+
+def published_schema(model: type[BaseModel], title: str) -> dict[str, Any]:
+    """Return the JSON Schema of a file with this layout."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema(), "title": title}
+
+
+def _left_out() -> None:
+    """Stand in for a value that a file may leave out; keeps 'null' out of the published schema."""

@@ -1,0 +1,132 @@
+"""Turns what pydantic found in a document into one line: the key, the value, what is allowed, the nearest name."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails
+
+from ppafo.errors import nearest_name, one_line
+
+_LONGEST_VALUE = 60
+_NOT_THERE = frozenset({"missing", "union_tag_not_found"})
+
+
+def is_gap(detail: ErrorDetails) -> bool:
+    """Tell whether a problem is only that something is not there yet."""
+    return detail["type"] in _NOT_THERE
+
+
+def first_problem(details: list[ErrorDetails], model: type[BaseModel]) -> str:
+    """Return one problem as a sentence, and how many more there are; a misspelt key also makes another one missing."""
+    first = next((detail for detail in details if detail["type"] == "extra_forbidden"), details[0])
+    spot = _spot(model, first["loc"])
+    template = _TEMPLATES.get(first["type"])
+    if template is None:
+        sentence = _SENTENCES.get(first["type"], _any_other)(spot, first)
+    else:
+        sentence = template.format(path=spot.path, value=shown(first["input"]))
+    more = len(details) - 1
+    return f"{sentence} (and {more} more)" if more else sentence
+
+
+def shown(value: object) -> str:
+    """Return a short quotation of a value on one line."""
+    quoted = one_line(repr(value))
+    return quoted if len(quoted) <= _LONGEST_VALUE else f"{quoted[:_LONGEST_VALUE]}..."
+
+
+@dataclass(frozen=True, slots=True)
+class _Spot:
+    """Where in a file a problem is: dotted path, the model that holds its last key, and the type of what is there."""
+
+    path: str
+    holder: Any
+    wanted: Any
+
+
+def _spot(model: Any, location: Iterable[int | str]) -> _Spot:
+    """Return the spot at a location; in a union pydantic puts the kind into it, where the file has no such key."""
+    keys: list[str] = []
+    holder = wanted = model
+    for part in location:
+        kinds = _kinds(wanted)
+        if kinds:
+            wanted = kinds.get(str(part))
+            continue
+        holder, wanted = wanted, _below(wanted, str(part))
+        keys.append(one_line(part))
+    return _Spot(".".join(keys), holder, wanted)
+
+
+def _kinds(node: Any) -> dict[str, Any]:
+    """Return the members of a union of kinds by kind, nothing for any other type."""
+    union = get_args(node)[0] if get_origin(node) is Annotated else node
+    models = [item for item in get_args(union) if _is_model(item)] if get_origin(union) in (Union, UnionType) else []
+    return {get_args(item.model_fields["kind"].annotation)[0]: item for item in models if "kind" in item.model_fields}
+
+
+def _below(node: Any, part: str) -> Any:
+    """Return the type of what a table has at a key, or a table or list by names or numbers at any; None if unknown."""
+    if _is_model(node):
+        field = node.model_fields.get(part)
+        return None if field is None else field.annotation
+    members = get_args(node)
+    return members[-1] if members else None
+
+
+def _is_model(node: Any) -> bool:
+    return isinstance(node, type) and issubclass(node, BaseModel)
+
+
+def _unknown_key(spot: _Spot, _detail: ErrorDetails) -> str:
+    allowed = list(spot.holder.model_fields)
+    hint = nearest_name(spot.path.rpartition(".")[2], allowed)
+    return f"unknown key '{spot.path}'{hint}; allowed here: {', '.join(allowed)}"
+
+
+def _unknown_choice(spot: _Spot, detail: ErrorDetails) -> str:
+    allowed = _quoted_names(detail["ctx"]["expected"].replace(" or ", ","))
+    hint = nearest_name(str(detail["input"]), allowed)
+    return f"{spot.path} = {shown(detail['input'])} is not allowed{hint}; allowed: {', '.join(allowed)}"
+
+
+def _unknown_kind(spot: _Spot, detail: ErrorDetails) -> str:
+    allowed, tag = _quoted_names(detail["ctx"]["expected_tags"]), detail["ctx"]["tag"]
+    return (
+        f"{spot.path}.kind = {shown(tag)} is not known{nearest_name(str(tag), allowed)}; allowed: {', '.join(allowed)}"
+    )
+
+
+def _not_a_table(spot: _Spot, detail: ErrorDetails) -> str:
+    fields = spot.wanted.model_fields if _is_model(spot.wanted) else {}
+    required = [name for name, field in fields.items() if field.is_required()]
+    keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{spot.path}]"
+    return f"{spot.path} = {shown(detail['input'])} must be a table{keys}"
+
+
+def _any_other(spot: _Spot, detail: ErrorDetails) -> str:
+    message = detail["msg"].removeprefix("Input should be ").removeprefix("String should ")
+    return f"{spot.path} = {shown(detail['input'])}: must be {one_line(message)}"
+
+
+def _quoted_names(text: str) -> list[str]:
+    return [name.strip(" '") for name in text.split(",")]
+
+
+_TEMPLATES = {
+    "missing": "'{path}' is missing",
+    "union_tag_not_found": "'{path}.kind' is missing",
+    "string_type": "{path} = {value} must be a text in quotation marks",
+    "string_pattern_mismatch": "{path} = {value} must consist of small letters, digits, '-' and '_'",
+}
+_SENTENCES: dict[str, Callable[[_Spot, ErrorDetails], str]] = {
+    "extra_forbidden": _unknown_key,
+    "literal_error": _unknown_choice,
+    "union_tag_invalid": _unknown_kind,
+    "model_type": _not_a_table,
+    "model_attributes_type": _not_a_table,
+    "dict_type": _not_a_table,
+}

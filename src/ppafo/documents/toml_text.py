@@ -1,0 +1,68 @@
+"""From a name or a path to the document in a TOML file; every mistake is one clear line."""
+
+import tomllib
+from dataclasses import dataclass
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+from ppafo.errors import PpafoError, nearest_name, one_line, reason
+
+_SUFFIX = ".toml"
+_LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
+
+
+@dataclass(frozen=True, slots=True)
+class TomlKind:
+    """A kind of file: what messages call it, its name for ``ppafo schema``, those of the package, the error raised."""
+
+    noun: str
+    schema: str
+    shipped: Traversable
+    error: type[PpafoError]
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the files that come with the package."""
+        names = (Path(item.name) for item in self.shipped.iterdir())
+        return tuple(sorted(name.stem for name in names if name.suffix == _SUFFIX))
+
+    def read(self, name_or_path: str | Path) -> bytes:
+        """Return the content of a file of the package, by its name, or of any other, by its path."""
+        name, path = str(name_or_path), Path(name_or_path)
+        if name in self.names():
+            return (self.shipped / (name + _SUFFIX)).read_bytes()
+        if path.suffix != _SUFFIX and not _exists(path):
+            hint, known = nearest_name(name, self.names()), ", ".join(self.names())
+            raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; known are {known}, or give a .toml file")
+        try:
+            return path.read_bytes()
+        except (OSError, ValueError) as error:
+            raise self.error(f"{label(name)}: cannot be read: {reason(error)}") from error
+
+    def parse(self, content: bytes, file: str) -> dict[str, Any]:
+        """Return the document in the bytes of a file; ``file`` is what messages call it."""
+        try:
+            text = content.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
+        if not text.strip():
+            raise self.error(f"{file}: is empty; 'ppafo schema {self.schema}' prints what belongs in it")
+        try:
+            return tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise self.error(f"{file}: is not valid TOML: {one_line(error)}") from error
+        except (RecursionError, ValueError) as error:
+            raise self.error(f"{file}: is not usable TOML: nested too deeply or a number too long") from error
+
+
+def label(file: str) -> str:
+    """Return what messages call a file: its name on one line, without its middle where it is very long."""
+    name = one_line(file)
+    return name if len(name) <= _LONGEST_LABEL else f"{name[:_KEPT_AT_EACH_END]}...{name[-_KEPT_AT_EACH_END:]}"
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False

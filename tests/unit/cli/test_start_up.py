@@ -1,0 +1,58 @@
+"""What the command line does to answer soon, and that nothing else notices."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def printed_by(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_a_run_loads_nothing_that_only_others_need(tmp_path: Path) -> None:
+    words = ["simulate", "step-response", "--json", "--out", str(tmp_path / "step")]
+    heavy = ("scipy.linalg", "xarray", "pandas", "matplotlib.pyplot", "jinja2", "jax")
+    code = (
+        f"import sys\nfrom ppafo.cli.main import main\nassert main({words!r}) == 0\n"
+        f"print([name for name in {heavy!r} if name in sys.modules])"
+    )
+    assert printed_by(code).splitlines()[-1] == "[]"
+
+
+def test_linear_algebra_can_still_be_loaded_after_the_compiler() -> None:
+    pytest.importorskip("scipy")
+    code = (
+        "import sys\nfrom ppafo.cli.quick_imports import load_compiler\nload_compiler()\n"
+        "assert 'numba' in sys.modules and 'scipy.linalg' not in sys.modules\n"
+        "import scipy.linalg\nprint(scipy.linalg.det([[2.0]]))"
+    )
+    assert printed_by(code) == "2.0"
+
+
+def test_the_drawing_library_is_left_as_it_was() -> None:
+    code = (
+        "from ppafo.cli.quick_imports import load_drawing\nload_drawing()\n"
+        "import matplotlib.artist\nfrom matplotlib.lines import Line2D\n"
+        "print('linewidth' in matplotlib.artist.kwdoc(Line2D))"
+    )
+    assert printed_by(code) == "True"
+
+
+@pytest.mark.parametrize(("library", "loader"), [("numba", "load_compiler"), ("matplotlib.figure", "load_drawing")])
+def test_a_library_that_is_there_already_is_not_touched(library: str, loader: str) -> None:
+    code = (
+        f"import sys, {library}\nfrom ppafo.cli import quick_imports\nbefore = dict(sys.modules)\n"
+        f"quick_imports.{loader}()\nprint(sys.modules == before)"
+    )
+    assert printed_by(code) == "True"
+
+
+def test_main_leaves_the_garbage_collection_of_a_calling_program_alone() -> None:
+    code = (
+        "import gc\nbefore = gc.get_threshold()\nfrom ppafo.cli.main import main\nmain(['schema', 'scenario'])\n"
+        "print(gc.isenabled() and gc.get_threshold() == before)"
+    )
+    assert printed_by(code).splitlines()[-1] == "True"
