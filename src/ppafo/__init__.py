@@ -22,11 +22,12 @@ if TYPE_CHECKING:
         UnitError,
     )
     from ppafo.metrics import Metric, evaluate
+    from ppafo.model.sensors import Measurement
     from ppafo.parameters import ParameterSet, apply_overrides, list_sets, load_device, load_parameter_set
     from ppafo.parameters.audit import audit
     from ppafo.parameters.device import Device
     from ppafo.signals import Channel, Recording
-    from ppafo.simulation.loading import list_scenarios, load_scenario
+    from ppafo.simulation.loading import list_scenarios, load_scenario, scenario_from_dict
     from ppafo.simulation.result import Result, Status
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import simulate, simulate_many
@@ -39,6 +40,7 @@ __all__ = [
     "DataError",
     "Device",
     "IdentificationError",
+    "Measurement",
     "Metric",
     "ParameterError",
     "ParameterSet",
@@ -60,6 +62,7 @@ __all__ = [
     "load_scenario",
     "read_recording",
     "read_result",
+    "scenario_from_dict",
     "simulate",
     "simulate_many",
 ]
@@ -75,11 +78,12 @@ _HOMES = {
         "UnitError",
     ),
     "ppafo.metrics": ("Metric", "evaluate"),
+    "ppafo.model.sensors": ("Measurement",),
     "ppafo.parameters": ("ParameterSet", "apply_overrides", "list_sets", "load_device", "load_parameter_set"),
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
     "ppafo.signals": ("Channel", "Recording"),
-    "ppafo.simulation.loading": ("list_scenarios", "load_scenario"),
+    "ppafo.simulation.loading": ("list_scenarios", "load_scenario", "scenario_from_dict"),
     "ppafo.simulation.result": ("Result", "Status"),
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("simulate", "simulate_many"),

@@ -22,7 +22,7 @@ def gas_vented(recording: Recording) -> float:
 
 
 def gas_leaked(recording: Recording) -> float:
-    """Gas leaked past the vane [kg], positive from chamber 1 to chamber 2."""
+    """Gas leaked past the vane [kg], either way."""
     return _gain(recording, "leaked_mass")
 
 
@@ -56,7 +56,7 @@ _BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
 METRICS = (
     MetricKind("gas_supplied", "kg", "gas taken from the supply", ("supplied_mass",), gas_supplied),
     MetricKind("gas_vented", "kg", "gas let out to the atmosphere", ("vented_mass",), gas_vented),
-    MetricKind("gas_leaked", "kg", "gas leaked past the vane, chamber 1 to chamber 2", ("leaked_mass",), gas_leaked),
+    MetricKind("gas_leaked", "kg", "gas leaked past the vane, either way", ("leaked_mass",), gas_leaked),
     MetricKind("gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance),
     MetricKind("largest_pressure", "Pa", "largest absolute pressure", ("pressure_1", "pressure_2"), largest_pressure),
     MetricKind("mechanical_work", "J", "work of the actuator on the vane", ("torque", "angle"), mechanical_work),

@@ -26,7 +26,7 @@ CHANNELS: dict[str, ChannelKind] = {
     "command": ChannelKind(PLAIN_NUMBER, "command to the valve, from -1 to 1", is_held=True),
     "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start"),
     "vented_mass": ChannelKind("kg", "gas let out to the atmosphere since the start"),
-    "leaked_mass": ChannelKind("kg", "gas leaked from chamber 1 to chamber 2 since the start"),
+    "leaked_mass": ChannelKind("kg", "gas leaked past the vane, either way, since the start"),
     "external_torque": ChannelKind("N m", "torque on the wearer, T_ex of equation (1)"),
     "mass_1": ChannelKind("kg", "gas in chamber 1"),
     "mass_2": ChannelKind("kg", "gas in chamber 2"),
