@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.cache import load_generated
-from ppafo.engine.lane_source import LANES, lane_source
+from ppafo.engine.lane_rows import LANES
+from ppafo.engine.lane_source import lane_source
 from ppafo.engine.program import Program
 
 Floats = NDArray[np.float64]

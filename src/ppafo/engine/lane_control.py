@@ -1,0 +1,79 @@
+"""What the lanes do at a sample: sense, control, and keep what sensors and valve get late."""
+
+from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
+from ppafo.model.plant import chamber_pressures
+from ppafo.model.sensors import Measurement, measure
+from ppafo.model.vane import actuator_torque
+
+
+def control_loop(rows: LaneRows) -> list[str]:
+    """Sense and control, at every sample; nothing where the caller sets the command."""
+    controller = rows.program.controller
+    if controller is None:
+        return []
+    groups = ("timing", "plant", "state", "controller", "controller_state", "reference")
+    lines = [
+        *[rows.load(group) for group in groups],
+        *sense(rows),
+        f"wanted = {rows.add(rows.program.reference.value)}(reference, step_index * timing.step)[0]",
+        f"command, controller_state = {rows.add(controller.update)}"
+        "(controller, controller_state, wanted, seen, timing.period)",
+        *rows.store("controller_state"),
+        f"x[{rows.state_at['result.command']}, lane] = command",
+    ]
+    loop = over_lanes(lines)
+    return ["if step_index % steps_per_sample == 0:", *indented(loop)]
+
+
+def sense(rows: LaneRows) -> list[str]:
+    """Lines that make the measurement ``seen``."""
+    if not rows.program.ideal_sensors:
+        measuring = rows.add(measure)
+        return [
+            rows.load("sensors"),
+            "depth = signal_history.shape[1]",
+            "late = (step_index - signal_delay) % depth",
+            "later = (step_index - signal_delay - 1) % depth",
+            *[
+                f"{name} = signal_history[{row}, late, lane] + timing.signal_lag * "
+                f"(signal_history[{row}, later, lane] - signal_history[{row}, late, lane])"
+                for row, name in enumerate(("angle", "pressure_1", "pressure_2"))
+            ],
+            f"seen = {measuring}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, "
+            "step_index // steps_per_sample)",
+        ]
+    return [
+        f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}(plant, state.angle, state.mass_1, state.mass_2)",
+        f"torque = {rows.add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
+        f"seen = {rows.add(Measurement)}(state.angle, pressure_1, pressure_2, torque)",
+    ]
+
+
+def remember_signals(rows: LaneRows) -> list[str]:
+    """Keeps the signals of every step, where they are seen late."""
+    if rows.program.ideal_sensors or rows.program.controller is None:
+        return []
+    lines = [
+        rows.load("plant"),
+        rows.load("state"),
+        f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}(plant, state.angle, state.mass_1, state.mass_2)",
+        "signal_history[0, step_index % signal_history.shape[1], lane] = state.angle",
+        "signal_history[1, step_index % signal_history.shape[1], lane] = pressure_1",
+        "signal_history[2, step_index % signal_history.shape[1], lane] = pressure_2",
+    ]
+    before_start = [
+        "if step_index == 0:",
+        "    for slot in range(1, signal_history.shape[1]):",
+        "        signal_history[:, slot, :] = signal_history[:, 0, :]",
+    ]
+    return [*over_lanes(lines), *before_start]
+
+
+def remember_commands(rows: LaneRows) -> list[str]:
+    """Keeps the command of every step, where the valve gets it late."""
+    if not rows.program.late_commands:
+        return []
+    lines = [
+        f"command_history[step_index % command_history.shape[0], lane] = x[{rows.state_at['result.command']}, lane]",
+    ]
+    return over_lanes(lines)

@@ -1,0 +1,60 @@
+"""The rows of one program in a lane block, and the lines that load and store them."""
+
+from collections.abc import Callable
+from typing import Any, final
+
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.source_text import SourceCollector
+
+LANES = 32
+
+
+@final
+class LaneRows:
+    """Where each number of a program lies: parameters in ``p``, state in ``x``, what a step hands on in ``t``."""
+
+    def __init__(self, program: Program, collector: SourceCollector) -> None:
+        self.program = program
+        self.add: Callable[[Callable[..., Any] | type], str] = collector.add
+        self.parameter_at = _row_numbers(program.parameter_rows())
+        self.state_at = _row_numbers(program.state_rows())
+        self.step_at = _row_numbers(program.step_rows())
+        self.cells = {path: f"p[{row}, lane]" for path, row in self.parameter_at.items()}
+        self.cells |= {path: f"x[{row}, lane]" for path, row in self.state_at.items()}
+        self.cells |= {path: f"t[{row}, lane]" for path, row in self.step_at.items()}
+
+    def load(self, group: str) -> str:
+        """Line that makes the NamedTuple ``group`` from its rows."""
+        groups = self.program.parameter_rows() | self.program.state_rows() | self.program.step_rows()
+        row = groups[group]
+        return f"{group} = {row_expression(row, group, self.cells, self.add)}"
+
+    def store(self, group: str) -> list[str]:
+        """Lines that write the NamedTuple ``group`` back to its rows."""
+        paths = leaf_paths(self.program.state_rows()[group], group)
+        return [f"x[{self.state_at[path]}, lane] = {path}" for path in paths]
+
+    def keep(self) -> list[str]:
+        """Lines that keep what the first stage hands on."""
+        groups = self.program.step_rows().items()
+        return [f"{self.cells[path]} = {path}" for name, row in groups for path in leaf_paths(row, name)]
+
+    def load_step(self) -> list[str]:
+        """Lines that load what the first stage handed on."""
+        return [self.load(name) for name in self.program.step_rows()]
+
+
+def _row_numbers(groups: dict[str, type]) -> dict[str, int]:
+    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
+    return {path: number for number, path in enumerate(paths)}
+
+
+def indented(lines: list[str], levels: int = 1) -> list[str]:
+    """The lines, some levels further in."""
+    return ["    " * levels + line for line in lines]
+
+
+def over_lanes(lines: list[str]) -> list[str]:
+    """A loop over all lanes of the block."""
+    return ["for lane in range(width):", *indented(lines)]
