@@ -114,6 +114,14 @@ def test_the_limits_of_accuracy_are_those_of_the_tests() -> None:
     assert [float(cell) for cell in row] == held
 
 
+def test_the_steps_that_the_readme_says_were_taken_are_those_of_the_plan() -> None:
+    steps = {scenario: plan_run(load_scenario(scenario)).step for scenario in MEASURED.values()}
+    section = " ".join(TEXT.partition("## Accuracy")[2].partition("## Speed")[0].split())
+    (parts, step) = re.findall(r"step response into (\d+) parts, so they are really (\S+) ms", section)[0]
+    assert steps["step-response"] == pytest.approx(float(step) * 1e-3) == pytest.approx(1e-3 / int(parts))
+    assert {steps["torque-task-solenoid"], steps["torque-task-proportional"]} == {1e-3}
+
+
 @pytest.mark.parametrize("row", MEASURED)
 def test_the_accuracy_that_the_readme_shows_is_about_what_is_measured(row: str) -> None:
     (cells,) = re.findall(rf"^\| {re.escape(row)} \| \S+ \| (\S+) \| (\S+) \|$", TEXT, re.MULTILINE)

@@ -149,6 +149,9 @@ def test_a_changed_value_is_on_record(tmp_path: Path) -> None:
         (["--set", "supply.presure=60 psi_g"], "did you mean 'supply.pressure'"),
         (["--set", "valve.area=-1 mm^2"], "valve"),
         (["--set", "nonsense"], "PATH=VALUE"),
+        (["--set", "referense.level=4 N m"], "did you mean 'reference.level'?"),
+        (["--set", "controller.integral_gian=1"], "did you mean 'controller.integral_gain'?"),
+        (["--set", "valve.aera=1 mm^2"], "no value 'valve.aera', did you mean 'valve.area'?"),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_written(
@@ -166,14 +169,32 @@ def test_a_place_that_cannot_be_written_is_refused_in_one_line(
 ) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     assert main(["reproduce", "--out", str(tmp_path / "file")]) == 2
-    assert "cannot be written" in capsys.readouterr().err.splitlines()[-1]
+    assert capsys.readouterr().err.endswith("file: is a file; a ppafo reproduction needs a folder\n")
 
 
-def test_what_else_is_in_the_folder_stays(tmp_path: Path) -> None:
+def test_a_folder_of_somebody_elses_is_refused_before_anything_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def never(*arguments: object) -> None:
+        raise AssertionError("it ran")
+
+    monkeypatch.setattr(study, "reproduce", never)
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
-    assert main(["reproduce", "--out", str(tmp_path)]) == 0
-    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
-    assert [entry.name for entry in tmp_path.iterdir() if entry.name.startswith(".")] == []
+    assert main(["reproduce", "--out", str(tmp_path)]) == 2
+    complaint = (
+        f"ppafo: {tmp_path}: is not empty and not a ppafo reproduction (it has no claims.json); choose another folder\n"
+    )
+    assert capsys.readouterr().err == complaint
+    assert {entry.name for entry in tmp_path.iterdir()} == {"notes.txt"}
+
+
+def test_the_same_folder_is_taken_again_and_replaced_whole(tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    assert main(["reproduce", "--out", str(folder), "--set", "reference.level=4 N m"]) == 0
+    assert main(["reproduce", "--out", str(folder)]) == 0
+    assert json.loads((folder / "claims.json").read_text(encoding="utf-8"))["overrides"] == []
+    assert {entry.name for entry in folder.iterdir()} == set(FILES)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
 def test_heavy_packages_are_not_loaded_to_show_the_help() -> None:

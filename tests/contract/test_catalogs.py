@@ -71,6 +71,17 @@ def test_profiles_return_value_rate_and_second_derivative_that_belong_together(k
         assert second == pytest.approx((after[1] - before[1]) / (2 * width), abs=1e-4)
 
 
+@pytest.mark.parametrize("kind", PROFILES.values(), ids=lambda kind: kind.name)
+def test_profiles_stay_within_the_bounds_that_they_state_and_reach_them(kind: ProfileKind) -> None:
+    parameters = kind.parameters(**(defaults(kind) | {"level": -0.7}))
+    lowest, highest = kind.bounds(parameters)
+    values = [kind.value(parameters, 0.001 * step)[0] for step in range(5000)]
+    assert min(values) == pytest.approx(lowest, abs=1e-4)
+    assert max(values) == pytest.approx(highest, abs=1e-4)
+    assert lowest - 1e-9 <= min(values)
+    assert max(values) <= highest + 1e-9
+
+
 @pytest.mark.parametrize(("name", "model", "settings"), valve_models())
 def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
     name: str, model: ValveModel, settings: dict[str, float]

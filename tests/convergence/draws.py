@@ -19,12 +19,13 @@ from ppafo.parameters.device import (
     Valve,
 )
 from ppafo.simulation.loading import load_scenario as load_from_file
-from ppafo.simulation.scenario import Control, FreeMotion, LedMotion, ProfileChoice, Scenario, Sensors
+from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice, Scenario, Sensors
 
 PSI = 6894.757293168361
 ATMOSPHERE = 101325.0
 GASES = (("CO2", 0.044, 1.3), ("air", 0.028965, 1.4), ("N2", 0.028013, 1.401))
 load_scenario = lru_cache(load_from_file)
+PERIODS = {"proportional": (0.001, 0.002, 0.005), "solenoid": (0.05, 0.05, 0.02, 0.001)}
 EXPERIMENTS = ("step", "step with solenoids", "proportional", "solenoid")
 
 
@@ -44,7 +45,9 @@ def random_valve(chance: random.Random, kind: str) -> Valve:
     """A valve with and without dynamics."""
     settings = {quantity.name: quantity.default or 0.0 for quantity in VALVES[kind].quantities}
     if kind == "solenoid":
-        settings = {name: chance.uniform(0.0, 0.01) for name in settings} | {"switching_interval": 0.05}
+        longest = chance.choice([0.001, 0.01])
+        settings = {name: chance.uniform(0.0, longest) for name in settings}
+        settings["switching_interval"] = chance.choice([0.05, chance.uniform(0.0, 0.06)])
     elif chance.random() < 0.5:
         settings |= {
             "dead_band": chance.uniform(0.0, 0.1),
@@ -110,5 +113,5 @@ def random_scenario(seed: int) -> Scenario:
             "ramp_hold", {"start_level": 0.0, "level": level, "ramp_start": 0.0, "ramp_time": ramp_time}
         ),
         sensors=dataclasses.replace(Sensors(), delay=chance.choice([0.0, 0.0, chance.uniform(0.0, 0.005)])),
-        control=dataclasses.replace(base.control) if isinstance(base.control, Control) else base.control,
+        control=dataclasses.replace(base.control, period=chance.choice(PERIODS[experiment])),
     )

@@ -47,6 +47,23 @@ def test_dead_volume_of_one_cubic_centimetre_is_within_the_limits(name: str) -> 
     assert_within_limits(compare_with_reference(plan_run(load_scenario(name, overrides))), name)
 
 
+@pytest.mark.parametrize(
+    ("interval", "opening", "closing", "rate"),
+    [
+        ("50.2 ms", "0.2 ms", "0.5 ms", "20 Hz"),
+        ("50.1 ms", "0.1 ms", "0.8 ms", "20 Hz"),
+        ("0.3 ms", "0.2 ms", "0.5 ms", "100 Hz"),
+    ],
+)
+def test_several_switchings_inside_one_step_are_within_the_limits(
+    interval: str, opening: str, closing: str, rate: str
+) -> None:
+    delays = [f"valve.opening_delay={opening}", f"valve.closing_delay={closing}"]
+    overrides = [*delays, f"valve.switching_interval={interval}", f"controller.rate={rate}"]
+    agreement = compare_with_reference(plan_run(load_scenario("torque-task-solenoid", overrides)))
+    assert_within_limits(agreement, f"{interval} {opening} {closing} {rate}")
+
+
 @pytest.mark.parametrize("first", range(0, len(SEEDS), SEEDS_PER_TEST))
 def test_random_devices_are_within_the_limits(draws: ModuleType, first: int) -> None:
     for seed in SEEDS[first : first + SEEDS_PER_TEST]:

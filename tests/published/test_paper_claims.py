@@ -100,3 +100,11 @@ def test_the_printed_numbers_are_judged_by_their_own_arithmetic(
     claim = claims[identifier]
     assert claim.value == pytest.approx(value, abs=digits)
     assert (claim.paper, claim.unit, claim.verdict) == (paper, unit, verdict)
+
+
+def test_report_says_where_the_step_response_differs_from_the_telling(reproduction: Reproduction) -> None:
+    differences = {seen.id: seen.difference for seen in reproduction.step_observations if seen.difference}
+    assert "chamber 2" in differences["pressure_1_rises_until_breakaway"]
+    assert "rises again by" in differences["pressure_1_falls_in_motion"]
+    assert "it rises by" in differences["pressure_2_slows_in_motion"]
+    assert len(differences) == 3

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 
 import ppafo
+from ppafo.cli.arguments import CommandParser, UsageError, check_command, check_options
 from ppafo.cli.catalog import COMMANDS
 from ppafo.errors import PpafoError, one_line
 
@@ -17,11 +18,11 @@ _OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 """The usual 700 make Python look for garbage hundreds of times while it imports, which is a tenth of a start."""
 
 
-def build_parser(chosen: str | None) -> argparse.ArgumentParser:
+def build_parser(chosen: str | None) -> CommandParser:
     """Return the parser; only the chosen subcommand's module is imported, so that help is quick."""
-    parser = argparse.ArgumentParser(prog="ppafo", description="Model-based design of pneumatic powered orthoses.")
+    parser = CommandParser(prog="ppafo", description="Model-based design of pneumatic powered orthoses.")
     parser.add_argument("--version", action="version", version=f"ppafo {ppafo.__version__}")
-    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND")
     for name, summary in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=summary, description=summary)
         if name == chosen:
@@ -43,9 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    chosen = next((word for word in words if not word.startswith("-")), None)
-    parsed = build_parser(chosen).parse_args(words)
     try:
+        parsed = _parsed(words)
         return int(parsed.run(parsed))
     except PpafoError as error:
         print(f"ppafo: {one_line(error)}", file=sys.stderr)
@@ -53,3 +53,14 @@ def _run(words: list[str]) -> int:
     except KeyboardInterrupt:
         print("ppafo: interrupted; nothing was written", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _parsed(words: list[str]) -> argparse.Namespace:
+    chosen = next((word for word in words if not word.startswith("-")), None)
+    check_command(chosen, tuple(COMMANDS))
+    parser = build_parser(chosen)
+    check_options(words, parser)
+    parsed = parser.parse_args(words)
+    if parsed.command is None:
+        raise UsageError(f"no command was given; known are {', '.join(COMMANDS)}; 'ppafo --help' says what each does")
+    return parsed

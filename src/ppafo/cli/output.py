@@ -1,14 +1,15 @@
 """Arguments that commands share, printing as text or JSON, and files that are never half written."""
 
 import argparse
+import contextlib
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from ppafo.documents.json_text import json_text
-from ppafo.errors import DataError
+from ppafo.errors import DataError, reason
 
 EXIT_GOOD = 0
 EXIT_CHECK_FAILED = 1
@@ -58,10 +59,32 @@ def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.
 
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
     """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``ppafo sets | head``."""
-    try:
+    with _printing():
         print(json_text(document) if as_json else text, flush=True)
+
+
+def flush_output() -> None:
+    """Write what was printed so far, such as a help text, with the same errors as ``print_result``."""
+    with _printing():
+        print(end="", flush=True)
+
+
+@contextlib.contextmanager
+def _printing() -> Iterator[None]:
+    try:
+        yield
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
+    except OSError as error:
+        _drop_output()
+        raise DataError(f"standard output cannot be written: {reason(error)}") from error
+
+
+def _drop_output() -> None:
+    """Let what is left go nowhere: Python would try to write it once more when it ends, and complain again."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
 
 
 def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:

@@ -37,7 +37,8 @@ class ProfileKind:
     """A function of time in the catalogue, for a reference or a prescribed angle.
 
     ``parameters`` is a NamedTuple class whose fields are the quantities in order; ``value(parameters, time)`` returns
-    value, rate and second derivative at a time [s]. A quantity with unit ``""`` takes the unit of what is prescribed.
+    value, rate and second derivative at a time [s]; ``bounds(parameters)`` the lowest and highest value of all time.
+    A quantity with unit ``""`` takes the unit of what is prescribed.
     """
 
     name: str
@@ -45,6 +46,7 @@ class ProfileKind:
     quantities: tuple[Quantity, ...]
     parameters: type
     value: Callable[..., Any]
+    bounds: Callable[..., tuple[float, float]]
 
 
 class PythonController(Protocol):

@@ -6,6 +6,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
 from ppafo.errors import PpafoError, nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
@@ -35,7 +36,7 @@ class TomlKind:
             hint, known = nearest_name(name, self.names()), ", ".join(self.names())
             raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; known are {known}, or give a .toml file")
         try:
-            return path.read_bytes()
+            return read_regular_file(path, MOST_BYTES_TYPED)
         except (OSError, ValueError) as error:
             raise self.error(f"{label(name)}: cannot be read: {reason(error)}") from error
 

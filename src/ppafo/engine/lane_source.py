@@ -42,7 +42,7 @@ def lane_source(program: Program) -> str:
                 f"x = np.empty(({len(rows.state_at)}, {LANES}))",
                 f"p = np.empty(({len(rows.parameter_at)}, {LANES}))",
                 f"t = np.empty(({len(rows.step_at)}, {LANES}))",
-                f"lengths = np.empty((3, {LANES}))",
+                f"lengths = np.empty((2, {LANES}))",
                 "width = states.shape[1]",
                 *_copy("x", "states", len(rows.state_at)),
                 *_copy("p", "parameters", len(rows.parameter_at)),

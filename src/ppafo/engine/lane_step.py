@@ -1,18 +1,18 @@
 """What the lanes do in a step: valve, gas and vane, whole or in parts where something changes abruptly inside it."""
 
-from collections.abc import Callable
-from typing import Any
-
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
-from ppafo.engine.scheme import motion, pneumatics
+from ppafo.engine.scheme import motion, parts, pneumatics
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
 
+MOST_PARTS = 16
+"""More parts than a step may sensibly have: two coils, each with an order and a change, several times over."""
+
 SKIP_EMPTY = [
     "longest = 0.0",
     "for lane in range(width):",
-    "    longest = max(longest, lengths[part, lane])",
+    "    longest = max(longest, lengths[0, lane])",
     "if longest == 0.0:",
     "    break",
 ]
@@ -22,8 +22,8 @@ def plant_loop(rows: LaneRows) -> list[str]:
     """Valve, gas and vane, one step: whole, or in parts where something changes abruptly inside it."""
     if rows.program.late_commands:
         return late_loop(rows)
-    if rows.program.valve.cuts is not None:
-        return cut_loop(rows, rows.program.valve.cuts)
+    if rows.program.valve.jumps:
+        return jump_loop(rows)
     return part(rows, [*opening(rows), "length = timing.step"])
 
 
@@ -33,24 +33,34 @@ def opening(rows: LaneRows) -> list[str]:
     return [*[rows.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
 
 
-def cut_loop(rows: LaneRows, cuts: Callable[..., Any]) -> list[str]:
-    """Three parts, between the switchings of the valve; parts that no lane needs are passed over."""
-    cut = [
-        f"first, second = {rows.add(cuts)}(valve, valve_state, command, time, timing.step)",
-        "whole = first <= 0.0",
-        "lengths[0, lane] = timing.step if whole else first",
-        "lengths[1, lane] = 0.0 if whole else (second - first if second > first else timing.step - first)",
-        "lengths[2, lane] = timing.step - second if second > first else 0.0",
+def jump_loop(rows: LaneRows) -> list[str]:
+    """As many parts as the valve's jumps ask for; a part that no lane needs ends the step.
+
+    ``lengths[0]`` is the length of a part and ``lengths[1]`` the time before it, both from the beginning of the step.
+    """
+    valve = rows.program.valve
+    functions = f"{rows.add(valve.next_event)}, {rows.add(valve.settle)}"
+    measure = [
+        *opening(rows),
+        "before = lengths[1, lane]",
+        "remaining = timing.step - before",
+        f"until = {rows.add(parts.part_length)}(valve, valve_state, command, time + before, remaining, {functions})",
+        f"lengths[0, lane] = remaining if part == {MOST_PARTS - 1} else until",
     ]
-    begin = [
-        "length = lengths[part, lane]",
-        "time += (lengths[0, lane] if part > 0 else 0.0) + (lengths[1, lane] if part > 1 else 0.0)",
+    begin = ["length = lengths[0, lane]", "time += lengths[1, lane]"]
+    # The end of the last part is the end of the step to the last bit, so that no sliver is left over.
+    add_up = [
+        f"step = p[{rows.parameter_at['timing.step']}, lane]",
+        "whole = lengths[0, lane] >= step - lengths[1, lane]",
+        "lengths[1, lane] = step if whole else lengths[1, lane] + lengths[0, lane]",
     ]
     return [
-        *over_lanes([*opening(rows), *cut]),
-        "for part in range(3):",
+        *over_lanes(["lengths[1, lane] = 0.0"]),
+        f"for part in range({MOST_PARTS}):",
+        *indented(over_lanes(measure)),
         *indented(SKIP_EMPTY),
         *indented(part(rows, [*opening(rows), *begin])),
+        *indented(over_lanes(add_up)),
     ]
 
 
@@ -61,7 +71,7 @@ def late_loop(rows: LaneRows) -> list[str]:
         *opening(rows),
         rows.load("early_valve"),
         "valve = early_valve",
-        "length = lengths[part, lane]",
+        "length = lengths[0, lane]",
         "command = command_history[(step_index - command_delay - 1) % command_history.shape[0], lane]",
     ]
     after = [

@@ -5,6 +5,7 @@ through the same instructions and no lane sees another.
 """
 
 import os
+import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -20,6 +21,9 @@ from ppafo.engine.lane_source import lane_source
 from ppafo.engine.program import Program
 
 Floats = NDArray[np.float64]
+
+STEPS_PER_CALL = 200_000
+"""Steps in one call of compiled code, a few tenths of a second."""
 
 VECTOR = 8
 """Lanes that the widest processors take at once; a block is a whole number of these."""
@@ -69,17 +73,22 @@ def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
 
     waiting = iter(starts)
     results: dict[int, BatchResult] = {}
+    stop = threading.Event()
 
     def work() -> None:
         for start in waiting:
-            results[start] = _run_block(module, batch, slice(start, min(start + LANES, runs)))
+            if not stop.is_set():
+                results[start] = _run_block(module, batch, slice(start, min(start + LANES, runs)), stop)
 
     if workers == 1:
         work()
     else:
         with ThreadPoolExecutor(workers) as pool:
-            for done in [pool.submit(work) for _ in range(workers)]:
-                done.result()
+            try:
+                for done in [pool.submit(work) for _ in range(workers)]:
+                    done.result()
+            finally:
+                stop.set()
     return _joined([results[start] for start in starts])
 
 
@@ -90,9 +99,14 @@ def _joined(results: Sequence[BatchResult]) -> BatchResult:
     return BatchResult(states, np.concatenate([result.record for result in results], axis=2))
 
 
-def _run_block(module: ModuleType, batch: Batch, runs: slice) -> BatchResult:
+def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Event) -> BatchResult:
+    """One block from beginning to end, in calls short enough for an interrupt to be seen between them."""
     block = LaneBlock(module, batch.clock, batch.parameters[:, runs], batch.states[:, runs])
-    block.advance(batch.clock.step_count)
+    steps = batch.clock.step_count
+    for done in range(0, steps, STEPS_PER_CALL):
+        if stop.is_set():
+            break
+        block.advance(min(STEPS_PER_CALL, steps - done))
     return block.result()
 
 

@@ -1,7 +1,7 @@
 """Changing single values of a set by dotted path, with the change visible in the provenance."""
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.gas import SPECIES
@@ -12,8 +12,34 @@ from ppafo.units import split_quantity
 
 SOURCE = "override"
 
+_CHOSEN = "valve."
+
 _AREA_NAMES = frozenset(quantity.name for quantity in AREA_FORM)
 _SONIC_NAMES = frozenset(quantity.name for quantity in SONIC_FORM)
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """An override as it was typed, and the valve that ``valve`` means in it."""
+
+    typed: str
+    chosen: str
+    text: str
+
+    @property
+    def path(self) -> str:
+        """The path in the set."""
+        inside = self.typed.removeprefix(_CHOSEN)
+        return f"valves.{self.chosen}.{inside}" if self.typed.startswith(_CHOSEN) else self.typed
+
+    def named(self, path: str) -> str:
+        """Return a path of the set in the way in which this override was typed."""
+        own = f"valves.{self.chosen}."
+        return _CHOSEN + path.removeprefix(own) if self.typed.startswith(_CHOSEN) and path.startswith(own) else path
+
+    def refusal(self, why: object) -> ParameterError:
+        """Return the error that quotes the override as it was typed."""
+        return ParameterError(f"override '{self.typed}={self.text}': {why}")
 
 
 def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve: str | None = None) -> ParameterSet:
@@ -29,10 +55,8 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
         path, separator, text = (part.strip() for part in on_one_line.partition("="))
         if not separator or not path or not text:
             raise ParameterError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
-        if path.startswith("valve."):
-            path = f"valves.{chosen}.{path.removeprefix('valve.')}"
         change = _with_species if path == SPECIES_PATH else _with_number
-        parameter_set = change(parameter_set, path, text)
+        parameter_set = change(parameter_set, _Order(path, chosen, text))
     return parameter_set
 
 
@@ -42,28 +66,27 @@ def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
     return frozenset(path for path, entry in entries.items() if entry.source == SOURCE)
 
 
-def _with_number(parameter_set: ParameterSet, path: str, text: str) -> ParameterSet:
-    declared = parameter_set.declared()
+def _with_number(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
+    declared, path = parameter_set.declared(), order.path
     if path not in declared:
-        allowed = [*declared, SPECIES_PATH]
-        hint = nearest_name(path, allowed) or f"; for example {', '.join(_neighbours(path, allowed))}"
-        raise ParameterError(f"override '{path}={text}': {parameter_set.file} has no value '{path}'{hint}")
+        allowed = [order.named(known) for known in (*declared, SPECIES_PATH)]
+        hint = nearest_name(order.typed, allowed) or f"; for example {', '.join(_neighbours(order.typed, allowed))}"
+        raise order.refusal(f"{parameter_set.file} has no value '{order.typed}'{hint}")
     try:
-        value, unit = split_quantity(text)
+        value, unit = split_quantity(order.text)
         entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
         entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
     except UnitError as error:
-        raise ParameterError(f"override '{path}={text}': {error}") from error
+        raise order.refusal(error) from error
     kept = {key: old for key, old in parameter_set.numbers.items() if key not in _other_form(path)}
     return replace(parameter_set, numbers={**kept, path: entry})
 
 
-def _with_species(parameter_set: ParameterSet, path: str, text: str) -> ParameterSet:
+def _with_species(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
+    path, text = order.path, order.text
     species = SPECIES.get(text)
     if species is None:
-        raise ParameterError(
-            f"override '{path}={text}': unknown gas{nearest_name(text, SPECIES)}; known are {', '.join(SPECIES)}"
-        )
+        raise order.refusal(f"unknown gas{nearest_name(text, SPECIES)}; known are {', '.join(SPECIES)}")
     note = f"follows from the override {path}={text}"
     constants = {"gas.molar_mass": (species.molar_mass, "kg/mol")}
     constants["gas.heat_capacity_ratio"] = (species.heat_capacity_ratio, "")

@@ -13,7 +13,7 @@ from ppafo.units import base_value, format_quantity, to_si
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class ParameterSet:
     """Values as given, with their provenance; conflicts and gaps allowed. ``build_device`` asks for more.
 
@@ -32,6 +32,12 @@ class ParameterSet:
     numbers: Mapping[str, Entry]
     texts: Mapping[str, TextEntry]
     accepted: Mapping[str, str]
+
+    def __repr__(self) -> str:
+        """Return name, title, how many values there are, and the valves; ``ppafo sets show`` lists every value."""
+        valves = ", ".join(f"{name} ({kind})" for name, kind in self.valve_kinds.items())
+        count = len(self.numbers) + len(self.texts)
+        return f"ParameterSet '{self.name}': {self.title}\n  {count} values; valves: {valves}"
 
     def declared(self) -> Mapping[str, Quantity]:
         """Return the declaration of every number that this set may hold, by path."""

@@ -1,13 +1,17 @@
-"""Everything that ``ppafo reproduce`` writes, as file contents by name."""
+"""Everything that ``ppafo reproduce`` writes, as file contents by name, and the folder that it goes into."""
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from ppafo.documents.json_text import json_text
+from ppafo.errors import DataError
 from ppafo.reporting.reproduction_report import holding_torque, reproduction_report
 from ppafo.reporting.step_response_figure import step_response_figure
 from ppafo.reporting.style import rendered
 from ppafo.reporting.torque_task_figure import torque_task_figure
 from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.owned_folder import FolderKind, check_owned_folder, read_json, write_owned_folder
 from ppafo.studies.reproduction import Reproduction
 from ppafo.studies.reproduction.step_response import Levels
 from ppafo.studies.reproduction.study import EXPERIMENTS
@@ -25,6 +29,16 @@ FILES = (
     REPORT,
 )
 """Names of all files, in the order of writing; the report comes last."""
+
+
+def check_reproduction_folder(folder: Path) -> None:
+    """Refuse a folder that holds anything but an earlier reproduction, or that cannot be made."""
+    check_owned_folder(folder, _REPRODUCTION)
+
+
+def write_reproduction(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write ``reproduction_files`` as a folder, all of them or none, in the place of an earlier reproduction."""
+    write_owned_folder(folder, contents, _REPRODUCTION)
 
 
 def reproduction_files(reproduction: Reproduction) -> dict[str, bytes]:
@@ -64,3 +78,15 @@ def _torque_figure(reproduction: Reproduction) -> dict[str, bytes]:
         (stated["co2_solenoid"], stated["co2_proportional"]),
     )
     return rendered(figure, _FORMATS)
+
+
+def _files_of(folder: Path) -> tuple[str, ...]:
+    """Return the names that an earlier reproduction may have."""
+    path = folder / CLAIMS
+    document = read_json(path)
+    if not isinstance(document, dict) or not isinstance(document.get("claims"), list):
+        raise DataError(f"{path}: is not of a ppafo reproduction (it has no list of claims); choose another folder")
+    return FILES
+
+
+_REPRODUCTION = FolderKind("ppafo reproduction", CLAIMS, _files_of)

@@ -21,7 +21,7 @@ _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _KINDS: tuple[RecordingKind, ...] = get_args(RecordingKind)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Channel:
     """Values of one quantity, read-only, and their unit as SI text: ``rad``, ``Pa`` (absolute), ``N m``, ``-``."""
 
@@ -36,12 +36,15 @@ class Channel:
 
     __hash__ = None  # type: ignore[assignment]  # arrays have no hash
 
+    def __repr__(self) -> str:
+        return f"Channel of {len(self.values)} values in {self.unit}"
+
     def __reduce__(self) -> tuple[Callable[..., "Channel"], tuple[Any, ...]]:
         """Copy and unpickle through the constructor, so that the values stay read-only."""
         return Channel, (self.values, self.unit)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Recording:
     """Channels over a common, strictly increasing time [s]; all values are finite.
 
@@ -72,6 +75,13 @@ class Recording:
         )
 
     __hash__ = None  # type: ignore[assignment]  # arrays have no hash
+
+    def __repr__(self) -> str:
+        """Return label, kind, samples, span and channels with their units."""
+        samples = f"{len(self)} sample{'' if len(self) == 1 else 's'}"
+        channels = ", ".join(f"{name} [{channel.unit}]" for name, channel in self.channels.items())
+        span = f"from {self.time[0]:g} s to {self.time[-1]:g} s"
+        return f"Recording '{self.label}', {self.kind}, {samples} {span}\n  channels: {channels or 'none'}"
 
     def __reduce__(self) -> tuple[Callable[..., "Recording"], tuple[Any, ...]]:
         """Copy and unpickle through the constructor: a read-only mapping cannot be pickled."""

@@ -38,12 +38,12 @@ def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file:
     device: list[str] = []
     for override in overrides:
         path, text = split_override(override)
-        if path.partition(".")[0] in _device_sections():
+        if is_of_device(path):
             device.append(override)
             continue
         known = scenario_paths(changed)
         if path not in known:
-            raise _unknown(override, path, known, file)
+            raise unknown_value(override, known, f"{file} has")
         _set(changed, path, text, file)
         paths.add(path)
     return Changed(changed, frozenset(paths), tuple(device))
@@ -70,16 +70,20 @@ def device_paths() -> tuple[str, ...]:
     return (*sections, SPECIES_PATH, *(f"valve.{item.name}" for item in valve))
 
 
-def _device_sections() -> frozenset[str]:
-    return frozenset({path.partition(".")[0] for path in device_paths()} | {"valves", "reported"})
+def is_of_device(path: str) -> bool:
+    """Tell whether a path begins in the device, which then has the say about the rest of it."""
+    sections = {path.partition(".")[0] for path in device_paths()} | {"valves", "reported"}
+    return path.partition(".")[0] in sections
 
 
-def _unknown(override: str, path: str, known: tuple[str, ...], file: str) -> ScenarioError:
+def unknown_value(override: str, known: tuple[str, ...], who_has: str) -> ScenarioError:
+    """Return the error for a path that is neither known nor of the device; ``who_has`` begins as ``task.toml has``."""
+    path, _ = split_override(override)
     allowed = [*known, *device_paths()]
     section = path.partition(".")[0]
     near = [name for name in known if name.startswith(f"{section}.")]
     hint = nearest_name(path, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
-    return ScenarioError(f"override '{one_line(override)}': {file} has no value '{path}'{hint}")
+    return ScenarioError(f"override '{one_line(override)}': {who_has} no value '{path}'{hint}")
 
 
 def _set(document: dict[str, Any], path: str, text: str, file: str) -> None:

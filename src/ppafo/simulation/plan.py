@@ -20,7 +20,7 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, ProfileChoice, Scenario
 
-PATH_SAMPLES = 2001
+MOST_STEPS = 1.0e9
 WHOLE = 1.0e-9
 
 
@@ -46,6 +46,11 @@ def plan_run(scenario: Scenario) -> Run:
     settings = device.valve.settings
     record_every = max(1, round(scenario.output_interval / step)) if in_lanes else 1
     step_count = math.ceil(scenario.duration / (step * record_every) - WHOLE) * record_every
+    if step_count > MOST_STEPS:
+        raise ScenarioError(
+            f"{scenario.name}: run.duration = {scenario.duration:.6g} s takes {step_count:.3g} steps of {step:.3g} s, "
+            f"at most {MOST_STEPS:.0e} are allowed: shorten the run, or look at what makes a chamber so fast"
+        )
     return Run(
         program=program,
         plant=plant,
@@ -119,8 +124,9 @@ def angle_range(scenario: Scenario, plant: PlantParameters) -> tuple[float, floa
     """Smallest and largest angle [rad] that the vane can reach in this scenario."""
     if isinstance(scenario.motion, FreeMotion):
         return plant.angle_min, plant.angle_max
-    angles = profile_values(scenario.motion.profile, np.linspace(0.0, scenario.duration, PATH_SAMPLES))[0]
-    return float(angles.min()), float(angles.max())
+    profile = scenario.motion.profile
+    lowest, highest = PROFILES[profile.kind].bounds(profile_parameters(profile))
+    return max(lowest, plant.angle_min), min(highest, plant.angle_max)
 
 
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:

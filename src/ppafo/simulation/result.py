@@ -30,7 +30,7 @@ class Status:
         return self.kind == "completed"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Result:
     """A finished run. ``versions`` are those of the packages, ``engine`` the figures of the time stepping."""
 
@@ -40,6 +40,15 @@ class Result:
     status: Status
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
+
+    def __repr__(self) -> str:
+        """Return name, status, duration and one line a metric, in SI units."""
+        scenario, status = self.scenario, self.status
+        width = max((len(name) for name in self.metrics), default=0)
+        lines = [f"  {name:<{width}}  {item.value:.4g} {item.unit}" for name, item in self.metrics.items()]
+        return "\n".join(
+            [f"Result of '{scenario.name}', {scenario.duration:g} s: {status.message or status.kind}", *lines]
+        )
 
     def plot(self) -> "Figure":
         """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` writes it."""

@@ -4,6 +4,7 @@
 an object of your own in charge of the valve.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -35,12 +36,25 @@ class FreeMotion:
     angular_velocity: float = 0.0
     external_torque: float = 0.0
 
+    @property
+    def told(self) -> str:
+        """The motion in a few words."""
+        return f"free, from {math.degrees(self.angle):.4g} deg"
+
 
 @dataclass(frozen=True, slots=True)
 class LedMotion:
     """The vane is led along an angle in time [rad]; a held vane is led along the constant profile."""
 
     profile: ProfileChoice
+
+    @property
+    def told(self) -> str:
+        """The motion in a few words."""
+        level = self.profile.settings.get("level", math.nan)
+        if self.profile.kind == "constant":
+            return f"held at {math.degrees(level):.4g} deg"
+        return f"led along the profile {self.profile.kind}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +85,12 @@ class Control:
     period: float
     custom: PythonController | None = None
 
+    @property
+    def told(self) -> str:
+        """The controller in a few words."""
+        name = self.kind if self.custom is None else f"{self.kind}, {type(self.custom).__name__}"
+        return f"{name}, every {self.period:g} s"
+
 
 @dataclass(frozen=True, slots=True)
 class Assumption:
@@ -92,7 +112,7 @@ class Origin:
     content: dict[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Scenario:
     """A device in one experiment.
 
@@ -116,8 +136,23 @@ class Scenario:
     assumptions: tuple[Assumption, ...]
     origin: Origin
 
+    def __repr__(self) -> str:
+        """Return name, device, valve, motion, controller and duration, a line each."""
+        return (
+            f"Scenario '{self.name}'\n"
+            f"  device      {self.device.name}, valve {self.device.valve_name}\n"
+            f"  motion      {self.motion.told}\n"
+            f"  controller  {self.control.told}\n"
+            f"  duration    {self.duration:g} s, in steps of at most {self.time_step:g} s"
+        )
+
     def controlled_by(self, controller: PythonController) -> "Scenario":
         """Return the scenario with any object that has ``reset`` and ``update``, at the same sample period."""
+        if isinstance(controller, type):
+            name = controller.__name__
+            raise ScenarioError(
+                f"{self.name}: {name} is a class; give an instance of it, as in controlled_by({name}())"
+            )
         for method in ("reset", "update"):
             if not callable(getattr(controller, method, None)):
                 kind = type(controller).__name__

@@ -6,13 +6,14 @@ import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from ppafo.documents.regular_file import read_regular_file
 from ppafo.errors import DataError, reason
 
 
-def read_bytes(path: str | Path) -> bytes:
-    """Return the content of a file that is there and is not empty."""
+def read_bytes(path: str | Path, most: int | None = None) -> bytes:
+    """Return the content of a regular file that is there and is not empty, refused above ``most`` bytes."""
     try:
-        content = Path(path).read_bytes()
+        content = read_regular_file(Path(path), most)
     except (OSError, ValueError) as error:
         raise DataError(f"{path}: cannot be read: {reason(error)}") from error
     if not content:

@@ -4,19 +4,18 @@ A folder is complete or not there. Only an empty folder or an earlier result is 
 """
 
 import hashlib
-import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ppafo.documents.json_text import json_text
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.signals import Recording
 from ppafo.storage.comma_separated import csv_bytes
-from ppafo.storage.files import check_folder_can_be_replaced, read_bytes, replace_folder
+from ppafo.storage.files import read_bytes
 from ppafo.storage.netcdf import netcdf_bytes, read_netcdf
+from ppafo.storage.owned_folder import FolderKind, check_owned_folder, read_json, write_owned_folder
 
 RUN_FILE = "run.json"
 NETCDF_FILE = "recording.nc"
@@ -27,7 +26,7 @@ SCHEMA_VERSION = 1
 _KNOWN_FILES = (RUN_FILE, NETCDF_FILE, CSV_FILE, "figure.png", "figure.svg")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class StoredResult:
     """What a result folder holds: the recording, and ``run.json`` as plain data."""
 
@@ -35,13 +34,15 @@ class StoredResult:
     recording: Recording
     document: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        return f"StoredResult in {self.folder}: {', '.join(self.document)}\n{self.recording!r}"
+
 
 def write_result(
     folder: str | Path, recording: Recording, document: Mapping[str, Any], attachments: Mapping[str, bytes]
 ) -> Path:
     """Write a result folder with ``document`` in ``run.json`` and attachments by file name; returns the folder."""
     place = Path(folder)
-    check_result_folder(place)
     netcdf = netcdf_bytes(recording, document.get("scenario"))
     contents = {
         NETCDF_FILE: netcdf,
@@ -55,18 +56,13 @@ def write_result(
         "recording": {**_description(recording), "sha256": _checksum(netcdf)},
         **document,
     }
-    replace_folder(place, {**contents, RUN_FILE: f"{json_text(described)}\n".encode()})
+    write_owned_folder(place, {**contents, RUN_FILE: f"{json_text(described)}\n".encode()}, _RESULT)
     return place
 
 
 def check_result_folder(folder: str | Path) -> None:
     """Refuse a folder that holds anything but an earlier result, or that cannot be made."""
-    place = Path(folder)
-    if os.path.isdir(place):  # noqa: PTH112  # Path.is_dir raises where no file can have the name
-        _check_replaceable(place)
-    elif os.path.lexists(place):
-        raise DataError(f"{folder}: is a file; a result needs a folder")
-    check_folder_can_be_replaced(place)
+    check_owned_folder(Path(folder), _RESULT)
 
 
 def read_result(folder: str | Path) -> StoredResult:
@@ -89,28 +85,10 @@ def _checksum(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _check_replaceable(place: Path) -> None:
-    present = {entry.name for entry in place.iterdir()}
-    if not present:
-        return
-    if RUN_FILE not in present:
-        raise DataError(f"{place}: is not empty and not a ppafo result (it has no {RUN_FILE}); choose another folder")
-    own = {*_KNOWN_FILES, *read_document(place)["files"]}
-    foreign = sorted(name for name in present if name not in own or (place / name).is_dir())
-    if foreign:
-        shown = ", ".join(foreign[:3]) + (", ..." if len(foreign) > 3 else "")
-        raise DataError(
-            f"{place}: holds files that are not of its result ({shown}); move them or choose another folder"
-        )
-
-
 def read_document(folder: str | Path) -> dict[str, Any]:
     """Return ``run.json`` of a result folder as plain data, or refuse what is not one."""
     path = Path(folder) / RUN_FILE
-    try:
-        document = json.loads(read_bytes(path).decode("utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise DataError(f"{path}: is not JSON: {one_line(error)}") from error
+    document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{path}: is not of a ppafo result (its 'format' is not '{FORMAT}')")
     if document.get("schema_version") != SCHEMA_VERSION:
@@ -128,3 +106,11 @@ def _description(recording: Recording) -> dict[str, Any]:
         "kind": recording.kind,
         "channels": {name: recording.unit(name) for name in recording.names},
     }
+
+
+def _files_of(folder: Path) -> set[str]:
+    """Return the names that an earlier result may have: its own list, and figures drawn since."""
+    return {*_KNOWN_FILES, *map(str, read_document(folder)["files"])}
+
+
+_RESULT = FolderKind("ppafo result", RUN_FILE, _files_of)

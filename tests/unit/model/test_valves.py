@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from ppafo.engine.scheme.parts import part_length
 from ppafo.model.valves import proportional, solenoid
 
 SPOOL = {"dead_band": 0.0, "delay": 0.0, "spool_frequency": 50.0, "spool_damping_ratio": 0.5, "slew_limit": 0.0}
@@ -96,9 +97,25 @@ def test_command_above_zero_feeds_chamber_1_and_vents_chamber_2() -> None:
     assert openings == (1.0, 0.0, 0.0, 1.0)
 
 
-def test_cuts_are_the_switchings_inside_a_step() -> None:
-    valve = solenoid.prepare_timed({"opening_delay": 0.0003, "closing_delay": 0.0007, "switching_interval": 0.0}, 1e-3)
-    both = solenoid.settle_timed(valve, solenoid.both_off_long_ago(), 1.0, 0.0)
-    both = solenoid.settle_timed(valve, both, 1.0, 0.5)
-    assert solenoid.switching_cuts(valve, both, -1.0, 1.0, 1e-3) == pytest.approx((0.0003, 0.0007))
-    assert solenoid.switching_cuts(valve, both, 1.0, 1.0, 1e-3) == (0.0, 0.0)
+def parts_of_a_step(settings: dict[str, float], command: float, step: float) -> list[float]:
+    """Lengths of the parts of a step that begins with a pair energised for chamber 1 long ago."""
+    valve = solenoid.prepare_timed(settings, step)
+    state = solenoid.settle_timed(valve, solenoid.both_off_long_ago(), 1.0, 0.0)
+    state = solenoid.settle_timed(valve, state, 1.0, 0.5)
+    time, remaining, lengths = 1.0, step, []
+    while remaining > 0.0:
+        args = (valve, state, command, time, remaining)
+        length = part_length(*args, solenoid.next_timed_event, solenoid.settle_timed)
+        _, state = solenoid.advance_timed(valve, state, command, time, length)
+        lengths.append(length)
+        time, remaining = time + length, 0.0 if length == remaining else remaining - length
+    return lengths
+
+
+def test_step_is_cut_at_every_switching_inside_it() -> None:
+    settings = {"opening_delay": 0.0003, "closing_delay": 0.0007, "switching_interval": 0.0}
+    assert parts_of_a_step(settings, -1.0, 1e-3) == pytest.approx([0.0003, 0.0004, 0.0003])
+
+
+def test_step_without_a_switching_is_whole() -> None:
+    assert parts_of_a_step(PAIR, 1.0, 1e-3) == [1e-3]

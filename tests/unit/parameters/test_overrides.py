@@ -52,7 +52,23 @@ def test_a_value_that_the_set_lacks_can_be_given() -> None:
 
 
 def test_a_misspelt_path_names_the_nearest() -> None:
-    assert "did you mean 'valves.proportional.area'" in problem_of("valve.aera=1mm^2")
+    assert "did you mean 'valves.proportional.area'" in problem_of("valves.proportional.aera=1mm^2")
+
+
+@pytest.mark.parametrize(
+    ("override", "told"),
+    [
+        (
+            "valve.aera=1mm^2",
+            "override 'valve.aera=1mm^2': ppafo2011 has no value 'valve.aera', did you mean 'valve.area'",
+        ),
+        ("valve.zzzzzzzz=1", "has no value 'valve.zzzzzzzz'; for example valve."),
+        ("valve.area=3mm", "override 'valve.area=3mm': unit 'mm' does not fit"),
+    ],
+)
+def test_a_message_names_the_path_that_was_typed_and_no_other(override: str, told: str) -> None:
+    assert told in problem_of(override)
+    assert "valves." not in problem_of(override)
 
 
 @pytest.mark.parametrize("override", ["valve.area", "=3", "valve.area=", "", "valve.area 3"])

@@ -24,3 +24,11 @@ def test_every_published_value_is_as_printed_up_to_its_unit() -> None:
 
 def test_every_accepted_contradiction_gives_a_reason() -> None:
     assert all(len(reason) > 40 for reason in COMPLETED.accepted.values())
+
+
+def test_a_set_is_shown_in_two_lines() -> None:
+    count = len(COMPLETED.numbers) + len(COMPLETED.texts)
+    assert repr(COMPLETED).splitlines() == [
+        f"ParameterSet 'ppafo2011': {COMPLETED.title}",
+        f"  {count} values; valves: proportional (proportional), solenoid (solenoid)",
+    ]

@@ -161,3 +161,14 @@ def test_recordings_that_differ_in_one_bit_are_not_equal() -> None:
     changed[3] = np.nextafter(changed[3], 9.0)
     assert recording().with_channel("angle", changed, "rad") != recording()
     assert recording("other") != recording()
+
+
+def test_a_recording_is_shown_without_its_numbers() -> None:
+    times = np.linspace(0.0, 2.0, 5)
+    shown = Recording("task", times, {"angle": Channel(times, "rad"), "command": Channel(times, "-")}, "simulated")
+    assert repr(shown).splitlines() == [
+        "Recording 'task', simulated, 5 samples from 0 s to 2 s",
+        "  channels: angle [rad], command [-]",
+    ]
+    assert repr(shown.channels["angle"]) == "Channel of 5 values in rad"
+    assert "1 sample from 0.5 s to 0.5 s" in repr(shown.between(0.5, 0.9))

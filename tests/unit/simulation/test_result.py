@@ -24,6 +24,22 @@ def result(step_response: Scenario) -> Result:
     return Result(step_response, recording, metrics, Status("completed"), {"ppafo": "0"}, {"step": 1e-3, "steps": 100})
 
 
+def test_a_result_is_shown_with_its_status_and_a_line_for_every_metric(result: Result) -> None:
+    assert repr(result).splitlines() == [
+        "Result of 'step-response', 0.5 s: completed",
+        "  angle_range  0.1 rad",
+        "  broken       inf N m",
+    ]
+    diverged = dataclasses.replace(result, status=Status("diverged", 0.05, "diverged at t = 0.05 s"))
+    assert repr(diverged).startswith("Result of 'step-response', 0.5 s: diverged at t = 0.05 s\n")
+
+
+def test_a_stored_result_is_shown_without_its_numbers(result: Result, tmp_path: Path) -> None:
+    shown = repr(read_result(result.save(tmp_path / "task")))
+    assert shown.startswith(f"StoredResult in {tmp_path / 'task'}: ")
+    assert len(shown.splitlines()) == 3
+
+
 def test_the_document_holds_every_number_of_the_device_in_si(result: Result) -> None:
     device = result_document(result)["scenario"]["device"]
     scenario = result.scenario

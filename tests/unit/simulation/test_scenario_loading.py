@@ -171,6 +171,31 @@ def test_an_object_without_update_is_no_controller() -> None:
         small().controlled_by(object())  # type: ignore[arg-type]
 
 
+def test_a_class_in_the_place_of_an_object_is_refused_with_the_remedy() -> None:
+    with pytest.raises(
+        ScenarioError, match=r"Relay is a class; give an instance of it, as in controlled_by\(Relay\(\)\)"
+    ):
+        small().controlled_by(Relay)  # type: ignore[arg-type]
+
+
+def test_a_scenario_is_shown_in_a_few_lines() -> None:
+    shown = repr(small().controlled_by(Relay()))
+    assert len(shown.splitlines()) == 5
+    for told in (
+        "'small'",
+        "ppafo2011, valve proportional",
+        "held at 75 deg",
+        "python, Relay, every 0.001 s",
+        "1 s, in steps",
+    ):
+        assert told in shown
+
+
+def test_the_motion_of_a_scenario_is_shown_in_words() -> None:
+    assert "free, from 20 deg" in repr(load_scenario("step-response"))
+    assert "led along the profile sine" in repr(load_scenario("torque-task-moving-ankle"))
+
+
 def test_an_assumption_carries_the_value_it_is_about() -> None:
     scenario = small(assumed={"motion.angle": "a guess", "controller.derivative_filter": "none", "valve.area": "old"})
     shown = [(item.path, item.value) for item in scenario.assumptions]

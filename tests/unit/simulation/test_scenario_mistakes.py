@@ -247,7 +247,7 @@ def test_a_mistake_in_the_device_names_scenario_and_set() -> None:
     message = problem_after('valve = "proportional"', 'valve = "solnoid"', ParameterError)
     assert "[device]: ppafo2011: there is no valve 'solnoid', did you mean 'solenoid'?" in message
     message = problem_after("[run]", 'overrides = ["valve.aera=1mm^2"]\n[run]', ParameterError)
-    assert "[device]: override 'valves.proportional.aera=1mm^2'" in message
+    assert "[device]: override 'valve.aera=1mm^2'" in message
     message = problem_after('"ppafo2011"', '"ppafo2012"', ParameterError)
     assert "there is no parameter set 'ppafo2012', did you mean 'ppafo2011'?" in message
 

@@ -2,6 +2,10 @@
 
 import dataclasses
 import math
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -10,6 +14,7 @@ import pytest
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import LedMotion, ProfileChoice, Scenario
 from ppafo.simulation.simulate import simulate, simulate_many
 
@@ -177,3 +182,38 @@ def test_restitution_makes_the_vane_rebound() -> None:
 
     assert largest_backward_speed(0.0) < 0.5
     assert largest_backward_speed(0.5) > 1.0
+
+
+@pytest.mark.parametrize("duration", ["1 s", "40 s"])
+def test_step_of_a_led_vane_does_not_depend_on_the_length_of_the_run(duration: str) -> None:
+    sine = {
+        "motion.profile.level": "75 deg",
+        "motion.profile.amplitude": "54.9 deg",
+        "motion.profile.frequency": "50 Hz",
+    }
+    overrides = [f"{path}={value}" for path, value in sine.items()]
+    scenario = load_scenario("torque-task-moving-ankle", [*overrides, f"run.duration={duration}"])
+    assert plan_run(scenario).step == pytest.approx(5e-5)
+
+
+def test_run_with_too_many_steps_is_refused_before_it_starts() -> None:
+    with pytest.raises(ScenarioError, match="steps of"):
+        simulate(load_scenario("step-response", ["run.duration=90000 s", "run.output_interval=1 s"]))
+
+
+def test_interrupt_is_seen_in_the_middle_of_a_long_run() -> None:
+    code = (
+        "import ppafo, sys; scenario = ppafo.load_scenario('step-response', ['run.duration=20000 s', "
+        "'run.output_interval=1 s']); ppafo.simulate('step-response'); print('ready', flush=True); "
+        "ppafo.simulate(scenario)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as running:
+        assert running.stdout is not None
+        assert running.stdout.readline().strip() == b"ready"
+        time.sleep(1.5)
+        assert running.poll() is None, "the run must be long enough to be interrupted"
+        running.send_signal(signal.SIGINT)
+        start = time.monotonic()
+        running.wait(timeout=30)
+        assert time.monotonic() - start < 5.0
+        assert running.returncode != 0

@@ -87,13 +87,13 @@ def filled_with_a_run_file_of_another_program(folder: Path) -> str:
 def filled_with_a_result_and_something_else(folder: Path) -> str:
     write_result(folder, recording(), DOCUMENT, {})
     (folder / "notes.txt").write_text("keep me")
-    return r"holds files that are not of its result \(notes.txt\)"
+    return r"holds files that are not of its ppafo result \(notes.txt\)"
 
 
 def filled_with_a_result_and_a_folder_by_the_name_of_a_file(folder: Path) -> str:
     write_result(folder, recording(), DOCUMENT, {})
     (folder / "figure.png").mkdir()
-    return r"holds files that are not of its result \(figure.png\)"
+    return r"holds files that are not of its ppafo result \(figure.png\)"
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_a_folder_with_anything_of_somebody_elses_is_refused_and_left_alone(
 def test_a_file_in_the_place_of_the_folder_or_above_it_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("")
-    with pytest.raises(DataError, match="is a file; a result needs a folder"):
+    with pytest.raises(DataError, match="is a file; a ppafo result needs a folder"):
         check_result_folder(file)
     with pytest.raises(DataError, match=r"task: cannot be written: there is a file '.*file' in the place of a folder"):
         check_result_folder(file / "task")

@@ -17,10 +17,16 @@ def value(profile: ConstantProfile, time: float) -> tuple[float, float, float]:
     return profile.level, 0.0, 0.0
 
 
+def bounds(profile: ConstantProfile) -> tuple[float, float]:
+    """The level, twice."""
+    return profile.level, profile.level
+
+
 KIND = ProfileKind(
     name="constant",
     summary="One level from beginning to end.",
     quantities=(Quantity("level", "", "the level"),),
     parameters=ConstantProfile,
     value=value,
+    bounds=bounds,
 )

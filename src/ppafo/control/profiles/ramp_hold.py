@@ -24,6 +24,11 @@ def value(profile: RampHold, time: float) -> tuple[float, float, float]:
     return profile.start_level + gain * share, (gain / profile.ramp_time if inside else 0.0), 0.0
 
 
+def bounds(profile: RampHold) -> tuple[float, float]:
+    """The lower and the higher of both levels."""
+    return min(profile.start_level, profile.level), max(profile.start_level, profile.level)
+
+
 KIND = ProfileKind(
     name="ramp_hold",
     summary="A level, a straight ramp to another level, and a hold.",
@@ -35,4 +40,5 @@ KIND = ProfileKind(
     ),
     parameters=RampHold,
     value=value,
+    bounds=bounds,
 )

@@ -52,6 +52,12 @@ def value(profile: Sine, time: float) -> tuple[float, float, float]:
     return profile.level + swing, angular * profile.amplitude * cosine, -angular * angular * swing
 
 
+def bounds(profile: Sine) -> tuple[float, float]:
+    """Trough and crest."""
+    swing = abs(profile.amplitude)
+    return profile.level - swing, profile.level + swing
+
+
 KIND = ProfileKind(
     name="sine",
     summary="A sine about a mean level.",
@@ -63,4 +69,5 @@ KIND = ProfileKind(
     ),
     parameters=Sine,
     value=value,
+    bounds=bounds,
 )

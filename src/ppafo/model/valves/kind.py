@@ -16,14 +16,13 @@ class ValveModel:
     step)`` returns what the valve shows the plant during the step, and the next state. ``connect(plant, shown)``
     turns that into ports (the engine reads its annotation of ``shown``, a float or a NamedTuple); ``port_flow`` and
     ``port_flow_slopes`` are the functions of that kind of port.
-    ``cuts(parameters, state, command, time, step)`` returns two lengths [s], the times from the beginning of the step
-    to the first and to the last abrupt change inside it (both 0 for none): the step is done in parts there. None
-    for a valve that does not jump by itself. ``command_delay(settings)`` is the dead time [s] before a command reaches
-    the valve.
+    ``jumps`` is True for a valve that changes abruptly by itself inside a step, as ``next_event`` and ``settle`` say:
+    the step is then done in parts between those changes. ``command_delay(settings)`` is the dead time [s] before a
+    command reaches the valve.
 
     The reference solver sees the same valve in continuous time: ``instant(parameters, state, command)`` returns the
     openings at an instant, ``rates(parameters, state, command)`` the time derivatives of the state,
-    ``next_event(parameters, state, command, time)`` when something changes abruptly (infinite for never), and
+    ``next_event(parameters, state, command, time)`` when something changes abruptly (1e9 or more for never), and
     ``settle(parameters, state, command, time)`` the state after the abrupt changes that are due.
     """
 
@@ -35,7 +34,7 @@ class ValveModel:
     connect: Callable[..., Any]
     port_flow: Callable[..., Any]
     port_flow_slopes: Callable[..., Any]
-    cuts: Callable[..., Any] | None
+    jumps: bool
     command_delay: Callable[[Mapping[str, float]], float]
     instant: Callable[..., Any]
     rates: Callable[..., Any]

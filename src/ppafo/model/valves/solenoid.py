@@ -126,19 +126,6 @@ def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, tim
     return min(event_a, next_coil_event(valve, state.coil_b, wanted_b, time))
 
 
-def switching_cuts(
-    valve: TimedSolenoid, state: PairState, command: float, time: float, step: float
-) -> tuple[float, float]:
-    """Times from the beginning of a step to the first and the second switching inside it [s]; 0 for none."""
-    now = settle_timed(valve, state, command, time)
-    first = next_timed_event(valve, now, command, time)
-    then = settle_timed(valve, now, command, first)
-    second = next_timed_event(valve, then, command, first)
-    end = time + step - SAME_INSTANT
-    first_cut = first - time if first < end else 0.0
-    return first_cut, (second - time if second < end else first_cut)
-
-
 def advance_timed(
     valve: TimedSolenoid, state: PairState, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairState]:
@@ -215,7 +202,7 @@ IDEAL = ValveModel(
     connect=connect_positions,
     port_flow=single_port_flow,
     port_flow_slopes=single_port_flow_slopes,
-    cuts=None,
+    jumps=False,
     command_delay=no_dead_time,
     instant=instant_ideal,
     rates=rates_ideal,
@@ -232,7 +219,7 @@ TIMED = ValveModel(
     connect=connect_positions,
     port_flow=single_port_flow,
     port_flow_slopes=single_port_flow_slopes,
-    cuts=switching_cuts,
+    jumps=True,
     command_delay=no_dead_time,
     instant=instant_timed,
     rates=rates_timed,

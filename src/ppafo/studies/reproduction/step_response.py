@@ -4,7 +4,7 @@ The text (section 'PPAFO Model Validation', figure 7): pressure 1 rises until th
 moves, then goes to the supply; pressure 2 falls, slows while chamber 2 is compressed, then goes to the atmosphere.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ _FIRST_ANGLE, _LAST_ANGLE, _SAME_ANGLE = 20.0, 130.0, 0.5
 
 _CLEAR = 0.05
 _SAME = 0.01
+_NOTABLE_TIME = 2.0e-3
 """Shares of the pressure range: a change has to be clear, a level that is reached or kept may be off by the second."""
 _SLOWED = 0.5
 """The fall has slowed where its rate is at most this share of the steepest before and after."""
@@ -77,7 +78,9 @@ def step_observations(recording: Recording, levels: Levels, events: StepEvents |
     if events is None:
         return [said.judged(False, "the vane does not go from one rest to another") for said in _SAID]
     step = _Step(recording, levels, events)
-    return [said.judged(*judge(step)) for said, judge in zip(_SAID, _JUDGES, strict=True)]
+    judged = [said.judged(*judge(step)) for said, judge in zip(_SAID, _JUDGES, strict=True)]
+    differences = {_RISES: _fills_early(step), _FALLS_IN_MOTION: _rises_again(step), _SLOWS: _more_than_slows(step)}
+    return [replace(observation, difference=differences.get(observation.id, "")) for observation in judged]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +124,35 @@ class _Step:
     def only_rises(self, pressure: Floats) -> bool:
         fallen_back = float(np.max(np.maximum.accumulate(pressure) - pressure))
         return bool(pressure[-1] > pressure[0] and fallen_back < _SAME * self.levels.range)
+
+
+def _fills_early(step: _Step) -> str:
+    """Chamber 1 stands at the supply before the vane leaves: then it is chamber 2 that decides when."""
+    before = step.standing("pressure_1")
+    full = int(np.argmax(before > step.levels.supply - _SAME * step.levels.range))
+    waits = step.recording.time[step.events.breakaway] - step.recording.time[full]
+    if before[full] <= step.levels.supply - _SAME * step.levels.range or waits < _NOTABLE_TIME:
+        return ""
+    return (
+        f"it is at the supply after {step.milliseconds(full)} already, so small is the volume at the stop, and what "
+        "starts the vane is the falling pressure in chamber 2"
+    )
+
+
+def _rises_again(step: _Step) -> str:
+    moving = step.moving("pressure_1")
+    rise = float(moving[-1] - np.min(moving))
+    if rise < _SAME * step.levels.range:
+        return ""
+    return f"it rises again by {rise / PASCALS_PER_PSI:.1f} psi before the stop"
+
+
+def _more_than_slows(step: _Step) -> str:
+    moving = step.moving("pressure_2")
+    rise = float(np.max(moving - np.minimum.accumulate(moving)))
+    if rise < _SAME * step.levels.range:
+        return ""
+    return f"it does more than slow: it rises by {rise / PASCALS_PER_PSI:.1f} psi"
 
 
 def _turns(step: _Step) -> tuple[bool, str]:
@@ -195,19 +227,22 @@ def _builds_up(step: _Step) -> tuple[bool, str]:
 
 
 _TEXT = "section 'PPAFO Model Validation'"
+_RISES, _FALLS_IN_MOTION, _SLOWS = (
+    "pressure_1_rises_until_breakaway",
+    "pressure_1_falls_in_motion",
+    "pressure_2_slows_in_motion",
+)
 _SAID = (
     _Sentence("vane_turns_through_its_range", "The vane turns from 20 to 130 deg.", "figure 7, panel A"),
-    _Sentence("pressure_1_rises_until_breakaway", "The pressure in chamber 1 rises until the vane breaks away.", _TEXT),
-    _Sentence("pressure_1_falls_in_motion", "While the vane moves, the pressure in chamber 1 falls.", _TEXT),
+    _Sentence(_RISES, "The pressure in chamber 1 rises until the vane breaks away.", _TEXT),
+    _Sentence(_FALLS_IN_MOTION, "While the vane moves, the pressure in chamber 1 falls.", _TEXT),
     _Sentence(
         "pressure_1_goes_to_supply", "After the vane has stopped, the pressure in chamber 1 rises to the supply.", _TEXT
     ),
     _Sentence(
         "pressure_2_falls_from_supply", "The pressure in chamber 2, at first the supply's, begins to fall.", _TEXT
     ),
-    _Sentence(
-        "pressure_2_slows_in_motion", "Its fall slows for a while, as the moving vane compresses chamber 2.", _TEXT
-    ),
+    _Sentence(_SLOWS, "Its fall slows for a while, as the moving vane compresses chamber 2.", _TEXT),
     _Sentence("pressure_2_goes_to_atmosphere", "Then the pressure in chamber 2 goes to the atmosphere.", _TEXT),
     _Sentence("difference_builds_up", "The pressure difference builds up as the flow switches.", "figure 7, panel B"),
 )

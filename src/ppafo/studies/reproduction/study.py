@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ppafo.errors import SimulationError
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding, audit
 from ppafo.simulation.declaration import value_at
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.overriding import apply_overrides, scenario_paths, split_override
+from ppafo.simulation.overriding import apply_overrides, is_of_device, scenario_paths, split_override, unknown_value
 from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
@@ -119,15 +120,23 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     meant: dict[str, list[str]] = {name: [] for name in EXPERIMENTS}
     for override in overrides:
         path, _ = split_override(override)
-        having = [name for name, earlier in meant.items() if _has(name, earlier, path)]
+        documents = {name: _changed(name, earlier) for name, earlier in meant.items()}
+        known = tuple(dict.fromkeys(known for item in documents.values() for known in scenario_paths(item)))
+        if path not in known and not is_of_device(path):
+            raise unknown_value(override, known, f"{', '.join(EXPERIMENTS)} have")
+        having = [name for name, document in documents.items() if _has(document, path)]
         for name in having or EXPERIMENTS:
             meant[name].append(override)
     return {name: load_scenario(name, chosen) for name, chosen in meant.items()}
 
 
-def _has(name: str, earlier: Sequence[str], path: str) -> bool:
-    """Tell whether a scenario, with the overrides before this one, has a value of its own at a path."""
-    document = apply_overrides(load_scenario(name).origin.content, earlier, name).document
+def _changed(name: str, earlier: Sequence[str]) -> dict[str, Any]:
+    """Return the document of a scenario with the overrides that came earlier."""
+    return apply_overrides(load_scenario(name).origin.content, earlier, name).document
+
+
+def _has(document: dict[str, Any], path: str) -> bool:
+    """Tell whether a scenario has a section of its own for the value at a path."""
     section = path.rpartition(".")[0]
     has_section = not section or value_at(document, section) is not None
     return has_section and path in scenario_paths(document)

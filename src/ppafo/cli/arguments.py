@@ -1,0 +1,73 @@
+"""The parser of the command line: like any of argparse, but a mistake is one error, and it names what was mistyped."""
+
+import argparse
+import re
+from collections.abc import Mapping, Sequence
+from itertools import takewhile
+from typing import NoReturn, final
+
+from ppafo.cli.output import flush_output
+from ppafo.errors import PpafoError, nearest_name
+
+_NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
+
+
+class UsageError(PpafoError):
+    """The words after ``ppafo`` are not an order that it knows."""
+
+
+@final
+class CommandParser(argparse.ArgumentParser):
+    """A parser that raises ``UsageError`` where argparse would print its usage and end the process."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise the message of argparse as an error of one line that names the help to look at."""
+        raise UsageError(f"{message}; '{self.prog} --help' shows what belongs here")
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """End the process after ``--help`` or ``--version``, once their text has really been written."""
+        flush_output()
+        super().exit(status, message)
+
+    def options(self) -> set[str]:
+        """Return every option of this parser and of the subcommands that it knows."""
+        found = {name for action in self._actions for name in action.option_strings}
+        for action in self._actions:
+            if isinstance(action.choices, Mapping):
+                found = found.union(*(parser.options() for parser in action.choices.values()))
+        return found
+
+
+def check_command(word: str | None, known: Sequence[str]) -> None:
+    """Refuse a word in the place of the command that names none; argparse would list them without the nearest."""
+    if word is not None and word not in known:
+        hint = nearest_name(word, known)
+        raise UsageError(f"there is no command '{word}'{hint}; known are {', '.join(known)}")
+
+
+def check_options(words: Sequence[str], parser: CommandParser) -> None:
+    """Refuse an option that no part of the parser has, before argparse complains of what it finds missing besides."""
+    known = sorted(parser.options())
+    for word in takewhile(lambda word: word != "--", words):
+        name = word.partition("=")[0]
+        if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
+            raise UsageError(f"there is no option '{name}'{_nearest_option(name, known)}; here are {', '.join(known)}")
+
+
+def _nearest_option(name: str, known: Sequence[str]) -> str:
+    """Return the hint; the dashes, which all have in common, would make strangers look alike."""
+    hint = nearest_name(name.strip("-"), [option.removeprefix("--") for option in known if option.startswith("--")])
+    return hint.replace("'", "'--", 1)
+
+
+def _looks_like_option(word: str) -> bool:
+    """Tell whether argparse takes a word for an option: a dash alone, numbers and words with a space are values."""
+    is_number = _NEGATIVE_NUMBER.fullmatch(word) is not None
+    return word.startswith("-") and len(word) > 1 and " " not in word and not is_number
+
+
+def _stands_for(name: str, option: str) -> bool:
+    """Tell whether a name is an option, the beginning of a long one, or a short one with its value behind it."""
+    if name.startswith("--"):
+        return option.startswith(name)
+    return name == option or (len(option) == 2 and name.startswith(option))

@@ -1,0 +1,86 @@
+"""Words that the command line does not understand, and output that nobody can take."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+
+FULL = Path("/dev/full")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([], "no command was given; known are reproduce, simulate"),
+        (["simulat"], "there is no command 'simulat', did you mean 'simulate'?"),
+        (["--bogus"], "there is no option '--bogus'; here are --help, --version, -h"),
+        (["--bogus", "simulate", "step-response"], "there is no option '--bogus'"),
+        (["simulate", "--bogus"], "there is no option '--bogus'; here are --help, --json"),
+        (["audit", "--josn"], "there is no option '--josn', did you mean '--json'?"),
+        (["audit", "ppafo2011", "--out=x", "--sett=valve.area=1mm^2"], "no option '--sett', did you mean '--set'?"),
+        (["sets", "-j"], "there is no option '-j'"),
+        (
+            ["simulate", "step-response", "--set"],
+            "argument --set: expected one argument; 'ppafo simulate --help' shows",
+        ),
+        (["audit"], "the following arguments are required: SET; 'ppafo audit --help' shows"),
+        (["sets", "show"], "the following arguments are required: SET; 'ppafo sets show --help' shows"),
+        (["sets", "shwo"], "invalid choice: 'shwo'"),
+        (["plot", "one", "two"], "unrecognized arguments: two"),
+        (["si\nmulate"], "there is no command 'si mulate', did you mean 'simulate'?"),
+    ],
+)
+def test_words_that_are_no_order_are_one_line_and_exit_code_2(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("ppafo: ")
+    assert told in printed.err
+    assert printed.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "words", [["--js"], ["--json", "--", "--bogus"], ["--set", "gas.species=- 1"], ["--out", "-1"]], ids=" ".join
+)
+def test_a_shortened_option_and_a_value_with_a_dash_are_no_unknown_options(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name = [] if "--" in words else ["ppafo2011"]
+    assert main(["audit", *name, *words]) in {0, 2}
+    assert "no option" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["--help"], ["simulate", "--help"], ["--version"]], ids=" ".join)
+def test_help_and_version_still_end_well(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 0
+    assert "ppafo" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="there is no full device here")
+@pytest.mark.parametrize(
+    "words", [["audit", "ppafo2011-printed"], ["sets", "--json"], ["--help"], ["--version"]], ids=" ".join
+)
+def test_output_that_cannot_be_written_is_one_line_and_exit_code_2(words: list[str]) -> None:
+    command = [sys.executable, "-c", "import sys; from ppafo.cli.main import main; sys.exit(main())", *words]
+    with FULL.open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.stderr == "ppafo: standard output cannot be written: no space left on device\n"
+    assert done.returncode == 2
+
+
+def test_a_reader_that_has_gone_is_no_mistake() -> None:
+    code = "import sys; from ppafo.cli.main import main; sys.exit(main(['sets']))"
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait(timeout=30) == 0
