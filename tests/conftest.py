@@ -39,7 +39,7 @@ def fresh_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The folder of real measurements, beside the repository or where PPAFO_SHARED_DATA says."""
-    beside = Path(__file__).parents[3] / "shared" / "data"
+    beside = Path(__file__).parents[2] / "shared" / "data"
     folder = Path(os.environ.get("PPAFO_SHARED_DATA", beside))
     if not folder.is_dir():
         pytest.skip("the real measurements are not here: no ../shared/data, and PPAFO_SHARED_DATA names no folder")

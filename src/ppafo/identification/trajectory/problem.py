@@ -149,7 +149,7 @@ class Range:
 
     def number(self, coordinate: float) -> float:
         """Return the number in SI units at a coordinate."""
-        return math.exp(coordinate) if self.scale == "log" else coordinate * self.size
+        return math.exp(coordinate) if self.scale == "log" else float(coordinate * self.size)
 
     def slope(self, coordinate: float) -> float:
         """Return the change of the number per change of its coordinate."""

@@ -41,6 +41,7 @@ def three(experiment: Experiment) -> TrajectoryFit:
 def test_three_planted_values_are_found_and_called_identified(three: TrajectoryFit, step: Scenario) -> None:
     for estimate in three.estimates:
         assert estimate.verdict == "identified"
+        assert {type(number) for number in (estimate.value, estimate.low, estimate.high)} == {float}
         assert estimate.relative_half_width < 0.02
         # Three standard errors: 3/1.96 half widths.
         assert abs(estimate.value - number_at(step, estimate.path)) < 3.0 / 1.96 * estimate.half_width
