@@ -1,6 +1,7 @@
 """Shared set-up: scenarios of the paper, and one cache folder for compiled models."""
 
 import dataclasses
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -33,3 +34,13 @@ def fresh_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder for compiled models."""
     monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path / "programs"))
     return tmp_path / "programs"
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real measurements, beside the repository or where PPAFO_SHARED_DATA says."""
+    beside = Path(__file__).parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("PPAFO_SHARED_DATA", beside))
+    if not folder.is_dir():
+        pytest.skip("the real measurements are not here: no ../shared/data, and PPAFO_SHARED_DATA names no folder")
+    return folder

@@ -3,6 +3,9 @@
 COMMANDS: dict[str, str] = {
     "reproduce": "run the paper's experiments and report against its claims",
     "simulate": "run a scenario and write its recording, metrics and figure",
+    "validate": "hold a parameter set against recordings, channel by channel",
+    "rig": "record synthetic bench data on the virtual test rig",
+    "identify": "bench recordings in, parameter set with uncertainty out",
     "plot": "draw a result folder again",
     "sets": "list parameter sets, or show one with the source of every value",
     "audit": "check a parameter set for contradictions",

@@ -72,9 +72,15 @@ def _below(node: Any, part: str) -> Any:
     """Return the type of what a table has at a key, or a table or list by names or numbers at any; None if unknown."""
     if _is_model(node):
         field = node.model_fields.get(part)
-        return None if field is None else field.annotation
-    members = get_args(node)
+        return None if field is None else _given(field.annotation)
+    members = [item for item in get_args(node) if item is not Ellipsis]
     return members[-1] if members else None
+
+
+def _given(annotation: Any) -> Any:
+    """Return the type of a value that is there, for one that may be left out as ``X | None``."""
+    members = [item for item in get_args(annotation) if item is not type(None)]
+    return members[0] if get_origin(annotation) in (Union, UnionType) and len(members) == 1 else annotation
 
 
 def _is_model(node: Any) -> bool:

@@ -143,6 +143,10 @@ class LaneBlock:
         )
         self._next_step += step_count
 
+    def set_parameters(self, rows: Sequence[int], values: Floats) -> None:
+        """Change some parameters of all runs from the next step on; ``rows`` as ``Program.parameter_rows`` has them."""
+        self._parameters[rows] = values[:, None]
+
     def past(self, step: int) -> Floats:
         """States (rows, runs) at the beginning of an earlier step; every step must be recorded. Step 0 before that."""
         step = max(0, step)

@@ -1,6 +1,5 @@
 """The page that tells a reader of the paper what came of running it again; one file, no scripts, nothing to fetch."""
 
-import base64
 import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,7 +9,8 @@ from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding
 from ppafo.reporting.claims_table import count_sentence
 from ppafo.reporting.metrics_table import in_shown_unit
-from ppafo.reporting.typesetting import printed_quantity, quantity, sentence, typeset, with_paths_as_code
+from ppafo.reporting.page import inline_figure, rendered_page
+from ppafo.reporting.typesetting import printed_quantity, quantity, sentence
 from ppafo.simulation.result import Result
 from ppafo.studies.reproduction import Claim, Reproduction
 from ppafo.studies.reproduction.assumed import AssumedValue
@@ -38,32 +38,19 @@ _TASK_METRICS = (
 
 def reproduction_report(reproduction: Reproduction, step_figure: bytes, torque_figure: bytes) -> str:
     """Return the report as HTML; figures are the contents of SVG files and become part of the page."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("ppafo.reporting"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters["typeset"] = typeset
-    environment.filters["sentence"] = sentence
-    environment.filters["coded"] = with_paths_as_code
-    page = environment.get_template(TEMPLATE)
-    return page.render(
+    values = {
         **_summary(reproduction),
         **_findings(reproduction),
-        step_figure=_inline(step_figure),
-        torque_figure=_inline(torque_figure),
-        task_rows=_task_rows(reproduction.solenoid.metrics, reproduction.proportional.metrics),
-        ceiling=f"{holding_torque(reproduction.solenoid):.1f}",
-        assumed_groups=_assumed_groups(reproduction.assumed),
-        versions=", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
-        steps=_steps((reproduction.step, reproduction.solenoid, reproduction.proportional)),
-        command=shlex.join(_command(reproduction.overrides)),
-    )
+        "step_figure": inline_figure(step_figure),
+        "torque_figure": inline_figure(torque_figure),
+        "task_rows": _task_rows(reproduction.solenoid.metrics, reproduction.proportional.metrics),
+        "ceiling": f"{holding_torque(reproduction.solenoid):.1f}",
+        "assumed_groups": _assumed_groups(reproduction.assumed),
+        "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
+        "steps": _steps((reproduction.step, reproduction.solenoid, reproduction.proportional)),
+        "command": shlex.join(_command(reproduction.overrides)),
+    }
+    return rendered_page(TEMPLATE, values)
 
 
 def holding_torque(result: Result) -> float:
@@ -156,7 +143,3 @@ def _steps(results: Sequence[Result]) -> str:
 def _command(overrides: Sequence[str]) -> list[str]:
     changed = [word for override in overrides for word in ("--set", override)]
     return ["ppafo", "reproduce", "--out", "out/reproduce", *changed]
-
-
-def _inline(svg: bytes) -> str:
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"

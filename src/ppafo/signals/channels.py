@@ -30,5 +30,12 @@ CHANNELS: dict[str, ChannelKind] = {
     "external_torque": ChannelKind("N m", "torque on the wearer, T_ex of equation (1)"),
     "mass_1": ChannelKind("kg", "gas in chamber 1"),
     "mass_2": ChannelKind("kg", "gas in chamber 2"),
+    "supply_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve"),
+    "pressure_difference": ChannelKind("Pa_d", "pressure in chamber 1 less that in chamber 2"),
+    "upstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas comes from"),
+    "downstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas goes to"),
+    "mass_flow": ChannelKind("kg/s", "gas through the part on the bench, positive into chamber 1"),
+    "direction": ChannelKind(PLAIN_NUMBER, "1 while the pressure rises, -1 while it falls", is_held=True),
+    "repetition": ChannelKind(PLAIN_NUMBER, "number of the repetition", is_held=True),
 }
 """To add one: one line here. A recording may also have channels that are not listed."""

@@ -67,14 +67,14 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         values = _table(rows, len(columns), first)
         time, *channels = (_channel(column, values[:, index], atmosphere) for index, column in enumerate(columns))
         named = {column.name: channel for column, channel in zip(columns[1:], channels, strict=True)}
-        return Recording(label or Path(path).stem, time.values, named, _kind(lines[:first]))
+        return Recording(label or Path(path).stem, time.values, named, kind_of_comments(lines[:first]))
     except csv.Error as error:
         raise DataError(f"{path}: is not a CSV file: {error}") from error
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
 
 
-def _kind(comments: Iterable[str]) -> RecordingKind:
+def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
     """Return the kind that a comment names; a misspelt one must not let a simulation pass for a measurement."""
     named: list[RecordingKind] = []
     for match in filter(None, map(_MARK.fullmatch, comments)):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
 from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import read_csv
@@ -10,15 +11,18 @@ from ppafo.storage.netcdf import read_netcdf
 from ppafo.storage.result_folder import CSV_FILE, RUN_FILE, read_document, read_result
 
 
-def read_recording(path: str | Path) -> Recording:
-    """Return the recording in a ``.nc`` or ``.csv`` file or in a result folder."""
+def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
+    """Return the recording in a ``.nc`` or ``.csv`` file or in a result folder.
+
+    Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute].
+    """
     place = Path(path)
     if place.is_dir():
         return read_result(place).recording
     if place.suffix == ".nc":
         return read_netcdf(place)
     if place.suffix == ".csv":
-        return _of_its_folder(read_csv(place), place)
+        return _of_its_folder(read_csv(place, atmosphere=atmosphere), place)
     raise DataError(f"{path}: is neither a .nc or .csv file nor a result folder")
 
 

@@ -1,0 +1,88 @@
+"""``ppafo validate PARAMETERS RECORDINGS``: replays recordings on the model and says how far apart they are."""
+
+import argparse
+from pathlib import Path
+
+from ppafo.cli.output import (
+    EXIT_CHECK_FAILED,
+    EXIT_GOOD,
+    add_output_arguments,
+    add_override_argument,
+    check_output,
+    print_result,
+    tell,
+    write_files,
+)
+from ppafo.cli.quick_imports import load_compiler, load_drawing
+
+_LONGEST_DELAY = "20 ms"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("parameters", metavar="PARAMETERS", help="name of a parameter set, or a .toml file")
+    parser.add_argument(
+        "recordings",
+        metavar="RECORDING",
+        nargs="+",
+        help="a .csv or .nc file, or a result folder; several may be given",
+    )
+    parser.add_argument("--valve", metavar="NAME", help="a valve of the set; its default valve unless given")
+    add_override_argument(parser)
+    parser.add_argument(
+        "--motion",
+        metavar="free|measured",
+        default="free",
+        help="free: the model moves the vane; measured: the vane is led along the recorded angle",
+    )
+    parser.add_argument(
+        "--initial",
+        metavar="CHANNEL=VALUE",
+        action="append",
+        default=[],
+        help="where the replay starts, for a channel that was not recorded, for example 'pressure_2=0 psi_g'",
+    )
+    parser.add_argument(
+        "--threshold",
+        dest="thresholds",
+        metavar="[CHANNEL=]LIMIT",
+        action="append",
+        default=[],
+        help="largest RMS error, of full range or with a unit: 5%%, angle=10%%, 'pressure_1=3.7 psi_d'; default 10%%",
+    )
+    parser.add_argument(
+        "--longest-delay",
+        metavar="TIME",
+        default=_LONGEST_DELAY,
+        help=f"largest delay of the measurement that is looked for; default '{_LONGEST_DELAY}', '0 s' for none",
+    )
+    add_output_arguments(parser)
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Compare, print and write; 1 where an error is above its limit."""
+    load_compiler()
+    from ppafo.parameters import load_device
+    from ppafo.reporting.agreement_files import REPORT, agreement_files, file_names
+    from ppafo.reporting.agreement_table import agreement_document, agreement_table
+    from ppafo.validation import ReplaySettings, parse_thresholds, validate
+    from ppafo.validation.alignment import parse_limit
+    from ppafo.validation.start import parse_initial
+    from ppafo.validation.validate import check_motion
+
+    atmosphere = load_device(parsed.parameters, parsed.valve, parsed.overrides).supply.atmospheric_pressure
+    settings = ReplaySettings(
+        motion=check_motion(parsed.motion),
+        initial=parse_initial(parsed.initial, atmosphere),
+        longest_delay=parse_limit(parsed.longest_delay),
+        thresholds=parse_thresholds(parsed.thresholds),
+    )
+    check_output(parsed.out, file_names(parsed.recordings))
+    validation = validate(parsed.parameters, parsed.recordings, parsed.valve, parsed.overrides, settings, tell)
+    lines = agreement_table(validation)
+    if parsed.out is not None:
+        load_drawing()
+        write_files(Path(parsed.out), agreement_files(validation))
+        lines += ["", f"report: {parsed.out / REPORT}"]
+    print_result("\n".join(lines), agreement_document(validation), parsed.json)
+    return EXIT_GOOD if validation.passes else EXIT_CHECK_FAILED

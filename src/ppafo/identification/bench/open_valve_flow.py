@@ -1,0 +1,253 @@
+"""Flow through the fully open valve: Cd A of equations (6), (7), or C and b of ISO 6358 from several ratios."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
+from ppafo.identification.bench.gas_flow import GasAt, iso6358_shape, orifice_shape
+from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pooled
+from ppafo.identification.bench.picture import Panel, Series
+from ppafo.identification.bench.result import BenchResult, Check, verdict_of
+from ppafo.identification.estimate import Estimate
+from ppafo.identification.source import Source, traces
+from ppafo.model.gas import critical_pressure_ratio
+from ppafo.signals.recording import Floats
+
+PROCEDURE = "open_valve_flow"
+CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
+FEWEST_SAMPLES = 5
+_FULLY_OPEN = 0.99
+_LARGEST_CRITICAL_RATIO = 0.95
+_SPREAD_OF_RATIOS = 0.15
+_GOOD_SHARE = 0.05
+
+Law = Literal["orifice", "iso6358"]
+
+
+@dataclass(frozen=True, slots=True)
+class OpenValveFlowSettings:
+    """The gas, the law to report, the valve's path in a set (``valves.main``) and its area [m^2] where it is known.
+
+    With an area, Cd follows from Cd A; without one only the product is known.
+    """
+
+    gas: GasAt
+    law: Law = "orifice"
+    area: float | None = None
+    path: str = "valve"
+    confidence: float = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class _Points:
+    """Readings with the valve fully open: absolute pressures [Pa], flow [kg/s]."""
+
+    upstream: Floats
+    downstream: Floats
+    flow: Floats
+
+    @property
+    def ratio(self) -> Floats:
+        return self.downstream / self.upstream
+
+
+def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings) -> BenchResult:
+    """Return Cd A [m^2] and Cd [-], and C [m^3/(s Pa)] and b [-] where the pressure ratios span enough; (6), (7)."""
+    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
+    for source in sources:
+        check_not_clipped(source, PROCEDURE, "mass_flow", "upstream_pressure")
+    points = _points(sources)
+    orifice = _orifice_fit(points, settings)
+    sonic = _sonic_fit(points, settings) if _spans_enough(points, settings.gas) else None
+    if settings.law == "iso6358" and sonic is None:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
+            f"{_SPREAD_OF_RATIOS:g} or more; these go from {points.ratio.min():.3g} to {points.ratio.max():.3g}"
+        )
+    estimates = _estimates(traces(sources), settings, orifice, sonic)
+    checks = _checks(settings, orifice, sonic)
+    text = f"{points.flow.size} readings, pressure ratios {points.ratio.min():.3g} to {points.ratio.max():.3g}; "
+    text += f"Cd A = {orifice.values[0] * 1e6:.4g} mm^2"
+    text += "" if sonic is None else f"; C = {sonic.values[0]:.4g} m^3/(s Pa), b = {sonic.values[1]:.3g}"
+    panels = _panels(points, settings, orifice, sonic)
+    return BenchResult(PROCEDURE, text, estimates, checks, panels, kind_of(sources))
+
+
+def _points(sources: tuple[Source, ...]) -> _Points:
+    upstream, downstream, flow = (pooled(sources, name) for name in CHANNELS)
+    is_open = np.concatenate([_is_open(source) for source in sources])
+    if is_open.sum() < FEWEST_SAMPLES:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE} needs {FEWEST_SAMPLES} readings with the valve fully open, "
+            f"command 1 or -1; there are {int(is_open.sum())}"
+        )
+    for name, values in (("upstream_pressure", upstream), ("downstream_pressure", downstream)):
+        bad = np.flatnonzero(values <= 0.0)
+        if bad.size:
+            raise IdentificationError(
+                f"{sources[0].name}: {PROCEDURE}: '{name}' is {values[bad[0]]:g} Pa at sample {bad[0] + 1}; "
+                f"it is absolute: say psi_g, bar_g, kPa_g for gauge"
+            )
+    points = _Points(upstream[is_open], downstream[is_open], np.abs(flow[is_open]))
+    wrong = np.flatnonzero(points.downstream >= points.upstream)
+    if wrong.size > points.flow.size // 10:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE}: downstream_pressure is at or above upstream_pressure in {wrong.size} of "
+            f"{points.flow.size} readings; are the two columns exchanged?"
+        )
+    if points.flow.max() <= 0.0:
+        check_moves(sources[0], PROCEDURE, "mass_flow")
+    return points
+
+
+def _is_open(source: Source) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+    if "command" not in source.recording:
+        return np.ones(len(source.recording), dtype=np.bool_)
+    return np.asarray(np.abs(source.recording["command"]) >= _FULLY_OPEN)
+
+
+def _spans_enough(points: _Points, gas: GasAt) -> bool:
+    """Whether flow is both nearly choked and clearly subsonic, so that the critical ratio has something to rest on."""
+    choked = critical_pressure_ratio(gas.heat_capacity_ratio)
+    return bool(np.ptp(points.ratio) >= _SPREAD_OF_RATIOS and points.ratio.max() > choked + 0.5 * _SPREAD_OF_RATIOS)
+
+
+def _orifice_flow(points: _Points, gas: GasAt) -> Floats:
+    return gas.choked_flow_constant * orifice_shape(points.upstream, points.downstream, gas.heat_capacity_ratio)
+
+
+def _orifice_fit(points: _Points, settings: OpenValveFlowSettings) -> CurveFit:
+    per_area = _orifice_flow(points, settings.gas)
+    start = np.array([per_area @ points.flow / (per_area @ per_area)])
+    scale = float(np.abs(points.flow).max())
+    return fit_curve(
+        lambda values: (points.flow - values[0] * per_area) / scale,
+        start,
+        np.array([0.0]),
+        np.array([np.inf]),
+        settings.confidence,
+    )
+
+
+def _sonic_fit(points: _Points, settings: OpenValveFlowSettings) -> CurveFit:
+    """Fit C (as a multiple of a first guess, so that both unknowns are of order one) and b."""
+    per_conductance = settings.gas.flow_per_sonic_conductance
+    guess = float(points.flow.max()) / (per_conductance * float(points.upstream[np.argmax(points.flow)]))
+    scale = float(np.abs(points.flow).max())
+
+    def residuals(values: Floats) -> Floats:
+        shape = iso6358_shape(points.upstream, points.downstream, float(values[1]))
+        return np.asarray((points.flow - values[0] * guess * per_conductance * shape) / scale)
+
+    fits = [
+        fit_curve(
+            residuals,
+            np.array([1.0, start]),
+            np.zeros(2),
+            np.array([100.0, _LARGEST_CRITICAL_RATIO]),
+            settings.confidence,
+        )
+        for start in (0.2, 0.5)
+    ]
+    best = min(fits, key=lambda fit: fit.rms)
+    units = np.array([guess, 1.0])
+    return replace(best, values=best.values * units, half_widths=best.half_widths * units)
+
+
+def _estimates(
+    names: tuple[str, ...], settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None
+) -> tuple[Estimate, ...]:
+    def entry(path: str, value: float, unit: str, half: float, text: str) -> Estimate:
+        low, high = float(value - half), float(value + half)
+        return Estimate(
+            path,
+            float(value),
+            unit,
+            max(0.0, low),
+            high,
+            verdict_of(value, low, high),
+            text,
+            names,
+            settings.confidence,
+        )
+
+    product, half = float(orifice.values[0]), float(orifice.half_widths[0])
+    listed = [
+        entry("open_valve_flow.effective_area", product, "m^2", half, "Cd A, the product; it alone sets the flow.")
+    ]
+    if settings.law == "orifice" and settings.area:
+        text = f"Cd A over the set's area of {settings.area * 1e6:.4g} mm^2, taken as exact."
+        listed.insert(
+            0, entry(f"{settings.path}.discharge_coefficient", product / settings.area, "", half / settings.area, text)
+        )
+    if sonic is not None:
+        (conductance, ratio), (wide_c, wide_b) = sonic.values, sonic.half_widths
+        section = settings.path if settings.law == "iso6358" else PROCEDURE
+        trade = f"Errors of C and b go together with {sonic.correlation[0, 1]:+.2f}."
+        listed += [
+            entry(f"{section}.sonic_conductance", conductance, "m^3/(s Pa)", wide_c, f"C of ISO 6358. {trade}"),
+            entry(f"{section}.critical_ratio", ratio, "", wide_b, f"b of ISO 6358. {trade}"),
+        ]
+    return tuple(listed)
+
+
+def _checks(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None) -> tuple[Check, ...]:
+    reported = sonic if settings.law == "iso6358" and sonic is not None else orifice
+    noise = "of the largest flow"
+    listed = [
+        Check("residuals", reported.rms <= _GOOD_SHARE, f"the law misses the flow by {reported.rms:.2%} {noise} (rms)")
+    ]
+    bound = float(np.mean(reported.residuals))
+    drift = abs(bound) <= max(0.01, 2.0 * reported.rms / np.sqrt(reported.effective))
+    listed.append(Check("bias", bool(drift), f"mean residual {bound:+.2%} {noise}"))
+    if sonic is not None:
+        count = min(orifice.effective, sonic.effective)
+        gain = count * np.log(max(orifice.rms, 1e-15) / max(sonic.rms, 1e-15)) * 2.0 - 2.0
+        better = "ISO 6358" if gain > 2.0 else "the orifice law" if gain < -2.0 else "neither law clearly"
+        text = f"AIC prefers {better} (difference {gain:+.1f}): rms {orifice.rms:.2%} orifice, {sonic.rms:.2%} ISO 6358"
+        listed.append(Check("which law", True, text))
+    else:
+        listed.append(
+            Check("which law", True, "one pressure ratio, or choked flow alone: C and b cannot be told apart")
+        )
+    return tuple(listed)
+
+
+def _panels(
+    points: _Points, settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None
+) -> tuple[Panel, ...]:
+    """Show conductance over ratio: flow over upstream pressure, which both laws make a function of the ratio alone."""
+    ratios = np.linspace(0.0, 1.0, 201)
+    ones = np.ones_like(ratios)
+    gas = settings.gas
+    law = orifice.values[0] * gas.choked_flow_constant * orifice_shape(ones, ratios, gas.heat_capacity_ratio)
+    shown = [Series("measured", points.ratio, points.flow / points.upstream, "measured")]
+    shown.append(Series("orifice", ratios, law, "law" if settings.law == "orifice" else "other law"))
+    if sonic is not None:
+        curve = sonic.values[0] * gas.flow_per_sonic_conductance * iso6358_shape(ones, ratios, float(sonic.values[1]))
+        shown.append(Series("ISO 6358", ratios, curve, "law" if settings.law == "iso6358" else "other law"))
+    modelled = points.flow - orifice.residuals * float(points.flow.max())
+    if settings.law == "iso6358" and sonic is not None:
+        modelled = points.flow - sonic.residuals * float(points.flow.max())
+    ends = np.array([0.0, float(points.flow.max())])
+    return (
+        Panel(
+            "Open-valve flow",
+            "Downstream over upstream pressure",
+            "-",
+            "Flow over upstream pressure",
+            "kg/(s Pa)",
+            tuple(shown),
+        ),
+        Panel(
+            "Fitted against measured",
+            "Measured flow",
+            "kg/s",
+            "Fitted flow",
+            "kg/s",
+            (Series("", points.flow, modelled, "measured"), Series("", ends, ends, "law")),
+        ),
+    )

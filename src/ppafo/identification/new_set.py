@@ -1,0 +1,92 @@
+"""The new parameter set: identified values in the place of the old ones, each with interval and origin."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from ppafo.errors import ParameterError
+from ppafo.identification.estimate import Estimate
+from ppafo.parameters.building import build_device
+from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, shown
+from ppafo.parameters.provenance import Entry
+from ppafo.units import from_si
+
+_FORMS = (frozenset(item.name for item in AREA_FORM), frozenset(item.name for item in SONIC_FORM))
+
+
+@dataclass(frozen=True, slots=True)
+class NewSet:
+    """A set with identified values: their paths, and what is wrong with it as a device (an empty text if nothing)."""
+
+    parameter_set: ParameterSet
+    written: tuple[str, ...]
+    problem: str
+
+
+def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], valve: str | None = None) -> NewSet:
+    """Return the set with every usable estimate that has a place in it; the later of two for one path counts."""
+    written: dict[str, None] = {}
+    for estimate in estimates:
+        if _has_a_place(parameter_set, estimate):
+            parameter_set = _with_estimate(parameter_set, estimate)
+            written[estimate.path] = None
+    return NewSet(parameter_set, tuple(written), _device_problem(parameter_set, valve))
+
+
+def _has_a_place(parameter_set: ParameterSet, estimate: Estimate) -> bool:
+    quantity = parameter_set.declared().get(estimate.path)
+    return quantity is not None and estimate.is_usable and is_within(estimate.value, quantity)
+
+
+def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> ParameterSet:
+    """Return the set with one value replaced; it keeps the unit that the set had."""
+    quantity = parameter_set.declared()[estimate.path]
+    before = parameter_set.numbers.get(estimate.path)
+    atmosphere = atmospheric_pressure(parameter_set)
+    unit = quantity.unit if before is None else before.unit
+    si_unit = next((item for item in alternatives(quantity) if _fits(unit, item)), quantity.unit)
+    value, low, high = (
+        from_si(number, unit, si_unit, atmosphere) for number in (estimate.value, estimate.low, estimate.high)
+    )
+    was = (
+        "the set had no value" if before is None else f"the set had {shown(before)} ({before.origin}: {before.source})"
+    )
+    interval = f"{estimate.confidence:.0%} interval {low:.6g} to {high:.6g} {unit}".rstrip()
+    entry = Entry(
+        value=value,
+        unit=unit,
+        origin="identified",
+        source="; ".join(estimate.recordings),
+        note=f"{estimate.verdict}, {interval}. {estimate.explanation} Before, {was}.",
+        uncertainty=max(high - value, value - low),
+    )
+    kept = {path: old for path, old in parameter_set.numbers.items() if path not in _other_form(estimate.path)}
+    return replace(parameter_set, numbers={**kept, estimate.path: entry})
+
+
+def _fits(unit: str, si_unit: str) -> bool:
+    from ppafo.errors import UnitError
+
+    try:
+        from_si(1.0, unit, si_unit)
+    except UnitError:
+        return False
+    return True
+
+
+def _other_form(path: str) -> frozenset[str]:
+    """Return the paths of an orifice that no longer hold when it is given in the form that ``path`` belongs to."""
+    section, _, name = path.rpartition(".")
+    own = next((form for form in _FORMS if name in form), None)
+    other = (
+        next((form for form in _FORMS if form is not own), frozenset[str]()) if own is not None else frozenset[str]()
+    )
+    return frozenset(f"{section}.{member}" for member in other)
+
+
+def _device_problem(parameter_set: ParameterSet, valve: str | None) -> str:
+    try:
+        build_device(parameter_set, valve)
+    except ParameterError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,154 @@
+"""The procedures by name in the recommended order, and how each gets its settings from a problem and a set.
+
+The order matters where one leans on another: torque and friction are measured first because they need nothing else, the
+flow of the open valve before its map, and the leak last, since its chambers must be known to hold.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ppafo.errors import IdentificationError, UnitError, nearest_name
+from ppafo.identification.bench.free_decay import FreeDecaySettings, free_decay
+from ppafo.identification.bench.gas_flow import GasAt
+from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, open_valve_flow
+from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_torque
+from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
+from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
+from ppafo.identification.problem import (
+    FreeDecayProblem,
+    OpenValveFlowProblem,
+    ProcedureProblem,
+    StaticTorqueProblem,
+    ValveMapProblem,
+    VaneLeakProblem,
+)
+from ppafo.identification.source import Source
+from ppafo.model.gas import SPECIES
+from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
+from ppafo.units import parse_quantity, to_si
+
+RECOMMENDED_ORDER = ("static_torque", "free_decay", "open_valve_flow", "valve_map", "vane_leak")
+UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What a procedure may lean on: the set as it stands, the chosen valve, and what messages call the place."""
+
+    parameter_set: ParameterSet
+    valve: str
+    place: str
+
+    def number(self, path: str) -> float:
+        """Return the value at a path [SI], or say that the set lacks it."""
+        value = number_in_si(self.parameter_set, path)
+        if value is None:
+            raise IdentificationError(f"{self.place}: needs {path}, which {self.parameter_set.file} does not have")
+        return value
+
+    def given(self, name: str, text: str | None, unit: str) -> float | None:
+        """Return a quantity of the problem file [unit], None where it was left out."""
+        if text is None:
+            return None
+        try:
+            return parse_quantity(text, unit)
+        except UnitError as error:
+            raise IdentificationError(f"{self.place}: {name} = {text!r}: {error}") from error
+
+    def gas(self, species: str | None) -> GasAt:
+        """Return the gas of the bench at the set's temperature; the set's own where no species is named."""
+        temperature = self.number("gas.temperature")
+        if species is None:
+            return GasAt(self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio"), temperature)
+        if species not in SPECIES:
+            hint = nearest_name(species, SPECIES)
+            known = ", ".join(SPECIES)
+            raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; known are {known}")
+        return GasAt(SPECIES[species].molar_mass, SPECIES[species].heat_capacity_ratio, temperature)
+
+    def valve_named(self, name: str | None) -> str:
+        """Return the path of a valve in the set, ``valves.main``."""
+        return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
+
+
+def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, setting: Setting) -> BenchResult:
+    """Return what a procedure of a problem makes of its recordings."""
+    return _RUNS[problem.kind](sources, problem, setting)
+
+
+def _static_torque(sources: tuple[Source, ...], problem: StaticTorqueProblem, _setting: Setting) -> BenchResult:
+    return static_torque(sources, StaticTorqueSettings(problem.confidence, problem.calibration))
+
+
+def _free_decay(sources: tuple[Source, ...], problem: FreeDecayProblem, setting: Setting) -> BenchResult:
+    start, end = (setting.given(name, getattr(problem, name), "s") for name in ("start", "end"))
+    inertia, half_width, source = _inertia(problem, setting)
+    return free_decay(sources, FreeDecaySettings(start, end, inertia, half_width, source, problem.confidence))
+
+
+def _inertia(problem: FreeDecayProblem, setting: Setting) -> tuple[float | None, float, str]:
+    """Return the inertia [kg m^2], half the width of its interval and where it comes from; None where it is unknown."""
+    if problem.inertia == UNKNOWN:
+        return None, 0.0, ""
+    if problem.inertia is not None:
+        value = setting.given("inertia", problem.inertia, "kg m^2")
+        if value is None or value <= 0.0:
+            raise IdentificationError(f"{setting.place}: inertia = {problem.inertia!r} must be above zero")
+        return value, 0.0, "given in the problem"
+    entry = setting.parameter_set.numbers.get("foot_plate.inertia")
+    if entry is None:
+        return None, 0.0, ""
+    value = setting.number("foot_plate.inertia")
+    half_width = to_si(entry.uncertainty or 0.0, entry.unit, "kg m^2")
+    return value, half_width, f"{entry.origin} in {setting.parameter_set.name}"
+
+
+def _open_valve_flow(sources: tuple[Source, ...], problem: OpenValveFlowProblem, setting: Setting) -> BenchResult:
+    path = setting.valve_named(problem.valve)
+    area = number_in_si(setting.parameter_set, f"{path}.area")
+    return open_valve_flow(
+        sources, OpenValveFlowSettings(setting.gas(problem.gas), problem.law, area, path, problem.confidence)
+    )
+
+
+def _valve_map(sources: tuple[Source, ...], problem: ValveMapProblem, setting: Setting) -> BenchResult:
+    return valve_map(
+        sources, ValveMapSettings(setting.gas(problem.gas), setting.valve_named(problem.valve), problem.confidence)
+    )
+
+
+def _vane_leak(sources: tuple[Source, ...], problem: VaneLeakProblem, setting: Setting) -> BenchResult:
+    start, end = (setting.given(name, getattr(problem, name), "s") for name in ("start", "end"))
+    volume_1, volume_2 = _volumes(problem, setting)
+    coefficient = number_in_si(setting.parameter_set, "actuator.leak.discharge_coefficient")
+    settings = VaneLeakSettings(
+        setting.gas(problem.gas), volume_1, volume_2, coefficient, start, end, problem.confidence
+    )
+    return vane_leak(sources, settings)
+
+
+def _volumes(problem: VaneLeakProblem, setting: Setting) -> tuple[float | None, float | None]:
+    """Return both volumes [m^3]: as given, else from the angle and the set, equations (4), (5); None where unknown."""
+    given = [setting.given(name, getattr(problem, name), "m^3") for name in ("volume_1", "volume_2")]
+    for name, volume in zip(("volume_1", "volume_2"), given, strict=True):
+        if volume is not None and volume <= 0.0:
+            raise IdentificationError(f"{setting.place}: {name} = {getattr(problem, name)!r} must be above zero")
+    angle = setting.given("angle", problem.angle, "rad")
+    if angle is None:
+        return given[0], given[1]
+    names = ("angle_min", "angle_max", "volume_per_angle", "dead_volume_1", "dead_volume_2")
+    lower, upper, per_angle, dead_1, dead_2 = (setting.number(f"actuator.{name}") for name in names)
+    if not lower <= angle <= upper:
+        raise IdentificationError(f"{setting.place}: angle = {problem.angle!r} lies beyond the stops of the set")
+    found = (dead_1 + per_angle * (angle - lower), dead_2 + per_angle * (upper - angle))
+    return given[0] or found[0], given[1] or found[1]
+
+
+_RUNS: dict[str, Callable[..., BenchResult]] = {
+    "static_torque": _static_torque,
+    "free_decay": _free_decay,
+    "open_valve_flow": _open_valve_flow,
+    "valve_map": _valve_map,
+    "vane_leak": _vane_leak,
+}

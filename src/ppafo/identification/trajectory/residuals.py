@@ -1,0 +1,120 @@
+"""Weighted residuals and their Jacobian; all columns of differences run as lanes of one block per experiment."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.trajectory.columns import numbers_in, trajectories
+from ppafo.identification.trajectory.preparation import Floats, Prepared, refined
+from ppafo.identification.trajectory.problem import Range
+
+Mask = NDArray[np.bool_]
+
+FIRST_STEP = 1.0e-3
+"""Step of a difference before standard errors are known: the share of a number by which it is moved."""
+
+_TOUCH = 1.0e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """What is to be made small: (model - sample) / noise of all channels, then (coordinate - prior) / deviation."""
+
+    experiments: tuple[Prepared, ...]
+    ranges: tuple[Range, ...]
+
+    def of_data(self, points: Floats) -> Floats:
+        """Return the residuals of the samples (samples, points) at points (points, coordinates); NaN if a run fails."""
+        signals = trajectories(self.experiments, self.ranges, points)
+        parts = [
+            (of_one[channel.name] - channel.values[:, None]) / channel.noise
+            for prepared, of_one in zip(self.experiments, signals, strict=True)
+            for channel in prepared.channels
+        ]
+        return np.concatenate(parts)
+
+    def of_priors(self, point: Floats) -> Floats:
+        """Return the residuals of the priors, one for each parameter that has one."""
+        mean, deviation, has = prior_coordinates(self.ranges)
+        return (point[has] - mean[has]) / deviation[has]
+
+    def around(self, point: Floats, directions: Floats) -> "Neighbourhood":
+        """Return the residuals at a point and one step away from it along each direction (the columns), all at once."""
+        values = self.of_data(np.vstack([point + directions.T, point - directions.T, point]))
+        return Neighbourhood(self, point, directions, values)
+
+    def with_finer_steps(self, point: Floats) -> "Residuals":
+        """Return the residuals with the step of time divided as the numbers at a point need it."""
+        finer = tuple(refined(item, numbers_in(item, self.ranges, point)) for item in self.experiments)
+        return Residuals(finer, self.ranges)
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbourhood:
+    """Residuals of the samples one step after a point along each direction, one step before it, and (last) at it."""
+
+    residuals: Residuals
+    point: Floats
+    directions: Floats
+    values: Floats
+
+    @property
+    def of_data(self) -> Floats:
+        """Residuals of the samples at the point."""
+        return self.values[:, -1]
+
+    def all_residuals(self) -> Floats:
+        """Return all residuals at the point, those of the priors last."""
+        return np.concatenate([self.of_data, self.residuals.of_priors(self.point)])
+
+    def jacobian_of_data(self) -> Floats:
+        """Return the derivative of the residuals of the samples by the coordinates, by central differences.
+
+        Where a step leaves the bounds on one side, or the run there fails, the difference is one-sided.
+        """
+        count = self.directions.shape[1]
+        above, below, centre = self.values[:, :count], self.values[:, count:-1], self.values[:, -1:]
+        use_above = self._is_inside(self.directions) & np.isfinite(above).all(axis=0)
+        use_below = self._is_inside(-self.directions) & np.isfinite(below).all(axis=0)
+        self._refuse_hopeless(~(use_above | use_below))
+        change = np.where(use_above, above, centre) - np.where(use_below, below, centre)
+        return np.asarray((change / (1.0 * use_above + use_below)) @ np.linalg.inv(self.directions))
+
+    def jacobian(self) -> Floats:
+        """Return the derivative of ``all_residuals`` by the coordinates."""
+        _, deviation, has = prior_coordinates(self.residuals.ranges)
+        return np.concatenate([self.jacobian_of_data(), np.diag(1.0 / deviation)[has]])
+
+    def _is_inside(self, directions: Floats) -> Mask:
+        low, high = coordinate_bounds(self.residuals.ranges)
+        reached, touch = self.point[:, None] + directions, _TOUCH * np.abs(directions)
+        inside = (reached <= high[:, None] + touch) & (reached >= low[:, None] - touch)
+        return np.asarray(inside.all(axis=0))
+
+    def _refuse_hopeless(self, hopeless: Mask) -> None:
+        for direction in self.directions.T[hopeless]:
+            index = int(np.argmax(np.abs(direction)))
+            item = self.residuals.ranges[index]
+            raise IdentificationError(
+                f"{item.name}: no run succeeds next to {item.number(float(self.point[index])):.6g}, so nothing can be "
+                f"said about it; give other bounds or another start"
+            )
+
+
+def coordinate_bounds(ranges: Sequence[Range]) -> tuple[Floats, Floats]:
+    """Return the bounds of all coordinates."""
+    low = np.array([item.coordinate(item.low) for item in ranges])
+    return low, np.array([item.coordinate(item.high) for item in ranges])
+
+
+def prior_coordinates(ranges: Sequence[Range]) -> tuple[Floats, Floats, Mask]:
+    """Return mean and standard deviation of the priors in coordinates, infinitely wide without, and who has one."""
+    mean, deviation = np.zeros(len(ranges)), np.full(len(ranges), np.inf)
+    for index, item in enumerate(ranges):
+        if item.prior is not None:
+            mean[index] = item.coordinate(item.prior.mean)
+            deviation[index] = item.prior.standard_deviation / abs(item.slope(float(mean[index])))
+    return mean, deviation, np.isfinite(deviation)

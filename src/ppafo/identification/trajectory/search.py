@@ -1,0 +1,154 @@
+"""The search for the optimum: several starts, each refined with scipy's bounded least squares."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.trajectory.information import ROBUST_SCALE, directions_for, precision, standard_errors
+from ppafo.identification.trajectory.preparation import Floats
+from ppafo.identification.trajectory.problem import Range, Search
+from ppafo.identification.trajectory.residuals import FIRST_STEP, Mask, Neighbourhood, Residuals, coordinate_bounds
+
+DRAWS_PER_START = 8
+STAGES = 3
+PASSES = 2
+AT_BOUND = 1.0e-4
+"""Share of a number, or of the way between its bounds if that is less, within which it counts as being at one."""
+
+_TOLERANCES = (1.0e-4, 3.0e-8)
+"""Of the first stage, which only comes near, and of the others."""
+
+_SETTLED = 0.05
+"""A further stage that moves no coordinate by more than this share of its standard error is the last."""
+_WIDEST_DRAW = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Optimum:
+    """Where a search ended: coordinates, cost (half the sum of squares, or of the loss), runs, information."""
+
+    residuals: Residuals
+    point: Floats
+    cost: float
+    evaluations: int
+    information: Floats
+    has_converged: bool
+
+
+def optimum(residuals: Residuals, search: Search) -> Optimum:
+    """Return the best optimum of all starts."""
+    best: Optimum | None = None
+    evaluations = 0
+    for start in _starts(residuals, search):
+        found = _refine(residuals, start, search)
+        evaluations += found.evaluations
+        if best is None or found.cost < best.cost:
+            best = found
+    if best is None:
+        raise IdentificationError("the model diverges at every start; look at start values and bounds (ppafo audit)")
+    return Optimum(best.residuals, best.point, best.cost, evaluations, best.information, best.has_converged)
+
+
+@dataclass(frozen=True, slots=True)
+class Descent:
+    """Where scipy's trust region ended from one start."""
+
+    point: Floats
+    cost: float
+    evaluations: int
+    has_converged: bool
+
+
+def descend(
+    residuals: Residuals, start: Floats, directions: Floats, search: Search, tolerance: float = _TOLERANCES[-1]
+) -> Descent:
+    """Return where the trust region ends from one start, with fixed steps of differences."""
+    from scipy.optimize import least_squares
+
+    low, high = coordinate_bounds(residuals.ranges)
+    margin = np.where(np.isfinite(high - low), 1.0e-9 * (high - low), 0.0)
+    tried: dict[bytes, Neighbourhood] = {}
+
+    def around(point: Floats) -> Neighbourhood:
+        """Run a point and its differences together: a Jacobian is asked for nearly wherever a residual was."""
+        key = point.tobytes()
+        if key not in tried:
+            tried.clear()
+            tried[key] = residuals.around(point, directions)
+        return tried[key]
+
+    done = least_squares(
+        lambda point: around(point).all_residuals(),
+        np.clip(start, low + margin, high - margin),
+        jac=lambda point: around(point).jacobian(),
+        bounds=(low, high),
+        method="trf",
+        loss=search.loss,
+        f_scale=1.0 if search.loss == "linear" else ROBUST_SCALE,
+        xtol=tolerance,
+        ftol=tolerance,
+        gtol=tolerance,
+        max_nfev=search.most_evaluations,
+    )
+    return Descent(done.x, float(done.cost), int(done.nfev), done.status > 0)
+
+
+def is_at_bound(point: Floats, ranges: Sequence[Range]) -> Mask:
+    """Return which coordinates sit at a bound."""
+    low, high = coordinate_bounds(ranges)
+    return np.asarray(np.minimum(point - low, high - point) <= AT_BOUND * np.minimum(high - low, 1.0))
+
+
+def _refine(residuals: Residuals, start: Floats, search: Search) -> Optimum:
+    """Return the optimum from one start; steps of differences and of time follow the numbers, in stages."""
+    directions = np.diag(np.full(len(start), FIRST_STEP))
+    evaluations = 0
+    for stage in range(STAGES):
+        found = descend(residuals, start, directions, search, _TOLERANCES[min(stage, 1)])
+        evaluations += found.evaluations
+        information, directions = _information(residuals, found.point, directions, search)
+        finer = residuals.with_finer_steps(found.point)
+        moved = np.abs(found.point - start) / standard_errors(information)
+        start = found.point
+        is_same = all(new is old for new, old in zip(finer.experiments, residuals.experiments, strict=True))
+        if is_same and stage > 0 and bool(np.all(moved <= _SETTLED)):
+            break
+        residuals = finer
+    return Optimum(residuals, found.point, found.cost, evaluations, information, found.has_converged)
+
+
+def _information(residuals: Residuals, point: Floats, directions: Floats, search: Search) -> tuple[Floats, Floats]:
+    """Return the information at a point and the steps that suit it; two passes, since each needs the other."""
+    fixed = is_at_bound(point, residuals.ranges)
+    for _ in range(PASSES):
+        directions = directions_for(precision(residuals.around(point, directions), search.loss), fixed)
+    return precision(residuals.around(point, directions), search.loss), directions
+
+
+def _starts(residuals: Residuals, search: Search) -> Sequence[Floats]:
+    """Return the given start and the best of many draws around it, all of which are tried in one block."""
+    first = np.array([item.coordinate(item.start) for item in residuals.ranges])
+    if not np.isfinite(residuals.of_data(first[None, :])).all():
+        if search.other_starts == 0:
+            raise IdentificationError("the model diverges at the start values; look at them (ppafo audit)")
+        return _best_draws(residuals, first, search)
+    return [first, *_best_draws(residuals, first, search)]
+
+
+def _best_draws(residuals: Residuals, first: Floats, search: Search) -> list[Floats]:
+    if search.other_starts == 0:
+        return []
+    low, high = _near(residuals.ranges, first)
+    random = np.random.default_rng(search.seed)
+    points = low + (high - low) * random.random((DRAWS_PER_START * search.other_starts, len(first)))
+    costs = np.sum(np.square(residuals.of_data(points)), axis=0)
+    order = [int(index) for index in np.argsort(costs) if np.isfinite(costs[index])]
+    return [points[index] for index in order[: search.other_starts]]
+
+
+def _near(ranges: Sequence[Range], first: Floats) -> tuple[Floats, Floats]:
+    """Return the box of the draws: the bounds, on the log scale at most a factor of 4.5 from the start."""
+    low, high = coordinate_bounds(ranges)
+    return np.maximum(low, first - _WIDEST_DRAW), np.minimum(high, first + _WIDEST_DRAW)

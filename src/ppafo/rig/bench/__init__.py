@@ -1,0 +1,1 @@
+"""Experiments on the rig, one module for each kind of bench."""

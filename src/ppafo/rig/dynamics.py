@@ -1,0 +1,219 @@
+"""The rig in continuous time: what CVODE integrates. Pure functions on floats, compiled as one program.
+
+Beyond the identified model: energy of the gas and heat through the walls, a real-gas factor, a line between valve and
+chamber with its own orifice, a laminar part of the leak, friction that grows with pressure, and slow sensors.
+"""
+
+import math
+
+from ppafo.engine.reference.derivative import ExactOrifice, exact_flow
+from ppafo.model.plant import Openings, PlantParameters, chamber_volumes, driving_torque
+from ppafo.model.thermal import (
+    energy_rate,
+    gas_enthalpy,
+    gas_temperature,
+    heat_from_wall,
+    real_density,
+    real_pressure,
+    temperature_flow_factor,
+)
+from ppafo.model.vane import vane_acceleration
+from ppafo.rig.rows import Exchange, Look, Node, RigPhysics, RigState, Side
+
+BREAKAWAY_DROP = 0.1
+"""Share of the fall from static to dynamic friction that happens as soon as the vane moves, so that it does move."""
+
+
+def gas_node(rig: RigPhysics, mass: float, energy: float, volume: float) -> Node:
+    """Gas in a volume [m^3] from its mass [kg] and internal energy [J]."""
+    temperature = gas_temperature(energy, mass, rig.heat_capacity)
+    pressure = real_pressure(mass, volume, temperature, rig.gas_constant, rig.virial)
+    enthalpy = gas_enthalpy(temperature, mass / volume, rig.gas_constant, rig.heat_capacity, rig.virial)
+    return Node(pressure, temperature, enthalpy)
+
+
+def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> Node:
+    """Gas outside the chambers at an absolute pressure [Pa] and a temperature [K]."""
+    density = real_density(pressure, temperature, rig.gas_constant, rig.virial)
+    enthalpy = gas_enthalpy(temperature, density, rig.gas_constant, rig.heat_capacity, rig.virial)
+    return Node(pressure, temperature, enthalpy)
+
+
+def passed(rig: RigPhysics, a: Node, b: Node, share: float, orifice: ExactOrifice) -> Exchange:
+    """What passes a share of an orifice, positive from a to b, with the upstream gas's temperature. Eqs (6), (7)."""
+    flow = exact_flow(a.pressure, b.pressure, share, orifice)
+    upstream_temperature = a.temperature if flow >= 0.0 else b.temperature
+    enthalpy = a.enthalpy if flow >= 0.0 else b.enthalpy
+    flow = flow * temperature_flow_factor(rig.reference_temperature, upstream_temperature)
+    return Exchange(flow, flow * enthalpy)
+
+
+def leaked(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> Exchange:
+    """What leaks across the vane, positive from a to b: an orifice, and a laminar gap if there is one."""
+    through_orifice = passed(rig, a, b, 1.0, orifice)
+    laminar = rig.laminar_conductance * (a.pressure * a.pressure - b.pressure * b.pressure)
+    enthalpy = a.enthalpy if laminar >= 0.0 else b.enthalpy
+    return Exchange(through_orifice.mass + laminar, through_orifice.energy + laminar * enthalpy)
+
+
+def wall_heat(rig: RigPhysics, node: Node, volume: float) -> float:
+    """Heat [W] from the wall of a volume [m^3] into its gas."""
+    area = rig.wall_area_per_volume * volume
+    return heat_from_wall(node.temperature, rig.wall_temperature, rig.heat_transfer_coefficient, area)
+
+
+def static_limit(plant: PlantParameters, rig: RigPhysics, pressure_1: float, pressure_2: float) -> float:
+    """Largest friction torque at rest [N m] under two absolute pressures [Pa]."""
+    return plant.static_torque + rig.static_per_pressure * abs(pressure_1 - pressure_2)
+
+
+def kinetic_friction(
+    plant: PlantParameters, rig: RigPhysics, angular_velocity: float, pressure_1: float, pressure_2: float
+) -> float:
+    """Size of the friction torque in motion [N m]: dynamic, and near standstill more (Stribeck). Equation (10)."""
+    dynamic = plant.dynamic_torque + rig.dynamic_per_pressure * abs(pressure_1 - pressure_2)
+    if rig.stribeck_velocity <= 0.0:
+        return dynamic
+    limit = static_limit(plant, rig, pressure_1, pressure_2)
+    relative = angular_velocity / rig.stribeck_velocity
+    return dynamic + (1.0 - BREAKAWAY_DROP) * max(limit - dynamic, 0.0) * math.exp(-relative * relative)
+
+
+def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> tuple[Node, Node]:
+    """Gas in both chambers; the air of the room where the chambers are open."""
+    if rig.chambers_open > 0.5:
+        room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
+        return room, room
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    node_1 = gas_node(rig, state.mass_1, state.energy_1, volume_1)
+    node_2 = gas_node(rig, state.mass_2, state.energy_2, volume_2)
+    return node_1, node_2
+
+
+def look(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> Look:
+    """What there is to see at an angle [rad]."""
+    node_1, node_2 = chamber_nodes(plant, rig, state, angle)
+    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure)
+    return Look(node_1, node_2, torque, static_limit(plant, rig, node_1.pressure, node_2.pressure))
+
+
+def followed(seen: float, true: float, rate: float) -> float:
+    """Slope of what a first-order sensor shows, in its unit per second; 0 for a sensor that is not slow."""
+    return rate * (true - seen)
+
+
+def drooped(rig: RigPhysics, drop: float, flow: float) -> float:
+    """Slope [Pa/s] of the fall of a regulated pressure under a mass flow [kg/s]."""
+    return rig.supply_rate * (rig.supply_droop * flow - drop)
+
+
+def side(
+    rig: RigPhysics,
+    node: Node,
+    port: Node,
+    source: Node,
+    room: Node,
+    source_share: float,
+    vent_share: float,
+    valve_orifice: ExactOrifice,
+    line_orifice: ExactOrifice,
+) -> Side:
+    """All that happens between the valve and one chamber; without a line the port is the chamber itself."""
+    supplied = passed(rig, source, port, rig.ports_open * source_share, valve_orifice)
+    vented = passed(rig, port, room, rig.ports_open * vent_share, valve_orifice)
+    mass, energy = supplied.mass - vented.mass, supplied.energy - vented.energy
+    if rig.line_volume <= 0.0:
+        return Side(supplied.mass, vented.mass, energy, mass, energy, 0.0, 0.0, 0.0)
+    through = passed(rig, port, node, 1.0, line_orifice)
+    heat = wall_heat(rig, port, rig.line_volume)
+    line_energy = energy_rate(energy - through.energy, port.pressure, 0.0, heat)
+    return Side(
+        supplied.mass, vented.mass, energy, through.mass, through.energy, mass - through.mass, line_energy, heat
+    )
+
+
+def line_nodes(rig: RigPhysics, state: RigState, node_1: Node, node_2: Node) -> tuple[Node, Node]:
+    """Gas at the ports of the valve: in the lines, or in the chambers where there are none."""
+    if rig.line_volume <= 0.0:
+        return node_1, node_2
+    port_1 = gas_node(rig, state.line_mass_1, state.line_energy_1, rig.line_volume)
+    port_2 = gas_node(rig, state.line_mass_2, state.line_energy_2, rig.line_volume)
+    return port_1, port_2
+
+
+def sides(
+    plant: PlantParameters,
+    rig: RigPhysics,
+    valve_orifice: ExactOrifice,
+    line_orifice: ExactOrifice,
+    openings: Openings,
+    state: RigState,
+    node_1: Node,
+    node_2: Node,
+) -> tuple[Side, Side]:
+    """Both sides between valve and chamber."""
+    port_1, port_2 = line_nodes(rig, state, node_1, node_2)
+    source_1 = ambient_node(rig, plant.supply_pressure - state.supply_drop_1, rig.supply_temperature)
+    source_2 = ambient_node(rig, plant.dorsiflexion_pressure - state.supply_drop_2, rig.supply_temperature)
+    room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
+    side_1 = side(rig, node_1, port_1, source_1, room, openings.source_1, openings.vent_1, valve_orifice, line_orifice)
+    side_2 = side(rig, node_2, port_2, source_2, room, openings.source_2, openings.vent_2, valve_orifice, line_orifice)
+    return side_1, side_2
+
+
+def sliding_acceleration(
+    plant: PlantParameters, rig: RigPhysics, state: RigState, node_1: Node, node_2: Node, angle: float, way: float
+) -> float:
+    """Angular acceleration [rad/s^2] of a vane that slides towards ``way``, 0 of one that does not. Equation (1)."""
+    if way == 0.0:
+        return 0.0
+    speed = state.angular_velocity
+    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure)
+    friction = way * kinetic_friction(plant, rig, speed, node_1.pressure, node_2.pressure)
+    return vane_acceleration(torque, speed, friction, plant.viscous_damping, plant.inertia)
+
+
+def rig_rates(
+    plant: PlantParameters,
+    rig: RigPhysics,
+    valve_orifice: ExactOrifice,
+    leak_orifice: ExactOrifice,
+    line_orifice: ExactOrifice,
+    openings: Openings,
+    state: RigState,
+    angle: float,
+    rate: float,
+    way: float,
+) -> RigState:
+    """Slopes of all unknowns; the vane slides towards ``way`` (0: it is held, or led at ``rate`` [rad/s])."""
+    node_1, node_2 = chamber_nodes(plant, rig, state, angle)
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    side_1, side_2 = sides(plant, rig, valve_orifice, line_orifice, openings, state, node_1, node_2)
+    leak = leaked(rig, node_1, node_2, leak_orifice)
+    sliding = state.angular_velocity if way != 0.0 else 0.0
+    grows = plant.volume_per_angle * (sliding if way != 0.0 else rate)
+    heat_1, heat_2 = wall_heat(rig, node_1, volume_1), wall_heat(rig, node_2, volume_2)
+    gas = 1.0 - rig.chambers_open
+    return RigState(
+        sliding,
+        sliding_acceleration(plant, rig, state, node_1, node_2, angle, way),
+        gas * (side_1.into_mass - leak.mass),
+        gas * energy_rate(side_1.into_energy - leak.energy, node_1.pressure, grows, heat_1),
+        gas * (side_2.into_mass + leak.mass),
+        gas * energy_rate(side_2.into_energy + leak.energy, node_2.pressure, -grows, heat_2),
+        gas * side_1.line_mass,
+        gas * side_1.line_energy,
+        gas * side_2.line_mass,
+        gas * side_2.line_energy,
+        gas * (side_1.supplied_mass + side_2.supplied_mass),
+        gas * (side_1.vented_mass + side_2.vented_mass),
+        gas * leak.mass,
+        drooped(rig, state.supply_drop_1, side_1.supplied_mass),
+        drooped(rig, state.supply_drop_2, side_2.supplied_mass),
+        gas * (side_1.enthalpy_in + side_2.enthalpy_in),
+        gas * grows * (node_1.pressure - node_2.pressure),
+        gas * (heat_1 + heat_2 + side_1.line_heat + side_2.line_heat),
+        followed(state.seen_angle, angle, rig.angle_follow_rate),
+        followed(state.seen_pressure_1, node_1.pressure, rig.pressure_follow_rate),
+        followed(state.seen_pressure_2, node_2.pressure, rig.pressure_follow_rate),
+    )

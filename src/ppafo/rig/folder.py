@@ -1,0 +1,57 @@
+"""Folders of synthetic recordings: one CSV for each experiment, and ``rig.json`` with the truth behind all of them."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ppafo.documents.json_text import json_text
+from ppafo.errors import DataError
+from ppafo.rig.record import NOTICE, RigRecording
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.files import add_files, check_files_can_be_added, read_bytes
+
+RIG_FILE = "rig.json"
+FORMAT = "ppafo rig"
+
+
+def csv_name(experiment: str) -> str:
+    """Return the file name of an experiment's recording."""
+    return f"{experiment}.csv"
+
+
+def check_rig_folder(folder: Path, experiment: str) -> None:
+    """Refuse, before anything runs, a folder that cannot be written or whose ``rig.json`` is not the rig's."""
+    check_files_can_be_added(folder, [csv_name(experiment), RIG_FILE])
+    _earlier(folder)
+
+
+def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
+    """Write recording and truth into a folder beside those of other experiments; returns the file names."""
+    name = csv_name(made.truth["experiment"])
+    recordings = {**_earlier(folder), name: dict(made.truth)}
+    document = {
+        "format": FORMAT,
+        "schema_version": 1,
+        "notice": NOTICE,
+        "recordings": {key: recordings[key] for key in sorted(recordings)},
+    }
+    contents = {name: marked_csv_bytes(made.recording), RIG_FILE: f"{json_text(document)}\n".encode()}
+    add_files(folder, contents)
+    return tuple(contents)
+
+
+def _earlier(folder: Path) -> dict[str, Any]:
+    """Return what ``rig.json`` says of recordings that are already in a folder; refuse a file of another kind."""
+    path = folder / RIG_FILE
+    if not path.exists():
+        return {}
+    try:
+        document = json.loads(read_bytes(path))
+    except ValueError as error:
+        raise DataError(f"{path}: is not valid JSON, so it is not overwritten: {error}") from error
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise DataError(f"{path}: was not written by the rig, so it is not overwritten")
+    recordings = document.get("recordings")
+    if not isinstance(recordings, dict):
+        raise DataError(f"{path}: has no 'recordings', so it is not overwritten")
+    return recordings

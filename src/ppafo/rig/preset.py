@@ -1,0 +1,128 @@
+"""Presets of the rig: how far it departs from the identified model. TOML files, each value with its unit and reason."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from ppafo.documents.problems import shown
+from ppafo.documents.toml_text import TomlKind, label
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
+from ppafo.parameters.declaration import is_within
+from ppafo.rig.declaration import PATHS, SECTIONS
+from ppafo.units import parse_quantity, to_si
+
+PREFIX = "rig."
+"""An override whose path begins so belongs to the preset, any other one to the device or the experiment."""
+
+_FILE = TomlKind("preset of the rig", "rig", resources.files("ppafo.rig") / "presets", ParameterError)
+_ENTRY = ("value", "unit", "reason")
+_HEAD = ("schema_version", "name", "title", "notes")
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """A preset: values in SI by dotted path, and why each is what it is."""
+
+    name: str
+    title: str
+    notes: str
+    values: Mapping[str, float]
+    reasons: Mapping[str, str]
+
+    def section(self, name: str) -> dict[str, float]:
+        """Return the values of one section by name, in SI."""
+        return {item.name: self.values[f"{name}.{item.name}"] for item in SECTIONS[name]}
+
+    def changed(self, path: str, value: float, reason: str) -> "Preset":
+        """Return the preset with one value [SI] replaced."""
+        quantity = PATHS.get(path)
+        if quantity is None:
+            raise ParameterError(f"preset '{self.name}' has no value '{path}'{nearest_name(path, PATHS)}")
+        if not (math.isfinite(value) and is_within(value, quantity)):
+            limits = f"from {quantity.minimum:g} to {quantity.maximum:g} {quantity.unit}".rstrip()
+            raise ParameterError(f"preset '{self.name}': {path} = {value:g}: {quantity.summary} must be {limits}")
+        return replace(self, values={**self.values, path: value}, reasons={**self.reasons, path: reason})
+
+
+def list_presets() -> tuple[str, ...]:
+    """Return the names of the presets that come with the package."""
+    return _FILE.names()
+
+
+def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Preset:
+    """Return a preset by its name in the package or by the path of a TOML file.
+
+    ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``.
+    """
+    file = label(str(name_or_path))
+    preset = _parsed(_FILE.parse(_FILE.read(name_or_path), file), file)
+    for override in overrides:
+        path, separator, text = (part.strip() for part in one_line(override).partition("="))
+        if not separator or not path.startswith(PREFIX) or not text:
+            raise ParameterError(f"override '{one_line(override)}' is not of the form {PREFIX}PATH=VALUE")
+        preset = _overridden(preset, path.removeprefix(PREFIX), text)
+    return preset
+
+
+def _overridden(preset: Preset, path: str, text: str) -> Preset:
+    if path not in PATHS:
+        raise ParameterError(
+            f"override '{PREFIX}{path}={text}': the rig has no value '{path}'{nearest_name(path, PATHS)}"
+        )
+    try:
+        value = parse_quantity(text, PATHS[path].unit)
+    except UnitError as error:
+        raise ParameterError(f"override '{PREFIX}{path}={text}': {error}") from error
+    return preset.changed(path, value, "override")
+
+
+def _parsed(document: dict[str, Any], file: str) -> Preset:
+    """Check keys, units and ranges of a document; every value must be there."""
+    _check_names(document, (*_HEAD, *SECTIONS), "", file)
+    if document.get("schema_version") != 1:
+        raise ParameterError(f"{file}: schema_version must be 1, it is {shown(document.get('schema_version'))}")
+    for key in _HEAD[1:]:
+        if not isinstance(document.get(key), str):
+            raise ParameterError(f"{file}: '{key}' must be a text in quotation marks")
+    preset = Preset(document["name"], document["title"], document["notes"].strip(), {}, {})
+    for section, members in SECTIONS.items():
+        table = _table(document, section, file)
+        _check_names(table, [item.name for item in members], f"{section}.", file)
+        for item in members:
+            preset = _with_entry(preset, f"{section}.{item.name}", _table(table, item.name, file, f"{section}."), file)
+    return preset
+
+
+def _with_entry(preset: Preset, path: str, entry: dict[str, Any], file: str) -> Preset:
+    _check_names(entry, _ENTRY, f"{path}.", file)
+    value, unit, reason = (entry.get(name) for name in _ENTRY)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ParameterError(f"{file}: {path}.value = {shown(value)} must be a number")
+    if not isinstance(unit, str) or not isinstance(reason, str) or not reason:
+        raise ParameterError(f"{file}: {path} needs a unit and a reason, both texts")
+    try:
+        in_si = to_si(float(value), unit, PATHS[path].unit)
+    except UnitError as error:
+        raise ParameterError(f"{file}: {path}: {error}") from error
+    try:
+        return preset.changed(path, in_si, reason)
+    except ParameterError as error:
+        raise ParameterError(f"{file}: {error}") from error
+
+
+def _table(parent: Mapping[str, Any], key: str, file: str, before: str = "") -> dict[str, Any]:
+    table = parent.get(key)
+    if not isinstance(table, dict):
+        raise ParameterError(f"{file}: there is no table [{before}{key}]")
+    return table
+
+
+def _check_names(table: Mapping[str, Any], allowed: Iterable[str], before: str, file: str) -> None:
+    names = list(allowed)
+    unknown = next((key for key in table if key not in names), None)
+    if unknown is not None:
+        hint = nearest_name(unknown, names)
+        raise ParameterError(f"{file}: unknown key '{before}{one_line(unknown)}'{hint}; allowed: {', '.join(names)}")

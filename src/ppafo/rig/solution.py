@@ -1,0 +1,263 @@
+"""Integrates one run on the rig with CVODE, from event to event: samples, arriving commands, valve, stick-slip, stops.
+
+Friction is Coulomb's with a static limit and Stribeck's curve, both growing with pressure, and sticking is a mode that
+root functions begin and end, as in the reference solver. A bristle model would need no modes, but to agree with
+equation (10) to 1e-3 of the angle range its stiffness must be some 1e7 N m/rad, and CVODE would crawl through every
+reversal; with modes no kink lies inside a step, and without the extra terms the rig is equation (10) exactly.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.reference import vane_mode
+from ppafo.engine.rows import numbers, rebuild
+from ppafo.errors import SimulationError
+from ppafo.model.friction import holds_still
+from ppafo.model.sensors import Measurement
+from ppafo.model.vane import actuator_torque
+from ppafo.rig.rows import RigState
+from ppafo.rig.run import RigRun, RigSolution, played, seen_signals
+from ppafo.rig.source import ANGLE, INPUTS, RATE, SEEN, UNKNOWNS, compiled
+
+Floats = NDArray[np.float64]
+
+SAME_TIME = 1.0e-12
+TOLERANCE = 1.0e-8
+MOST_STEPS = 100_000
+_TOLERANCES = {
+    "angle": 1e-10,
+    "angular_velocity": 1e-9,
+    "supply_drop_1": 1e-2,
+    "supply_drop_2": 1e-2,
+    "seen_angle": 1e-9,
+    "seen_pressure_1": 1e-2,
+    "seen_pressure_2": 1e-2,
+}
+_MASS_TOLERANCE, _ENERGY_TOLERANCE, _VALVE_TOLERANCE = 1e-13, 1e-8, 1e-10
+
+
+def solve_rig(given: RigRun) -> RigSolution:
+    """Solve a run; SimulationError where the extra ``reference`` is not installed or the solver gives up."""
+    return _Rig(given).solve()
+
+
+def make_solver(slopes: Any, tolerances: Floats, roots: Any) -> Any:
+    """Return CVODE for these slopes, with two root functions or none."""
+    try:
+        from sksundae.cvode import CVODE
+    except ImportError as error:
+        raise SimulationError("the virtual rig needs scikit-sundae: pip install 'ppafo[reference]'") from error
+    return CVODE(
+        slopes,
+        rtol=TOLERANCE,
+        atol=tolerances,
+        eventsfn=roots,
+        num_events=0 if roots is None else 2,
+        max_num_steps=MOST_STEPS,
+    )
+
+
+class _Rig:
+    """State of one solution while it is being made."""
+
+    def __init__(self, given: RigRun) -> None:
+        self.given = given
+        self.run = given.run
+        self.plant = given.run.plant
+        self.is_free = given.run.program.angle is None
+        functions = compiled()
+        self.fill, self.show = functions.fill, functions.show
+        run = given.run
+        groups = (
+            run.plant,
+            given.physics,
+            run.valve_orifice,
+            run.leak_orifice,
+            given.line_orifice,
+        )
+        self.parameters = np.array([number for group in groups for number in numbers(group)])
+        self.y = np.array([*given.initial, *numbers(run.program.valve.initial())], dtype=np.float64)
+        self.seen, self.inputs = np.empty(SEEN), np.zeros(INPUTS)
+        self.valve_moves = True
+        state = run.program.valve.initial()
+        self.has_flat_valve = not any(isinstance(value, tuple) for value in state)
+        self.time, self.command, self.way = 0.0, 0.0, 0.0
+        self.decided, self.spool = 0.0, 0.0
+        self.on_the_way: list[tuple[float, float]] = []
+        self.controller_state = None if run.program.controller is None else run.program.controller.initial
+        self.recorded = 0
+        count = given.sample_times.size
+        self.result = RigSolution(np.empty((count, UNKNOWNS)), np.empty((count, 2)), np.zeros(count))
+        self.solver = make_solver(self.slopes, self.tolerances(), self.root_function())
+        if self.is_free:
+            self.way = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()
+
+    def tolerances(self) -> Floats:
+        """Absolute tolerances of all unknowns."""
+        plain = [
+            _TOLERANCES.get(name, _MASS_TOLERANCE if "mass" in name else _ENERGY_TOLERANCE) for name in RigState._fields
+        ]
+        return np.array(plain + [_VALVE_TOLERANCE] * (self.y.size - UNKNOWNS))
+
+    def slopes(self, t: float, y: Floats, slopes: Floats) -> None:
+        """Right-hand side; the valve is asked anew only while it moves."""
+        slopes[UNKNOWNS:] = self.ask_valve(y) if self.valve_moves else 0.0
+        self.place_vane(t, y)
+        self.fill(y, slopes, self.parameters, self.inputs, self.way)
+
+    def ask_valve(self, y: Floats) -> list[float]:
+        """Put the valve's openings into the inputs and return the slopes of its state."""
+        valve, state = self.run.program.valve, self.valve_state(y)
+        self.inputs[:ANGLE] = valve.instant(self.run.valve, state, self.command)
+        return numbers(valve.rates(self.run.valve, state, self.command))
+
+    def place_vane(self, t: float, y: Floats) -> None:
+        """Put the angle into the inputs, and the rate of a vane that is led."""
+        path = self.run.program.angle
+        self.inputs[ANGLE], self.inputs[RATE] = (y[0], 0.0) if path is None else path.value(self.run.path, t)[:2]
+
+    def root_function(self) -> Any:
+        """Two root functions that belong to the present mode; none for a vane that is led."""
+        if not self.is_free:
+            return None
+
+        def roots(t: float, y: Floats, events: Floats) -> None:
+            events[:] = self.roots(t, y)
+
+        roots.terminal = [True, True]  # type: ignore[attr-defined]
+        roots.direction = [-1, -1]  # type: ignore[attr-defined]
+        return roots
+
+    def roots(self, t: float, y: Floats) -> vane_mode.Roots:
+        """Distance from breakaway, or from standstill and the stop ahead."""
+        if self.way != 0.0:
+            return vane_mode.roots_sliding(self.plant, float(y[0]), float(y[1]), self.way)
+        torque, limit = self.torque_and_limit(t, y)
+        return vane_mode.roots_at_rest(self.plant._replace(static_torque=limit), float(y[0]), torque)
+
+    def look(self, t: float, y: Floats) -> Floats:
+        """Pressures, driving torque and static limit of a state."""
+        self.place_vane(t, y)
+        self.show(y, self.seen, self.parameters, self.inputs, self.way)
+        return self.seen
+
+    def torque_and_limit(self, t: float, y: Floats) -> tuple[float, float]:
+        """Driving torque and static limit of friction [N m]."""
+        seen = self.look(t, y)
+        return float(seen[2]), float(seen[3])
+
+    def rest_mode(self) -> float:
+        """Way in which a vane at rest sets off, 0 where it is held."""
+        torque, limit = self.torque_and_limit(self.time, self.y)
+        angle, plant = float(self.y[0]), self.plant
+        if holds_still(torque, limit, angle <= plant.angle_min, angle >= plant.angle_max):
+            return 0.0
+        return 1.0 if torque > 0.0 else -1.0
+
+    def solve(self) -> RigSolution:
+        """From sample to sample of the controller."""
+        end = float(self.given.sample_times[-1])
+        sample = 0
+        while self.time < end - SAME_TIME:
+            self.decide(sample)
+            sample += 1
+            self.advance_to(min(sample * self.given.control_period, end))
+        self.record_until(end + 1.0, None)
+        return self.result
+
+    def decide(self, sample: int) -> None:
+        """Let the controller see the sensors and send its command on its way."""
+        run, controller = self.run, self.run.program.controller
+        if controller is None:
+            raise SimulationError("the virtual rig runs controllers of the catalogue only")
+        wanted = run.program.reference.value(run.reference, sample * self.given.control_period)[0]
+        self.decided, self.controller_state = controller.update(
+            run.controller, self.controller_state, wanted, self.measurement(), run.period
+        )
+        self.spool = played(self.spool, self.decided, self.given.hysteresis)
+        self.on_the_way.append((self.time + self.given.command_delay, self.spool))
+
+    def measurement(self) -> Measurement:
+        """What the sensors read now; the noise is that of the last recorded sample's time."""
+        times, sensors = self.given.sample_times, self.given.sensors
+        index = max(0, int(np.searchsorted(times, self.time + SAME_TIME, side="right")) - 1)
+        seen = seen_signals(self.given, self.led(self.y, self.time), self.look(self.time, self.y)[:2])
+        names = ("angle", "pressure_1", "pressure_2")
+        angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, seen, strict=True))
+        return Measurement(angle, first, second, actuator_torque(first, second, self.plant.torque_constant))
+
+    def advance_to(self, end: float) -> None:
+        """Integrate over all that happens on the way."""
+        valve = self.run.program.valve
+        while self.time < end - SAME_TIME:
+            while self.on_the_way and self.on_the_way[0][0] <= self.time + SAME_TIME:
+                self.command = self.on_the_way.pop(0)[1]
+            state = valve.settle(self.run.valve, self.valve_state(self.y), self.command, self.time)
+            self.y[UNKNOWNS:] = numbers(state)
+            event = max(valve.next_event(self.run.valve, state, self.command, self.time), self.time + 2 * SAME_TIME)
+            later = [moment for moment, _ in self.on_the_way if moment > self.time + SAME_TIME]
+            self.integrate(min([end, event, *later]))
+
+    def valve_state(self, y: Floats) -> Any:
+        """The valve's part of the unknowns."""
+        state, values = self.run.program.valve.state, y[UNKNOWNS:].tolist()
+        return state(*values) if self.has_flat_valve else rebuild(state, values)
+
+    def integrate(self, end: float) -> None:
+        """Integrate to ``end`` or to the next event of the vane, and change the mode there."""
+        if self.is_free and self.way == 0.0:
+            self.way = self.rest_mode()
+            if self.way != 0.0:
+                self.result.breakaways.append(self.time)
+        # A valve whose slopes are 0 stays where it is, because they depend on nothing but its state and the command.
+        self.valve_moves = any(self.ask_valve(self.y))
+        times = self.given.sample_times
+        wanted = times[self.recorded : np.searchsorted(times, end - SAME_TIME)]
+        grid = np.unique(np.concatenate([[self.time], wanted[wanted > self.time + SAME_TIME], [end]]))
+        inner = grid if grid.size > 2 else np.array([grid[0], 0.5 * (grid[0] + grid[1]), grid[1]])
+        solution = self.solver.solve(inner, self.y)
+        if not solution.success:
+            raise SimulationError(f"the rig's solver stopped at t = {solution.t[-1]:.6g} s: {solution.message}")
+        self.record_until(float(solution.t[-1]) + SAME_TIME, solution)
+        self.time = float(solution.t[-1])
+        self.y = np.array(solution.y[-1])
+        if self.time < end - SAME_TIME:
+            self.change_mode()
+        else:
+            self.time = end
+
+    def record_until(self, end: float, solution: Any) -> None:
+        """Keep the states at the samples before ``end``."""
+        times = self.given.sample_times
+        while self.recorded < times.size and times[self.recorded] < end - 2 * SAME_TIME:
+            moment, index = float(times[self.recorded]), self.recorded
+            state = self.y if solution is None else solution.y[np.argmin(np.abs(solution.t - moment))]
+            self.result.states[index] = self.led(state, moment)
+            self.result.pressures[index] = self.look(moment, np.ascontiguousarray(state))[:2]
+            self.result.commands[index] = self.decided
+            self.recorded += 1
+
+    def led(self, state: Floats, time: float) -> Floats:
+        """The unknowns of ``RigState`` with the prescribed angle put in, where there is one."""
+        unknowns = np.array(state[:UNKNOWNS])
+        if not self.is_free and self.run.program.angle is not None:
+            unknowns[0], unknowns[1], _ = self.run.program.angle.value(self.run.path, time)
+        return unknowns
+
+    def change_mode(self) -> None:
+        """The vane breaks away, comes to rest, or meets a stop."""
+        plant = self.plant
+        if self.way == 0.0:
+            self.way = 1.0 if self.torque_and_limit(self.time, self.y)[0] > 0.0 else -1.0
+            self.result.breakaways.append(self.time)
+            return
+        roots = self.roots(self.time, self.y)
+        if abs(roots.second) < abs(roots.first):
+            self.result.impacts.append(self.time)
+            self.y[0] = plant.angle_max if self.way > 0.0 else plant.angle_min
+            self.y[1] = vane_mode.after_stop(plant, float(self.y[1]))
+        else:
+            self.y[1] = 0.0
+        self.way = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()

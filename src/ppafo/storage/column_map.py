@@ -1,0 +1,57 @@
+"""Column maps: how a table from elsewhere, with its own columns, units and signs, becomes a recording.
+
+A map is part of a TOML file; ``storage.foreign`` reads a file through it.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+_Text = Annotated[str, Field(min_length=1)]
+Thousands = Literal["point", "comma", "apostrophe", "blank"]
+
+
+class MappedChannel(BaseModel):
+    """Where one channel comes from: a column, or a constant. The value is sign * (factor * number + offset) in unit."""
+
+    model_config = _STRICT
+
+    column: Annotated[
+        Annotated[int, Field(ge=1)] | _Text | None, Field(description="number of the column from 1, or its name")
+    ] = None
+    constant: Annotated[_Text | None, Field(description="instead of a column: one value, such as '1 bar_a'")] = None
+    unit: Annotated[str, Field(description="unit of the value, such as 'bar_g'; '-' for a plain number")] = "-"
+    sign: Annotated[Literal[1, -1], Field(description="-1 where the file counts the other way")] = 1
+    factor: Annotated[float, Field(description="unit per number, for a sensor's volts")] = 1.0
+    offset: Annotated[float, Field(description="added after the factor, in unit")] = 0.0
+    times: Annotated[_Text | None, Field(description="a quantity to multiply by, such as a lever arm '0.13 m'")] = None
+    thousands: Annotated[Thousands | None, Field(description="mark between groups of digits")] = None
+
+
+class MappedDirection(BaseModel):
+    """Direction (1 or -1, 0 for neither) from how fast a channel moves; sweeps one way are counted as repetitions."""
+
+    model_config = _STRICT
+
+    of: Annotated[_Text, Field(description="channel whose rate decides")]
+    threshold: Annotated[_Text, Field(description="slowest rate that counts, such as '2 mm/s'")]
+    window: Annotated[_Text, Field(description="time over which the channel is smoothed, such as '0.2 s'")]
+    sign: Annotated[Literal[1, -1], Field(description="-1 where a growing channel means falling pressure")] = 1
+
+
+class ColumnMap(BaseModel):
+    """How a file is written and what its columns are."""
+
+    model_config = _STRICT
+
+    delimiter: Annotated[
+        Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what parts columns")
+    ] = "comma"
+    decimal: Annotated[Literal["point", "comma"], Field(description="decimal mark")] = "point"
+    encoding: Annotated[Literal["utf-8", "latin-1"], Field(description="how the text is encoded")] = "utf-8"
+    header: Annotated[bool, Field(description="whether a line names the columns")] = True
+    skip_lines: Annotated[int, Field(ge=0, description="lines before the header, or before the first row")] = 0
+    skip_rows: Annotated[int, Field(ge=0, description="rows of numbers to leave out at the start")] = 0
+    channels: Annotated[dict[str, MappedChannel], Field(min_length=1, description="channels by name, with 'time'")]
+    direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None

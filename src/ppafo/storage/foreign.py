@@ -1,0 +1,209 @@
+"""Tables from elsewhere, read through a column map; what cannot be read is named with file, line and column."""
+
+import csv
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import DataError, UnitError, nearest_name, one_line
+from ppafo.signals import Channel, Recording
+from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
+from ppafo.signals.recording import Floats
+from ppafo.storage.column_map import ColumnMap, MappedChannel, MappedDirection
+from ppafo.storage.columns import Column, in_si
+from ppafo.storage.comma_separated import kind_of_comments
+from ppafo.storage.files import read_bytes
+
+_DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t"}
+_MARKS = {"point": ".", "comma": ",", "apostrophe": "'", "blank": " "}
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_LONGEST_SHOWN = 40
+_COMMENT = "#"
+
+
+def read_foreign(
+    path: str | Path, columns: ColumnMap, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE
+) -> Recording:
+    """Return the recording in a table through a column map, in SI units; gauge counts from ``atmosphere`` [Pa abs]."""
+    try:
+        lines = _lines(path, columns.encoding)
+        names, rows = _rows(lines, columns)
+        if TIME not in columns.channels:
+            raise DataError(f"the column map has no channel '{TIME}'")
+        channels = {
+            name: _channel(name, item, columns.decimal, names, rows, atmosphere)
+            for name, item in columns.channels.items()
+        }
+        time = channels.pop(TIME).values
+        _check_clock(time, rows)
+        recording = Recording(label or Path(path).stem, time, channels, kind_of_comments(_comments(lines)))
+        return recording if columns.direction is None else _with_direction(recording, columns.direction)
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from error
+
+
+Rows = list[tuple[int, list[str]]]
+
+
+def _rows(lines_of_file: list[str], columns: ColumnMap) -> tuple[list[str], Rows]:
+    """Return the names of the columns (none without a header) and the rows of text, each with its line in the file."""
+    lines = list(enumerate(lines_of_file, start=1))[columns.skip_lines :]
+    cells = [(number, row) for number, row in _split(lines, columns.delimiter) if row]
+    if not cells:
+        raise DataError("has no rows" if columns.skip_lines == 0 else f"has no rows after {columns.skip_lines} lines")
+    names = [name.strip() for name in cells[0][1]] if columns.header else []
+    rows = cells[1 if columns.header else 0 :][columns.skip_rows :]
+    if not rows:
+        raise DataError("has no rows of numbers")
+    width = len(names) or len(rows[0][1])
+    for number, row in rows:
+        if len(row) != width:
+            raise DataError(f"line {number} has {len(row)} values for {width} columns")
+    return names, rows
+
+
+def _lines(path: str | Path, encoding: str) -> list[str]:
+    content = read_bytes(path)
+    try:
+        text = content.decode("utf-8-sig" if encoding == "utf-8" else encoding)
+    except UnicodeDecodeError as error:
+        raise DataError(
+            f'is not text in UTF-8 (byte {error.start}); give encoding = "latin-1" if it is that'
+        ) from error
+    if "\0" in text:
+        raise DataError(f"is not a text file (byte {text.index(chr(0))} is zero)")
+    return text.splitlines()
+
+
+def _comments(lines: list[str]) -> list[str]:
+    """Return the lines of comment: a synthetic recording stays one through a column map."""
+    return [line for line in lines if line.startswith(_COMMENT)]
+
+
+def _split(lines: list[tuple[int, str]], delimiter: str) -> Iterator[tuple[int, list[str]]]:
+    for number, line in lines:
+        if not line.strip() or line.startswith(_COMMENT):
+            continue
+        if delimiter == "whitespace":
+            yield number, line.split()
+            continue
+        try:
+            yield number, next(csv.reader([line], delimiter=_DELIMITERS[delimiter], strict=True))
+        except csv.Error as error:
+            raise DataError(f"line {number} cannot be read: {error}") from error
+
+
+def _channel(name: str, item: MappedChannel, decimal: str, names: list[str], rows: Rows, atmosphere: float) -> Channel:
+    if (item.column is None) == (item.constant is None):
+        raise DataError(
+            f"the column map gives channel '{name}' {'neither' if item.column is None else 'both'} "
+            f"a column {'nor' if item.column is None else 'and'} a constant; give one of them"
+        )
+    if item.constant is not None:
+        return _constant(name, item.constant, len(rows), atmosphere)
+    index = _index(name, item, names, len(rows[0][1]))
+    column = names[index] if names else str(index + 1)
+    numbers = np.array([_number(row[index], item.thousands, decimal, column, line) for line, row in rows])
+    return _converted(name, item, numbers, atmosphere)
+
+
+def _constant(name: str, text: str, count: int, atmosphere: float) -> Channel:
+    from ppafo.units import split_quantity
+
+    try:
+        value, unit = split_quantity(text)
+    except UnitError as error:
+        raise DataError(f"channel '{name}', constant = {text!r}: {error}") from error
+    column = Column(name, unit or PLAIN_NUMBER)
+    return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit)
+
+
+def _index(name: str, item: MappedChannel, names: list[str], width: int) -> int:
+    if isinstance(item.column, int):
+        if item.column > width:
+            raise DataError(f"channel '{name}' is to come from column {item.column}, the file has {width}")
+        return item.column - 1
+    if not names:
+        raise DataError(f"channel '{name}' names a column {item.column!r}, but the file has no header; give its number")
+    if item.column not in names:
+        shown = ", ".join(one_line(known)[:_LONGEST_SHOWN] for known in names)
+        hint = nearest_name(str(item.column), names)
+        raise DataError(f"channel '{name}': there is no column {item.column!r}{hint}; the file has {shown}")
+    return names.index(str(item.column))
+
+
+def _number(cell: str, thousands: str | None, decimal: str, column: str, line: int) -> float:
+    text = cell.strip()
+    if thousands is not None:
+        text = text.replace(_MARKS[thousands], "")
+    if decimal != "point":
+        # A point that is left is no mark of this file; what no number has in it makes the text none.
+        text = text.replace(".", "?").replace(_MARKS[decimal], ".")
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(value):
+        shown = one_line(cell)[:_LONGEST_SHOWN]
+        raise DataError(f"line {line}, column {column!r}: {shown!r} is not a finite number")
+    return value
+
+
+def _converted(name: str, item: MappedChannel, numbers: Floats, atmosphere: float) -> Channel:
+    """Return the channel in SI; the quantity that it is multiplied by brings its own unit."""
+    from ppafo.units import split_quantity
+
+    values, unit = item.sign * (item.factor * numbers + item.offset), item.unit
+    if item.times is not None:
+        try:
+            multiple, times_unit = split_quantity(item.times)
+        except UnitError as error:
+            raise DataError(f"channel '{name}', times = {item.times!r}: {error}") from error
+        values, unit = values * multiple, f"{unit} {times_unit}".removeprefix(f"{PLAIN_NUMBER} ").strip()
+    column = Column(name, unit)
+    return Channel(in_si(column, values, atmosphere), TIME_UNIT if name == TIME else column.si_unit)
+
+
+def _check_clock(time: Floats, rows: Rows) -> None:
+    stalled = np.flatnonzero(np.diff(time) <= 0.0)
+    if stalled.size:
+        index = int(stalled[0]) + 1
+        word = "stands still" if time[index] == time[index - 1] else "goes backwards"
+        raise DataError(f"line {rows[index][0]}: the clock {word}: {time[index]:g} s follows {time[index - 1]:g} s")
+
+
+def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
+    """Return the recording with ``direction``, and with ``repetition`` counted up at every reversal."""
+    from ppafo.units import parse_quantity
+
+    unit = recording.unit(wanted.of)
+    rate_unit = f"{'1' if unit == PLAIN_NUMBER else unit.removesuffix('_d')}/s"
+    try:
+        threshold = parse_quantity(wanted.threshold, rate_unit)
+        window = parse_quantity(wanted.window, TIME_UNIT)
+    except UnitError as error:
+        raise DataError(f"direction of '{wanted.of}': {error}") from error
+    rate = wanted.sign * _smooth_rate(recording.time, recording[wanted.of], window)
+    direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
+    moving = np.flatnonzero(direction)
+    if moving.size == 0:
+        raise DataError(f"direction: '{wanted.of}' never moves faster than {wanted.threshold}")
+    sweeps = np.zeros(direction.size)
+    sweeps[moving] = np.concatenate(([1], 1 + np.cumsum(np.diff(direction[moving]) != 0.0)))
+    found = recording.with_channel("direction", direction, PLAIN_NUMBER)
+    return found if "repetition" in recording else found.with_channel("repetition", sweeps, PLAIN_NUMBER)
+
+
+def _smooth_rate(time: Floats, values: Floats, window: float) -> Floats:
+    """Return the slope between the means of the half windows [s] before and after each sample."""
+    sums = np.concatenate(([0.0], np.cumsum(values)))
+    times = np.concatenate(([0.0], np.cumsum(time)))
+    here = np.arange(time.size)
+    first = np.minimum(np.searchsorted(time, time - 0.5 * window), here)
+    last = np.maximum(np.searchsorted(time, time + 0.5 * window, side="right"), here + 1)
+    before, after = here - first + 1, last - here
+    means = (sums[here + 1] - sums[first]) / before, (sums[last] - sums[here]) / after
+    centres = (times[here + 1] - times[first]) / before, (times[last] - times[here]) / after
+    gap = np.maximum(centres[1] - centres[0], 1e-12)
+    return np.asarray((means[1] - means[0]) / gap)

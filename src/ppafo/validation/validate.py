@@ -1,0 +1,164 @@
+"""A parameter set held against recordings."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.errors import DataError, nearest_name, one_line
+from ppafo.parameters import load_device
+from ppafo.parameters.device import Device
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+from ppafo.validation.agreement import Comparison, RecordingAgreement, channel_agreement, common_delay
+from ppafo.validation.alignment import DEFAULT_LIMIT, Curve
+from ppafo.validation.compared import ANGLE, COMPARED, PRESSURE_1, PRESSURE_2, PRESSURE_DIFFERENCE
+from ppafo.validation.measured import SUPPLY, Measured, read_measured
+from ppafo.validation.replay import Motion, Replayed, regular_interval, replay_recording
+from ppafo.validation.start import start_of
+from ppafo.validation.thresholds import Thresholds, parse_thresholds
+
+_OTHER_SUPPLY = 0.05
+"""Share of the set's gauge pressure by which a recorded supply may differ before it is remarked on."""
+_AT_LIMIT = "model and measurement are further apart in time than a delay of {:g} s; no delay was taken out"
+MOTIONS: tuple[Motion, ...] = ("free", "measured")
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaySettings:
+    """How recordings are replayed and judged.
+
+    ``motion`` ``free`` lets the vane move as the model demands, ``measured`` leads it along the recorded angle;
+    ``initial`` values [SI] by channel go before the first samples; ``longest_delay`` [s] limits the delay looked for.
+    """
+
+    motion: Motion = "free"
+    initial: Mapping[str, float] = field(default_factory=dict)
+    longest_delay: float = DEFAULT_LIMIT
+    thresholds: Thresholds = field(default_factory=parse_thresholds)
+
+
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """A parameter set and what each recording says of it."""
+
+    parameter_set: str
+    device: Device
+    overrides: tuple[str, ...]
+    settings: ReplaySettings
+    recordings: tuple[RecordingAgreement, ...]
+
+    @property
+    def passes(self) -> bool:
+        """True where every channel of every recording is within its limit."""
+        return all(recording.passes for recording in self.recordings)
+
+
+def validate(
+    parameter_set: str | Path,
+    recordings: Sequence[str | Path],
+    valve: str | None = None,
+    overrides: Sequence[str] = (),
+    settings: ReplaySettings | None = None,
+    tell: Callable[[str], None] = lambda _text: None,
+) -> Validation:
+    """Return how far the model with a parameter set is from each recording (a CSV or NetCDF file, or a result folder).
+
+    ``tell`` is called with what is being done. DataError, ParameterError or SimulationError for bad input.
+    """
+    device = load_device(parameter_set, valve, overrides)
+    chosen = settings or ReplaySettings()
+    if not recordings:
+        raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
+    read = [read_measured(path, device) for path in recordings]
+    agreements = []
+    for measured in read:
+        tell(f"replaying {measured.file}")
+        agreements.append(compare_recording(measured, device, chosen))
+    return Validation(str(parameter_set), device, tuple(overrides), chosen, tuple(agreements))
+
+
+def compare_recording(measured: Measured, device: Device, settings: ReplaySettings) -> RecordingAgreement:
+    """Return how far the model of a device is from one recording, on the inputs of that recording."""
+    _check_angle(measured, settings.motion)
+    start = start_of(measured, device, settings.initial)
+    replayed = replay_recording(measured, device, start, settings.motion, settings.longest_delay)
+    items = _comparisons(measured, replayed, device, settings)
+    delay = common_delay(items, settings.longest_delay)
+    channels = tuple(channel_agreement(item, delay.taken_out, settings.longest_delay) for item in items)
+    late = (_AT_LIMIT.format(settings.longest_delay),) if delay.is_at_limit else ()
+    return RecordingAgreement(
+        file=measured.file,
+        sha256=measured.sha256,
+        measured=measured.recording,
+        model=replayed.recording,
+        motion=settings.motion,
+        inputs=replayed.inputs,
+        step=replayed.step,
+        delay=delay,
+        channels=channels,
+        remarks=(*measured.remarks, *_remarks(measured, device, settings.motion), *late),
+    )
+
+
+def measured_values(recording: Recording, name: str) -> Floats | None:
+    """The values of a channel to compare; the pressure difference follows from both pressures where they are there."""
+    if name == PRESSURE_DIFFERENCE and PRESSURE_1 in recording and PRESSURE_2 in recording:
+        return np.asarray(recording[PRESSURE_1] - recording[PRESSURE_2])
+    if name not in recording:
+        return None
+    return recording[name]
+
+
+def check_motion(text: str) -> Motion:
+    """Return the way in which the vane moves in a replay: ``free`` or ``measured``."""
+    for motion in MOTIONS:
+        if motion == text:
+            return motion
+    raise DataError(f"motion '{one_line(text)}' is neither {' nor '.join(MOTIONS)}{nearest_name(text, MOTIONS)}")
+
+
+def _check_angle(measured: Measured, motion: Motion) -> None:
+    if motion == "measured" and not measured.has(ANGLE):
+        raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to lead the vane along (--motion measured)")
+
+
+def _comparisons(measured: Measured, replayed: Replayed, device: Device, settings: ReplaySettings) -> list[Comparison]:
+    """The channels that the recording has and that the model was not given."""
+    gauge = _supply_gauge(measured, device)
+    items = []
+    for name, kind in COMPARED.items():
+        values = measured_values(measured.recording, name)
+        if values is None or name in replayed.inputs:
+            continue
+        full_range = kind.full_range(device, gauge)
+        model = replayed.recording
+        curve = Curve(measured.recording.time, values, model.time, model[name], full_range)
+        items.append(Comparison(name, kind.unit, curve, settings.thresholds.limit(name).share_of(full_range)))
+    if not items:
+        raise DataError(f"{measured.file}: has nothing to compare beside the angle that the vane was led along")
+    return items
+
+
+def _supply_gauge(measured: Measured, device: Device) -> float:
+    """Gauge pressure of the supply [Pa]: the median of the recorded one, else the higher one of the set."""
+    supply = device.supply
+    if measured.has(SUPPLY):
+        return float(np.median(measured.recording[SUPPLY])) - supply.atmospheric_pressure
+    return max(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
+
+
+def _remarks(measured: Measured, device: Device, motion: str) -> tuple[str, ...]:
+    remarks = []
+    own = device.supply.pressure - device.supply.atmospheric_pressure
+    if measured.has(SUPPLY) and abs(_supply_gauge(measured, device) - own) > _OTHER_SUPPLY * own:
+        ratio = _supply_gauge(measured, device) / own
+        remarks.append(f"the recorded supply has {ratio:.3g} times the gauge pressure of the set; it was followed")
+    if not measured.has(SUPPLY):
+        remarks.append("the supply pressure was not recorded; that of the set was taken")
+    if regular_interval(measured.recording.time) is None:
+        remarks.append("samples are not regular in time; changes of the command were placed on the nearest step")
+    if motion == "measured":
+        remarks.append("the vane was led along the recorded angle, which is therefore not compared")
+    return tuple(remarks)

@@ -1,0 +1,97 @@
+"""The user's guide on raw files, run on the real measurements that it is about."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.identification.identify import Identification, identify
+
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "identify-from-raw-files.md"
+KNOWN_AREA = 5.1875e-4
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+@pytest.fixture(scope="module")
+def raw_files(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the raw files of the page."""
+    folder = tmp_path_factory.mktemp("raw")
+    for path in sorted((shared_data / "pneumatic").glob("zillen2021_*/*.csv")):
+        shutil.copy(path, folder / path.name)
+    assert len(list(folder.iterdir())) == 6
+    return folder
+
+
+@pytest.fixture(scope="module")
+def cylinder(raw_files: Path) -> Identification:
+    """What the first problem of the page gives."""
+    (raw_files / "cylinder-problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
+    return identify(raw_files / "cylinder-problem.toml")
+
+
+def test_the_known_area_lies_inside_the_interval_and_within_half_a_percent(cylinder: Identification) -> None:
+    area = cylinder.results[0]["actuator.torque_constant"]
+    assert area.low <= KNOWN_AREA <= area.high
+    assert abs(area.value / KNOWN_AREA - 1.0) < 0.005
+    assert area.relative_half_width < 0.005
+
+
+def test_friction_of_the_cylinder_grows_with_pressure(cylinder: Identification) -> None:
+    growth = cylinder.results[0]["static_torque.friction_per_pressure"]
+    assert growth.low > 2.0e-6
+    assert growth.value == pytest.approx(5.07e-6, rel=0.02)
+    assert "grows" in cylinder.results[0]["friction.static_torque"].explanation
+
+
+def test_mean_forces_alone_would_count_the_regulator_as_friction(cylinder: Identification) -> None:
+    friction = cylinder.results[0]["friction.static_torque"].value
+    growth = cylinder.results[0]["static_torque.friction_per_pressure"].value
+    at_1_bar = friction + growth * (1.0e5 - 4.3e5)
+    assert at_1_bar == pytest.approx(4.7, abs=0.2)
+    assert "6.6 N at 1 bar" in PAGE.read_text(encoding="utf-8")
+
+
+def test_a_wrong_sign_of_the_direction_is_found_in_the_real_data(raw_files: Path) -> None:
+    text = blocks("toml")[0].replace("sign = -1", "sign = 1")
+    (raw_files / "turned.toml").write_text(text, encoding="utf-8")
+    assert main(["identify", str(raw_files / "turned.toml")]) == 2
+
+
+def test_the_printed_chamber_gets_no_area(raw_files: Path) -> None:
+    (raw_files / "chamber-problem.toml").write_text(blocks("toml")[1], encoding="utf-8")
+    result = identify(raw_files / "chamber-problem.toml").results[0]
+    assert result["actuator.leak.area"].verdict == "law does not describe the data"
+    assert "vane_leak.relaxation_rate" in [item.path for item in result.estimates]
+
+
+def test_a_chamber_whose_laws_cannot_be_told_apart_gets_no_area_either(raw_files: Path) -> None:
+    text = blocks("toml")[1].replace("Prusa", "Formlabs").replace("10 s", "25 s")
+    (raw_files / "formlabs-problem.toml").write_text(text, encoding="utf-8")
+    outcome = identify(raw_files / "formlabs-problem.toml")
+    assert outcome.new_set.written == ()
+    assert outcome.results[0]["vane_leak.area_over_volume"].verdict == "weak"
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_the_page_shows_what_the_command_prints(
+    raw_files: Path, number: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (raw_files / "problem.toml").write_text(blocks("toml")[number], encoding="utf-8")
+    assert main(["identify", str(raw_files / "problem.toml")]) == number
+    assert capsys.readouterr().out.strip() == blocks("text")[number].strip()
+
+
+def test_the_command_of_the_page_leaves_what_the_page_says(
+    raw_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = blocks("sh")[0].split()
+    monkeypatch.chdir(tmp_path)
+    (raw_files / "problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
+    assert main([str(raw_files / word) if word == "problem.toml" else word for word in words[1:]]) == 0
+    made = {path.name for path in (tmp_path / "identified").iterdir()}
+    assert {"cylinder.toml", "estimates.json", "identify.txt", "static_torque.png"} <= made

@@ -1,0 +1,40 @@
+"""What the page on validation shows is run as it stands there."""
+
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.storage import read_csv
+from ppafo.validation.measured import COMMAND, SUPPLY
+
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "validate-a-model.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+
+
+def test_the_commands_of_the_page_end_as_the_page_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    commands = [line for block in blocks("sh") for line in block.splitlines()]
+    codes = [main(shlex.split(command)[1:]) for command in commands]
+    assert codes == [0, 0, 1, 0]
+    assert {"report.html", "agreement.json"} <= {path.name for path in (tmp_path / "out" / "agreement").iterdir()}
+    capsys.readouterr()
+    names: dict[str, Any] = {}
+    exec(blocks("python")[0], names)
+    assert capsys.readouterr().out == "True ['pressure_1', 'pressure_2', 'pressure_difference', 'torque']\n"
+
+
+def test_the_recording_of_the_page_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text(blocks("csv")[0])
+    recording = read_csv(path)
+    assert recording.names == (COMMAND, SUPPLY, "angle", "pressure_1", "pressure_2")
+    assert recording["pressure_1"][0] == pytest.approx(101325.0 + 0.1 * 6894.757293168)

@@ -1,0 +1,90 @@
+"""``ppafo rig``."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.storage import read_csv
+
+
+def test_the_list_names_experiments_and_presets(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["rig", "list"]) == 0
+    printed = capsys.readouterr().out
+    assert "synthetic" in printed
+    assert "vane-leak" in printed
+    assert "worn-seals" in printed
+    assert main(["rig", "list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert "step-response" in [item["name"] for item in listed["experiments"]]
+    assert [item["name"] for item in listed["presets"]] == ["ideal-laboratory", "paper-bench", "worn-seals"]
+
+
+def test_recordings_of_one_bench_share_a_folder_and_its_truth(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for experiment in ("static-torque", "valve-map"):
+        assert main(["rig", "record", experiment, "--seed", "7", "--out", str(tmp_path)]) == 0
+    assert "synthetic" in capsys.readouterr().out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["rig.json", "static-torque.csv", "valve-map.csv"]
+    truth = json.loads((tmp_path / "rig.json").read_text())
+    assert "synthetic" in truth["notice"]
+    assert {name: item["seed"] for name, item in truth["recordings"].items()} == {
+        "static-torque.csv": 7,
+        "valve-map.csv": 7,
+    }
+    assert (tmp_path / "static-torque.csv").read_text().startswith("# synthetic")
+    assert read_csv(tmp_path / "valve-map.csv").kind == "synthetic"
+
+
+def test_the_same_command_gives_the_same_bytes(tmp_path: Path) -> None:
+    words = ["rig", "record", "step-response", "--preset", "worn-seals", "--seed", "3", "--out"]
+    for folder in ("one", "two"):
+        assert main([*words, str(tmp_path / folder)]) == 0
+    for name in ("step-response.csv", "rig.json"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+def test_device_and_overrides_reach_the_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = [
+        "--device",
+        "ppafo2011",
+        "--valve",
+        "solenoid",
+        "--set",
+        "valve.area=10mm^2",
+        "--set",
+        "rig.flow_sensor.noise=0 kg/s",
+    ]
+    assert main(["rig", "record", "open-valve-flow", *words, "--json", "--out", str(tmp_path)]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["device"]["valve"]["orifice"]["area"] == pytest.approx(1e-5)
+    assert document["preset"]["values"]["flow_sensor.noise"] == 0.0
+    assert document["files"] == ["open-valve-flow.csv", "rig.json"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["step-respons"], "did you mean 'step-response'"),
+        (["static-torque", "--preset", "worn-seal"], "did you mean 'worn-seals'"),
+        (["static-torque", "--preset", "mine.toml"], "mine.toml: cannot be read"),
+        (["static-torque", "--seed", "one"], "--seed one: must be a whole number"),
+        (["static-torque", "--seed", "-3"], "seed = -3"),
+        (["static-torque", "--device", "ppafo2010"], "did you mean 'ppafo2011'"),
+        (["static-torque", "--set", "friction.static=1"], "friction.static"),
+        (["static-torque", "--out", "file"], "--out file"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("in the way")
+    assert main(["rig", "record", *words]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert len(told.err.splitlines()) == 1
+    assert message in told.err
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -1,0 +1,216 @@
+"""Open valve, valve map and vane leak: planted values, laws told apart, and no area where there is no orifice."""
+
+import math
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.bench import (
+    OpenValveFlowSettings,
+    ValveMapSettings,
+    VaneLeakSettings,
+    open_valve_flow,
+    valve_map,
+    vane_leak,
+)
+from ppafo.identification.bench.gas_flow import orifice_shape
+from ppafo.identification.bench.leak_laws import Chambers, difference_in_time, laws_of
+from ppafo.identification.source import Source
+
+VOLUME = 60e-6
+
+
+def changed(source: Source, name: str, values: np.ndarray) -> Source:
+    return Source(source.recording.with_channel(name, values, source.recording.unit(name)))
+
+
+def test_planted_effective_area_lies_inside_its_interval(planted: ModuleType) -> None:
+    result = open_valve_flow((planted.flow(),), OpenValveFlowSettings(planted.CO2, area=31.6e-6, path="valves.main"))
+    area = result["open_valve_flow.effective_area"]
+    assert area.low <= 3.57e-6 <= area.high
+    assert area.relative_half_width < 0.01
+    assert result["valves.main.discharge_coefficient"].value == pytest.approx(area.value / 31.6e-6)
+    assert result.failed == ()
+
+
+def test_flow_of_the_standard_gives_back_its_two_numbers(planted: ModuleType) -> None:
+    source = planted.flow()
+    ratio = source.recording["downstream_pressure"] / source.recording["upstream_pressure"]
+    conductance, critical = 7.0e-9, 0.3
+    shape = np.where(ratio <= critical, 1.0, np.sqrt(1.0 - ((ratio - critical) / (1.0 - critical)) ** 2))
+    mass_flow = conductance * planted.CO2.flow_per_sonic_conductance * planted.SUPPLY * shape
+    exact = changed(source, "mass_flow", mass_flow)
+    result = open_valve_flow((exact,), OpenValveFlowSettings(planted.CO2, law="iso6358", path="valves.main"))
+    assert result["valves.main.sonic_conductance"].value == pytest.approx(conductance, rel=1e-6)
+    assert result["valves.main.critical_ratio"].value == pytest.approx(critical, abs=1e-6)
+    assert "AIC prefers ISO 6358" in next(check for check in result.checks if check.name == "which law").statement
+
+
+def test_choked_flow_alone_gives_no_critical_ratio(planted: ModuleType) -> None:
+    choked = planted.flow(ratios=(0.2, 0.3))
+    assert len(open_valve_flow((choked,), OpenValveFlowSettings(planted.CO2)).estimates) == 1
+    with pytest.raises(IdentificationError, match="C and b need choked and subsonic flow"):
+        open_valve_flow((choked,), OpenValveFlowSettings(planted.CO2, law="iso6358"))
+
+
+def test_gauge_pressures_passed_for_absolute_are_refused(planted: ModuleType) -> None:
+    source = planted.flow()
+    gauge = changed(source, "downstream_pressure", source.recording["downstream_pressure"] - planted.ROOM)
+    gauge = changed(gauge, "downstream_pressure", np.minimum(gauge.recording["downstream_pressure"], 0.0))
+    with pytest.raises(IdentificationError, match="it is absolute"):
+        open_valve_flow((gauge,), OpenValveFlowSettings(planted.CO2))
+
+
+def test_exchanged_pressures_are_told(planted: ModuleType) -> None:
+    source = planted.flow()
+    first, second = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
+    turned = changed(changed(source, "upstream_pressure", second), "downstream_pressure", first)
+    with pytest.raises(IdentificationError, match="are the two columns exchanged"):
+        open_valve_flow((turned,), OpenValveFlowSettings(planted.CO2))
+
+
+def test_a_valve_that_was_never_open_is_told(planted: ModuleType) -> None:
+    half = changed(planted.flow(), "command", np.full(60, 0.5))
+    with pytest.raises(IdentificationError, match="fully open"):
+        open_valve_flow((half,), OpenValveFlowSettings(planted.CO2))
+
+
+def test_planted_dead_band_saturation_and_hysteresis_come_back(planted: ModuleType) -> None:
+    result = valve_map((planted.sweep(),), ValveMapSettings(planted.CO2, "valves.main"))
+    assert result["valves.main.dead_band"].value == pytest.approx(0.12, abs=0.003)
+    assert result["valve_map.hysteresis"].value == pytest.approx(0.04, abs=0.003)
+    assert result["valve_map.full_area"].value == pytest.approx(3.4e-6, rel=0.01)
+    assert result["valve_map.gain"].value == pytest.approx(4.2e-6, rel=0.01)
+    assert result["valve_map.saturation_command"].value == pytest.approx(0.12 + 3.4 / 4.2, abs=0.01)
+    assert result.failed == ()
+
+
+def test_a_command_that_only_rises_leaves_hysteresis_unknown(planted: ModuleType) -> None:
+    source = planted.sweep()
+    up = Source(source.recording.between(0.0, 10.0))
+    result = valve_map((up,), ValveMapSettings(planted.CO2))
+    assert "valve_map.hysteresis" not in [item.path for item in result.estimates]
+    assert [check.name for check in result.failed] == ["hysteresis seen"]
+
+
+def test_flow_with_the_wrong_sign_is_told(planted: ModuleType) -> None:
+    with pytest.raises(IdentificationError, match="turn the sign of one of them round"):
+        valve_map((planted.sweep(sign=-1.0),), ValveMapSettings(planted.CO2))
+
+
+def test_a_command_in_percent_is_told(planted: ModuleType) -> None:
+    source = planted.sweep()
+    percent = changed(source, "command", 100.0 * source.recording["command"])
+    with pytest.raises(IdentificationError, match="it goes from -1 to 1"):
+        valve_map((percent,), ValveMapSettings(planted.CO2))
+
+
+def test_a_planted_orifice_leak_gives_its_area(planted: ModuleType) -> None:
+    effective = 0.3e-6 * 0.113
+    source = planted.leak("orifice", planted.orifice_rate(effective, VOLUME))
+    settings = VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, 0.113)
+    area = vane_leak((source,), settings)["actuator.leak.area"]
+    assert area.low <= 0.3e-6 <= area.high
+    assert area.relative_half_width < 0.01
+    assert area.verdict == "identified"
+
+
+@pytest.mark.parametrize(("law", "rate"), [("laminar", 1.0e-7), ("linear", 0.05)])
+def test_a_leak_of_another_law_gets_no_area_and_its_own_rate(planted: ModuleType, law: str, rate: float) -> None:
+    settings = VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, 0.113)
+    result = vane_leak((planted.leak(law, rate),), settings)
+    area, found = result["actuator.leak.area"], result[f"vane_leak.{law}_rate"]
+    assert area.verdict == "law does not describe the data"
+    assert math.isnan(area.value)
+    assert found.low <= rate <= found.high
+    assert "orifice law" in [check.name for check in result.failed]
+
+
+def test_an_unknown_volume_gives_a_ratio_and_no_area(planted: ModuleType) -> None:
+    rate = planted.orifice_rate(3.39e-8, VOLUME)
+    result = vane_leak((planted.leak("orifice", rate),), VaneLeakSettings(planted.CO2, discharge_coefficient=0.113))
+    found = result["vane_leak.area_over_volume"]
+    assert found.value == pytest.approx(3.39e-8 / VOLUME, rel=0.02)
+    assert "actuator.leak.area" not in [item.path for item in result.estimates]
+
+
+def test_gas_that_leaks_to_the_outside_fails_its_check(planted: ModuleType) -> None:
+    source = planted.leak("orifice", planted.orifice_rate(3.39e-8, VOLUME), lost=5000.0)
+    result = vane_leak((source,), VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, 0.113))
+    assert "gas is kept" in [check.name for check in result.failed]
+
+
+def test_a_tight_vane_is_said_to_show_no_leak(planted: ModuleType) -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    noise = np.random.default_rng(1).normal(0.0, 300.0, time.size)
+    tight = planted.source("tight", time, pressure_1=(4e5 + noise, "Pa"), pressure_2=(np.full(time.size, 1e5), "Pa"))
+    with pytest.raises(IdentificationError, match="tight: vane_leak: no leak shows"):
+        vane_leak((tight,), VaneLeakSettings(planted.CO2))
+
+
+def steady(planted: ModuleType, law: str, rate: float) -> Source:
+    first = np.linspace(1.3e5, 6.0e5, 24)
+    second = np.full(24, planted.ROOM)
+    chosen = next(item for item in laws_of(1.3) if item.name == law)
+    flow = rate * chosen.shape(first, second)
+    flow *= 1.0 + np.random.default_rng(1).normal(0.0, 0.003, 24)
+    channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
+    return planted.source("steady", np.arange(24.0), **channels)
+
+
+def test_a_steady_orifice_leak_gives_its_area_without_any_volume(planted: ModuleType) -> None:
+    source = steady(planted, "orifice", 0.3e-6 * 0.113 * planted.CO2.choked_flow_constant)
+    area = vane_leak((source,), VaneLeakSettings(planted.CO2, discharge_coefficient=0.113))["actuator.leak.area"]
+    assert area.low <= 0.3e-6 <= area.high
+    assert area.verdict == "identified"
+
+
+def test_a_steady_laminar_leak_gets_no_area(planted: ModuleType) -> None:
+    settings = VaneLeakSettings(planted.CO2, discharge_coefficient=0.113)
+    result = vane_leak((steady(planted, "laminar", 2.0e-16),), settings)
+    assert result["actuator.leak.area"].verdict == "law does not describe the data"
+    assert result["vane_leak.laminar_coefficient"].value == pytest.approx(2.0e-16, rel=0.01)
+
+
+def test_steady_flow_with_the_wrong_sign_is_told(planted: ModuleType) -> None:
+    with pytest.raises(IdentificationError, match="turn its sign round"):
+        vane_leak((steady(planted, "linear", -1.0e-10),), VaneLeakSettings(planted.CO2))
+
+
+def test_an_orifice_that_is_the_best_law_but_not_all_of_it_is_called_weak(planted: ModuleType) -> None:
+    source = planted.leak("orifice", planted.orifice_rate(3.39e-8, VOLUME))
+    cooling = 3.0e3 * np.exp(-source.recording.time / 0.3)
+    warm = changed(source, "pressure_1", source.recording["pressure_1"] + cooling)
+    area = vane_leak((warm,), VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, 0.113))["actuator.leak.area"]
+    assert area.verdict == "weak"
+    assert "temperature" in area.explanation
+    assert area.value == pytest.approx(0.3e-6, rel=0.02)
+
+
+def test_the_linear_law_is_an_exponential() -> None:
+    law = next(item for item in laws_of(1.3) if item.name == "linear")
+    time = np.linspace(0.0, 10.0, 50)
+    found = difference_in_time(law, Chambers(0.5, 4e5), 2e5, 0.1, time, 1e4)
+    assert np.allclose(found, 2e5 * np.exp(-0.15 * time), rtol=1e-6)
+
+
+def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pressure() -> None:
+    law = laws_of(1.3)[0]
+    time = np.linspace(0.0, 3.0, 50)
+    found = difference_in_time(law, Chambers(0.0, 1e5), 9e5, 0.2, time, 4e5) + 1e5
+    assert np.allclose(found, 1e6 * np.exp(-0.2 * time), rtol=1e-5)
+
+
+def test_flow_is_antisymmetric_under_exchange_of_sides() -> None:
+    first, second = np.array([2e5, 3e5, 1.0005e5]), np.array([1e5, 2.9e5, 1e5])
+    assert np.array_equal(orifice_shape(first, second, 1.4), -orifice_shape(second, first, 1.4))
+
+
+def test_a_leak_below_zero_absolute_pressure_is_refused(planted: ModuleType) -> None:
+    source = planted.leak("linear", 0.05)
+    gauge = replace(changed(source, "pressure_2", source.recording["pressure_2"] - 2.0e5))
+    with pytest.raises(IdentificationError, match="'pressure_2' is not absolute"):
+        vane_leak((gauge,), VaneLeakSettings(planted.CO2))

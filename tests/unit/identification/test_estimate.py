@@ -1,0 +1,32 @@
+"""An estimate keeps its promises."""
+
+import math
+
+import pytest
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.estimate import Estimate
+
+
+def estimate(value: float, low: float, high: float, verdict: str = "identified") -> Estimate:
+    return Estimate("a.b", value, "m", low, high, verdict, "why", ("file sha256:0",))  # type: ignore[arg-type]
+
+
+def test_half_widths_follow_from_the_interval() -> None:
+    assert estimate(2.0, 1.0, 3.0).relative_half_width == 0.5
+    assert math.isinf(estimate(0.0, -1.0, 1.0).relative_half_width)
+
+
+def test_an_identified_value_outside_its_interval_is_refused() -> None:
+    with pytest.raises(IdentificationError, match="lies inside its interval"):
+        estimate(4.0, 1.0, 3.0)
+
+
+def test_a_value_that_could_not_be_told_may_be_no_number() -> None:
+    nothing = estimate(math.nan, math.nan, math.nan, "law does not describe the data")
+    assert not nothing.is_usable
+
+
+def test_an_unknown_verdict_is_refused() -> None:
+    with pytest.raises(IdentificationError, match="'fine' is not a verdict"):
+        estimate(2.0, 1.0, 3.0, "fine")

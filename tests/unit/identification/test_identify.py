@@ -1,0 +1,180 @@
+"""From a problem file to a new set: order, provenance, units, and every mistake in one line."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.errors import PpafoError
+from ppafo.identification.identify import Identification, identify
+from ppafo.identification.problem import json_schema, parse_problem
+from ppafo.parameters.loading import load_device, load_parameter_set, parse_parameter_set
+from ppafo.parameters.writing import parameter_set_toml
+from ppafo.reporting.identification_files import identification_files
+from ppafo.storage import write_csv
+
+HEAD = 'schema_version = 1\nname = "twin"\ndevice.set = "ppafo2011"\n'
+STATIC = '[[procedure]]\nkind = "static_torque"\nrecordings = ["static.csv"]\n'
+DECAY = '[[procedure]]\nkind = "free_decay"\nrecordings = ["decay.csv"]\n'
+FLOW = '[[procedure]]\nkind = "open_valve_flow"\nrecordings = ["flow.csv"]\n'
+MAP = '[[procedure]]\nkind = "valve_map"\nrecordings = ["sweep.csv"]\n'
+LEAK = '[[procedure]]\nkind = "vane_leak"\nrecordings = ["leak.csv"]\nvolume_1 = "60 cm^3"\nvolume_2 = "46.15 cm^3"\n'
+MAPPED = "[columns.rig]\n"
+ALL = LEAK + MAP + FLOW + DECAY + STATIC
+
+Solve = Callable[[str], Identification]
+
+
+@pytest.fixture
+def bench(tmp_path: Path, planted: ModuleType) -> Path:
+    """A folder with one recording for each procedure."""
+    leak = planted.leak("orifice", planted.orifice_rate(0.3e-6 * 0.113, 60e-6))
+    sources = (planted.static(), planted.decay(), planted.flow(), planted.sweep(), leak)
+    for source in sources:
+        write_csv(tmp_path / f"{source.recording.label}.csv", source.recording)
+    return tmp_path
+
+
+@pytest.fixture
+def solved(bench: Path) -> Solve:
+    """Solves a problem in that folder."""
+
+    def solve(text: str) -> Identification:
+        path = bench / "problem.toml"
+        path.write_text(HEAD + text)
+        return identify(path)
+
+    return solve
+
+
+def test_procedures_run_in_the_recommended_order_whatever_the_order_of_the_file(solved: Solve) -> None:
+    names = [result.procedure for result in solved(ALL).results]
+    assert names == ["static_torque", "free_decay", "open_valve_flow", "valve_map", "vane_leak"]
+
+
+def test_every_planted_value_gets_into_the_new_set_with_interval_and_origin(solved: Solve, planted: ModuleType) -> None:
+    outcome = solved(ALL)
+    new = outcome.new_set.parameter_set
+    assert set(outcome.new_set.written) == {
+        "actuator.torque_constant",
+        "friction.static_torque",
+        "friction.viscous_damping",
+        "friction.dynamic_torque",
+        "valves.proportional.discharge_coefficient",
+        "valves.proportional.dead_band",
+        "actuator.leak.area",
+    }
+    entry = new.numbers["actuator.leak.area"]
+    assert (entry.origin, entry.unit) == ("identified", "mm^2")
+    assert entry.uncertainty is not None
+    assert abs(entry.value - 0.3) <= entry.uncertainty
+    assert entry.source.startswith("leak.csv sha256:")
+    assert len(entry.source.partition("sha256:")[2]) == 64
+    assert "Before, the set had 0.3 mm^2 (published" in entry.note
+
+
+def test_the_new_set_reads_back_and_makes_a_device(solved: Solve, bench: Path) -> None:
+    outcome = solved(ALL)
+    text = parameter_set_toml(outcome.new_set.parameter_set)
+    assert parse_parameter_set(text.encode(), "twin.toml") == outcome.new_set.parameter_set
+    (bench / "twin.toml").write_text(text)
+    device = load_device(bench / "twin.toml")
+    assert device.valve.settings["dead_band"] == pytest.approx(0.12, abs=0.01)
+    assert outcome.is_good
+
+
+def test_values_that_no_procedure_touched_stay_as_they_were(solved: Solve) -> None:
+    new, old = solved(STATIC).new_set.parameter_set, load_parameter_set("ppafo2011")
+    changed = {path for path in old.numbers if new.numbers[path] != old.numbers[path]}
+    assert changed == {"actuator.torque_constant", "friction.static_torque"}
+
+
+def test_the_standard_form_of_an_orifice_takes_the_place_of_the_area(solved: Solve) -> None:
+    new = solved(f'{FLOW}law = "iso6358"\n').new_set.parameter_set
+    names = {path.rpartition(".")[2] for path in new.numbers if path.startswith("valves.proportional.")}
+    assert names == {"sonic_conductance", "critical_ratio"}
+
+
+def test_the_inertia_may_be_said_to_be_unknown(solved: Solve) -> None:
+    outcome = solved(f'{DECAY}inertia = "unknown"\n')
+    assert outcome.new_set.written == ()
+
+
+def test_friction_that_contradicts_itself_is_told_and_fails(solved: Solve) -> None:
+    outcome = solved(f'{STATIC}{DECAY}inertia = "100 kg m^2"\n')
+    assert "friction.dynamic_torque" in outcome.new_set.problem
+    assert not outcome.is_good
+
+
+def test_figures_and_files_are_there_for_each_procedure_and_figure_3_for_both(solved: Solve) -> None:
+    files = identification_files(solved(STATIC + DECAY))
+    names = {"twin.toml", "estimates.json", "identify.txt"}
+    names |= {f"{name}.{kind}" for name in ("static_torque", "free_decay", "figure-3") for kind in ("png", "svg")}
+    assert set(files) == names
+    assert files["figure-3.png"].startswith(b"\x89PNG")
+    assert json.loads(files["estimates.json"])["procedures"][0]["recordings_are"] == "synthetic"
+    assert "figure-3.png" not in identification_files(solved(STATIC))
+
+
+def test_the_published_schema_knows_every_procedure() -> None:
+    text = json.dumps(json_schema())
+    assert all(name in text for name in ("static_torque", "free_decay", "open_valve_flow", "valve_map", "vane_leak"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "procedure"),
+        (STATIC.replace("static_torque", "static_torqe"), "did you mean 'static_torque'"),
+        (f"{STATIC}colums = 'rig'\n", "did you mean 'columns'"),
+        (f"{STATIC}columns = 'rig'\n", "procedure 1: there is no column map 'rig'; there are none"),
+        (STATIC.replace("static.csv", "nowhere.csv"), "nowhere.csv"),
+        (STATIC.replace("static.csv", "decay.csv"), "decay.csv: static_torque needs a channel 'torque [N m]'"),
+        (f'{DECAY}start = "2 m"\n', "procedure 1, free_decay: start = '2 m': unit 'm' does not fit"),
+        (f'{DECAY}inertia = "0 kg m^2"\n', "must be above zero"),
+        (f'{FLOW}valve = "proportionl"\n', "did you mean 'proportional'"),
+        (f'{FLOW}gas = "CO3"\n', "gas = 'CO3' is unknown, did you mean 'CO2'"),
+        (LEAK.replace('volume_1 = "60 cm^3"', 'angle = "200 deg"'), "lies beyond the stops"),
+        (LEAK.replace("60 cm^3", "0 cm^3"), "volume_1 = '0 cm^3' must be above zero"),
+        ('procedure = "none"\n', "procedure"),
+        (f"{STATIC}{MAPPED}direction.thresold = 3\n", "did you mean 'threshold'"),
+        (f"{STATIC}{MAPPED}channels.time.colum = 3\n", "did you mean 'column'"),
+        (f"{STATIC}{MAPPED}channels.time.column = 0\n", "columns.rig.channels.time.column"),
+        (f"{STATIC}{MAPPED}channels.time.column = 1.5\n", "columns.rig.channels.time.column"),
+        (f"{STATIC}{MAPPED}delimiter = 'pipe'\n", "allowed: comma, semicolon, tab, whitespace"),
+        (STATIC.replace('["static.csv"]', '"static.csv"'), "procedure.0"),
+        (STATIC.replace('["static.csv"]', "[]"), "procedure.0"),
+    ],
+)
+def test_a_mistake_is_one_line_that_says_where(solved: Solve, text: str, message: str) -> None:
+    with pytest.raises(PpafoError) as caught:
+        solved(text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_problem_without_a_device_is_refused() -> None:
+    with pytest.raises(PpafoError, match=r"p\.toml: .*device"):
+        parse_problem(b'schema_version = 1\nname = "a"\n', "p.toml")
+
+
+def test_the_command_writes_the_folder_and_prints_json(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (bench / "problem.toml").write_text(HEAD + STATIC)
+    assert main(["identify", str(bench / "problem.toml"), "--out", str(tmp_path / "made"), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["new_set"]["identified"] == ["actuator.torque_constant", "friction.static_torque"]
+    assert (tmp_path / "made" / "twin.toml").is_file()
+
+
+def test_bad_input_writes_nothing_and_exits_with_two(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (bench / "problem.toml").write_text(HEAD + STATIC.replace("static.csv", "decay.csv"))
+    assert main(["identify", str(bench / "problem.toml"), "--out", str(tmp_path / "made")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "made").exists()

@@ -1,0 +1,44 @@
+import pytest
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.trajectory.paths import (
+    broken_order,
+    declaration_of,
+    declared_numbers,
+    full_path,
+    number_at,
+    with_numbers,
+)
+from ppafo.simulation.scenario import Scenario
+
+
+def test_every_declared_number_can_be_read_and_replaced(step: Scenario) -> None:
+    paths = list(declared_numbers(step))
+    assert len(paths) > 30
+    for path in paths:
+        changed = with_numbers(step, {path: number_at(step, path) + 0.125})
+        assert number_at(changed, path) == number_at(step, path) + 0.125
+        others = [other for other in paths if number_at(changed, other) != number_at(step, other)]
+        assert others == [path]
+
+
+def test_the_scenario_itself_is_left_as_it_was(step: Scenario) -> None:
+    before = number_at(step, "valve.dead_band")
+    with_numbers(step, {"valves.proportional.dead_band": 0.25})
+    assert number_at(step, "valve.dead_band") == before
+
+
+def test_the_chosen_valve_has_the_path_that_a_parameter_set_has(step: Scenario) -> None:
+    assert full_path("valve.area", step) == "valves.proportional.area"
+    assert number_at(step, "valve.area") == number_at(step, "valves.proportional.area") == pytest.approx(31.6e-6)
+
+
+def test_a_misspelt_path_is_answered_with_the_nearest_one(step: Scenario) -> None:
+    with pytest.raises(IdentificationError, match=r"did you mean 'friction\.viscous_damping'"):
+        declaration_of("friction.viscous_dampening", step)
+
+
+def test_dynamic_friction_above_static_friction_is_named(step: Scenario) -> None:
+    assert broken_order(step.device) == ""
+    above = with_numbers(step, {"friction.dynamic_torque": 0.5})
+    assert "friction.dynamic_torque" in broken_order(above.device)

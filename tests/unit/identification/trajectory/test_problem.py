@@ -1,0 +1,143 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.trajectory import Experiment, FreeParameter, Prior, TrajectoryProblem, fit
+from ppafo.identification.trajectory.preparation import noise_of, prepare, refined
+from ppafo.identification.trajectory.problem import ranges_of
+from ppafo.simulation.simulate import simulate
+
+INERTIA = FreeParameter("foot_plate.inertia")
+
+
+def problem(experiment: Experiment, *parameters: FreeParameter) -> TrajectoryProblem:
+    return TrajectoryProblem(parameters, (experiment,))
+
+
+def test_bounds_and_scale_follow_from_the_declaration(experiment: Experiment) -> None:
+    inertia, friction, angle = ranges_of(
+        problem(experiment, INERTIA, FreeParameter("friction.static_torque"), FreeParameter("motion.angle"))
+    )
+    assert (inertia.scale, inertia.low, inertia.high) == ("log", pytest.approx(8.4e-5), pytest.approx(0.84))
+    assert (friction.scale, friction.low, friction.unit) == ("linear", 0.0, "N m")
+    assert (angle.scale, angle.low) == ("linear", -10.0)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "message"),
+    [
+        (FreeParameter("foot_plate.inertia", low=1.0, high=2.0), "must lie between the bounds"),
+        (FreeParameter("foot_plate.inertia", high=5.0e3), "leave what is allowed"),
+        (FreeParameter("friction.static_torque", start=0.0, scale="log"), "log scale"),
+        (FreeParameter("friction.static_torque", start=0.0), "a start at 0 needs bounds"),
+        (FreeParameter("foot_plate.inertia", start=float("nan")), "must be finite"),
+        (FreeParameter("foot_plate.inertia", prior=Prior(0.01, 0.0)), "standard deviation of a prior"),
+        (FreeParameter("foot_plate.inertia", prior=Prior(-0.01, 1.0)), "mean of a prior"),
+        (FreeParameter("foot_plate.inertia", recordings=("stop",)), "did you mean 'step'"),
+        (FreeParameter("foot_plate.weight"), "no number 'foot_plate.weight'"),
+    ],
+)
+def test_a_parameter_that_makes_no_sense_is_refused(
+    experiment: Experiment, parameter: FreeParameter, message: str
+) -> None:
+    with pytest.raises(IdentificationError, match=message):
+        problem(experiment, parameter)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"channels": ("torque",)}, "channel 'torque' cannot be fitted"),
+        ({"channels": ()}, "no channel"),
+        ({"noise": {"angle": 0.0}}, "must be above 0"),
+        ({"inputs": ("wind",)}, "no measured input"),
+    ],
+)
+def test_an_experiment_that_makes_no_sense_is_refused(
+    experiment: Experiment, change: dict[str, object], message: str
+) -> None:
+    with pytest.raises(IdentificationError, match=message):
+        problem(dataclasses.replace(experiment, **change), INERTIA)  # type: ignore[arg-type]
+
+
+def test_the_same_parameter_twice_is_refused(experiment: Experiment) -> None:
+    with pytest.raises(IdentificationError, match="named twice"):
+        problem(experiment, FreeParameter("valve.area"), FreeParameter("valves.proportional.area"))
+
+
+def test_a_problem_without_parameters_is_refused(experiment: Experiment) -> None:
+    with pytest.raises(IdentificationError, match="at least one"):
+        problem(experiment)
+
+
+def test_noise_is_estimated_from_a_signal_that_moves() -> None:
+    time = np.linspace(0.0, 1.0, 2000)
+    noisy = np.sin(6.0 * time) + 0.003 * np.random.default_rng(2).standard_normal(time.size)
+    assert noise_of(noisy) == pytest.approx(0.003, rel=0.1)
+
+
+def test_a_channel_without_noise_needs_its_deviation_given(experiment: Experiment) -> None:
+    silent = dataclasses.replace(
+        experiment,
+        recording=experiment.recording.with_channel("pressure_1", np.full(len(experiment.recording), 2.0e5), "Pa"),
+        noise={},
+    )
+    with pytest.raises(IdentificationError, match="'pressure_1' shows no noise"):
+        fit(problem(silent, INERTIA))
+
+
+def test_too_few_samples_after_the_start_are_refused(experiment: Experiment) -> None:
+    with pytest.raises(IdentificationError, match="at least 10 are needed"):
+        fit(problem(dataclasses.replace(experiment, start=0.345), INERTIA))
+
+
+def test_samples_on_the_grid_are_taken_from_the_record_as_they_are(experiment: Experiment) -> None:
+    prepared = prepare(experiment, {})
+    assert not prepared.share.any()
+    assert prepared.run.record_every == prepared.run.steps_per_sample
+    assert len(prepared.time) == len(experiment.recording)
+
+
+def test_samples_off_the_grid_lie_between_two_records(experiment: Experiment) -> None:
+    recording = experiment.recording.resampled(np.linspace(0.0, 0.35, 223))
+    prepared = prepare(dataclasses.replace(experiment, recording=recording), {})
+    assert prepared.share.any()
+    at = (prepared.place + prepared.share) * prepared.run.step * prepared.run.record_every
+    assert at == pytest.approx(recording.time, abs=1e-9)
+
+
+def test_the_step_gets_finer_where_a_smaller_chamber_needs_it_and_never_coarser(experiment: Experiment) -> None:
+    prepared = prepare(experiment, {})
+    finer = refined(prepared, {"actuator.dead_volume_1": 1.0e-6})
+    assert finer.run.steps_per_sample > prepared.run.steps_per_sample
+    assert refined(finer, {}) is finer
+
+
+def test_the_initial_state_is_the_mean_of_the_samples_up_to_the_start(experiment: Experiment) -> None:
+    clean = simulate(experiment.scenario).recording
+    shifted = dataclasses.replace(clean, time=clean.time - 0.01)
+    prepared = prepare(dataclasses.replace(experiment, recording=shifted, initial_state="recording"), {})
+    before = shifted.time <= 1e-9
+    assert before.sum() == 11
+    assert prepared.scenario.initial_pressure_1 == pytest.approx(float(np.mean(clean["pressure_1"][before])))
+    assert prepared.scenario.initial_pressure_2 == pytest.approx(float(np.mean(clean["pressure_2"][before])))
+
+
+def test_supply_pressure_and_command_are_taken_from_the_recording(experiment: Experiment) -> None:
+    count = len(experiment.recording)
+    recording = experiment.recording.with_channel("supply_pressure", np.full(count, 4.0e5), "Pa")
+    recording = recording.with_channel("command", np.full(count, 0.5), "-")
+    given = dataclasses.replace(experiment, recording=recording, inputs=("supply_pressure", "command"))
+    prepared = prepare(given, {})
+    assert prepared.scenario.device.supply.pressure == 4.0e5
+    assert prepared.scenario.control.settings["command"] == 0.5
+
+
+def test_a_command_that_changes_is_refused_by_sample(experiment: Experiment) -> None:
+    command = np.ones(len(experiment.recording))
+    command[40:60] = 0.0
+    recording = experiment.recording.with_channel("command", command, "-")
+    with pytest.raises(IdentificationError, match="sample 41 "):
+        prepare(dataclasses.replace(experiment, recording=recording, inputs=("command",)), {})

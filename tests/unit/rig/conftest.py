@@ -1,0 +1,31 @@
+"""Presets without sensors' faults, and the true states behind a recording."""
+
+from collections.abc import Callable
+
+import pytest
+
+from ppafo.rig.bench.dynamic import rig_run
+from ppafo.rig.preset import Preset, load_preset
+from ppafo.rig.request import Request
+from ppafo.rig.run import RigRun
+from ppafo.simulation.loading import load_scenario
+
+
+@pytest.fixture(scope="session")
+def perfect() -> Preset:
+    """The ideal laboratory without noise, offset and rounding."""
+    preset = load_preset("ideal-laboratory")
+    for path in preset.values:
+        if path.rpartition(".")[2] in {"noise", "offset", "quantum"}:
+            preset = preset.changed(path, 0.0, "a test")
+    return preset
+
+
+@pytest.fixture
+def on_the_rig() -> Callable[[str, Preset], RigRun]:
+    """A scenario of the package on the rig, to be looked into."""
+
+    def made(scenario: str, preset: Preset) -> RigRun:
+        return rig_run(load_scenario(scenario), Request(preset, 1, "ppafo2011", None, ()), 1000.0)
+
+    return made

@@ -1,0 +1,145 @@
+"""Files from elsewhere: units, signs, marks and constants; and what is wrong is named with line and column."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ppafo.errors import DataError
+from ppafo.storage.column_map import ColumnMap
+from ppafo.storage.foreign import read_foreign
+
+TIME = {"column": 1, "unit": "ms"}
+
+
+def mapped(**keys: Any) -> ColumnMap:
+    channels = {"time": TIME, **keys.pop("channels", {})}
+    return ColumnMap.model_validate({"header": False, "channels": channels, **keys})
+
+
+def written(folder: Path, text: str | bytes) -> Path:
+    path = folder / "raw.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_units_sign_factor_and_offset_are_applied_in_that_order(tmp_path: Path) -> None:
+    angle = {"column": 2, "unit": "deg", "sign": -1, "factor": 10.0, "offset": 5.0}
+    recording = read_foreign(written(tmp_path, "0,1\n10,2\n"), mapped(channels={"angle": angle}))
+    assert np.allclose(recording.time, [0.0, 0.01])
+    assert np.allclose(recording["angle"], np.radians([-15.0, -25.0]))
+
+
+def test_a_force_and_a_lever_arm_make_a_torque(tmp_path: Path) -> None:
+    torque = {"column": 2, "unit": "N", "times": "130 mm"}
+    recording = read_foreign(written(tmp_path, "0,10\n10,20\n"), mapped(channels={"torque": torque}))
+    assert np.allclose(recording["torque"], [1.3, 2.6])
+    assert recording.unit("torque") == "N m"
+
+
+def test_gauge_pressure_counts_from_the_atmosphere_that_is_given(tmp_path: Path) -> None:
+    channels = {"pressure_1": {"column": 2, "unit": "bar_g"}, "pressure_2": {"constant": "0 bar_g"}}
+    recording = read_foreign(written(tmp_path, "0,1\n10,2\n"), mapped(channels=channels), atmosphere=9e4)
+    assert np.allclose(recording["pressure_1"], [1.9e5, 2.9e5])
+    assert np.allclose(recording["pressure_2"], 9e4)
+
+
+def test_decimal_commas_semicolons_and_names_are_read(tmp_path: Path) -> None:
+    text = "exported by hand\nZeit;Kraft\n0,0;1,5\n1,0;-2,25\n"
+    channels = {"time": {"column": "Zeit", "unit": "s"}, "torque": {"column": "Kraft", "unit": "N m"}}
+    columns = ColumnMap.model_validate(
+        {"delimiter": "semicolon", "decimal": "comma", "skip_lines": 1, "channels": channels}
+    )
+    assert np.allclose(read_foreign(written(tmp_path, text), columns)["torque"], [1.5, -2.25])
+
+
+def test_groups_of_digits_in_one_column_leave_the_decimal_point_of_another(tmp_path: Path) -> None:
+    time = {"column": 1, "unit": "s", "factor": 1e-6, "thousands": "point"}
+    columns = mapped(delimiter="semicolon", channels={"time": time, "torque": {"column": 2, "unit": "N m"}})
+    recording = read_foreign(written(tmp_path, "101.000;7.5\n12.345.000;7.6\n"), columns)
+    assert np.allclose(recording.time, [0.101, 12.345])
+    assert np.allclose(recording["torque"], [7.5, 7.6])
+
+
+def test_direction_and_sweeps_follow_from_the_rate_of_a_channel(tmp_path: Path) -> None:
+    time = np.arange(0.0, 4000.0, 10.0)
+    position = 40.0 * np.abs(1.0 - (time / 1000.0) % 2.0)
+    text = "".join(f"{moment:g},{place:g}\n" for moment, place in zip(time, position, strict=True))
+    direction = {"of": "position", "threshold": "20 mm/s", "window": "0.1 s"}
+    columns = mapped(channels={"position": {"column": 2, "unit": "mm"}}, direction=direction)
+    recording = read_foreign(written(tmp_path, text), columns)
+    assert [recording["direction"][index] for index in (50, 150, 250, 350)] == [-1.0, 1.0, -1.0, 1.0]
+    assert [recording["repetition"][index] for index in (50, 150, 250, 350)] == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_a_synthetic_recording_stays_one_through_a_column_map(tmp_path: Path) -> None:
+    text = "# synthetic: made by a model to stand for a measurement\n0,1\n10,2\n"
+    columns = mapped(channels={"torque": {"column": 2, "unit": "N m"}})
+    assert read_foreign(written(tmp_path, text), columns).kind == "synthetic"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0,1\n10,x\n", "line 2, column '2': 'x' is not a finite number"),
+        ("0,1\n10,nan\n", "line 2, column '2': 'nan' is not a finite number"),
+        ("0,1\n10,\n", "line 2, column '2': '' is not a finite number"),
+        ("0,1\n10,2\n10,3\n", "line 3: the clock stands still"),
+        ("0,1\n10,2\n5,3\n", "line 3: the clock goes backwards"),
+        ("0,1\n10\n", "line 2 has 1 values for 2 columns"),
+        ("\n\n", "has no rows"),
+        ("0\n1\n", "channel 'torque' is to come from column 2, the file has 1"),
+        (b"0,1\n\xff,2\n", "latin-1"),
+        (b"0,1\n\x00,2\n", "is not a text file"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_place(tmp_path: Path, text: str | bytes, message: str) -> None:
+    columns = mapped(channels={"torque": {"column": 2, "unit": "N m"}})
+    with pytest.raises(DataError) as caught:
+        read_foreign(written(tmp_path, text), columns)
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "raw.csv"))
+
+
+@pytest.mark.parametrize(
+    ("channel", "message"),
+    [
+        ({"column": 2, "unit": "N"}, "a unit like 'N m' is needed"),
+        ({"column": "torque", "unit": "N m"}, "the file has no header; give its number"),
+        ({"column": 2, "constant": "1 N m"}, "both a column and a constant"),
+        ({}, "neither a column nor a constant"),
+        ({"column": 2, "unit": "N", "times": "arm"}, "does not start with a number"),
+        ({"constant": "3 bananas"}, "not a known unit"),
+    ],
+)
+def test_a_map_that_does_not_fit_is_explained(tmp_path: Path, channel: dict[str, Any], message: str) -> None:
+    with pytest.raises(DataError) as caught:
+        read_foreign(written(tmp_path, "0,1\n10,2\n"), mapped(channels={"torque": channel}))
+    assert message in str(caught.value)
+
+
+def test_a_misspelt_column_gets_the_nearest_name(tmp_path: Path) -> None:
+    columns = mapped(header=True, channels={"time": {"column": "tme", "unit": "s"}})
+    with pytest.raises(DataError, match="no column 'tme', did you mean 'time'"):
+        read_foreign(written(tmp_path, "time,force\n0,1\n"), columns)
+
+
+@given(
+    content=st.binary(max_size=200),
+    delimiter=st.sampled_from(["comma", "semicolon", "tab", "whitespace"]),
+    header=st.booleans(),
+)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None)
+def test_any_bytes_are_read_or_refused_in_one_line(
+    tmp_path: Path, content: bytes, delimiter: str, header: bool
+) -> None:
+    columns = mapped(delimiter=delimiter, header=header, channels={"torque": {"column": 2, "unit": "N m"}})
+    try:
+        recording = read_foreign(written(tmp_path, content), columns)
+    except DataError as error:
+        assert str(error).startswith(str(tmp_path / "raw.csv"))
+    else:
+        assert np.isfinite(recording["torque"]).all()

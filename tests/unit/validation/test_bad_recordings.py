@@ -1,0 +1,200 @@
+"""What cannot carry a comparison is refused in one line, or remarked on; never a silent wrong number."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError, PpafoError
+from ppafo.parameters import load_device
+from ppafo.parameters.device import Device
+from ppafo.signals import Channel, Recording
+from ppafo.validation import parse_thresholds
+from ppafo.validation.alignment import parse_limit
+from ppafo.validation.measured import checked, read_measured
+from ppafo.validation.start import parse_initial
+from ppafo.validation.validate import check_motion, validate
+
+Step = tuple[Device, Recording]
+HEADER = "time [s],command [-],angle [deg],pressure_1 [psi_g],pressure_2 [psi_g]"
+ROWS = [f"{0.001 * n:.3f},1,{20 + n},{min(n, 50)},{50 - min(n, 50)}" for n in range(60)]
+
+
+def refused(recording: Recording, device: Device) -> str:
+    with pytest.raises(DataError) as caught:
+        checked(recording, device, "bench.csv")
+    text = str(caught.value)
+    assert text.startswith("bench.csv: ")
+    assert "\n" not in text
+    return text
+
+
+def renamed(recording: Recording, old: str, new: str) -> Recording:
+    channels = {new if name == old else name: channel for name, channel in recording.channels.items()}
+    return Recording(recording.label, recording.time, channels, recording.kind)
+
+
+def written(folder: Path, *lines: str) -> Path:
+    path = folder / "bench.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ([HEADER.replace("pressure_1 [psi_g]", "pressure_1 [psi]"), *ROWS], ["pressure_1 [psi]", "psi_g"]),
+        ([HEADER.replace("angle [deg]", "angle [s]"), *ROWS], ["angle [s]", "an angle is needed"]),
+        ([HEADER.replace("angle [deg]", "angel [deg]"), *ROWS], ["'angel' is not known", "did you mean 'angle'"]),
+        ([HEADER.replace("command [-]", "valve [-]"), *ROWS], ["no channel 'command'", "there are valve, angle"]),
+        ([HEADER, *ROWS[:5], ROWS[5].replace(",1,", ",nan,"), *ROWS[6:]], ["'command' is nan", "sample 6"]),
+        ([HEADER, *ROWS[:5], ROWS[4], *ROWS[6:]], ["time must grow", "sample 6"]),
+        ([HEADER, *ROWS[:5], "0.0045,1,,3,4", *ROWS[6:]], ["line 7", "not a number"]),
+        ([HEADER, ROWS[0]], ["has 1 sample"]),
+        ([HEADER], ["no samples"]),
+        ([HEADER, *ROWS[:20], *(f"9{row}" for row in ROWS[20:])], ["gap of 90 s after 0.019 s (sample 20)"]),
+        ([HEADER, *(row.replace(",1,", ",12,") for row in ROWS)], ["'command' is 12 at 0 s (sample 1)"]),
+        ([HEADER, *(ROWS[0].replace("0.000", f"{0.001 * n:.3f}") for n in range(60))], ["nothing happens in it"]),
+        ([HEADER.replace("psi_g", "psi_a"), *ROWS], ["'pressure_1' is 0 Pa absolute", "gauge"]),
+        ([HEADER, ROWS[0], ROWS[1].replace("21", "1e9"), *ROWS[2:]], ["'angle' is", "(sample 2), more than 20 times"]),
+        ([HEADER.replace("psi_g", "bar_g"), *ROWS], ["above the supply", "--set"]),
+    ],
+    ids=[
+        "psi without gauge",
+        "wrong unit",
+        "misspelt channel",
+        "no command",
+        "NaN",
+        "clock goes back",
+        "empty cell",
+        "one sample",
+        "no sample",
+        "gap",
+        "command in volts",
+        "constant channels",
+        "gauge as absolute",
+        "spike",
+        "other supply",
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line_that_names_it(lines: list[str], words: list[str], tmp_path: Path) -> None:
+    path = written(tmp_path, *lines)
+    with pytest.raises(PpafoError) as caught:
+        read_measured(path, load_device("ppafo2011"))
+    text = str(caught.value)
+    assert text.startswith(f"{path}: ")
+    assert "\n" not in text
+    assert all(word in text for word in words), text
+
+
+def test_the_same_file_without_a_mistake_is_taken(tmp_path: Path) -> None:
+    measured = read_measured(written(tmp_path, HEADER, *ROWS), load_device("ppafo2011"))
+    assert measured.remarks == ()
+    assert len(measured.sha256) == 64
+
+
+def test_gauge_pressures_count_from_the_atmosphere_of_the_set(tmp_path: Path) -> None:
+    path = written(tmp_path, HEADER, *ROWS)
+    device = load_device("ppafo2011", None, ["supply.atmospheric_pressure=90 kPa_a"])
+    assert read_measured(path, device).recording["pressure_1"][0] == 90000.0
+
+
+def test_an_unknown_channel_that_is_like_none_is_left_out_and_said(step: Step) -> None:
+    device, recording = step
+    extra = recording.with_channel("room_temperature", np.full(len(recording), 295.0), "K")
+    assert any("'room_temperature'" in remark for remark in checked(extra, device, "bench.csv").remarks)
+
+
+def test_a_recorded_supply_below_its_chambers_is_refused(step: Step) -> None:
+    device, recording = step
+    low = recording.with_channel("supply_pressure", np.full(len(recording), 3.0e5), "Pa")
+    assert "the recorded 'supply_pressure'" in refused(low, device)
+
+
+def test_a_misspelt_input_is_not_passed_over(step: Step) -> None:
+    device, recording = step
+    misspelt = recording.with_channel("suply_pressure", np.full(len(recording), 4.8e5), "Pa")
+    assert "did you mean 'supply_pressure'" in refused(misspelt, device)
+
+
+def test_a_clipped_sensor_is_remarked_on_and_a_vane_at_its_stop_is_not(step: Step) -> None:
+    device, recording = step
+    assert not any("limit" in remark for remark in checked(recording, device, "bench.csv").remarks)
+    noise = 2e3 * np.random.default_rng(2).standard_normal(len(recording))
+    clipped = np.minimum(recording["pressure_1"] + noise, 4.0e5)
+    remarks = checked(recording.with_channel("pressure_1", clipped, "Pa"), device, "bench.csv").remarks
+    assert any("'pressure_1' stays at exactly its largest value" in remark for remark in remarks)
+
+
+def test_an_angle_far_beyond_the_stops_is_refused_and_noise_at_a_stop_is_not(
+    step: Step, agree: Callable[..., Any]
+) -> None:
+    device, recording = step
+    assert agree(recording.with_channel("angle", recording["angle"] - 0.01, "rad"), device).model["angle"][0] == (
+        device.actuator.angle_min
+    )
+    for motion in ("free", "measured"):
+        with pytest.raises(DataError, match=r"'angle' is -20 deg, beyond the stops of ppafo2011, 20 to 130 deg"):
+            agree(recording.with_channel("angle", recording["angle"] - np.radians(40.0), "rad"), device, motion=motion)
+
+
+def test_a_led_vane_needs_its_angle(step: Step, agree: Callable[..., Any]) -> None:
+    device, recording = step
+    blind = renamed(recording, "angle", "knee_flexion")
+    with pytest.raises(DataError, match=r"no channel 'angle' to lead the vane along"):
+        agree(blind, device, motion="measured")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("angel=10%", "did you mean 'angle'"),
+        ("angle=10 psi_d", "an angle is needed"),
+        ("pressure_1=3 psi_g", "a pressure difference is needed"),
+        ("pressure_1=3 psi", "does not say which pressure"),
+        ("angle", "does not start with a number"),
+        ("3 deg", "a plain number without a unit"),
+        ("0.1", "a share of the full range in %"),
+        ("angle=-5%", "must be above 0"),
+        ("angle=0%", "must be above 0"),
+        ("", "does not start with a number"),
+    ],
+)
+def test_a_bad_threshold_is_refused(text: str, words: str) -> None:
+    with pytest.raises(DataError) as caught:
+        parse_thresholds([text])
+    assert words in str(caught.value)
+
+
+def test_thresholds_are_shares_or_errors_and_the_last_one_wins() -> None:
+    thresholds = parse_thresholds(["5%", "angle=2.2 deg", "pressure_1=20%", "pressure_1=7 percent"])
+    assert thresholds.limit("torque").share_of(123.0) == 0.05
+    assert thresholds.limit("pressure_1").share_of(1e5) == pytest.approx(0.07)
+    assert thresholds.limit("angle").share_of(np.radians(110.0)) == pytest.approx(0.02)
+    assert parse_thresholds().limit("angle").share_of(1.0) == 0.10
+
+
+@pytest.mark.parametrize("text", ["pressure_3=0 psi_g", "angle=3 psi_g", "pressure_1=3 psi", "pressure_1"])
+def test_a_bad_initial_value_is_refused(text: str) -> None:
+    with pytest.raises(DataError, match="initial value"):
+        parse_initial([text], 101325.0)
+
+
+def test_other_settings_are_checked() -> None:
+    assert parse_limit("5 ms") == 0.005
+    assert parse_initial(["pressure_1=0 psi_g"], 9e4) == {"pressure_1": 9e4}
+    for text in ("-1 ms", "2 s", "5", "5 V"):
+        with pytest.raises(DataError, match="longest delay"):
+            parse_limit(text)
+    with pytest.raises(DataError, match="did you mean 'measured'"):
+        check_motion("mesured")
+    with pytest.raises(DataError, match="no recording was given"):
+        validate("ppafo2011", [])
+
+
+def test_channels_need_values_to_compare(step: Step) -> None:
+    device, recording = step
+    bare = Recording("bare", recording.time, {"command": Channel(recording["command"], "-")})
+    assert "none of the channels to compare" in refused(bare, device)
