@@ -3,6 +3,7 @@
 Between two changes the lanes run on their own, so that a recording with a constant supply costs only a few calls.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -30,12 +31,18 @@ def segment_value(segment: Segment, time: float) -> tuple[float, float, float]:
     return segment.level + segment.rate * (time - segment.start), segment.rate, 0.0
 
 
+def segment_bounds(segment: Segment) -> tuple[float, float]:
+    """No bounds: the next piece may lead anywhere between the stops."""
+    return -math.inf, math.inf
+
+
 RECORDED_ANGLE = ProfileKind(
     name="recorded",
     summary="A recorded angle, straight from sample to sample; its parameters change at every sample.",
     quantities=(),
     parameters=Segment,
     value=segment_value,
+    bounds=segment_bounds,
 )
 """Not in the catalogue: a scenario file cannot name it, because its values come from a recording."""
 
