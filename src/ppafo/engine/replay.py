@@ -31,7 +31,7 @@ def segment_value(segment: Segment, time: float) -> tuple[float, float, float]:
     return segment.level + segment.rate * (time - segment.start), segment.rate, 0.0
 
 
-def segment_bounds(segment: Segment) -> tuple[float, float]:
+def segment_bounds(_segment: Segment) -> tuple[float, float]:
     """No bounds: the next piece may lead anywhere between the stops."""
     return -math.inf, math.inf
 
