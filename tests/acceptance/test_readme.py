@@ -99,11 +99,13 @@ def test_the_table_of_claims_is_that_of_a_run(reproduction: Reproduction) -> Non
     assert shown_claims() == testable
 
 
-def test_every_claim_that_is_not_testable_is_named(reproduction: Reproduction) -> None:
-    untestable = [claim.id for claim in reproduction.claims if claim.verdict == "not_testable"]
-    assert untestable
-    assert [name for name in untestable if f"`{name}`" not in TEXT] == []
-    assert [name for name in shown_claims() if name in untestable] == []
+def test_every_claim_on_a_synthetic_measurement_is_named_in_the_text_below_the_table(
+    reproduction: Reproduction,
+) -> None:
+    synthetic = [claim.id for claim in reproduction.claims if claim.is_synthetic]
+    assert synthetic
+    below = TEXT.partition('"Synthetic" matters more.')[2]
+    assert [name for name in synthetic if f"`{name}`" not in below] == []
 
 
 def test_the_limits_of_accuracy_are_those_of_the_tests() -> None:

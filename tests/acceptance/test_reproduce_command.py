@@ -14,6 +14,7 @@ from ppafo.cli.main import main
 from ppafo.reporting.reproduction_files import FILES
 from ppafo.storage import read_csv
 from ppafo.studies import reproduction as study
+from ppafo.studies.reproduction.bench import bench_study
 
 # Spelled out once more on purpose: other programs read these identifiers and this order.
 IDS = [
@@ -36,7 +37,7 @@ IDS = [
     "co2_proportional",
     "co2_saving",
 ]
-FIGURES = ("figure-7-step-response", "figure-8-torque-task")
+FIGURES = ("figure-3-identification", "figure-7-step-response", "figure-8-torque-task")
 RECORDINGS = ("step-response", "torque-task-solenoid", "torque-task-proportional")
 
 
@@ -62,6 +63,28 @@ def test_the_claims_file_has_every_claim_in_the_agreed_form(out: Path) -> None:
         assert (claim["value"] is None) == (claim["verdict"] == "not_testable")
 
 
+def test_what_a_synthetic_measurement_tests_is_marked_in_file_and_report(out: Path) -> None:
+    claims = json.loads((out / "claims.json").read_text(encoding="utf-8"))["claims"]
+    marked = [claim for claim in claims if claim["synthetic"]]
+    assert len(marked) == 7
+    assert all(claim["verdict"] != "reproduced" and "synthetic" in claim["note"] for claim in marked)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("with assumptions,<br>synthetic</span></td>") == 7
+    assert "Figure 3 of the paper, from synthetic recordings" in page
+
+
+def test_without_the_solver_of_the_rig_the_report_has_no_figure_3_and_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench_study.cache_clear()
+    monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
+    assert main(["reproduce", "--out", str(tmp_path)]) == 0
+    assert not list(tmp_path.glob("figure-3*"))
+    assert "pip install" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    claims = json.loads((tmp_path / "claims.json").read_text(encoding="utf-8"))["claims"]
+    assert sum(claim["verdict"] == "not_testable" for claim in claims) == 7
+
+
 def test_the_report_is_one_file_that_fetches_nothing(out: Path) -> None:
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.startswith("<!DOCTYPE html>")
@@ -76,7 +99,7 @@ def test_every_figure_is_a_picture_of_some_size(out: Path) -> None:
         content = (out / f"{name}.png").read_bytes()
         width, height = struct.unpack(">II", content[16:24])
         assert content.startswith(b"\x89PNG")
-        assert min(width, height) > 600
+        assert min(width, height) > 500
         drawing = (out / f"{name}.svg").read_text(encoding="utf-8")
         assert drawing.count("<path") > 50
 

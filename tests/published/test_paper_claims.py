@@ -83,6 +83,28 @@ def test_the_vane_breaks_away_at_the_printed_static_friction(reproduction: Repro
 
 
 @pytest.mark.parametrize(
+    ("identifier", "paper", "low", "high", "unit"),
+    [
+        ("k_actuator", 1.451e-5, 1.44e-5, 1.46e-5, "m^3"),
+        ("static_friction", 0.45, 0.445, 0.455, "N m"),
+        ("leak_area", 0.3, 0.298, 0.302, "mm^2"),
+        ("step_rms_position", 2.1, 0.5, 4.0, "deg"),
+        ("step_rms_pressure_1", 3.7, 0.5, 3.0, "psi"),
+        ("step_rms_pressure_2", 1.4, 3.0, 5.5, "psi"),
+        ("step_rms_pressure_difference", 4.8, 3.0, 7.0, "psi"),
+    ],
+)
+def test_what_a_synthetic_measurement_gives_holds_with_assumptions(
+    claims: dict[str, Claim], identifier: str, paper: float, low: float, high: float, unit: str
+) -> None:
+    claim = claims[identifier]
+    assert claim.value is not None
+    assert low <= claim.value <= high
+    assert (claim.paper, claim.unit, claim.verdict) == (paper, unit, "reproduced_with_assumptions")
+    assert claim.is_synthetic
+
+
+@pytest.mark.parametrize(
     ("identifier", "paper", "value", "digits", "unit", "verdict"),
     [
         ("c1", 0.00281, 0.002812, 1e-6, "s/m", "reproduced"),

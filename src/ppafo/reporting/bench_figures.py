@@ -1,6 +1,7 @@
 """Figures of the bench procedures in the paper's style; figure 3 is the static torque beside the free decay."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,6 +59,19 @@ def figure_3(results: Sequence[BenchResult]) -> "Figure | None":
         return None
     torque, decay = by_name["static_torque"], by_name["free_decay"]
     return _figure((torque.panels[0], decay.panels[1]), (torque.kind, decay.kind))
+
+
+def synthetic_figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
+    """Return figure 3 of the paper from synthetic recordings, which each panel says of itself."""
+    panels = (torque.panels[0], decay.panels[1])
+    return _figure(tuple(_called_synthetic(panel) for panel in panels), (torque.kind, decay.kind))
+
+
+def _called_synthetic(panel: Panel) -> Panel:
+    series = tuple(
+        replace(item, name="synthetic measurement") if item.name == "measured" else item for item in panel.series
+    )
+    return replace(panel, title=f"{panel.title}, synthetic", series=series)
 
 
 def _figure(panels: tuple[Panel, ...], kinds: tuple[str, ...]) -> "Figure":

@@ -25,9 +25,11 @@ def count_sentence(claims: Sequence[Claim]) -> str:
     """Return how many claims have each verdict, for example ``18 claims: 3 reproduced, 4 contradicted``."""
     counts = verdict_counts(claims)
     told = ", ".join(f"{count} {VERDICTS[verdict]}" for verdict, count in counts.items() if count)
-    return f"{len(claims)} claims: {told}"
+    synthetic = sum(claim.is_synthetic for claim in claims)
+    rest = f"; {synthetic} of them synthetic" if synthetic else ""
+    return f"{len(claims)} claims: {told}{rest}"
 
 
 def _row(claim: Claim) -> tuple[str, ...]:
     ours = _NOTHING if claim.value is None else quantity(claim.value, claim.unit)
-    return claim.id, printed_quantity(claim.paper, claim.unit), ours, VERDICTS[claim.verdict]
+    return claim.id, printed_quantity(claim.paper, claim.unit), ours, claim.verdict_words

@@ -6,6 +6,7 @@ from typing import Any
 
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError
+from ppafo.reporting.bench_figures import synthetic_figure_3
 from ppafo.reporting.reproduction_report import holding_torque, reproduction_report
 from ppafo.reporting.step_response_figure import step_response_figure
 from ppafo.reporting.style import rendered
@@ -15,20 +16,26 @@ from ppafo.storage.owned_folder import FolderKind, check_owned_folder, read_json
 from ppafo.studies.reproduction import Reproduction
 from ppafo.studies.reproduction.step_response import Levels
 from ppafo.studies.reproduction.study import EXPERIMENTS
+from ppafo.studies.reproduction.synthetic import NoEvidence
 
 REPORT = "report.html"
 CLAIMS = "claims.json"
+IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
 _FORMATS = ("png", "svg")
 
 FILES = (
     *(f"{name}.csv" for name in EXPERIMENTS),
-    *(f"{figure}.{file_format}" for figure in (STEP_FIGURE, TORQUE_FIGURE) for file_format in _FORMATS),
+    *(
+        f"{figure}.{file_format}"
+        for figure in (IDENTIFICATION_FIGURE, STEP_FIGURE, TORQUE_FIGURE)
+        for file_format in _FORMATS
+    ),
     CLAIMS,
     REPORT,
 )
-"""Names of all files, in the order of writing; the report comes last."""
+"""Names of all files, in the order of writing; the report comes last. Without the virtual rig there is no figure 3."""
 
 
 def check_reproduction_folder(folder: Path) -> None:
@@ -42,15 +49,17 @@ def write_reproduction(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def reproduction_files(reproduction: Reproduction) -> dict[str, bytes]:
-    """Return every one of ``FILES``: recordings as CSV, both figures as PNG and SVG, claims and report."""
+    """Return the contents of ``FILES``: recordings as CSV, the figures as PNG and SVG, claims and report."""
     step, torque = _step_figure(reproduction), _torque_figure(reproduction)
+    identification = _identification_figure(reproduction)
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
     return {
         **{f"{run.scenario.name}.csv": marked_csv_bytes(run.recording) for run in runs},
+        **{f"{IDENTIFICATION_FIGURE}.{file_format}": content for file_format, content in identification.items()},
         **{f"{STEP_FIGURE}.{file_format}": content for file_format, content in step.items()},
         **{f"{TORQUE_FIGURE}.{file_format}": content for file_format, content in torque.items()},
         CLAIMS: f"{json_text(claims_document(reproduction))}\n".encode(),
-        REPORT: reproduction_report(reproduction, step["svg"], torque["svg"]).encode(),
+        REPORT: reproduction_report(reproduction, step["svg"], torque["svg"], identification.get("svg")).encode(),
     }
 
 
@@ -63,19 +72,32 @@ def claims_document(reproduction: Reproduction) -> dict[str, Any]:
     }
 
 
+def _identification_figure(reproduction: Reproduction) -> dict[str, bytes]:
+    """Return figure 3 by format; nothing where the virtual rig could not measure."""
+    evidence = reproduction.synthetic
+    if isinstance(evidence, NoEvidence):
+        return {}
+    return rendered(synthetic_figure_3(evidence.bench.torque, evidence.bench.decay), _FORMATS)
+
+
 def _step_figure(reproduction: Reproduction) -> dict[str, bytes]:
     supply = reproduction.step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
-    return rendered(step_response_figure(reproduction.step.recording, levels, reproduction.step_events), _FORMATS)
+    evidence = reproduction.synthetic
+    measured = None if isinstance(evidence, NoEvidence) else evidence.step.measured
+    figure = step_response_figure(reproduction.step.recording, levels, reproduction.step_events, measured)
+    return rendered(figure, _FORMATS)
 
 
 def _torque_figure(reproduction: Reproduction) -> dict[str, bytes]:
     stated = {claim.id: claim.paper for claim in reproduction.claims}
+    evidence = reproduction.synthetic
     figure = torque_task_figure(
         reproduction.solenoid.recording,
         reproduction.proportional.recording,
         holding_torque(reproduction.solenoid),
         (stated["co2_solenoid"], stated["co2_proportional"]),
+        None if isinstance(evidence, NoEvidence) else (evidence.solenoid, evidence.proportional),
     )
     return rendered(figure, _FORMATS)
 

@@ -10,6 +10,7 @@ from ppafo.parameters.audit import Finding
 from ppafo.reporting.claims_table import count_sentence
 from ppafo.reporting.metrics_table import in_shown_unit
 from ppafo.reporting.page import inline_figure, rendered_page
+from ppafo.reporting.synthetic_section import synthetic_values
 from ppafo.reporting.typesetting import printed_quantity, quantity, sentence
 from ppafo.simulation.result import Result
 from ppafo.studies.reproduction import Claim, Reproduction
@@ -36,11 +37,14 @@ _TASK_METRICS = (
 )
 
 
-def reproduction_report(reproduction: Reproduction, step_figure: bytes, torque_figure: bytes) -> str:
+def reproduction_report(
+    reproduction: Reproduction, step_figure: bytes, torque_figure: bytes, identification_figure: bytes | None = None
+) -> str:
     """Return the report as HTML; figures are the contents of SVG files and become part of the page."""
     values = {
         **_summary(reproduction),
         **_findings(reproduction),
+        **synthetic_values(reproduction, identification_figure),
         "step_figure": inline_figure(step_figure),
         "torque_figure": inline_figure(torque_figure),
         "task_rows": _task_rows(reproduction.solenoid.metrics, reproduction.proportional.metrics),
@@ -82,9 +86,10 @@ def _claim_row(claim: Claim) -> dict[str, Any]:
         "paper": printed_quantity(claim.paper, claim.unit),
         "ours": quantity(claim.value, claim.unit),
         "verdict": claim.verdict,
-        "word": VERDICTS[claim.verdict],
+        "word": claim.verdict_words,
         "symbol": _SYMBOLS[claim.verdict],
         "note": claim.note,
+        "is_synthetic": claim.is_synthetic,
         "is_assumed": claim.verdict == "reproduced_with_assumptions",
     }
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.reporting.layout import Margins, figure_of_panels
-from ppafo.reporting.style import ACTUAL, CHAMBER_1, CHAMBER_2, GREY, house_style, mark_kind
+from ppafo.reporting.style import ACTUAL, BLACK, CHAMBER_1, CHAMBER_2, GREY, house_style, mark_kind
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.studies.reproduction.step_response import Levels, StepEvents
@@ -24,10 +24,17 @@ _SHOWN_BEFORE_STEP = 0.03
 _SHOWN_AFTER_STOP = 0.8
 """Share of the time until the stop that is shown beyond it; what follows is rest."""
 _MILLISECONDS = 1.0e3
+_NAMED = "BC"
+"""Panels with room at the lower right for the names of both curves."""
 
 
-def step_response_figure(recording: Recording, levels: Levels, events: StepEvents | None) -> "Figure":
-    """Return figure 7: angle, pressure difference, and both pressures over time; ``events`` are marked where known."""
+def step_response_figure(
+    recording: Recording, levels: Levels, events: StepEvents | None, synthetic: Recording | None = None
+) -> "Figure":
+    """Return figure 7: angle, pressure difference, and both pressures over time; ``events`` are marked where known.
+
+    ``synthetic`` is a measurement on the virtual rig, shown as dots in front of the lines of the model.
+    """
     with house_style():
         figure, grid = figure_of_panels(_SIZE, _MARGINS, rows=2, columns=2)
         panels = [axes for row in grid for axes in row]
@@ -42,8 +49,24 @@ def step_response_figure(recording: Recording, levels: Levels, events: StepEvent
         panels[0].set_xlim(-_SHOWN_BEFORE_STEP * last, last)
         if events is not None:
             _mark(panels, events)
-        mark_kind(figure, recording.kind)
+        if synthetic is None:
+            mark_kind(figure, recording.kind)
+        else:
+            _add_synthetic(panels, synthetic, levels, last)
+            mark_kind(figure, synthetic.kind)
         return figure
+
+
+def _add_synthetic(panels: "list[Axes]", synthetic: Recording, levels: Levels, last: float) -> None:
+    """Draw a synthetic measurement as dots and name both where there is room."""
+    shown = _MILLISECONDS * synthetic.time <= last
+    for axes, curve in zip(panels, _curves(synthetic, levels), strict=True):
+        axes.lines[0].set_label("model")
+        times = _MILLISECONDS * synthetic.time[shown]
+        label = "synthetic measurement"
+        axes.plot(times, curve.values[shown], ".", color=BLACK, markersize=2.6, zorder=3, label=label)
+        if curve.letter in _NAMED:
+            axes.legend(loc="lower right", handlelength=1.2)
 
 
 @dataclass(frozen=True, slots=True)

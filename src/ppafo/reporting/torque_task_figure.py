@@ -6,7 +6,7 @@ import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.reporting.layout import Margins, figure_of_panels
-from ppafo.reporting.style import BLUE, GREY, VERMILION, WANTED, house_style, mark_kind
+from ppafo.reporting.style import BLACK, BLUE, GREY, VERMILION, WANTED, house_style, mark_kind
 from ppafo.signals import Recording
 
 if TYPE_CHECKING:
@@ -17,16 +17,22 @@ _SIZE = (7.6, 8.5)
 _MARGINS = Margins(left=0.68, right=0.15, top=0.42, bottom=0.52, row_gap=0.36)
 """Inches."""
 _HEIGHTS = (3.0, 0.9, 3.0, 0.9, 2.0)
+_MOST_POINTS = 1000
 _SOLENOID, _PROPORTIONAL = VERMILION, BLUE
 
 
 def torque_task_figure(
-    solenoid: Recording, proportional: Recording, ceiling: float, gas_in_paper: tuple[float, float]
+    solenoid: Recording,
+    proportional: Recording,
+    ceiling: float,
+    gas_in_paper: tuple[float, float],
+    synthetic: tuple[Recording, Recording] | None = None,
 ) -> "Figure":
     """Return figure 8: torque and reference with each valve, what the valve does below, and the gas at the bottom.
 
     ``ceiling`` is the torque that the supply can hold [N m], ``gas_in_paper`` what the paper states for the solenoid
-    valves and for the proportional valve [g].
+    valves and for the proportional valve [g]. ``synthetic`` is the same task on the virtual rig with the one and with
+    the other, shown as a thin line.
     """
     with house_style():
         figure, rows = figure_of_panels(_SIZE, _MARGINS, rows=len(_HEIGHTS), heights=_HEIGHTS)
@@ -36,6 +42,9 @@ def torque_task_figure(
         _torque(grid[2], proportional, "Proportional valve", _PROPORTIONAL, ceiling)
         _opening(grid[3], proportional)
         _gas(grid[4], solenoid, proportional, gas_in_paper)
+        if synthetic is not None:
+            for axes, recording in zip((grid[0], grid[2]), synthetic, strict=True):
+                _add_synthetic(axes, recording)
         grid[4].set_xlabel("Time (s)")
         grid[4].set_xlim(float(solenoid.time[0]), float(solenoid.time[-1]))
         limits = [axes.get_ylim() for axes in (grid[0], grid[2])]
@@ -43,6 +52,14 @@ def torque_task_figure(
             axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
         mark_kind(figure, solenoid.kind)
         return figure
+
+
+def _add_synthetic(axes: "Axes", recording: Recording) -> None:
+    """Draw the torque of a synthetic experiment as a thin line, beside which that of the simulation shows."""
+    thin = slice(None, None, max(1, len(recording) // _MOST_POINTS))
+    times, torque = recording.time[thin], recording["torque"][thin]
+    axes.plot(times, torque, color=BLACK, linewidth=0.6, zorder=3, label="torque, synthetic experiment")
+    axes.legend(loc="lower right")
 
 
 def _torque(axes: "Axes", recording: Recording, title: str, colour: str, ceiling: float) -> None:

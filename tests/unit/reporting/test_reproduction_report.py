@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from ppafo.reporting.bench_figures import synthetic_figure_3
 from ppafo.reporting.claims_table import claims_table
 from ppafo.reporting.reproduction_report import holding_torque, reproduction_report
 from ppafo.reporting.step_response_figure import step_response_figure
@@ -13,6 +14,7 @@ from ppafo.reporting.torque_task_figure import torque_task_figure
 from ppafo.reporting.typesetting import typeset
 from ppafo.studies.reproduction import Reproduction, reproduce
 from ppafo.studies.reproduction.step_response import Levels
+from ppafo.studies.reproduction.synthetic import NoEvidence, SyntheticEvidence
 
 LEVELS = Levels(480536.0, 101325.0)
 
@@ -97,7 +99,7 @@ def test_the_page_states_every_claim_with_both_numbers_and_the_verdict(reproduct
         assert words(typeset(claim.statement)) in text
         assert words(typeset(claim.note)) in text
     assert "contradicted" in text
-    assert "not testable" in text
+    assert "with assumptions, synthetic" in text
 
 
 def test_the_page_holds_both_figures_and_fetches_nothing(page: str) -> None:
@@ -130,6 +132,54 @@ def test_a_run_with_overrides_says_so_and_gives_the_command(reproduction: Reprod
     assert "departs from the paper" in told
     assert "--set 'reference.level=5 N m'" in told
     assert "departs from the paper" not in words(page)
+
+
+def test_without_the_rig_the_page_says_why_and_shows_nothing_synthetic(reproduction: Reproduction) -> None:
+    bare = dataclasses.replace(reproduction, synthetic=NoEvidence("the solver is missing"))
+    told = reproduction_report(bare, b"", b"")
+    assert "There are no synthetic measurements in this report: the solver is missing." in words(told)
+    assert 'id="identification"' not in told
+
+
+def test_the_page_shows_what_was_identified_on_both_presets_beside_what_was_planted(
+    reproduction: Reproduction, page: str
+) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    text = words(page)
+    assert "ideal-laboratory" in text
+    assert "paper-bench" in text
+    table = page.partition('id="identification"')[2].partition("</table>")[0]
+    assert table.count("<tr>") == 1 + len(evidence.bench.values)
+
+
+def test_figure_3_says_in_each_panel_that_it_is_synthetic(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    figure = synthetic_figure_3(evidence.bench.torque, evidence.bench.decay)
+    assert all("synthetic" in axes.get_title(loc="left") for axes in figure.axes)
+    rising, falling = figure.axes[0].lines[:2]
+    assert (rising.get_marker(), falling.get_marker()) == ("x", "o")
+
+
+def test_figure_7_shows_the_synthetic_measurement_as_dots_and_names_it(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    recording = reproduction.step.recording
+    figure = step_response_figure(recording, LEVELS, None, evidence.step.measured)
+    assert [axes.lines[1].get_marker() for axes in figure.axes] == ["."] * 4
+    legends = [axes.get_legend() for axes in figure.axes]
+    named = [text.get_text() for legend in legends if legend is not None for text in legend.get_texts()]
+    assert "synthetic measurement" in named
+
+
+def test_figure_8_shows_the_synthetic_experiment_with_both_valves(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    runs = (reproduction.solenoid.recording, reproduction.proportional.recording)
+    figure = torque_task_figure(*runs, 5.0, (1.1, 0.4), (evidence.solenoid, evidence.proportional))
+    for axes in (figure.axes[0], figure.axes[2]):
+        assert "torque, synthetic experiment" in {line.get_label() for line in axes.lines}
 
 
 def test_the_same_reproduction_gives_the_same_page(reproduction: Reproduction, page: str) -> None:

@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import math
+import sys
 
 import pytest
 
@@ -10,10 +12,23 @@ from ppafo.parameters.audit.evidence import Evidence
 from ppafo.simulation.result import Result, Status
 from ppafo.studies.reproduction import Claim, Reproduction, reproduce, study
 from ppafo.studies.reproduction.arithmetic import arithmetic_claims
+from ppafo.studies.reproduction.bench import bench_study
 from ppafo.studies.reproduction.claim import VERDICTS, verdict_counts
+from ppafo.studies.reproduction.measured import measured_claims
 from ppafo.studies.reproduction.printed import Printed, load_printed
 from ppafo.studies.reproduction.study import EXPERIMENTS, ORDER, PROPORTIONAL, SOLENOID, STEP
+from ppafo.studies.reproduction.synthetic import SyntheticEvidence
 from ppafo.studies.reproduction.torque_task import torque_task_observations
+
+SYNTHETIC = {
+    "k_actuator",
+    "static_friction",
+    "leak_area",
+    "step_rms_position",
+    "step_rms_pressure_1",
+    "step_rms_pressure_2",
+    "step_rms_pressure_difference",
+}
 
 
 @pytest.fixture(scope="module")
@@ -47,18 +62,90 @@ def test_a_claim_as_a_document_is_plain_data_with_all_that_a_reader_needs(reprod
     assert all(claim["verdict"] in VERDICTS and claim["source"] and claim["statement"] for claim in document)
 
 
-def test_what_needs_a_measurement_has_no_value_but_a_reason(reproduction: Reproduction) -> None:
-    open_claims = [claim for claim in reproduction.claims if claim.verdict == "not_testable"]
-    assert {claim.id for claim in open_claims} == {
-        "k_actuator",
-        "static_friction",
-        "leak_area",
-        "step_rms_position",
-        "step_rms_pressure_1",
-        "step_rms_pressure_2",
-        "step_rms_pressure_difference",
-    }
+def test_without_the_rig_what_needs_a_measurement_has_no_value_but_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench_study.cache_clear()
+    monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
+    bare = reproduce()
+    open_claims = [claim for claim in bare.claims if claim.verdict == "not_testable"]
+    assert {claim.id for claim in open_claims} == SYNTHETIC
     assert all(claim.value is None and claim.note.startswith("Needs") for claim in open_claims)
+    assert all("pip install 'ppafo[reference]'" in claim.note for claim in open_claims)
+    assert not any(claim.is_synthetic for claim in bare.claims)
+
+
+def test_what_a_synthetic_measurement_tests_says_so_and_is_never_plainly_reproduced(reproduction: Reproduction) -> None:
+    tested = [claim for claim in reproduction.claims if claim.is_synthetic]
+    assert {claim.id for claim in tested} == SYNTHETIC
+    for claim in tested:
+        assert claim.verdict in ("reproduced_with_assumptions", "contradicted")
+        assert claim.verdict_words.endswith(", synthetic")
+        assert "synthetic: it shows that the procedure works, not that the paper's device" in claim.note
+        assert any("virtual rig" in assumption for assumption in claim.assumptions)
+        assert claim.document()["synthetic"] is True
+
+
+def test_every_planted_value_comes_back_from_the_rig_with_the_paper_s_physics() -> None:
+    values = bench_study().values
+    assert len(values) == 7
+    for value in values:
+        assert value.ideal.low <= value.planted <= value.ideal.high, value.path
+        assert value.ideal.value == pytest.approx(value.planted, rel=2e-3)
+
+
+def test_the_realistic_bench_misleads_the_static_friction_as_it_grows_with_pressure() -> None:
+    value = bench_study()["friction.static_torque"]
+    assert value.realistic.low > value.planted
+    with pytest.raises(KeyError):
+        bench_study()["supply.pressure"]
+
+
+def test_an_interval_beside_the_planted_value_contradicts_the_claim(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    values = tuple(
+        dataclasses.replace(value, ideal=dataclasses.replace(value.ideal, value=0.5, low=0.49, high=0.51))
+        if value.path == "friction.static_torque"
+        else value
+        for value in evidence.bench.values
+    )
+    wrong = dataclasses.replace(evidence, bench=dataclasses.replace(evidence.bench, values=values))
+    judged = {claim.id: claim for claim in measured_claims(load_printed(), wrong, ())}
+    assert judged["static_friction"].verdict == "contradicted"
+    assert "does not hold it" in judged["static_friction"].note
+    assert judged["k_actuator"].verdict == "reproduced_with_assumptions"
+
+
+def test_an_error_beyond_a_tenth_of_the_full_range_contradicts_the_claim(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    for degrees, verdict in ((10.9, "reproduced_with_assumptions"), (11.1, "contradicted")):
+        channels = tuple(
+            dataclasses.replace(channel, rms=math.radians(degrees)) if channel.channel == "angle" else channel
+            for channel in evidence.step.channels
+        )
+        changed = dataclasses.replace(evidence, step=dataclasses.replace(evidence.step, channels=channels))
+        judged = {claim.id: claim for claim in measured_claims(load_printed(), changed, ())}
+        assert judged["step_rms_position"].verdict == verdict
+        assert judged["step_rms_position"].value == pytest.approx(degrees)
+
+
+def test_what_the_rig_records_is_marked_synthetic(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    recordings = (evidence.solenoid, evidence.proportional, evidence.step.measured)
+    assert {recording.kind for recording in recordings} == {"synthetic"}
+    assert {evidence.bench.torque.kind, evidence.bench.decay.kind} == {"synthetic"}
+
+
+def test_overrides_reach_the_rig_s_torque_task_but_not_the_identification(reproduction: Reproduction) -> None:
+    changed = reproduce(["reference.level=4 N m"])
+    assert isinstance(changed.synthetic, SyntheticEvidence)
+    assert isinstance(reproduction.synthetic, SyntheticEvidence)
+    assert changed.synthetic.proportional["reference"].max() == pytest.approx(4.0)
+    before, after = (
+        [value.realistic.value for value in run.bench.values] for run in (reproduction.synthetic, changed.synthetic)
+    )
+    assert after == before
 
 
 def test_the_counts_of_the_verdicts_add_up(reproduction: Reproduction) -> None:

@@ -21,6 +21,8 @@ class Claim:
 
     ``source`` is where the paper says it, ``assumptions`` what our number rests on beside the paper, ``note`` why the
     verdict is what it is. A claim that has to hold for this package to be sound has a window that it must fall into.
+    ``is_synthetic`` says that our number comes from a measurement on the virtual rig: it shows that the procedure
+    works, and nothing about the paper's device.
     """
 
     id: str
@@ -33,6 +35,13 @@ class Claim:
     note: str
     assumptions: tuple[str, ...] = ()
     window: tuple[float, float] | None = None
+    is_synthetic: bool = False
+
+    @property
+    def verdict_words(self) -> str:
+        """The verdict in words, and that it rests on a synthetic measurement where it does."""
+        words = VERDICTS[self.verdict]
+        return f"{words.removeprefix('reproduced ')}, synthetic" if self.is_synthetic else words
 
     @property
     def is_missed(self) -> bool:
@@ -50,6 +59,7 @@ class Claim:
             "value": self.value,
             "unit": self.unit,
             "verdict": self.verdict,
+            "synthetic": self.is_synthetic,
             "assumptions": list(self.assumptions),
             "source": self.source,
             "note": self.note,

@@ -1,6 +1,6 @@
 """Runs the paper's experiments and judges what the paper claims of them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from ppafo.studies.reproduction.measured import measured_claims
 from ppafo.studies.reproduction.observation import Observation
 from ppafo.studies.reproduction.printed import load_printed
 from ppafo.studies.reproduction.step_response import Levels, StepEvents, step_events, step_observations
+from ppafo.studies.reproduction.synthetic import NoEvidence, SyntheticEvidence, synthetic_evidence
 from ppafo.studies.reproduction.torque_task import torque_task_claims, torque_task_observations
 
 STEP = "step-response"
@@ -62,6 +63,7 @@ class Reproduction:
     step_events: StepEvents | None
     solenoid: Result
     proportional: Result
+    synthetic: SyntheticEvidence | NoEvidence
     assumed: tuple[AssumedValue, ...]
     printed_set: str
     printed_findings: tuple[Finding, ...]
@@ -83,18 +85,21 @@ def reproduce(overrides: Sequence[str] = (), tell: Callable[[str], None] = _sile
     """Run the paper's experiments with the shipped scenarios and judge every claim.
 
     ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
-    have it, a path of the device all of them. ``tell`` hears what is being done. SimulationError where a run diverges.
+    have it, a path of the device all of them. The virtual rig stands in for the paper's measurements, where it can.
+    ``tell`` hears what is being done. SimulationError where a run diverges.
     """
     scenarios = _scenarios(overrides)
     runs = {name: _run(scenario, tell) for name, scenario in scenarios.items()}
     step, solenoid, proportional = (runs[name] for name in EXPERIMENTS)
+    tell("measuring on the virtual rig, synthetic")
+    synthetic = _synthetic(scenarios)
     tell("checking the paper's own numbers")
     printed = load_printed()
     completed = load_parameter_set(step.scenario.origin.parameter_set)
     assumed = assumed_values(scenarios)
     claims = [
         *arithmetic_claims(printed),
-        *measured_claims(printed),
+        *measured_claims(printed, synthetic, used_by(assumed, STEP)),
         *torque_task_claims(solenoid, proportional, used_by(assumed, SOLENOID, PROPORTIONAL)),
     ]
     events = step_events(step.recording)
@@ -106,6 +111,7 @@ def reproduce(overrides: Sequence[str] = (), tell: Callable[[str], None] = _sile
         step_events=events,
         solenoid=solenoid,
         proportional=proportional,
+        synthetic=synthetic,
         assumed=assumed,
         printed_set=printed.parameter_set.name,
         printed_findings=tuple(audit(printed.parameter_set)),
@@ -133,6 +139,13 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
 def _changed(name: str, earlier: Sequence[str]) -> dict[str, Any]:
     """Return the document of a scenario with the overrides that came earlier."""
     return apply_overrides(load_scenario(name).origin.content, earlier, name).document
+
+
+def _synthetic(scenarios: Mapping[str, Scenario]) -> SyntheticEvidence | NoEvidence:
+    """Return what the rig measures in place of the paper, with the same overrides as the simulations."""
+    overrides = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
+    tasks = {"solenoid": overrides[SOLENOID], "proportional": overrides[PROPORTIONAL]}
+    return synthetic_evidence(scenarios[STEP], tasks, overrides[STEP])
 
 
 def _has(document: dict[str, Any], path: str) -> bool:
