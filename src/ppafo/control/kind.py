@@ -2,16 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
-
-
-class Command(NamedTuple):
-    """Result of one update is a command from -1 to 1 and the controller's next state."""
-
-    value: float
 
 
 @dataclass(frozen=True, slots=True)

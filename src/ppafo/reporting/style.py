@@ -17,9 +17,7 @@ GREY = "#6e6e6e"
 BLUE = "#0072B2"
 VERMILION = "#D55E00"
 GREEN = "#009E73"
-PURPLE = "#CC79A7"
 ORANGE = "#E69F00"
-SKY = "#56B4E9"
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
 
 CHAMBER_1 = BLUE

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.reference import vane_mode
+from ppafo.engine.reference.sampling import SAME_TIME
+from ppafo.engine.reference.segment import solve_segment
 from ppafo.engine.rows import numbers, rebuild
 from ppafo.errors import SimulationError
 from ppafo.model.friction import holds_still
@@ -23,7 +25,6 @@ from ppafo.rig.source import ANGLE, INPUTS, RATE, SEEN, UNKNOWNS, compiled
 
 Floats = NDArray[np.float64]
 
-SAME_TIME = 1.0e-12
 TOLERANCE = 1.0e-8
 MOST_STEPS = 100_000
 _TOLERANCES = {
@@ -213,13 +214,8 @@ class _Rig:
                 self.result.breakaways.append(self.time)
         # A valve whose slopes are 0 stays where it is, because they depend on nothing but its state and the command.
         self.valve_moves = any(self.ask_valve(self.y))
-        times = self.given.sample_times
-        wanted = times[self.recorded : np.searchsorted(times, end - SAME_TIME)]
-        grid = np.unique(np.concatenate([[self.time], wanted[wanted > self.time + SAME_TIME], [end]]))
-        inner = grid if grid.size > 2 else np.array([grid[0], 0.5 * (grid[0] + grid[1]), grid[1]])
-        solution = self.solver.solve(inner, self.y)
-        if not solution.success:
-            raise SimulationError(f"the rig's solver stopped at t = {solution.t[-1]:.6g} s: {solution.message}")
+        wanted = self.given.sample_times[self.recorded :]
+        solution = solve_segment(self.solver, self.y, self.time, end, wanted, "the rig's solver")
         self.record_until(float(solution.t[-1]) + SAME_TIME, solution)
         self.time = float(solution.t[-1])
         self.y = np.array(solution.y[-1])

@@ -15,7 +15,6 @@ from ppafo.model.chambers import chamber_mass
 from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.catalog import VALVES
-from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, ProfileChoice, Scenario
@@ -27,7 +26,6 @@ WHOLE = 1.0e-9
 def plan_run(scenario: Scenario) -> Run:
     """The run of a scenario; with a Python controller it records every step, because that controller needs the past."""
     device, motion, control = scenario.device, scenario.motion, scenario.control
-    is_free = isinstance(motion, FreeMotion)
     plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     valve = VALVES[device.valve.kind].choose(device.valve.settings)
     delay = valve.command_delay(device.valve.settings)
@@ -61,7 +59,7 @@ def plan_run(scenario: Scenario) -> Run:
         early_valve=valve.prepare(settings, lag) if program.late_commands else (),
         controller=() if controller is None else controller.parameters(**control.settings),
         reference=profile_parameters(scenario.reference),
-        path=() if is_free else profile_parameters(_path(scenario)),
+        path=() if isinstance(motion, FreeMotion) else profile_parameters(motion.profile),
         sensors=sensor_parameters(scenario),
         step=step,
         step_count=step_count,
@@ -149,15 +147,3 @@ def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifi
     if isinstance(orifice, SonicOrifice):
         return ExactOrifice(conductance, 1.0, orifice.critical_ratio, device.flow.linear_ratio)
     return ExactOrifice(conductance, 0.0, device.gas.heat_capacity_ratio, device.flow.linear_ratio)
-
-
-def valve_model(scenario: Scenario) -> ValveModel:
-    """The model of the scenario's valve."""
-    valve = scenario.device.valve
-    return VALVES[valve.kind].choose(valve.settings)
-
-
-def _path(scenario: Scenario) -> ProfileChoice:
-    if isinstance(scenario.motion, FreeMotion):
-        raise TypeError("a free vane has no path")
-    return scenario.motion.profile

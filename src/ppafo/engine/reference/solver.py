@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ppafo.engine.cache import load_generated
 from ppafo.engine.reference import vane_mode
 from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals
+from ppafo.engine.reference.segment import solve_segment
 from ppafo.engine.reference.source import PLANT_UNKNOWNS, right_hand_side_source
 from ppafo.engine.rows import numbers, rebuild
 from ppafo.engine.run import Run
@@ -168,13 +169,8 @@ class _Solution:
             self.way = self.rest_mode()
             if self.way != 0.0:
                 self.result.breakaways.append(self.time)
-        times = self.result.times
-        wanted = times[self.records : np.searchsorted(times, end - SAME_TIME)]
-        grid = np.unique(np.concatenate([[self.time], wanted[wanted > self.time + SAME_TIME], [end]]))
-        inner = grid if grid.size > 2 else np.array([grid[0], 0.5 * (grid[0] + grid[1]), grid[1]])
-        solution = self.solver.solve(inner, self.y)
-        if not solution.success:
-            raise SimulationError(f"the reference solver stopped at t = {solution.t[-1]:.6g} s: {solution.message}")
+        wanted = self.result.times[self.records :]
+        solution = solve_segment(self.solver, self.y, self.time, end, wanted, "the reference solver")
         self.record_until(solution.t[-1] + SAME_TIME, solution)
         self.time = float(solution.t[-1])
         self.y = np.array(solution.y[-1])
