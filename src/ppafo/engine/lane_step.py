@@ -1,7 +1,7 @@
 """What the lanes do in a step: valve, gas and vane, whole or in parts where something changes abruptly inside it."""
 
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
-from ppafo.engine.scheme import motion, parts, pneumatics
+from ppafo.engine.scheme import motion, parts, pneumatics, thermal_gas
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -29,7 +29,8 @@ def plant_loop(rows: LaneRows) -> list[str]:
 
 def opening(rows: LaneRows) -> list[str]:
     """Lines that load what a step needs."""
-    names = ("timing", "plant", "valve", "result", "state", "valve_state")
+    names = ["timing", "plant", "valve", "result", "state", "valve_state"]
+    names += ["thermal", "masses"] if rows.program.is_thermal else []
     return [*[rows.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
 
 
@@ -105,36 +106,63 @@ def part(rows: LaneRows, prelude: list[str]) -> list[str]:
 def begin(rows: LaneRows) -> list[str]:
     """The valve, and the first stage of the step."""
     valve, add = rows.program.valve, rows.add
-    lines = [
+    return [
         f"shown, valve_state = {add(valve.advance)}(valve, valve_state, command, time, length)",
         f"port_1, port_2 = {add(valve.connect)}(plant, shown)",
+        *lead(rows),
+        begin_gas(rows),
     ]
-    given = f"port_1, port_2, length, {add(valve.port_flow_slopes)}"
-    if rows.program.angle is None:
-        return [*lines, f"begun = {add(motion.begin_free)}(plant, state, {given})"]
-    if rows.program.is_held:
-        return [*lines, f"begun = {add(pneumatics.begin_still_gas)}(plant, state, {given})"]
+
+
+def lead(rows: LaneRows) -> list[str]:
+    """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
+    program, add = rows.program, rows.add
+    if program.angle is None:
+        return [
+            f"begun = {add(motion.begin_free)}(plant, state, length)",
+            f"next_angle = {add(motion.bounded)}(plant, begun.free_angle)",
+        ]
+    if program.is_held:
+        return ["next_angle = state.angle"]
     return [
-        *lines,
         rows.load("path"),
-        f"next_angle, next_rate, _ = {add(rows.program.angle.value)}(path, time + length)",
-        f"begun = {add(motion.begin_led)}(plant, state, next_angle, next_rate, {given})",
+        f"next_angle, next_rate, _ = {add(program.angle.value)}(path, time + length)",
+        f"begun = {add(motion.LedStep)}(next_angle, next_rate)",
     ]
+
+
+def begin_gas(rows: LaneRows) -> str:
+    """The first stage of the gas."""
+    program, add = rows.program, rows.add
+    given = f"port_1, port_2, length, {add(program.valve.port_flow_slopes)}"
+    if program.is_thermal:
+        return f"gas = {add(thermal_gas.begin_thermal_gas)}(plant, thermal, state, masses, next_angle, {given})"
+    if program.is_held:
+        return f"gas = {add(pneumatics.begin_still_gas)}(plant, state, {given})"
+    return f"gas = {add(pneumatics.begin_moving_gas)}(plant, state, next_angle, {given})"
 
 
 def feed(rows: LaneRows) -> list[str]:
     """The second stage: the gas of the step, and where a led vane is at its end."""
     valve, add = rows.program.valve, rows.add
-    lines = [*rows.load_step(), f"port_1, port_2 = {add(valve.connect)}(plant, shown)"]
-    given = f"port_1, port_2, length, {add(valve.port_flow)}"
-    if rows.program.is_held:
-        lines.append(f"gas = {add(pneumatics.end_still_gas)}(plant, begun, {given})")
-    else:
-        lines.append(f"gas = {add(pneumatics.end_moving_gas)}(plant, begun.gas, {given})")
-    lines.append(f"state = {add(motion.with_gas)}(state, gas)")
+    lines = [*rows.load_step(), f"port_1, port_2 = {add(valve.connect)}(plant, shown)", *end_gas(rows)]
     if rows.program.angle is not None and not rows.program.is_held:
         lines.append(f"state = {add(motion.with_motion)}(state, begun.next_angle, begun.next_rate)")
     return lines
+
+
+def end_gas(rows: LaneRows) -> list[str]:
+    """The second stage of the gas, and the state with it."""
+    program, add = rows.program, rows.add
+    given = f"port_1, port_2, length, {add(program.valve.port_flow)}"
+    if program.is_thermal:
+        return [
+            f"change = {add(thermal_gas.end_thermal_gas)}(plant, thermal, gas, {given})",
+            f"state, masses = {add(thermal_gas.with_thermal_gas)}(state, masses, change)",
+            *rows.store("masses"),
+        ]
+    end = pneumatics.end_still_gas if program.is_held else pneumatics.end_moving_gas
+    return [f"change = {add(end)}(plant, gas, {given})", f"state = {add(motion.with_gas)}(state, change)"]
 
 
 def end_free(rows: LaneRows) -> list[str]:
@@ -144,9 +172,12 @@ def end_free(rows: LaneRows) -> list[str]:
 
 def judge(rows: LaneRows) -> list[str]:
     """The first time at which a run left what is possible."""
+    counted = ["state.mass_1", "state.mass_2"]
+    counted += ["masses.mass_1", "masses.mass_2"] if rows.program.is_thermal else []
+    gas = ", ".join(counted)
     return [
-        f"possible = (abs(state.angular_velocity) < {IMPOSSIBLE_RATE} and min(state.mass_1, state.mass_2) > 0.0 "
-        f"and max(state.mass_1, state.mass_2) < {IMPOSSIBLE_MASS})",
+        f"possible = (abs(state.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
+        f"and max({gas}) < {IMPOSSIBLE_MASS})",
         "failed = result.failure_time if possible else min(result.failure_time, time + length)",
         f"x[{rows.state_at['result.failure_time']}, lane] = failed",
     ]

@@ -6,8 +6,9 @@ from typing import NamedTuple, get_type_hints
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import constant
 from ppafo.engine.scheme.motion import FreeStep, LedStep
-from ppafo.engine.scheme.pneumatics import StillGas
-from ppafo.model.plant import PlantParameters, PlantState
+from ppafo.engine.scheme.pneumatics import MovingGas, StillGas
+from ppafo.engine.scheme.thermal_gas import ThermalGas
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 
@@ -39,7 +40,8 @@ class Program:
     ``angle`` None leaves the vane free, otherwise it is led along that profile. ``controller`` None leaves the command
     to the caller, sample by sample. ``ideal_sensors`` False adds noise, quantisation and delay of the signals.
     ``late_commands`` True adds a dead time before the valve; a step is then done in two parts, before and after the
-    instant at which a command arrives, each with valve parameters of its own length.
+    instant at which a command arrives, each with valve parameters of its own length. ``is_thermal`` True gives the
+    gas an energy balance instead of a constant temperature.
     """
 
     valve: ValveModel
@@ -48,12 +50,14 @@ class Program:
     angle: ProfileKind | None
     ideal_sensors: bool
     late_commands: bool
+    is_thermal: bool = False
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
         return {
             "timing": LaneTiming,
             "plant": PlantParameters,
+            "thermal": ThermalParameters if self.is_thermal else NoParameters,
             "valve": self.valve.parameters,
             "early_valve": self.valve.parameters if self.late_commands else NoParameters,
             "controller": NoParameters if self.controller is None else self.controller.parameters,
@@ -67,6 +71,7 @@ class Program:
         return {
             "result": LaneResult,
             "state": PlantState,
+            "masses": ThermalState if self.is_thermal else NoParameters,
             "valve_state": self.valve.state,
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
         }
@@ -78,6 +83,7 @@ class Program:
 
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that the first stage of a step hands to the later phases, in order."""
-        begun = FreeStep if self.angle is None else (StillGas if self.is_held else LedStep)
+        begun = FreeStep if self.angle is None else (NoParameters if self.is_held else LedStep)
+        isothermal = StillGas if self.is_held else MovingGas
         _, shown, _ = get_type_hints(self.valve.connect).values()
-        return {"begun": begun, "shown": shown}
+        return {"begun": begun, "gas": ThermalGas if self.is_thermal else isothermal, "shown": shown}

@@ -26,10 +26,17 @@ def gas_spring_frequency(plant: PlantParameters, volume: float) -> float:
     return math.sqrt(stiffness / plant.inertia)
 
 
-def divisions(plant: PlantParameters, step: float, lowest_angle: float, highest_angle: float, is_free: bool) -> int:
-    """Number of parts [-] into which a step [s] is divided for a vane that stays between two angles [rad]."""
+def divisions(
+    plant: PlantParameters, step: float, lowest_angle: float, highest_angle: float, is_free: bool, stiffness: float
+) -> int:
+    """Number of parts [-] into which a step [s] is divided for a vane that stays between two angles [rad].
+
+    ``stiffness`` [-] is how much stiffer than at constant temperature the gas is: 1, or the heat capacity ratio, by
+    which adiabatic chambers also fill faster.
+    """
     volume = min(chamber_volumes(plant, lowest_angle)[0], chamber_volumes(plant, highest_angle)[1])
-    parts = step * STEPS_PER_FILLING / filling_time(plant, volume)
+    parts = step * STEPS_PER_FILLING * stiffness / filling_time(plant, volume)
     if is_free:
-        parts = max(parts, step * gas_spring_frequency(plant, volume) / RADIANS_PER_STEP)
+        spring = gas_spring_frequency(plant, volume) * math.sqrt(stiffness)
+        parts = max(parts, step * spring / RADIANS_PER_STEP)
     return max(1, math.ceil(parts - 1e-9))

@@ -10,7 +10,7 @@ from ppafo.engine.lanes import Batch, BatchResult, Clock, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.rows import numbers
-from ppafo.model.plant import PlantParameters, PlantState
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.sensors import SensorParameters
 
 NEVER_FAILED = 1.0e300
@@ -28,6 +28,7 @@ class Run:
 
     program: Program
     plant: PlantParameters
+    thermal: ThermalParameters | NoParameters
     valve_orifice: ExactOrifice
     leak_orifice: ExactOrifice
     initial: PlantState
@@ -64,9 +65,12 @@ def batch_of(run: Run) -> Batch:
     signal_steps, signal_lag = whole_and_rest(run.signal_delay, run.step)
     clock = Clock(run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     timing = LaneTiming(run.step, run.period, command_lag, signal_lag)
-    parameters = [timing, run.plant, run.valve, run.early_valve, run.controller, run.reference, run.path, run.sensors]
+    plant, valve = [run.plant, run.thermal], [run.valve, run.early_valve]
+    parameters = [timing, *plant, *valve, run.controller, run.reference, run.path, run.sensors]
     controller_state = NoParameters() if program.controller is None else program.controller.initial
-    states = [LaneResult(0.0, NEVER_FAILED), run.initial, program.valve.initial(), controller_state]
+    # The gas begins at the reference temperature, where its true mass is what the state counts.
+    masses = ThermalState(run.initial.mass_1, run.initial.mass_2) if program.is_thermal else NoParameters()
+    states = [LaneResult(0.0, NEVER_FAILED), run.initial, masses, program.valve.initial(), controller_state]
     return Batch(program, clock, _column(parameters), _column(states))
 
 

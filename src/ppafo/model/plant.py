@@ -35,7 +35,10 @@ class PlantParameters(NamedTuple):
 
 
 class PlantState(NamedTuple):
-    """Angle [rad], angular velocity [rad/s], gas in the chambers [kg]; gas totals [kg] since the start of the run."""
+    """Angle [rad], angular velocity [rad/s], gas in the chambers [kg]; gas totals [kg] since the start of the run.
+
+    The gas in a chamber is counted at the reference temperature, ``P V M / (R T_0)``: isothermal gas has that mass.
+    """
 
     angle: float
     angular_velocity: float
@@ -44,6 +47,23 @@ class PlantState(NamedTuple):
     supplied_mass: float
     vented_mass: float
     leaked_mass: float
+
+
+class ThermalParameters(NamedTuple):
+    """Gas with an energy balance: heat capacity ratio [-], and what the walls give, h a (k - 1)/R [kg/(s m^3)].
+
+    ``h`` is the heat transfer coefficient, ``a`` the wall's area over the volume, ``R`` the specific gas constant.
+    """
+
+    heat_capacity_ratio: float
+    wall_exchange: float
+
+
+class ThermalState(NamedTuple):
+    """True masses of the gas in both chambers [kg], where ``PlantState`` counts it at the reference temperature."""
+
+    mass_1: float
+    mass_2: float
 
 
 class Openings(NamedTuple):

@@ -56,6 +56,26 @@ def energy_rate(enthalpy_flow: float, pressure: float, volume_rate: float, heat:
     return enthalpy_flow - pressure * volume_rate + heat
 
 
+def wall_exchange(
+    heat_transfer_coefficient: float, area_per_volume: float, heat_capacity_ratio: float, gas_constant: float
+) -> float:
+    """Heat of the walls over the heat that one kelvin takes up, h a/c_v [kg/(s m^3)]; ``gas_constant`` is specific."""
+    return heat_transfer_coefficient * area_per_volume * (heat_capacity_ratio - 1.0) / gas_constant
+
+
+def carried_mass(root: float) -> float:
+    """Mass flow [-] over that of gas at the reference temperature; ``root`` is sqrt(T_up/T_ref) [-], equation (6)."""
+    return 1.0 / root
+
+
+def carried_energy(root: float, heat_capacity_ratio: float) -> float:
+    """Enthalpy that a flow carries over c_v T_ref and over its flow at the reference temperature [-].
+
+    ``root`` is sqrt(T_up/T_ref) [-]: gas at four times the temperature flows half as much and is four times as rich.
+    """
+    return heat_capacity_ratio * root
+
+
 def temperature_flow_factor(reference_temperature: float, upstream_temperature: float) -> float:
     """Factor [-] on a conductance that holds at a reference temperature [K]: sqrt(T_ref/T_up), from equation (6)."""
     return math.sqrt(reference_temperature / upstream_temperature)

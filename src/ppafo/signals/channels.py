@@ -30,6 +30,8 @@ CHANNELS: dict[str, ChannelKind] = {
     "external_torque": ChannelKind("N m", "torque on the wearer, T_ex of equation (1)"),
     "mass_1": ChannelKind("kg", "gas in chamber 1"),
     "mass_2": ChannelKind("kg", "gas in chamber 2"),
+    "temperature_1": ChannelKind("K", "temperature of the gas in chamber 1, of a gas with an energy balance"),
+    "temperature_2": ChannelKind("K", "temperature of the gas in chamber 2, of a gas with an energy balance"),
     "supply_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve"),
     "pressure_difference": ChannelKind("Pa_d", "pressure in chamber 1 less that in chamber 2"),
     "upstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas comes from"),

@@ -17,6 +17,8 @@ from ppafo.simulation.declaration import (
     PRESSURE_WORDS,
     SEED,
     SENSORS,
+    THERMAL,
+    THERMAL_GAS,
     TORQUE_LEVEL,
     controller_settings,
     kind_at,
@@ -25,7 +27,7 @@ from ppafo.simulation.declaration import (
 from ppafo.simulation.motion import read_motion, read_profile
 from ppafo.simulation.overriding import Changed
 from ppafo.simulation.reading import Reading, written
-from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors
+from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors, Thermal
 
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
@@ -68,6 +70,7 @@ def build_scenario(given: Given, changed: Changed) -> Scenario:
         sensors=_sensors(reading, clock),
         assumptions=read_assumptions(before, reading, hardware, given.overrides),
         origin=Origin(given.path, document["device"]["set"], hardware.valve, given.overrides, given.content),
+        thermal=_thermal(reading),
     )
 
 
@@ -120,6 +123,13 @@ def _initial_pressure(reading: Reading, chamber: int, supply: Supply) -> float:
 def _control(reading: Reading, period: float) -> Control:
     kind = kind_at(reading.document, "controller")
     return Control(kind, reading.section("controller", controller_settings(kind)), period)
+
+
+def _thermal(reading: Reading) -> Thermal | None:
+    if kind_at(reading.document, "gas_model") != THERMAL:
+        return None
+    values = reading.section("gas_model", THERMAL_GAS)
+    return Thermal(values["heat_transfer_coefficient"], values["wall_area_per_volume"])
 
 
 def _sensors(reading: Reading, clock: Clock) -> Sensors:

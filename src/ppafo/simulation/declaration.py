@@ -47,6 +47,13 @@ SENSORS = (
 )
 SEED = Quantity("seed", "", "seed of the noise, a whole number", 1.0, 0.0, float(LARGEST_SEED))
 
+THERMAL = "thermal"
+ISOTHERMAL = "isothermal"
+THERMAL_GAS = (
+    Quantity("heat_transfer_coefficient", "W/(m^2 K)", "between gas and walls; 0 is adiabatic", None, 0.0, 1.0e9),
+    Quantity("wall_area_per_volume", "1/m", "area of a chamber's walls over its volume", None, 0.0, 1.0e6),
+)
+
 RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.0e-6, 1.0e8)
 PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6)
 SAMPLING = (RATE, PERIOD)
@@ -55,7 +62,7 @@ TORQUE_LEVEL = Quantity("level", "N m", "", None, -1.0e4, 1.0e4)
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
 MOTIONS = ("free", "held", "led")
-SECTIONS = ("device", "run", "motion", "initial", "controller", "reference", "sensors", "assumed")
+SECTIONS = ("device", "run", "motion", "initial", "controller", "reference", "sensors", "gas_model", "assumed")
 TEXTS = ("name", "description", "device.set", "device.valve")
 
 
@@ -67,6 +74,11 @@ def controller_settings(kind: str) -> tuple[Quantity, ...]:
 def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
     """Return the settings of a profile; a level, which has no unit of its own, gets that of what is prescribed."""
     return tuple(_level(item, prescribed) for item in PROFILES[kind].quantities) if kind in PROFILES else ()
+
+
+def gas_settings(kind: str) -> tuple[Quantity, ...]:
+    """Return the settings of a gas model; the isothermal one has none."""
+    return THERMAL_GAS if kind == THERMAL else ()
 
 
 def motion_settings(kind: str) -> tuple[Quantity, ...]:
@@ -85,13 +97,14 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
         "controller": SAMPLING + controller_settings(kind_at(document, "controller")),
         "reference": profile_settings(kind_at(document, "reference"), TORQUE_LEVEL),
         "sensors": (*SENSORS, SEED),
+        "gas_model": gas_settings(kind_at(document, "gas_model")),
     }
     return {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
 
 
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
-    kinds = ["motion.kind", "controller.kind", "reference.kind"]
+    kinds = ["motion.kind", "controller.kind", "reference.kind", "gas_model.kind"]
     return (*TEXTS, *kinds, *(["motion.profile.kind"] if kind_at(document, "motion") == "led" else []))
 
 

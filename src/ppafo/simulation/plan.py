@@ -6,14 +6,15 @@ import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.program import Program
+from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.refinement import MOST_DIVISIONS, divisions
 from ppafo.engine.run import Run, whole_and_rest
 from ppafo.errors import ScenarioError
 from ppafo.model.chambers import chamber_mass
-from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_volumes
 from ppafo.model.sensors import SensorParameters
+from ppafo.model.thermal import wall_exchange
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
@@ -38,6 +39,7 @@ def plan_run(scenario: Scenario) -> Run:
         angle=None if isinstance(motion, FreeMotion) else PROFILES[motion.profile.kind],
         ideal_sensors=has_ideal_sensors(scenario),
         late_commands=delay > 0.0,
+        is_thermal=scenario.thermal is not None,
     )
     steps_per_sample, step = divided_step(scenario, plant)
     lag = whole_and_rest(delay, step)[1] * step
@@ -52,6 +54,7 @@ def plan_run(scenario: Scenario) -> Run:
     return Run(
         program=program,
         plant=plant,
+        thermal=thermal_parameters(scenario),
         valve_orifice=exact_orifice(device.valve.orifice, device),
         leak_orifice=exact_orifice(device.actuator.leak, device),
         initial=initial_state(scenario, plant),
@@ -68,6 +71,17 @@ def plan_run(scenario: Scenario) -> Run:
         signal_delay=scenario.sensors.delay,
         command_delay=delay,
     )
+
+
+def thermal_parameters(scenario: Scenario) -> ThermalParameters | NoParameters:
+    """How the gas takes up heat, where it has an energy balance."""
+    if scenario.thermal is None:
+        return NoParameters()
+    gas, walls = scenario.device.gas, scenario.thermal
+    exchange = wall_exchange(
+        walls.heat_transfer_coefficient, walls.area_per_volume, gas.heat_capacity_ratio, gas.specific_gas_constant
+    )
+    return ThermalParameters(gas.heat_capacity_ratio, exchange)
 
 
 def has_ideal_sensors(scenario: Scenario) -> bool:
@@ -108,7 +122,9 @@ def divided_step(scenario: Scenario, plant: PlantParameters) -> tuple[int, float
     period = scenario.control.period
     coarse = max(1, math.ceil(period / scenario.time_step - WHOLE))
     lowest, highest = angle_range(scenario, plant)
-    parts = divisions(plant, period / coarse, lowest, highest, isinstance(scenario.motion, FreeMotion))
+    is_free = isinstance(scenario.motion, FreeMotion)
+    stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
+    parts = divisions(plant, period / coarse, lowest, highest, is_free, stiffness)
     if parts > MOST_DIVISIONS:
         raise ScenarioError(
             f"{scenario.name}: run.step = {scenario.time_step:.3g} s would have to be divided into {parts} parts "

@@ -58,6 +58,18 @@ class LedMotion:
 
 
 @dataclass(frozen=True, slots=True)
+class Thermal:
+    """Gas with an energy balance: heat transfer coefficient [W/(m^2 K)], area of the walls over the volume [1/m].
+
+    The walls, the source and the room have the temperature of the device's gas. A coefficient of 0 is adiabatic; a
+    very large one gives the isothermal gas of the paper.
+    """
+
+    heat_transfer_coefficient: float
+    area_per_volume: float
+
+
+@dataclass(frozen=True, slots=True)
 class Sensors:
     """What the controller sees, ideal by default.
 
@@ -118,7 +130,7 @@ class Scenario:
 
     Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
     ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
-    reference is a torque [N m].
+    reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, as in the paper.
     """
 
     name: str
@@ -135,6 +147,7 @@ class Scenario:
     sensors: Sensors
     assumptions: tuple[Assumption, ...]
     origin: Origin
+    thermal: Thermal | None = None
 
     def __repr__(self) -> str:
         """Return name, device, valve, motion, controller and duration, a line each."""

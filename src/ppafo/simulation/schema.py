@@ -86,6 +86,16 @@ def _controller() -> Any:
     )
 
 
+def _gas_model() -> Any:
+    warm = "the gas warms and cools: energy balance, heat through the walls"
+    return one_of(
+        [
+            table("IsothermalGas", _kind(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")),
+            table("ThermalGas", _kind(declaration.THERMAL, warm) | _fields(declaration.THERMAL_GAS)),
+        ]
+    )
+
+
 def _device() -> dict[str, Any]:
     return {
         "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
@@ -116,6 +126,7 @@ def scenario_file() -> type[BaseModel]:
         "controller": (_controller(), Field(description="what sets the valve")),
         "reference": optional(reference, "torque that the controller follows; 0 N m unless given"),
         "sensors": optional(table("Sensors", _sensors()), "what the controller sees; ideal unless given"),
+        "gas_model": optional(_gas_model(), "how the gas in the chambers behaves; isothermal unless given"),
         "assumed": (dict[str, str], Field(default_factory=dict, description="values that no source gives, and why")),
     }
     return table("ScenarioFile", fields)

@@ -109,8 +109,21 @@ def _recording(scenario: Scenario, run: Run, times: Floats, record: Floats, rows
     }
     if scenario.control.kind != OPEN_LOOP:
         channels["reference"] = (profile_values(scenario.reference, times)[0], "N m")
+    if run.program.is_thermal:
+        channels |= _thermal_channels(scenario, record, rows)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(scenario.name, times, values, kind="simulated")
+
+
+def _thermal_channels(scenario: Scenario, record: Floats, rows: dict[str, int]) -> dict[str, tuple[Floats, str]]:
+    """True masses and temperatures of gas with an energy balance."""
+    channels = {}
+    for chamber in (1, 2):
+        mass = record[:, rows[f"masses.mass_{chamber}"]]
+        warmth = record[:, rows[f"state.mass_{chamber}"]] / mass
+        channels[f"mass_{chamber}"] = (mass, "kg")
+        channels[f"temperature_{chamber}"] = (scenario.device.gas.temperature * warmth, "K")
+    return channels
 
 
 def _external_torque(

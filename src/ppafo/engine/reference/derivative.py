@@ -1,9 +1,17 @@
 """The plant in continuous time, with the exact flow functions: what the reference solver integrates."""
 
+import math
 from typing import NamedTuple
 
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
-from ppafo.model.plant import Openings, PlantParameters, driving_torque
+from ppafo.model.plant import (
+    Openings,
+    PlantParameters,
+    ThermalParameters,
+    chamber_pressures,
+    chamber_volumes,
+    driving_torque,
+)
 from ppafo.model.vane import vane_acceleration
 
 
@@ -22,6 +30,25 @@ class ExactOrifice(NamedTuple):
 class GasRates(NamedTuple):
     """Mass flows [kg/s]: into each chamber, from the source, to the atmosphere, across the vane (size)."""
 
+    mass_1: float
+    mass_2: float
+    supplied: float
+    vented: float
+    leaked: float
+
+
+class Passed(NamedTuple):
+    """Mass and energy that pass [kg/s], the energy as a content of ``PlantState``."""
+
+    mass: float
+    content: float
+
+
+class ThermalGasRates(NamedTuple):
+    """As ``GasRates``, with the contents of ``PlantState`` [kg/s] before the true masses."""
+
+    content_1: float
+    content_2: float
     mass_1: float
     mass_2: float
     supplied: float
@@ -62,6 +89,59 @@ def gas_rates(
     vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, openings.vent_2, valve_orifice)
     leak = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
     return GasRates(source_1 - vent_1 - leak, source_2 - vent_2 + leak, source_1 + source_2, vent_1 + vent_2, abs(leak))
+
+
+def passed(
+    thermal: ThermalParameters, pressure_a: float, pressure_b: float, warmth_a: float, warmth_b: float, flow: float
+) -> Passed:
+    """What a flow [kg/s] that holds at the reference temperature carries, with the temperature of its upstream side.
+
+    Warmths are T/T_0 [-] on both sides; flow from a to b. Equation (6).
+    """
+    warmth = warmth_a if pressure_a >= pressure_b else warmth_b
+    mass = flow / math.sqrt(warmth)
+    return Passed(mass, thermal.heat_capacity_ratio * warmth * mass)
+
+
+def thermal_gas_rates(
+    plant: PlantParameters,
+    thermal: ThermalParameters,
+    valve_orifice: ExactOrifice,
+    leak_orifice: ExactOrifice,
+    openings: Openings,
+    contents: tuple[float, float],
+    masses: tuple[float, float],
+    angle: float,
+    angular_velocity: float,
+) -> ThermalGasRates:
+    """All rates of gas with an energy balance [kg/s]; contents as in ``PlantState``. Equations (3), (6) to (9)."""
+    source_pressure_1, source_pressure_2 = plant.supply_pressure, plant.dorsiflexion_pressure
+    room = plant.atmospheric_pressure
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    pressure_1, pressure_2 = chamber_pressures(plant, angle, contents[0], contents[1])
+    warmth_1, warmth_2 = contents[0] / masses[0], contents[1] / masses[1]
+    supply_1 = exact_flow(source_pressure_1, pressure_1, openings.source_1, valve_orifice)
+    supply_2 = exact_flow(source_pressure_2, pressure_2, openings.source_2, valve_orifice)
+    outlet_1 = exact_flow(pressure_1, room, openings.vent_1, valve_orifice)
+    outlet_2 = exact_flow(pressure_2, room, openings.vent_2, valve_orifice)
+    across = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
+    source_1 = passed(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
+    source_2 = passed(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)
+    vent_1 = passed(thermal, pressure_1, room, warmth_1, 1.0, outlet_1)
+    vent_2 = passed(thermal, pressure_2, room, warmth_2, 1.0, outlet_2)
+    leak = passed(thermal, pressure_1, pressure_2, warmth_1, warmth_2, across)
+    compression = (thermal.heat_capacity_ratio - 1.0) * plant.volume_per_angle * angular_velocity
+    wall_1 = thermal.wall_exchange * volume_1 * (1.0 - warmth_1)
+    wall_2 = thermal.wall_exchange * volume_2 * (1.0 - warmth_2)
+    return ThermalGasRates(
+        source_1.content - vent_1.content - leak.content - compression * contents[0] / volume_1 + wall_1,
+        source_2.content - vent_2.content + leak.content + compression * contents[1] / volume_2 + wall_2,
+        source_1.mass - vent_1.mass - leak.mass,
+        source_2.mass - vent_2.mass + leak.mass,
+        source_1.mass + source_2.mass,
+        vent_1.mass + vent_2.mass,
+        abs(leak.mass),
+    )
 
 
 def free_motion(

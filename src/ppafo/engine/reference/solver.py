@@ -11,7 +11,7 @@ from ppafo.engine.cache import load_generated
 from ppafo.engine.reference import vane_mode
 from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals
 from ppafo.engine.reference.segment import solve_segment
-from ppafo.engine.reference.source import PLANT_UNKNOWNS, right_hand_side_source
+from ppafo.engine.reference.source import PLANT_UNKNOWNS, gas_unknowns, right_hand_side_source
 from ppafo.engine.rows import numbers, rebuild
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
@@ -19,7 +19,8 @@ from ppafo.model.plant import chamber_pressures
 
 Floats = NDArray[np.float64]
 
-TOLERANCES = (1e-11, 1e-10, 1e-15, 1e-15, 1e-15, 1e-15, 1e-15)
+MASS_TOLERANCE = 1e-15
+TOLERANCES = (1e-11, 1e-10, *(MASS_TOLERANCE,) * 5)
 VALVE_TOLERANCE = 1e-11
 MOST_STEPS = 200_000
 
@@ -44,7 +45,7 @@ def load_right_hand_side(run: Run) -> Callable[..., None]:
 
 def right_hand_side_parameters(run: Run) -> Floats:
     """The numbers that ``fill`` needs, in its order."""
-    groups = (run.plant, run.valve_orifice, run.leak_orifice, run.valve, run.path)
+    groups = (run.plant, run.thermal, run.valve_orifice, run.leak_orifice, run.valve, run.path)
     return np.array([number for group in groups for number in numbers(group)])
 
 
@@ -63,7 +64,9 @@ class _Solution:
         self.run = run
         self.fill = load_right_hand_side(run)
         self.parameters = right_hand_side_parameters(run)
-        self.y = np.array([*numbers(run.initial), *numbers(run.program.valve.initial())])
+        masses = [run.initial.mass_1, run.initial.mass_2] if run.program.is_thermal else []
+        self.y = np.array([*numbers(run.initial), *masses, *numbers(run.program.valve.initial())])
+        self.valve_from = gas_unknowns(run.program)
         self.command = 0.0
         self.way = self.rest_mode() if run.program.angle is None else 0.0
         if self.y[1] != 0.0 and run.program.angle is None:
@@ -92,12 +95,13 @@ class _Solution:
 
         roots.terminal = [True, True]  # type: ignore[attr-defined]
         roots.direction = [-1, -1]  # type: ignore[attr-defined]
-        valve_count = self.y.size - PLANT_UNKNOWNS
+        gas_count = self.valve_from - PLANT_UNKNOWNS
+        valve_count = self.y.size - self.valve_from
         free = self.run.program.angle is None
         return CVODE(
             slopes,
             rtol=tolerance,
-            atol=np.array(TOLERANCES + (VALVE_TOLERANCE,) * valve_count),
+            atol=np.array(TOLERANCES + (MASS_TOLERANCE,) * gas_count + (VALVE_TOLERANCE,) * valve_count),
             eventsfn=roots if free else None,
             num_events=2 if free else 0,
             max_num_steps=MOST_STEPS,
@@ -151,11 +155,11 @@ class _Solution:
         """Let the valve make the abrupt changes that are due."""
         valve = self.run.program.valve
         state = valve.settle(self.run.valve, self.valve_state(), self.command, self.time)
-        self.y[PLANT_UNKNOWNS:] = numbers(state)
+        self.y[self.valve_from :] = numbers(state)
 
     def valve_state(self) -> Any:
         """The valve's part of the unknowns."""
-        return rebuild(self.run.program.valve.state, self.y[PLANT_UNKNOWNS:])
+        return rebuild(self.run.program.valve.state, self.y[self.valve_from :])
 
     def next_valve_event(self) -> float:
         """When the valve next changes by itself."""

@@ -1,12 +1,20 @@
 """Writes the source of the right-hand side that the reference solver and the benchmark's solvers integrate."""
 
+from collections.abc import Callable
+
 from ppafo.engine.program import NoParameters, Program
-from ppafo.engine.reference.derivative import ExactOrifice, free_motion, gas_rates
+from ppafo.engine.reference.derivative import ExactOrifice, free_motion, gas_rates, thermal_gas_rates
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector
-from ppafo.model.plant import PlantParameters, chamber_pressures
+from ppafo.model.plant import PlantParameters, ThermalParameters, chamber_pressures
 
 PLANT_UNKNOWNS = 7
+
+
+def gas_unknowns(program: Program) -> int:
+    """Unknowns before those of the valve: the plant's, and the true masses of gas with an energy balance."""
+    return PLANT_UNKNOWNS + (2 if program.is_thermal else 0)
+
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
 
@@ -24,6 +32,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
     """Groups of numbers that the right-hand side needs, in order."""
     return {
         "plant": PlantParameters,
+        "thermal": ThermalParameters if program.is_thermal else NoParameters,
         "valve_orifice": ExactOrifice,
         "leak_orifice": ExactOrifice,
         "valve": program.valve.parameters,
@@ -34,7 +43,8 @@ def parameter_groups(program: Program) -> dict[str, type]:
 def right_hand_side_source(program: Program) -> str:
     """Source of the module whose ``fill(t, y, slopes, parameters, command, way)`` writes the slopes of all unknowns.
 
-    The unknowns are angle, angular velocity, both masses, the three gas totals, and the state of the valve.
+    The unknowns are angle, angular velocity, both masses, the three gas totals, the true masses of gas with an energy
+    balance, and the state of the valve.
     """
     collector = SourceCollector(INLINE)
     add = collector.add
@@ -43,19 +53,17 @@ def right_hand_side_source(program: Program) -> str:
         for path in leaf_paths(row, name):
             cells[path] = f"parameters[{len(cells)}]"
     valve_paths = leaf_paths(program.valve.state, "valve_state")
-    cells |= {path: f"y[{PLANT_UNKNOWNS + number}]" for number, path in enumerate(valve_paths)}
+    cells |= {path: f"y[{gas_unknowns(program) + number}]" for number, path in enumerate(valve_paths)}
     groups = parameter_groups(program) | {"valve_state": program.valve.state}
     lines = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in groups.items()]
     lines += [f"openings = {add(program.valve.instant)}(valve, valve_state, command)"]
     if program.angle is None:
-        lines += ["angle = y[0]"]
+        lines += ["angle = y[0]", "rate = y[1] if way != 0.0 else 0.0"]
     else:
-        lines += [f"angle, _, _ = {add(program.angle.value)}(path, t)"]
+        lines += [f"angle, rate, _ = {add(program.angle.value)}(path, t)"]
     lines += [
         f"pressure_1, pressure_2 = {add(chamber_pressures)}(plant, angle, y[2], y[3])",
-        f"gas = {add(gas_rates)}(plant, valve_orifice, leak_orifice, openings, pressure_1, pressure_2)",
-        "slopes[2] = gas.mass_1",
-        "slopes[3] = gas.mass_2",
+        *gas_lines(program, add),
         "slopes[4] = gas.supplied",
         "slopes[5] = gas.vented",
         "slopes[6] = gas.leaked",
@@ -66,9 +74,28 @@ def right_hand_side_source(program: Program) -> str:
         lines += ["slopes[0] = 0.0", "slopes[1] = 0.0"]
     lines += [f"moves = {add(program.valve.rates)}(valve, valve_state, command)"]
     lines += [
-        f"slopes[{PLANT_UNKNOWNS + number}] = {path.replace('valve_state', 'moves', 1)}"
+        f"slopes[{gas_unknowns(program) + number}] = {path.replace('valve_state', 'moves', 1)}"
         for number, path in enumerate(valve_paths)
     ]
     body = "\n".join(f"    {line}" for line in lines)
     function = f"{COMPILED}\ndef fill(t, y, slopes, parameters, command, way):\n{body}\n"
     return f"{HEADER}\n\n{collector.text()}\n\n\n{function}"
+
+
+def gas_lines(program: Program, add: Callable[..., str]) -> list[str]:
+    """Lines that find the rates ``gas`` and write the slopes of what is in the chambers."""
+    orifices = "valve_orifice, leak_orifice, openings"
+    if not program.is_thermal:
+        return [
+            f"gas = {add(gas_rates)}(plant, {orifices}, pressure_1, pressure_2)",
+            "slopes[2] = gas.mass_1",
+            "slopes[3] = gas.mass_2",
+        ]
+    given = "(y[2], y[3]), (y[7], y[8]), angle, rate"
+    return [
+        f"gas = {add(thermal_gas_rates)}(plant, thermal, {orifices}, {given})",
+        "slopes[2] = gas.content_1",
+        "slopes[3] = gas.content_2",
+        "slopes[7] = gas.mass_1",
+        "slopes[8] = gas.mass_2",
+    ]

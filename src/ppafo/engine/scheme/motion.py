@@ -7,10 +7,9 @@ from there with a torque that runs linearly.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, begin_moving_gas
+from ppafo.engine.scheme.pneumatics import GasChange
 from ppafo.model.friction import holds_still
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, driving_torque
 
@@ -24,20 +23,18 @@ class Departure(NamedTuple):
 
 
 class FreeStep(NamedTuple):
-    """First stage of a free step: angle without stops [rad], acceleration [rad/s^2], driving torque [N m], gas."""
+    """Where a free step would lead: angle without stops [rad], acceleration [rad/s^2], driving torque now [N m]."""
 
     free_angle: float
     acceleration: float
     torque: float
-    gas: MovingGas
 
 
 class LedStep(NamedTuple):
-    """First stage of a led step: where it leads [rad], [rad/s], and the gas."""
+    """Where a led step leads [rad], [rad/s]."""
 
     next_angle: float
     next_rate: float
-    gas: MovingGas
 
 
 def direction_of(value: float) -> float:
@@ -127,15 +124,8 @@ def first_event(
     return Departure(share, angle, rebound if hits_first else 0.0)
 
 
-def begin_free(
-    plant: PlantParameters,
-    state: PlantState,
-    port_1: Any,
-    port_2: Any,
-    step: float,
-    port_flow_slopes: Callable[..., Any],
-) -> FreeStep:
-    """First stage of one step [s] of a vane that is free between its stops. Equations (1) to (10)."""
+def begin_free(plant: PlantParameters, state: PlantState, step: float) -> FreeStep:
+    """Where one step [s] would lead a vane that is free between its stops. Equations (1), (2), (10)."""
     velocity = state.angular_velocity
     way = direction_of(velocity)
     pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
@@ -143,8 +133,7 @@ def begin_free(
     sliding = (torque - way * plant.dynamic_torque - plant.viscous_damping * velocity) / plant.inertia
     acceleration = sliding if way != 0.0 else 0.0
     free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
-    gas = begin_moving_gas(plant, state, bounded(plant, free_angle), port_1, port_2, step, port_flow_slopes)
-    return FreeStep(free_angle, acceleration, torque, gas)
+    return FreeStep(free_angle, acceleration, torque)
 
 
 def end_free(plant: PlantParameters, state: PlantState, begun: FreeStep, step: float) -> PlantState:
@@ -165,21 +154,6 @@ def end_free(plant: PlantParameters, state: PlantState, begun: FreeStep, step: f
     next_angle = predicted if slides_through else left_angle
     next_rate = full_velocity if slides_through else left_velocity
     return with_motion(state, next_angle, next_rate)
-
-
-def begin_led(
-    plant: PlantParameters,
-    state: PlantState,
-    next_angle: float,
-    next_rate: float,
-    port_1: Any,
-    port_2: Any,
-    step: float,
-    port_flow_slopes: Callable[..., Any],
-) -> LedStep:
-    """First stage of one step [s] of a vane that is led to ``next_angle`` [rad]. Equations (3) to (9)."""
-    gas = begin_moving_gas(plant, state, next_angle, port_1, port_2, step, port_flow_slopes)
-    return LedStep(next_angle, next_rate, gas)
 
 
 def with_motion(state: PlantState, angle: float, angular_velocity: float) -> PlantState:

@@ -1,0 +1,315 @@
+"""One step of both chambers with an energy balance: the Rosenbrock method of ``pneumatics`` on energies and masses.
+
+The energy of a chamber is counted as its content, ``P V M / (R T_0)`` [kg]: the mass that would give its pressure at
+the reference temperature. Where the gas is isothermal the content is the mass, so all that reads pressures from
+``PlantState`` stays as it is; here the true masses stand beside it, and content over mass is ``T / T_0``. Gas comes
+from the source and from the atmosphere at ``T_0``. The matrix leaves out how the flows depend on the temperature
+upstream, which changes no faster than a chamber fills; the method keeps its order with any matrix.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from ppafo.engine.scheme.pneumatics import GAMMA, SHORTEST
+from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_volumes
+from ppafo.model.ports import PortFlow
+from ppafo.model.thermal import carried_energy, carried_mass
+
+
+class ThermalFlows(NamedTuple):
+    """Rates of both contents and both masses, of the gas drawn from the source and of the vane leak (1 to 2) [kg/s]."""
+
+    content_1: float
+    content_2: float
+    mass_1: float
+    mass_2: float
+    supplied: float
+    leaked: float
+
+
+class FlowSlopes(NamedTuple):
+    """Gamma h times the derivatives of ``ThermalFlows`` with respect to both contents; walls and work left out."""
+
+    content_1_by_1: float
+    content_1_by_2: float
+    content_2_by_1: float
+    content_2_by_2: float
+    mass_1_by_1: float
+    mass_1_by_2: float
+    mass_2_by_1: float
+    mass_2_by_2: float
+    supplied_by_1: float
+    supplied_by_2: float
+    leaked_by_1: float
+    leaked_by_2: float
+
+
+class ThermalMatrix(NamedTuple):
+    """Matrix of both contents after the masses are eliminated, by rows; how the walls answer to the masses [-]."""
+
+    slopes: FlowSlopes
+    a: float
+    b: float
+    c: float
+    d: float
+    scale: float
+    wall_1: float
+    wall_2: float
+
+
+class ThermalGas(NamedTuple):
+    """First stage of a step: its matrix, the stage, the changes in time, the gas and volumes it leads to.
+
+    ``growth`` is the rate [m^3/s] at which chamber 1 grows.
+    """
+
+    matrix: ThermalMatrix
+    first: ThermalFlows
+    drift: ThermalFlows
+    end: PlantState
+    end_masses: ThermalState
+    volume_1: float
+    volume_2: float
+    growth: float
+
+
+class Carried(NamedTuple):
+    """Mass [kg/s] and content [kg/s] that a flow carries, each over the flow at the reference temperature [-]."""
+
+    mass: float
+    content: float
+
+
+def carried(thermal: ThermalParameters, flow: float, root_from: float, root_to: float) -> Carried:
+    """What a flow carries, by the sign of its direction; roots of ``T / T_0`` on both sides [-]."""
+    root = root_from if flow >= 0.0 else root_to
+    return Carried(carried_mass(root), carried_energy(root, thermal.heat_capacity_ratio))
+
+
+def wall_rate(thermal: ThermalParameters, volume: float, content: float, mass: float) -> float:
+    """Content [kg/s] that the wall of a chamber gives to its gas."""
+    return thermal.wall_exchange * volume * (1.0 - content / mass)
+
+
+def thermal_flows(
+    thermal: ThermalParameters,
+    state: PlantState,
+    masses: ThermalState,
+    volume_1: float,
+    volume_2: float,
+    growth: float,
+    in_1: PortFlow,
+    in_2: PortFlow,
+    leak: float,
+) -> ThermalFlows:
+    """All rates from the flows at the reference temperature [kg/s]: enthalpy that passes, work, heat of the walls."""
+    root_1 = math.sqrt(state.mass_1 / masses.mass_1)
+    root_2 = math.sqrt(state.mass_2 / masses.mass_2)
+    vent_1 = in_1.total - in_1.from_source
+    vent_2 = in_2.total - in_2.from_source
+    source_1_carries = carried(thermal, in_1.from_source, 1.0, root_1)
+    source_2_carries = carried(thermal, in_2.from_source, 1.0, root_2)
+    vent_1_carries = carried(thermal, vent_1, 1.0, root_1)
+    vent_2_carries = carried(thermal, vent_2, 1.0, root_2)
+    leak_carries = carried(thermal, leak, root_1, root_2)
+    supplied_1 = in_1.from_source * source_1_carries.mass
+    supplied_2 = in_2.from_source * source_2_carries.mass
+    leaked = leak * leak_carries.mass
+    enthalpy_1 = in_1.from_source * source_1_carries.content + vent_1 * vent_1_carries.content
+    enthalpy_2 = in_2.from_source * source_2_carries.content + vent_2 * vent_2_carries.content
+    leaked_enthalpy = leak * leak_carries.content
+    work = (thermal.heat_capacity_ratio - 1.0) * growth
+    return ThermalFlows(
+        enthalpy_1
+        - leaked_enthalpy
+        - work * state.mass_1 / volume_1
+        + wall_rate(thermal, volume_1, state.mass_1, masses.mass_1),
+        enthalpy_2
+        + leaked_enthalpy
+        + work * state.mass_2 / volume_2
+        + wall_rate(thermal, volume_2, state.mass_2, masses.mass_2),
+        supplied_1 + vent_1 * vent_1_carries.mass - leaked,
+        supplied_2 + vent_2 * vent_2_carries.mass + leaked,
+        supplied_1 + supplied_2,
+        leaked,
+    )
+
+
+def flow_slopes(
+    thermal: ThermalParameters,
+    root_1: float,
+    root_2: float,
+    weight_1: float,
+    weight_2: float,
+    in_1: Any,
+    in_2: Any,
+    leak: Any,
+) -> FlowSlopes:
+    """How all flows answer to both contents; weights are gamma h times pressure over content [Pa s/kg]."""
+    leak_carries = carried(thermal, leak[0], root_1, root_2)
+    source_1 = carried(thermal, in_1.from_source, 1.0, root_1)
+    source_2 = carried(thermal, in_2.from_source, 1.0, root_2)
+    vent_1 = carried(thermal, in_1.total - in_1.from_source, 1.0, root_1)
+    vent_2 = carried(thermal, in_2.total - in_2.from_source, 1.0, root_2)
+    vent_slope_1 = in_1.total_slope - in_1.source_slope
+    vent_slope_2 = in_2.total_slope - in_2.source_slope
+    by_1 = leak[1] * weight_1
+    by_2 = leak[2] * weight_2
+    return FlowSlopes(
+        (in_1.source_slope * source_1.content + vent_slope_1 * vent_1.content) * weight_1 - by_1 * leak_carries.content,
+        -by_2 * leak_carries.content,
+        by_1 * leak_carries.content,
+        (in_2.source_slope * source_2.content + vent_slope_2 * vent_2.content) * weight_2 + by_2 * leak_carries.content,
+        (in_1.source_slope * source_1.mass + vent_slope_1 * vent_1.mass) * weight_1 - by_1 * leak_carries.mass,
+        -by_2 * leak_carries.mass,
+        by_1 * leak_carries.mass,
+        (in_2.source_slope * source_2.mass + vent_slope_2 * vent_2.mass) * weight_2 + by_2 * leak_carries.mass,
+        in_1.source_slope * source_1.mass * weight_1,
+        in_2.source_slope * source_2.mass * weight_2,
+        by_1 * leak_carries.mass,
+        by_2 * leak_carries.mass,
+    )
+
+
+def thermal_matrix(
+    thermal: ThermalParameters,
+    state: PlantState,
+    masses: ThermalState,
+    volume_1: float,
+    volume_2: float,
+    growth: float,
+    weight: float,
+    slopes: FlowSlopes,
+) -> ThermalMatrix:
+    """The matrix of a step; ``weight`` is gamma h [s]."""
+    cooling_1 = weight * thermal.wall_exchange * volume_1 / masses.mass_1
+    cooling_2 = weight * thermal.wall_exchange * volume_2 / masses.mass_2
+    wall_1 = cooling_1 * state.mass_1 / masses.mass_1
+    wall_2 = cooling_2 * state.mass_2 / masses.mass_2
+    work = weight * (thermal.heat_capacity_ratio - 1.0) * growth
+    a = 1.0 - slopes.content_1_by_1 + work / volume_1 + cooling_1 - wall_1 * slopes.mass_1_by_1
+    b = -slopes.content_1_by_2 - wall_1 * slopes.mass_1_by_2
+    c = -slopes.content_2_by_1 - wall_2 * slopes.mass_2_by_1
+    d = 1.0 - slopes.content_2_by_2 - work / volume_2 + cooling_2 - wall_2 * slopes.mass_2_by_2
+    return ThermalMatrix(slopes, a, b, c, d, 1.0 / (a * d - b * c), wall_1, wall_2)
+
+
+def answered(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
+    """Gamma h times the change of all flows [kg/s] while both contents change at two rates [kg/s]."""
+    return ThermalFlows(
+        slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2,
+        slopes.content_2_by_1 * content_1 + slopes.content_2_by_2 * content_2,
+        slopes.mass_1_by_1 * content_1 + slopes.mass_1_by_2 * content_2,
+        slopes.mass_2_by_1 * content_1 + slopes.mass_2_by_2 * content_2,
+        slopes.supplied_by_1 * content_1 + slopes.supplied_by_2 * content_2,
+        slopes.leaked_by_1 * content_1 + slopes.leaked_by_2 * content_2,
+    )
+
+
+def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFlows:
+    """Stage slopes [kg/s] from the right-hand sides [kg/s]."""
+    right_1 = right.content_1 + matrix.wall_1 * right.mass_1
+    right_2 = right.content_2 + matrix.wall_2 * right.mass_2
+    content_1 = (matrix.d * right_1 - matrix.b * right_2) * matrix.scale
+    content_2 = (matrix.a * right_2 - matrix.c * right_1) * matrix.scale
+    by_contents = answered(matrix.slopes, content_1, content_2)
+    return ThermalFlows(
+        content_1,
+        content_2,
+        right.mass_1 + by_contents.mass_1,
+        right.mass_2 + by_contents.mass_2,
+        right.supplied + by_contents.supplied,
+        right.leaked + by_contents.leaked,
+    )
+
+
+def combined(one: ThermalFlows, factor_one: float, other: ThermalFlows, factor_other: float) -> ThermalFlows:
+    """Two sets of rates, each times a factor, added."""
+    return ThermalFlows(
+        factor_one * one.content_1 + factor_other * other.content_1,
+        factor_one * one.content_2 + factor_other * other.content_2,
+        factor_one * one.mass_1 + factor_other * other.mass_1,
+        factor_one * one.mass_2 + factor_other * other.mass_2,
+        factor_one * one.supplied + factor_other * other.supplied,
+        factor_one * one.leaked + factor_other * other.leaked,
+    )
+
+
+def begin_thermal_gas(
+    plant: PlantParameters,
+    thermal: ThermalParameters,
+    state: PlantState,
+    masses: ThermalState,
+    next_angle: float,
+    port_1: Any,
+    port_2: Any,
+    step: float,
+    port_flow_slopes: Callable[..., Any],
+) -> ThermalGas:
+    """First stage of one step [s] in which the volumes run linearly to those of ``next_angle`` [rad]."""
+    volume_1, volume_2 = chamber_volumes(plant, state.angle)
+    next_1, next_2 = chamber_volumes(plant, next_angle)
+    growth = (next_1 - volume_1) / max(step, SHORTEST)
+    per_content_1 = plant.gas_product / volume_1
+    per_content_2 = plant.gas_product / volume_2
+    pressure_1 = state.mass_1 * per_content_1
+    pressure_2 = state.mass_2 * per_content_2
+    in_1 = port_flow_slopes(pressure_1, port_1, plant.valve_curve)
+    in_2 = port_flow_slopes(pressure_2, port_2, plant.valve_curve)
+    leak = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
+    flow_1 = PortFlow(in_1.total, in_1.from_source)
+    flow_2 = PortFlow(in_2.total, in_2.from_source)
+    flows = thermal_flows(thermal, state, masses, volume_1, volume_2, growth, flow_1, flow_2, leak[0])
+    weight = GAMMA * step
+    root_1 = math.sqrt(state.mass_1 / masses.mass_1)
+    root_2 = math.sqrt(state.mass_2 / masses.mass_2)
+    slopes = flow_slopes(thermal, root_1, root_2, weight * per_content_1, weight * per_content_2, in_1, in_2, leak)
+    matrix = thermal_matrix(thermal, state, masses, volume_1, volume_2, growth, weight, slopes)
+    # A growing volume lowers the pressure as a loss of content at this rate would.
+    drift = answered(slopes, -state.mass_1 * growth / volume_1, state.mass_2 * growth / volume_2)
+    first = solve_thermal_stage(matrix, combined(flows, 1.0, drift, 1.0))
+    change = combined(first, step, first, 0.0)
+    end, end_masses = with_thermal_gas(state, masses, change)
+    return ThermalGas(matrix, first, drift, end, end_masses, next_1, next_2, growth)
+
+
+def end_thermal_gas(
+    plant: PlantParameters,
+    thermal: ThermalParameters,
+    begun: ThermalGas,
+    port_1: Any,
+    port_2: Any,
+    step: float,
+    port_flow: Callable[..., Any],
+) -> ThermalFlows:
+    """Changes [kg] in one step [s], from its first stage."""
+    pressure_1 = begun.end.mass_1 * plant.gas_product / begun.volume_1
+    pressure_2 = begun.end.mass_2 * plant.gas_product / begun.volume_2
+    in_1 = port_flow(pressure_1, port_1, plant.valve_curve)
+    in_2 = port_flow(pressure_2, port_2, plant.valve_curve)
+    leak = orifice_flow(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
+    flows = thermal_flows(
+        thermal, begun.end, begun.end_masses, begun.volume_1, begun.volume_2, begun.growth, in_1, in_2, leak
+    )
+    right = combined(combined(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
+    second = solve_thermal_stage(begun.matrix, right)
+    return combined(begun.first, 1.5 * step, second, 0.5 * step)
+
+
+def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlows) -> tuple[PlantState, ThermalState]:
+    """State and true masses with the changes [kg] of one step added."""
+    vented = change.supplied - change.mass_1 - change.mass_2
+    return (
+        PlantState(
+            state.angle,
+            state.angular_velocity,
+            state.mass_1 + change.content_1,
+            state.mass_2 + change.content_2,
+            state.supplied_mass + change.supplied,
+            state.vented_mass + vented,
+            state.leaked_mass + abs(change.leaked),
+        ),
+        ThermalState(masses.mass_1 + change.mass_1, masses.mass_2 + change.mass_2),
+    )
