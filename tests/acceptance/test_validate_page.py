@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.simulation.recorded.inputs import COMMAND, SUPPLY
 from ppafo.storage import read_csv
-from ppafo.validation.measured import COMMAND, SUPPLY
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "validate-a-model.md").read_text(encoding="utf-8")
 

@@ -1,5 +1,6 @@
 """Synthetic recordings with planted values: the fit finds them, and its intervals hold them as often as they say."""
 
+import dataclasses
 import math
 import re
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory import TrajectoryFit, fit
+from ppafo.identification.trajectory import Search, TrajectoryFit, fit
 from ppafo.studies.trajectory import (
     EIGHT_PARAMETERS,
     Coverage,
@@ -92,6 +93,17 @@ def test_scores_are_neither_too_wide_nor_too_narrow(study: Coverage) -> None:
 def test_scores_have_no_preferred_side(study: Coverage) -> None:
     # The mean of normal scores has the standard deviation 1 / sqrt(repetitions); 3.9 of these are one in 10 000.
     assert np.abs(study.scores.mean(axis=0)).max() < 3.9 / math.sqrt(REPETITIONS)
+
+
+def test_a_robust_fit_of_recordings_with_stray_samples_knows_its_uncertainty() -> None:
+    from scipy.stats import chi2
+
+    thrown = dataclasses.replace(two_step_responses(0.4), stray=0.02)
+    robust = coverage(thrown, repetitions=REPETITIONS, seed=6, search=Search(loss="soft_l1"))
+    for path, square in zip(robust.paths, np.sum(np.square(robust.scores), axis=0), strict=True):
+        assert chi2.ppf(UNLIKELY, REPETITIONS) < square < chi2.ppf(1.0 - UNLIKELY, REPETITIONS), path
+    for path, inside in zip(robust.paths, robust.inside, strict=True):
+        assert binomial_below(inside, REPETITIONS, robust.confidence) > UNLIKELY, path
 
 
 def test_the_study_prints_a_line_for_each_parameter_and_one_for_all(study: Coverage) -> None:

@@ -1,4 +1,4 @@
-"""``ppafo identify PROBLEM.toml --out DIR``: bench recordings in, parameter set with uncertainty out."""
+"""``ppafo identify PROBLEM.toml --out DIR``: recordings in, parameter set with uncertainty out."""
 
 import argparse
 from pathlib import Path
@@ -9,6 +9,7 @@ from ppafo.cli.output import (
     add_output_arguments,
     check_output,
     print_result,
+    tell,
     write_files,
 )
 from ppafo.cli.quick_imports import load_drawing
@@ -27,7 +28,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.reporting.identification_table import identification_table
 
     check_output(parsed.out)
-    identification = identify(parsed.problem)
+    identification = identify(parsed.problem, tell)
     lines = identification_table(identification)
     if parsed.out is not None:
         load_drawing()

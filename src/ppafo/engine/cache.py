@@ -6,6 +6,7 @@ import logging
 import os
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 from types import ModuleType
@@ -15,6 +16,7 @@ from ppafo.errors import SimulationError
 logger = logging.getLogger("ppafo")
 
 CACHE_VARIABLE = "PPAFO_CACHE_DIR"
+_LOADING = threading.RLock()
 
 
 def cache_folder() -> Path:
@@ -30,8 +32,12 @@ def load_generated(kind: str, source: str) -> ModuleType:
     """Import the module with this source, from the cache where it is there; compiled code is cached beside it."""
     digest = hashlib.sha256(source.encode()).hexdigest()[:24]
     name = f"ppafo_{kind}_{digest}"
-    if name in sys.modules:
-        return sys.modules[name]
+    # A second thread must not get a module of which only the beginning has run.
+    with _LOADING:
+        return sys.modules[name] if name in sys.modules else _imported(name, source)
+
+
+def _imported(name: str, source: str) -> ModuleType:
     path = _written(f"{name}.py", source)
     is_new = not any((path.parent / "__pycache__").glob(f"{name}.*.nbi"))
     if is_new:

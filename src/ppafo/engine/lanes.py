@@ -89,10 +89,11 @@ def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
                     done.result()
             finally:
                 stop.set()
-    return _joined([results[start] for start in starts])
+    return joined([results[start] for start in starts])
 
 
-def _joined(results: Sequence[BatchResult]) -> BatchResult:
+def joined(results: Sequence[BatchResult]) -> BatchResult:
+    """Return the results of neighbouring blocks as one."""
     if len(results) == 1:
         return results[0]
     states = np.concatenate([result.states for result in results], axis=1)

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.lanes import Batch, BatchResult, Floats, LaneBlock, load_program
+from ppafo.engine.lane_rows import LANES
+from ppafo.engine.lanes import Batch, BatchResult, Floats, LaneBlock, joined, load_program
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
 
@@ -49,9 +50,12 @@ RECORDED_ANGLE = ProfileKind(
 
 @dataclass(frozen=True, slots=True)
 class StepInputs:
-    """Inputs of every step of a run: the command [-], and parameters by path such as ``plant.supply_pressure`` (SI)."""
+    """Inputs of every step of a run: the command [-], and parameters by path such as ``plant.supply_pressure`` (SI).
 
-    command: Floats
+    ``command`` None leaves the command to the controller of the program.
+    """
+
+    command: Floats | None
     parameters: Mapping[str, Floats]
 
 
@@ -61,18 +65,25 @@ def led_by_recording(program: Program) -> Program:
 
 
 def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
-    """Run up to 32 devices on the same recorded inputs; the program must leave the command to the caller."""
-    program = batch.program
-    block = LaneBlock(load_program(program), batch.clock, batch.parameters, batch.states)
+    """Run devices on the same recorded inputs; with a command, the program must leave it to the caller."""
+    runs = batch.states.shape[1]
+    blocks = [slice(first, min(first + LANES, runs)) for first in range(0, runs, LANES)]
+    return joined([_replay_block(batch, inputs, block) for block in blocks])
+
+
+def _replay_block(batch: Batch, inputs: StepInputs, runs: slice) -> BatchResult:
+    program, parameters, command = batch.program, inputs.parameters, inputs.command
+    block = LaneBlock(load_program(program), batch.clock, batch.parameters[:, runs], batch.states[:, runs])
     command_row = _numbered(program.state_rows())[COMMAND]
     numbered = _numbered(program.parameter_rows())
-    rows = [numbered[path] for path in inputs.parameters]
-    table = np.array([inputs.command, *inputs.parameters.values()])
+    rows = [numbered[path] for path in parameters]
+    table = np.array([*parameters.values(), *(() if command is None else (command,))])
     starts = _changes(table)
     for start, end in zip(starts, [*starts[1:], batch.clock.step_count], strict=True):
-        block.states[command_row] = inputs.command[start]
+        if command is not None:
+            block.states[command_row] = command[start]
         if rows:
-            block.set_parameters(rows, table[1:, start])
+            block.set_parameters(rows, table[: len(rows), start])
         block.advance(end - start)
     return block.result()
 

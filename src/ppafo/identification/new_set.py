@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError
 from ppafo.identification.estimate import Estimate
+from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, shown
@@ -44,7 +45,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
     before = parameter_set.numbers.get(estimate.path)
     atmosphere = atmospheric_pressure(parameter_set)
     unit = quantity.unit if before is None else before.unit
-    si_unit = next((item for item in alternatives(quantity) if _fits(unit, item)), quantity.unit)
+    si_unit = fitting_unit(unit, quantity)
     value, low, high = (
         from_si(number, unit, si_unit, atmosphere) for number in (estimate.value, estimate.low, estimate.high)
     )
@@ -62,6 +63,11 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
     )
     kept = {path: old for path, old in parameter_set.numbers.items() if path not in _other_form(estimate.path)}
     return replace(parameter_set, numbers={**kept, estimate.path: entry})
+
+
+def fitting_unit(unit: str, quantity: Quantity) -> str:
+    """Return the SI unit of a quantity, of the several that it may be declared in, that a unit can be turned into."""
+    return next((item for item in alternatives(quantity) if _fits(unit, item)), quantity.unit)
 
 
 def _fits(unit: str, si_unit: str) -> bool:

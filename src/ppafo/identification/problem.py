@@ -10,6 +10,7 @@ from ppafo.documents.models import NAME, one_of, published_schema
 from ppafo.documents.problems import first_problem
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name, reason
+from ppafo.identification.trajectory.section import TrajectorySection
 from ppafo.storage.column_map import ColumnMap
 
 _STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -125,7 +126,13 @@ class ProblemFile(BaseModel):
     title: Annotated[str, Field(description="title of the new parameter set")] = ""
     device: Annotated[DeviceProblem, Field(description="the set to start from")]
     columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = {}
-    procedure: Annotated[tuple[one_of(_KINDS), ...], Field(strict=False, min_length=1, description="what to apply")]  # type: ignore[valid-type]
+    procedure: Annotated[
+        tuple[one_of(_KINDS), ...],  # type: ignore[valid-type]
+        Field(strict=False, min_length=1, description="bench procedures to apply"),
+    ] = ()
+    trajectory: Annotated[
+        TrajectorySection | None, Field(description="a fit to recordings of motion, after the bench procedures")
+    ] = None
 
 
 def load_problem(path: str | Path) -> ProblemFile:
@@ -145,14 +152,22 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
     except ValidationError as error:
         text = first_problem(error.errors(include_url=False), ProblemFile)
         raise IdentificationError(f"{file}: {text}") from error
-    for number, item in enumerate(problem.procedure, start=1):
-        if item.columns is not None and item.columns not in problem.columns:
-            hint = nearest_name(item.columns, problem.columns)
+    if not problem.procedure and problem.trajectory is None:
+        raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")
+    for place, name in _column_maps(problem):
+        if name not in problem.columns:
+            hint = nearest_name(name, problem.columns)
             known = ", ".join(problem.columns) or "none"
-            raise IdentificationError(
-                f"{file}: procedure {number}: there is no column map '{item.columns}'{hint}; there are {known}"
-            )
+            raise IdentificationError(f"{file}: {place}: there is no column map '{name}'{hint}; there are {known}")
     return problem
+
+
+def _column_maps(problem: ProblemFile) -> list[tuple[str, str]]:
+    """Return every place that names a column map, with the name."""
+    bench = [(f"procedure {number}", item.columns) for number, item in enumerate(problem.procedure, start=1)]
+    fitted = () if problem.trajectory is None else problem.trajectory.experiments
+    places = [*bench, *((f"experiment '{item.label}'", item.columns) for item in fitted)]
+    return [(place, name) for place, name in places if name is not None]
 
 
 def json_schema() -> dict[str, Any]:

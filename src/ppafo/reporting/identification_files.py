@@ -9,6 +9,7 @@ from ppafo.parameters.writing import parameter_set_toml
 from ppafo.reporting.bench_figures import figure_3, procedure_figure
 from ppafo.reporting.identification_table import identification_table
 from ppafo.reporting.style import rendered
+from ppafo.reporting.trajectory_files import trajectory_document, trajectory_figures
 from ppafo.simulation.document import plain
 
 FORMATS = ("png", "svg")
@@ -23,6 +24,7 @@ def identification_document(identification: Identification) -> dict[str, Any]:
         "started_from": identification.before.name,
         "is_good": identification.is_good,
         "procedures": [_procedure(result) for result in identification.results],
+        **trajectory_document(identification.trajectory),
         "new_set": {
             "file": f"{identification.name}.toml",
             "identified": list(identification.new_set.written),
@@ -45,6 +47,11 @@ def identification_files(identification: Identification) -> dict[str, bytes]:
         number = counts[result.procedure]
         name = result.procedure if number == 1 else f"{result.procedure}-{number}"
         files |= _figure(name, procedure_figure(result))
+    files |= {
+        file: content
+        for name, figure in trajectory_figures(identification)
+        for file, content in _figure(name, figure).items()
+    }
     both = figure_3(identification.results)
     return files if both is None else files | _figure("figure-3", both)
 

@@ -2,15 +2,22 @@
 
 import math
 import textwrap
+from collections.abc import Iterable
 
 from ppafo.identification.bench.result import BenchResult, counted
+from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.identify import Identification
+from ppafo.identification.trajectory.expected import Expected
+from ppafo.identification.trajectory.outcome import TrajectoryOutcome
+from ppafo.identification.trajectory.profiles import Profile
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.units import from_si
+from ppafo.reporting.in_set_units import in_set_unit
+from ppafo.reporting.trajectory_files import kind_of_fit
 
 _WIDTH = 118
 _NO_VALUE = "no value"
+_FEWEST_DIGITS, _MOST_DIGITS = 4, 9
 
 
 def identification_table(identification: Identification) -> list[str]:
@@ -20,6 +27,8 @@ def identification_table(identification: Identification) -> list[str]:
     lines: list[str] = []
     for result in identification.results:
         lines += [*_procedure(result, identification.before, widths), ""]
+    if identification.trajectory is not None:
+        lines += [*_trajectory(identification.trajectory, identification.before, widths), ""]
     written = identification.new_set.written
     told = f"{counted(len(written), 'value')} identified: {', '.join(written)}" if written else "no value identified"
     lines += textwrap.wrap(f"new set '{identification.name}': {told}", _WIDTH, subsequent_indent="  ")
@@ -31,27 +40,76 @@ def identification_table(identification: Identification) -> list[str]:
 def _procedure(result: BenchResult, before: ParameterSet, widths: list[int]) -> list[str]:
     kind = "" if result.kind == "measured" else f" ({result.kind})"
     lines = textwrap.wrap(f"{result.procedure}{kind}: {result.summary}", _WIDTH, subsequent_indent="  ")
-    for item in result.estimates:
-        path, value, unit, interval = _row(item, before)
-        lines.append(
-            f"  {path:<{widths[0]}}  {value:>{widths[1]}} {unit:<{widths[2]}}  {interval:<{widths[3]}}  {item.verdict}"
-        )
-    for check in result.checks:
-        mark = "holds" if check.holds else "FAILS"
-        lines += textwrap.wrap(f"  {mark}: {check.name}: {check.statement}", _WIDTH, subsequent_indent="         ")
+    lines += [_estimate(item, before, widths) for item in result.estimates]
+    return lines + _checks(result.checks)
+
+
+def _trajectory(outcome: TrajectoryOutcome, before: ParameterSet, widths: list[int]) -> list[str]:
+    """Return estimates, each that is not simply identified with its sentence, then checks, profiles and candidates."""
+    kind = kind_of_fit(outcome.fit)
+    told = "" if kind == "measured" else f" ({kind})"
+    recordings = counted(len(outcome.fit.measurements), "recording")
+    lines = [f"trajectory{told}: {counted(len(outcome.fit.estimates), 'number')} fitted to {recordings}"]
+    for item in outcome.fit.estimates:
+        lines.append(_estimate(item, before, widths))
+        if item.verdict != "identified":
+            lines += _wrapped(f"    {item.explanation}", "    ")
+    lines += _checks(outcome.checks)
+    for remark in outcome.remarks:
+        lines += _wrapped(f"  remark: {remark}", "          ")
+    for one in outcome.profiles:
+        lines += _wrapped(f"  profile: {_profile(one, before)}", "           ")
+    for number, candidate in enumerate(outcome.expected, start=1):
+        lines += _wrapped(f"  next experiment {number}: {_candidate(candidate)}", "                     ")
     return lines
+
+
+def _profile(one: Profile, before: ParameterSet) -> str:
+    """Return the interval of a profile in words."""
+    sides = [None if side is None else in_set_unit(side, one.path, one.unit, before) for side in (one.low, one.high)]
+    known = [side[0] for side in sides if side is not None]
+    digits = _digits(known[0], 0.5 * (known[-1] - known[0])) if known else _FEWEST_DIGITS
+    low, high = ("not bounded" if side is None else f"{side[0]:#.{digits}g}" for side in sides)
+    unit = next((side[1] for side in sides if side is not None), "")
+    return f"{one.path}: {low} to {high} {unit}".rstrip()
+
+
+def _candidate(one: Expected) -> str:
+    share = 1.0 - one.shrinkage[one.most_helped]
+    return f"{one.label}: gain {one.gain:.2f}; most for {one.most_helped}, whose interval would shrink by {share:.0%}"
+
+
+def _estimate(item: Estimate, before: ParameterSet, widths: list[int]) -> str:
+    path, value, unit, interval = _row(item, before)
+    return f"  {path:<{widths[0]}}  {value:>{widths[1]}} {unit:<{widths[2]}}  {interval:<{widths[3]}}  {item.verdict}"
+
+
+def _checks(checks: Iterable[Check]) -> list[str]:
+    lines: list[str] = []
+    for check in checks:
+        mark = "holds" if check.holds else "FAILS"
+        lines += _wrapped(f"  {mark}: {check.name}: {check.statement}", "         ")
+    return lines
+
+
+def _wrapped(text: str, indent: str) -> list[str]:
+    return textwrap.wrap(text, _WIDTH, subsequent_indent=indent)
 
 
 def _row(estimate: Estimate, before: ParameterSet) -> tuple[str, str, str, str]:
     """Return path, value, unit and interval."""
     if math.isnan(estimate.value):
         return estimate.path, _NO_VALUE, "", ""
-    entry = before.numbers.get(estimate.path)
-    unit = estimate.unit if entry is None else entry.unit
     numbers = (estimate.value, estimate.low, estimate.high)
-    value, low, high = (number if unit == estimate.unit else _moved(number, unit, estimate.unit) for number in numbers)
-    return estimate.path, f"{value:#.4g}", unit, f"{low:#.4g} to {high:#.4g}"
+    shown = [in_set_unit(one, estimate.path, estimate.unit, before) for one in numbers]
+    value, low, high = (number for number, _ in shown)
+    digits = _digits(value, 0.5 * abs(high - low))
+    return estimate.path, f"{value:#.{digits}g}", shown[0][1], f"{low:#.{digits}g} to {high:#.{digits}g}"
 
 
-def _moved(number: float, unit: str, si_unit: str) -> float:
-    return from_si(number, unit, "N m s" if si_unit == "N m s/rad" and "rad" not in unit else si_unit)
+def _digits(value: float, half_width: float) -> int:
+    """Return the digits that a number needs so that its interval can be told from it, at least four."""
+    if not (half_width > 0.0 and math.isfinite(half_width) and value != 0.0):
+        return _FEWEST_DIGITS
+    needed = math.ceil(math.log10(abs(value) / half_width)) + 1
+    return min(max(needed, _FEWEST_DIGITS), _MOST_DIGITS)

@@ -10,7 +10,7 @@ from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
 from ppafo.reporting.layout import Margins, figure_of_panels
 from ppafo.reporting.style import ACTUAL, BLACK, CHAMBER_1, CHAMBER_2, GREY, house_style, mark_kind
-from ppafo.signals import Recording
+from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:
@@ -19,21 +19,25 @@ if TYPE_CHECKING:
 
 _WIDTH, _VALUES, _LEFT_OVER = 7.2, 1.5, 0.62
 _MARGINS = Margins(left=0.78, right=0.2, top=0.62, bottom=0.52, row_gap=0.36, label=0.58)
-_MATRIX_CELL, _LETTER, _MATRIX_TOP = 0.62, 0.08, 0.75
+_MATRIX_CELL, _LETTER, _MATRIX_TOP = 0.62, 0.08, 0.5
 """Inches."""
 
-_DOT, _SAMPLE = 1.6, 3.0
+_DOT, _SAMPLE = 1.6, 3.6
+_MOST_DOTS = 90
+"""Samples shown beside the line; what is left is shown of all."""
+_KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
 _NAMED = 0.3
 """Correlations from this size on are written into their cell."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """How a channel is drawn: channel, title, unit, values per SI unit, zero in SI units, colour."""
+    """How a channel is drawn: channel, title, units, values per SI unit, zero in SI units, colour."""
 
     channel: str
     title: str
     unit: str
+    unit_of_difference: str
     factor: float
     zero: float
     colour: str
@@ -66,8 +70,11 @@ def trajectory_fit_figure(
         return figure
 
 
-def correlation_figure(names: Sequence[str], correlation: Floats) -> "Figure":
-    """Return the correlation matrix of estimates as a picture; strong colours are numbers that trade off."""
+def correlation_figure(names: Sequence[str], correlation: Floats, kind: RecordingKind = "measured") -> "Figure":
+    """Return the correlation matrix of estimates as a picture; strong colours are numbers that trade off.
+
+    ``kind`` is that of the recordings.
+    """
     from matplotlib.figure import Figure
 
     count = len(names)
@@ -87,6 +94,7 @@ def correlation_figure(names: Sequence[str], correlation: Floats) -> "Figure":
         figure.text(
             0.12 / width, 1.0 - 0.12 / height, "Correlation of the estimates", ha="left", va="top", fontweight="bold"
         )
+        mark_kind(figure, kind)
         return figure
 
 
@@ -98,21 +106,32 @@ def _write(axes: "Axes", row: int, column: int, number: float) -> None:
 def _channels(atmosphere: float) -> tuple[_Shown, ...]:
     degrees, gauge = float(np.degrees(1.0)), 1.0 / PASCALS_PER_PSI
     return (
-        _Shown("angle", "Vane angle", "deg", degrees, 0.0, ACTUAL),
-        _Shown("pressure_1", "Pressure in chamber 1", "psig", gauge, atmosphere, CHAMBER_1),
-        _Shown("pressure_2", "Pressure in chamber 2", "psig", gauge, atmosphere, CHAMBER_2),
+        _Shown("angle", "Vane angle", "deg", "deg", degrees, 0.0, ACTUAL),
+        _Shown("pressure_1", "Pressure in chamber 1", "psig", "psi", gauge, atmosphere, CHAMBER_1),
+        _Shown("pressure_2", "Pressure in chamber 2", "psig", "psi", gauge, atmosphere, CHAMBER_2),
     )
 
 
 def _draw(one: _Shown, panels: "tuple[Axes, Axes]", measurement: Recording, model: Recording) -> None:
     values, left = panels
     samples, fitted = (one.factor * (recording[one.channel] - one.zero) for recording in (measurement, model))
-    values.plot(measurement.time, samples, ".", color=GREY, markersize=_SAMPLE, alpha=0.6, label=measurement.kind)
-    values.plot(measurement.time, fitted, color=one.colour, linewidth=1.0, label="model")
+    some = slice(None, None, -(-measurement.time.size // _MOST_DOTS))
+    times, word = measurement.time[some], _KIND_WORDS[measurement.kind]
+    values.plot(
+        times,
+        samples[some],
+        "o",
+        color=BLACK,
+        markersize=_SAMPLE,
+        markerfacecolor="none",
+        markeredgewidth=0.7,
+        label=word,
+    )
+    values.plot(measurement.time, fitted, color=one.colour, linewidth=1.2, label="model")
     values.set_title(f"{one.title} ({one.unit})")
     left.plot(measurement.time, fitted - samples, ".", color=one.colour, markersize=_DOT)
     left.axhline(0.0, color=GREY, linewidth=0.8)
     largest = 1.1 * float(np.max(np.abs(fitted - samples))) or 1.0
     left.set_ylim(-largest, largest)
-    left.set_title(f"model less sample ({one.unit})", fontsize=9)
+    left.set_title(f"model less sample ({one.unit_of_difference})", fontsize=9)
     left.locator_params(axis="y", nbins=3)

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.errors import ParameterError, nearest_name, one_line
+from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
-from ppafo.parameters import build_device, list_sets, load_parameter_set
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.parameter_set import chosen_valve
 from ppafo.simulation.assumptions import Hardware, read_assumptions
@@ -37,7 +37,7 @@ class Given:
     """What a scenario is made from.
 
     ``file`` is what messages call it, ``path`` the file itself if there is one, ``folder`` where relative paths begin,
-    ``content`` the document as it was given.
+    ``content`` the document as it was given. ``parameter_set`` takes the place of the set that the document names.
     """
 
     file: str
@@ -45,13 +45,14 @@ class Given:
     folder: Path
     content: dict[str, Any]
     overrides: tuple[str, ...]
+    parameter_set: ParameterSet | None = None
 
 
 def build_scenario(given: Given, changed: Changed) -> Scenario:
     """Return the scenario of a document that has the right keys, or refuse the first value that is not usable."""
     document = changed.document
     reading = Reading(given.file, document, changed.paths)
-    hardware = _hardware(reading, given.folder, changed.device)
+    hardware = _hardware(reading, given, changed.device)
     device = _device(reading, hardware)
     clock = read_clock(reading)
     before = Reading(given.file, given.content)
@@ -74,12 +75,12 @@ def build_scenario(given: Given, changed: Changed) -> Scenario:
     )
 
 
-def _hardware(reading: Reading, folder: Path, overrides: tuple[str, ...]) -> Hardware:
+def _hardware(reading: Reading, given: Given, overrides: tuple[str, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then those of the caller."""
     section = reading.document["device"]
     valve = section.get("valve")
     try:
-        parameter_set = load_parameter_set(_set_name(section["set"], folder))
+        parameter_set = given.parameter_set or load_parameter_set(_set_name(section["set"], given.folder))
         name = chosen_valve(parameter_set, valve)
         parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
     except ParameterError as error:

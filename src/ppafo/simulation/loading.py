@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 from ppafo.documents.problems import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError
+from ppafo.parameters import ParameterSet
 from ppafo.simulation.building import Given, build_scenario
 from ppafo.simulation.overriding import apply_overrides
 from ppafo.simulation.scenario import Scenario
@@ -25,14 +26,18 @@ def list_scenarios() -> tuple[str, ...]:
     return _FILE.names()
 
 
-def load_scenario(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
+def load_scenario(
+    name_or_path: str | Path, overrides: Iterable[str] = (), parameter_set: ParameterSet | None = None
+) -> Scenario:
     """Return a scenario by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
-    ``valve.area=12.6mm^2``.
+    ``valve.area=12.6mm^2``. ``parameter_set`` takes the place of the set that the scenario names; what the scenario
+    changes in its device is changed in this one.
     """
-    path = Path(name_or_path)
-    return parse_scenario(_FILE.read(name_or_path), str(name_or_path), overrides, path.parent)
+    document = _FILE.parse(_FILE.read(name_or_path), label(str(name_or_path)))
+    folder, file = Path(name_or_path).parent, str(name_or_path)
+    return _scenario(Given(label(file), file, folder, document, tuple(overrides), parameter_set))
 
 
 def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:

@@ -10,25 +10,17 @@ from ppafo.errors import DataError, nearest_name
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded.checks import check_absolute, check_command, check_gaps, usual_interval
+from ppafo.simulation.recorded.inputs import COMMAND, EXTERNAL_TORQUE, SUPPLY
 from ppafo.storage import read_recording
 from ppafo.storage.files import read_bytes
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.validation.compared import ANGLE, COMPARED, PRESSURE_1, PRESSURE_2
 
-COMMAND, SUPPLY, EXTERNAL_TORQUE = "command", "supply_pressure", "external_torque"
-PRESSURES = (PRESSURE_1, PRESSURE_2, SUPPLY)
-
-LONGEST_GAP = 0.05
-"""Seconds without a sample in which so much can happen that the inputs are not known any more ..."""
-GAP_SAMPLES = 10.0
-"""... unless the whole recording is as slow as that: a gap is this many times the usual time between samples."""
 _REMARKED_GAP = 3.0
-_SMALLEST_ABSOLUTE = 0.3
-"""Share of the atmosphere; an absolute pressure below it is almost surely a gauge pressure under the wrong name."""
 _ABOVE_SUPPLY = 0.05
 _MOST_RANGES = 20.0
 _LEAST_CHANGE = 0.01
-_COMMAND_TOLERANCE = 1.0e-6
 _CLIPPED_SAMPLES = 20
 _NOISY_SHARE = 0.2
 
@@ -59,18 +51,13 @@ def checked(recording: Recording, device: Device, file: str, sha256: str = "") -
     """Return a recording as evidence with its remarks, or refuse it in one line that begins with ``file``."""
     _check_length(recording, file)
     unknown = _check_names(recording, file)
-    _check_gaps(recording, file)
-    _check_command(recording, file)
+    check_gaps(recording, file)
+    check_command(recording, file)
     _check_size(recording, device, file)
     _check_pressures(recording, device, file)
     _check_change(recording, device, file)
     remarks = (*unknown, *_gap_remarks(recording), *_clip_remarks(recording))
     return Measured(file, sha256, recording, remarks)
-
-
-def usual_interval(time: Floats) -> float:
-    """Median time between two samples [s]."""
-    return float(np.median(np.diff(time)))
 
 
 def _check_length(recording: Recording, file: str) -> None:
@@ -95,26 +82,6 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
     return tuple(f"channel '{name}' is not known and was not used" for name in unknown)
 
 
-def _check_gaps(recording: Recording, file: str) -> None:
-    gaps = np.diff(recording.time)
-    longest = int(np.argmax(gaps))
-    if gaps[longest] > max(LONGEST_GAP, GAP_SAMPLES * usual_interval(recording.time)):
-        raise DataError(
-            f"{file}: there is a gap of {gaps[longest]:.4g} s after {recording.time[longest]:.6g} s (sample "
-            f"{longest + 1}), in which the inputs are not known; cut the recording there"
-        )
-
-
-def _check_command(recording: Recording, file: str) -> None:
-    command = recording[COMMAND]
-    worst = int(np.argmax(np.abs(command)))
-    if abs(command[worst]) > 1.0 + _COMMAND_TOLERANCE:
-        raise DataError(
-            f"{file}: '{COMMAND}' is {command[worst]:.6g} at {recording.time[worst]:.6g} s (sample {worst + 1}); it "
-            "must be from -1 to 1, the share of full opening"
-        )
-
-
 def _check_size(recording: Recording, device: Device, file: str) -> None:
     """Refuse values that no such device can have: a damaged line, or a unit that is off by powers of ten."""
     highest = max(device.supply.pressure, device.supply.dorsiflexion_pressure)
@@ -132,13 +99,7 @@ def _check_size(recording: Recording, device: Device, file: str) -> None:
 def _check_pressures(recording: Recording, device: Device, file: str) -> None:
     """Refuse pressures that cannot be absolute, and chambers that stand above the supply they are fed from."""
     supply = device.supply
-    for name in (name for name in PRESSURES if name in recording):
-        lowest = int(np.argmin(recording[name]))
-        if recording[name][lowest] < _SMALLEST_ABSOLUTE * supply.atmospheric_pressure:
-            raise DataError(
-                f"{file}: '{name}' is {recording[name][lowest]:.6g} Pa absolute at {recording.time[lowest]:.6g} s "
-                f"(sample {lowest + 1}), far below the atmosphere; is it a gauge pressure ('{name} [psi_g]')?"
-            )
+    check_absolute(recording, supply.atmospheric_pressure, file)
     given = recording[SUPPLY] if SUPPLY in recording else np.array([supply.pressure, supply.dorsiflexion_pressure])
     highest = float(given.max())
     allowed = highest + _ABOVE_SUPPLY * (highest - supply.atmospheric_pressure)

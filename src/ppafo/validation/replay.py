@@ -7,38 +7,34 @@ from typing import Literal
 import numpy as np
 
 from ppafo.engine.lanes import Floats
-from ppafo.engine.replay import StepInputs, led_by_recording, replay
+from ppafo.engine.replay import led_by_recording, replay
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import DataError, SimulationError
 from ppafo.model.plant import chamber_pressures
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.sampled import state_row_numbers
-from ppafo.simulation.scenario import (
-    PYTHON_CONTROLLER,
-    Control,
-    FreeMotion,
-    Origin,
-    ProfileChoice,
-    Scenario,
-    Sensors,
+from ppafo.simulation.recorded.inputs import (
+    COMMAND,
+    EXTERNAL_TORQUE,
+    SUPPLY,
+    RecordedInputs,
+    sample_period,
+    step_inputs,
+    step_times,
 )
+from ppafo.simulation.recorded.scenario import recorded_scenario, with_highest_supply
+from ppafo.simulation.recorded.start import Start, between_stops
+from ppafo.simulation.sampled import state_row_numbers
 from ppafo.validation.compared import ANGLE
-from ppafo.validation.measured import COMMAND, EXTERNAL_TORQUE, SUPPLY, Measured
-from ppafo.validation.start import Start, between_stops
+from ppafo.validation.measured import Measured
 
 Motion = Literal["free", "measured"]
 
-LONGEST_STEP = 1.0e-3
-SHORTEST_SAMPLE = 1.0e-4
-"""Seconds; irregular samples are placed on a grid no finer than this."""
 MOST_STEPS = 20_000_000
 _WHOLE = 1.0e-9
 _RECORD_INTERVAL = 2.5e-4
 """Seconds between two records of the model, or less: fine enough to be shifted in time and read between."""
-_UNIFORM = 0.02
-"""Share of a sample by which a time may be off a regular grid; clocks write rounded times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,52 +51,35 @@ def replay_recording(measured: Measured, device: Device, start: Start, motion: M
     run = _planned(measured, device, start, extra)
     if motion == "measured":
         run = replace(run, program=led_by_recording(run.program), path=(0.0, start.angle, 0.0))
-    times = run.step * np.arange(run.step_count, dtype=np.float64)
-    inputs = StepInputs(_held(measured, COMMAND, times, run.step), _parameters(measured, device, motion, run, times))
-    outcome = replay(batch_of(run), inputs)
+    inputs = _inputs(measured, motion)
+    given = step_inputs(inputs, device, run)
+    if motion == "measured":
+        given = replace(
+            given, parameters={**given.parameters, **_path(measured, device, step_times(run) + 0.5 * run.step)}
+        )
+    outcome = replay(batch_of(run), given)
     failed = float(outcome.states[state_row_numbers(run)["result.failure_time"], 0])
     if failed < NEVER_FAILED or not np.isfinite(outcome.record).all():
-        until = min(failed, float(times[-1]))
+        until = min(failed, run.step * run.step_count)
         raise SimulationError(
             f"{measured.file}: the model diverged {until:.6g} s after the first sample; look at the volumes, the "
             "inertia and the valve of the set (ppafo audit)"
         )
-    used = (COMMAND, *(name for name in (SUPPLY, EXTERNAL_TORQUE) if _is_used(measured, name, motion)))
-    names = (*used, ANGLE) if motion == "measured" else used
+    names = (*inputs.names, ANGLE) if motion == "measured" else inputs.names
     return Replayed(_recording(measured, run, outcome.record[:, :, 0]), run.step, names)
 
 
-def regular_interval(time: Floats) -> float | None:
-    """Time between samples [s] where they are regular, else None."""
-    interval = float(time[-1] - time[0]) / (time.size - 1)
-    away = time - time[0] - interval * np.arange(time.size)
-    return interval if float(np.abs(away).max()) < _UNIFORM * interval else None
+def _inputs(measured: Measured, motion: Motion) -> RecordedInputs:
+    """Return what the model is given: the command, and supply and torque where they are in the recording."""
+    names = (COMMAND, *(name for name in (SUPPLY, EXTERNAL_TORQUE) if _is_used(measured, name, motion)))
+    return RecordedInputs(measured.recording, names, float(measured.recording.time[0]))
 
 
 def _planned(measured: Measured, device: Device, start: Start, extra: float) -> Run:
     """The run of a free vane, whose steps are fine enough for a led one too."""
-    time = measured.recording.time
-    regular = regular_interval(time)
-    period = regular or min(max(float(np.diff(time).min()), SHORTEST_SAMPLE), LONGEST_STEP)
-    duration = measured.recording.duration + max(extra, period)
-    highest = float(measured.recording[SUPPLY].max()) if measured.has(SUPPLY) else 0.0
-    supply = replace(device.supply, pressure=max(device.supply.pressure, highest))
-    scenario = Scenario(
-        name=measured.recording.label,
-        description="replay of a recording",
-        device=replace(device, supply=supply),
-        duration=duration,
-        time_step=min(period, LONGEST_STEP),
-        output_interval=period,
-        motion=FreeMotion(start.angle, start.angular_velocity),
-        initial_pressure_1=start.pressure_1,
-        initial_pressure_2=start.pressure_2,
-        control=Control(PYTHON_CONTROLLER, {}, period),
-        reference=ProfileChoice("constant", {"level": 0.0}),
-        sensors=Sensors(),
-        assumptions=(),
-        origin=Origin(measured.file, device.name, device.valve_name, (), {}),
-    )
+    recording = measured.recording
+    duration = recording.duration + max(extra, sample_period(recording.time))
+    scenario = recorded_scenario(recording, with_highest_supply(device, recording), start, duration, measured.file)
     run = plan_run(scenario)
     if run.step_count > MOST_STEPS:
         raise DataError(
@@ -118,23 +97,6 @@ def _record_every(run: Run) -> int:
     return max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
 
 
-def _parameters(measured: Measured, device: Device, motion: Motion, run: Run, times: Floats) -> dict[str, Floats]:
-    """Parameters that follow the recording, for every step; pressure and torque keep their mean over a millisecond."""
-    together = max(1, min(run.steps_per_sample, round(LONGEST_STEP / run.step)))
-    first = (np.arange(times.size) // together * together).astype(np.float64)
-    middle: Floats = run.step * (first + 0.5 * together)
-    followed: dict[str, Floats] = {}
-    if measured.has(SUPPLY):
-        followed["plant.supply_pressure"] = _between_samples(measured, SUPPLY, middle)
-        if device.supply.pressure == device.supply.dorsiflexion_pressure:
-            followed["plant.dorsiflexion_pressure"] = followed["plant.supply_pressure"]
-    if _is_used(measured, EXTERNAL_TORQUE, motion):
-        followed["plant.external_torque"] = _between_samples(measured, EXTERNAL_TORQUE, middle)
-    if motion == "measured":
-        followed |= _path(measured, device, times + 0.5 * run.step)
-    return followed
-
-
 def _path(measured: Measured, device: Device, middle: Floats) -> dict[str, Floats]:
     """The straight piece of the recorded angle that holds at each step; after the last sample the vane stands still."""
     time = measured.recording.time - measured.recording.time[0]
@@ -147,18 +109,6 @@ def _path(measured: Measured, device: Device, middle: Floats) -> dict[str, Float
 def _is_used(measured: Measured, name: str, motion: Motion) -> bool:
     """True where an input is in the recording; a torque on a led vane is what leads it, not an input."""
     return measured.has(name) and not (name == EXTERNAL_TORQUE and motion == "measured")
-
-
-def _held(measured: Measured, name: str, times: Floats, step: float) -> Floats:
-    """The last value at each time after the first sample; a change falls on the nearest step."""
-    recording = measured.recording
-    index = np.searchsorted(recording.time - recording.time[0], times + 0.5 * step, side="right") - 1
-    return recording[name][index]
-
-
-def _between_samples(measured: Measured, name: str, times: Floats) -> Floats:
-    recording = measured.recording
-    return np.interp(times, recording.time - recording.time[0], recording[name])
 
 
 def _recording(measured: Measured, run: Run, record: Floats) -> Recording:

@@ -11,11 +11,12 @@ from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded.inputs import SUPPLY, regular_interval
 from ppafo.validation.agreement import Comparison, RecordingAgreement, channel_agreement, common_delay
 from ppafo.validation.alignment import DEFAULT_LIMIT, Curve
 from ppafo.validation.compared import ANGLE, COMPARED, PRESSURE_1, PRESSURE_2, PRESSURE_DIFFERENCE
-from ppafo.validation.measured import SUPPLY, Measured, read_measured
-from ppafo.validation.replay import Motion, Replayed, regular_interval, replay_recording
+from ppafo.validation.measured import Measured, read_measured
+from ppafo.validation.replay import Motion, Replayed, replay_recording
 from ppafo.validation.start import start_of
 from ppafo.validation.thresholds import Thresholds, parse_thresholds
 

@@ -4,11 +4,13 @@ import math
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.engine.cache import load_generated
 from ppafo.engine.lane_source import lane_source
 from ppafo.engine.program import Program
 from ppafo.engine.reference.source import right_hand_side_source
@@ -55,6 +57,18 @@ def test_second_start_finds_the_compiled_model_and_changed_physics_does_not(tmp_
     assert compiled_changed
     assert first == second
     assert changed != first
+
+
+def test_threads_that_load_one_module_at_once_all_get_the_whole_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path))
+    source = "import time\ntime.sleep(0.2)\nlast_line = 1\n"
+    with ThreadPoolExecutor(4) as pool:
+        modules = list(pool.map(lambda _: load_generated("test", source), range(4)))
+        assert [module.last_line for module in modules] == [1] * 4
+    assert len({id(module) for module in modules}) == 1
+    del sys.modules[modules[0].__name__]
 
 
 def program() -> Program:

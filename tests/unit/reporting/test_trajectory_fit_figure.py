@@ -23,7 +23,7 @@ def test_every_fitted_channel_has_a_panel_and_one_for_what_is_left() -> None:
         "Vane angle (deg)",
         "model less sample (deg)",
         "Pressure in chamber 1 (psig)",
-        "model less sample (psig)",
+        "model less sample (psi)",
     ]
     left = figure.axes[1].lines[0].get_ydata()
     assert np.asarray(left) == pytest.approx(np.full(101, 0.5))
@@ -31,7 +31,7 @@ def test_every_fitted_channel_has_a_panel_and_one_for_what_is_left() -> None:
 
 def test_samples_are_dots_and_the_model_is_a_line() -> None:
     samples, model = trajectory_fit_figure(recording("synthetic", 0.0), recording("simulated", 0.5)).axes[0].lines
-    assert (samples.get_marker(), samples.get_label()) == (".", "synthetic")
+    assert (samples.get_marker(), samples.get_label()) == ("o", "synthetic measurement")
     assert (model.get_marker(), model.get_linestyle(), model.get_label()) == ("None", "-", "model")
 
 

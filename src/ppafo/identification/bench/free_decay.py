@@ -15,7 +15,8 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
 from ppafo.identification.bench.inputs import check_moves, check_sources, kind_of, window
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, Check, counted, verdict_of
+from ppafo.identification.bench.result import BenchResult, counted, verdict_of
+from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats

@@ -6,7 +6,7 @@ import numpy as np
 
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
 from ppafo.identification.bench.leak_laws import Chambers, Law, decay_times, difference_in_time
-from ppafo.identification.bench.result import Check
+from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.signals.recording import Floats
 

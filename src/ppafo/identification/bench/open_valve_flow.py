@@ -10,7 +10,8 @@ from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
 from ppafo.identification.bench.gas_flow import GasAt, iso6358_shape, orifice_shape
 from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pooled
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, Check, verdict_of
+from ppafo.identification.bench.result import BenchResult, verdict_of
+from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
 from ppafo.model.gas import critical_pressure_ratio

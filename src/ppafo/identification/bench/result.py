@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ppafo.identification.bench.picture import Panel
+from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.signals import RecordingKind
 
@@ -12,15 +13,6 @@ IDENTIFIED_WITHIN = 0.25
 
 WEAK_WITHIN = 1.0
 """Half width over value from which the interval reaches zero: such a value is not identifiable."""
-
-
-@dataclass(frozen=True, slots=True)
-class Check:
-    """A question that the residuals answer: its name, whether the answer is good, and the answer in words."""
-
-    name: str
-    holds: bool
-    statement: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,8 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pooled
 from ppafo.identification.bench.picture import Panel, Series
 from ppafo.identification.bench.regression import Labels, Regression, labels_of, regress
-from ppafo.identification.bench.result import BenchResult, Check, verdict_of
+from ppafo.identification.bench.result import BenchResult, verdict_of
+from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats

@@ -18,7 +18,8 @@ from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
 from ppafo.identification.bench.gas_flow import GasAt, orifice_shape
 from ppafo.identification.bench.inputs import check_moves, check_sources, kind_of
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, Check, verdict_of
+from ppafo.identification.bench.result import BenchResult, verdict_of
+from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats

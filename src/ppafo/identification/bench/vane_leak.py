@@ -28,7 +28,8 @@ from ppafo.identification.bench.leak_fits import (
 from ppafo.identification.bench.leak_laws import Chambers, laws_of
 from ppafo.identification.bench.leak_steady import steady_leak
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, Check, counted, verdict_of
+from ppafo.identification.bench.result import BenchResult, counted, verdict_of
+from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats

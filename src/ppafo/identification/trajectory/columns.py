@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.lanes import Batch, BatchResult, run_batch
+from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, whole_and_rest
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.paths import with_numbers
+from ppafo.identification.trajectory.paths import TIME_OFFSET, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, Prepared
-from ppafo.identification.trajectory.problem import Range
+from ppafo.identification.trajectory.ranges import Range
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.plant import plant_parameters
@@ -26,10 +27,7 @@ _OF_PRESSURE = ("gas_product", "volume_per_angle", "angle_min", "angle_max", "de
 
 def numbers_in(prepared: Prepared, ranges: Sequence[Range], point: Floats) -> dict[str, float]:
     """Return the numbers in SI units, by path, that a point of coordinates gives to one experiment."""
-    label = prepared.label
-    acting = [
-        (item, z) for item, z in zip(ranges, point, strict=True) if not item.recordings or label in item.recordings
-    ]
+    acting = [pair for pair in zip(ranges, point, strict=True) if pair[0].acts_in(prepared.label)]
     return {item.path: item.number(float(z)) for item, z in acting}
 
 
@@ -78,16 +76,21 @@ def run_with(prepared: Prepared, numbers: Mapping[str, float]) -> Run:
 
 def _trajectories(prepared: Prepared, columns: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
     runs = [run_with(prepared, numbers) for numbers in columns]
-    outcomes = _outcomes(runs)
+    outcomes = _outcomes(runs, prepared.inputs)
     rows = state_row_numbers(prepared.run)
     ends = np.concatenate([outcome.states for outcome in outcomes], axis=1)
     failed = (ends[rows["result.failure_time"]] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
-    record = np.concatenate([outcome.record for outcome in outcomes], axis=2)
-    signals = _signals(runs, record, rows, prepared)
-    return {name: np.where(failed, np.nan, values) for name, values in signals.items()}
+    offsets = np.array([numbers.get(TIME_OFFSET, prepared.time_offset) for numbers in columns])
+
+    def at_samples(name: str) -> Floats:
+        whole = [outcome.record[:, rows[f"state.{name}"]] for outcome in outcomes]
+        return _at_samples(whole[0] if len(whole) == 1 else np.concatenate(whole, axis=1), prepared, offsets)
+
+    found = _signals(runs, at_samples("angle"), at_samples("mass_1"), at_samples("mass_2"))
+    return {channel.name: np.where(failed, np.nan, found[channel.name]) for channel in prepared.channels}
 
 
-def _outcomes(runs: Sequence[Run]) -> list[BatchResult]:
+def _outcomes(runs: Sequence[Run], inputs: StepInputs | None) -> list[BatchResult]:
     """Return all outcomes in order; neighbours of one clock share a block, and a fitted dead time changes the clock."""
     batches = [batch_of(run) for run in runs]
     outcomes, first = [], 0
@@ -97,29 +100,38 @@ def _outcomes(runs: Sequence[Run]) -> list[BatchResult]:
         members = batches[first:last]
         parameters = np.concatenate([batch.parameters for batch in members], axis=1)
         states = np.concatenate([batch.states for batch in members], axis=1)
-        outcomes.append(run_batch(Batch(members[0].program, members[0].clock, parameters, states), threads=1))
+        joint = Batch(members[0].program, members[0].clock, parameters, states)
+        outcomes.append(run_batch(joint, threads=1) if inputs is None else replay(joint, inputs))
         first = last
     return outcomes
 
 
-def _signals(runs: Sequence[Run], record: Floats, rows: Mapping[str, int], prepared: Prepared) -> dict[str, Floats]:
-    """Return the channels at the times of the samples, by straight lines between records."""
-    angle, mass_1, mass_2 = (record[:, rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
+def _signals(runs: Sequence[Run], angle: Any, mass_1: Any, mass_2: Any) -> dict[str, Floats]:
+    """Return angle and pressures from angle and masses, all (samples, runs)."""
     plant: dict[str, Any] = {name: np.array([getattr(run.plant, name) for run in runs]) for name in _OF_PRESSURE}
-    volume_1: Any = chamber_1_volume(angle, plant["angle_min"], plant["volume_per_angle"], plant["dead_volume_1"])  # type: ignore[arg-type]
-    volume_2: Any = chamber_2_volume(angle, plant["angle_max"], plant["volume_per_angle"], plant["dead_volume_2"])  # type: ignore[arg-type]
-    signals: dict[str, Any] = {
-        "angle": angle,
-        "pressure_1": chamber_pressure(mass_1, volume_1, plant["gas_product"]),  # type: ignore[arg-type]
-        "pressure_2": chamber_pressure(mass_2, volume_2, plant["gas_product"]),  # type: ignore[arg-type]
-    }
-    return {channel.name: _at_samples(signals[channel.name], prepared) for channel in prepared.channels}
+    volume_1 = chamber_1_volume(angle, plant["angle_min"], plant["volume_per_angle"], plant["dead_volume_1"])
+    volume_2 = chamber_2_volume(angle, plant["angle_max"], plant["volume_per_angle"], plant["dead_volume_2"])
+    pressure_1: Any = chamber_pressure(mass_1, volume_1, plant["gas_product"])
+    pressure_2: Any = chamber_pressure(mass_2, volume_2, plant["gas_product"])
+    return {"angle": angle, "pressure_1": pressure_1, "pressure_2": pressure_2}
 
 
-def _at_samples(values: Floats, prepared: Prepared) -> Floats:
+def _at_samples(values: Floats, prepared: Prepared, offsets: Floats) -> Floats:
+    """Return a state at the times of the samples, by straight lines between records; each run with its offset [s]."""
+    if offsets.any():
+        return _at_moved_samples(values, prepared, offsets)
     place, share = prepared.place, prepared.share
     here = values[place]
     if not share.any():
         return here
     following = values[np.minimum(place + 1, len(values) - 1)]
     return np.asarray(here + share[:, None] * (following - here))
+
+
+def _at_moved_samples(values: Floats, prepared: Prepared, offsets: Floats) -> Floats:
+    """Return a state where samples are later than the run; before its first record the device stands still."""
+    position = np.clip((prepared.time[:, None] - offsets) / prepared.record_interval, 0.0, len(values) - 1.0)
+    place = np.minimum(position.astype(np.intp), len(values) - 2)
+    lanes = np.arange(len(offsets))
+    here, following = values[place, lanes], values[place + 1, lanes]
+    return np.asarray(here + (position - place) * (following - here))

@@ -1,95 +1,40 @@
-"""The section [trajectory] of a problem file: quantities as texts with units, scenarios and recordings by name."""
+"""From the section [trajectory] of a problem file to a problem: texts with units, scenarios and recordings by name."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.problems import first_problem
-from ppafo.errors import IdentificationError, UnitError
+from ppafo.errors import IdentificationError
 from ppafo.identification.source import Source
-from ppafo.identification.trajectory.paths import declaration_of
-from ppafo.identification.trajectory.problem import (
-    FITTED_CHANNELS,
-    Experiment,
-    FreeParameter,
-    InitialState,
-    Loss,
-    Prior,
-    Scale,
-    Search,
-    TrajectoryProblem,
+from ppafo.identification.trajectory.expected import Candidate
+from ppafo.identification.trajectory.experiment import Experiment
+from ppafo.identification.trajectory.paths import TIME_OFFSET, declaration_of, full_path
+from ppafo.identification.trajectory.problem import Search, TrajectoryProblem
+from ppafo.identification.trajectory.ranges import FreeParameter, Prior
+from ppafo.identification.trajectory.section import (
+    CandidateSection,
+    ExperimentSection,
+    ParameterSection,
+    TrajectorySection,
 )
+from ppafo.identification.trajectory.setting import Setting, noise_of_channels, quantity_of
+from ppafo.identification.trajectory.verdicts import interval_factor
+from ppafo.identification.trajectory.without_scenario import experiment_without_scenario
 from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.simulation.recorded.inputs import LONGEST_STEP
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.files import read_bytes
-from ppafo.units import parse_quantity
 
-_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-_Text = Annotated[str, Field(min_length=1)]
-_Texts = Annotated[tuple[_Text, ...], Field(strict=False)]
-_NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
-
-
-class PriorSection(BaseModel):
-    """What is known beforehand."""
-
-    model_config = _STRICT
-
-    mean: Annotated[_Text, Field(description="most likely value, with its unit")]
-    relative: Annotated[float, Field(gt=0.0, description="standard deviation over the mean")]
-
-
-class ParameterSection(BaseModel):
-    """A number to be fitted."""
-
-    model_config = _STRICT
-
-    path: Annotated[_Text, Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")]
-    start: Annotated[_Text | None, Field(description="where the search begins; the scenario's value unless given")] = (
-        None
-    )
-    low: Annotated[_Text | None, Field(description="lower bound")] = None
-    high: Annotated[_Text | None, Field(description="upper bound")] = None
-    scale: Annotated[Scale | None, Field(description="whether steps are ratios")] = None
-    prior: Annotated[PriorSection | None, Field(description="what is known beforehand")] = None
-    recordings: Annotated[_Texts, Field(description="experiments in which it acts, by label; all unless given")] = ()
-
-
-class ExperimentSection(BaseModel):
-    """A recording and the scenario that is to explain it."""
-
-    model_config = _STRICT
-
-    label: Annotated[_Text, Field(description="how it is called")]
-    scenario: Annotated[_Text, Field(description="name of a scenario, or a file relative to this one")]
-    overrides: Annotated[_Texts, Field(description="changes to the scenario")] = ()
-    recording: Annotated[_Text, Field(description="file, relative to this one")]
-    start: Annotated[_Text, Field(description="time of the recording at which the run begins")] = "0 s"
-    channels: Annotated[_Texts, Field(description="what is compared")] = FITTED_CHANNELS
-    noise: Annotated[dict[str, _Text], Field(description="standard deviation by channel, '0.1 deg', '500 Pa_d'")] = {}
-    inputs: Annotated[_Texts, Field(description="constants taken from the recording")] = ()
-    initial_state: Annotated[InitialState, Field(description="where the state at the start comes from")] = "scenario"
-
-
-class TrajectorySection(BaseModel):
-    """A trajectory fit, as it is written."""
-
-    model_config = _STRICT
-
-    parameters: Annotated[tuple[ParameterSection, ...], Field(strict=False, min_length=1, description="what is free")]
-    experiments: Annotated[
-        tuple[ExperimentSection, ...], Field(strict=False, min_length=1, description="what is to be explained")
-    ]
-    loss: Annotated[Loss, Field(description="how stray samples count")] = "linear"
-    other_starts: Annotated[int, Field(ge=0, le=100, description="starts besides the first")] = 0
-    seed: Annotated[int, Field(ge=0, description="of the draws of starts")] = 1
-    confidence: Annotated[float, Field(gt=0.5, lt=1.0, description="of the intervals")] = 0.95
-    kind: Annotated[Literal["trajectory"], Field(description="what this is")] = "trajectory"
+_VALVE = "device.valve"
+_PRESSURES = ("pressure_1", "pressure_2")
+SHORTEST_STEP = 1.0e-6
+"""Seconds; a shorter step would only cost time."""
 
 
 def trajectory_from_dict(
@@ -102,23 +47,27 @@ def trajectory_from_dict(
         text = first_problem(error.errors(include_url=False), TrajectorySection)
         raise IdentificationError(f"{file}: {text}") from error
     home = folder or Path()
-    return trajectory_problem(section, lambda name: _read(home / name), home, file)
+    return trajectory_problem(section, Setting(lambda item: _read(home / item.recording), home, file))
 
 
-def trajectory_problem(
-    section: TrajectorySection, read: Callable[[str], Source], folder: Path, file: str
-) -> TrajectoryProblem:
-    """Return the problem of a section; ``read`` gives a recording by the name that the section has for it."""
-    experiments = tuple(_experiment(item, read, folder, file) for item in section.experiments)
+def trajectory_problem(section: TrajectorySection, setting: Setting) -> TrajectoryProblem:
+    """Return the problem of a section."""
+    experiments = tuple(_experiment(item, setting) for item in section.experiments)
     scenarios = {item.label: item.scenario for item in experiments}
-    parameters = tuple(_parameter(item, scenarios, file) for item in section.parameters)
+    parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
+    nuisances = [one for item in section.experiments for one in _nuisances(item, setting)]
     search = Search(
         loss=section.loss,
         other_starts=section.other_starts,
         seed=section.seed,
         confidence=section.confidence,
     )
-    return TrajectoryProblem(parameters, experiments, search)
+    return TrajectoryProblem((*parameters, *nuisances), experiments, search)
+
+
+def candidates_of(section: TrajectorySection, setting: Setting, noise: Mapping[str, float]) -> tuple[Candidate, ...]:
+    """Return the experiments that could be done next; ``noise`` [rad], [Pa] by channel where none is given."""
+    return tuple(_candidate(item, setting, noise) for item in section.candidates)
 
 
 def _read(path: Path) -> Source:
@@ -126,42 +75,83 @@ def _read(path: Path) -> Source:
     return Source(read_csv(path), f"{path.name} sha256:{digest}")
 
 
-def _experiment(item: ExperimentSection, read: Callable[[str], Source], folder: Path, file: str) -> Experiment:
-    said = f"{file}: experiment '{item.label}'"
-    source = read(item.recording)
-    for name in item.noise:
-        if name not in _NOISE_UNITS:
-            raise IdentificationError(f"{said}: noise of '{name}': only {', '.join(_NOISE_UNITS)} have one here")
-    noise = {name: _quantity(f"{said}: noise.{name}", text, _NOISE_UNITS[name]) for name, text in item.noise.items()}
+def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
+    said = f"{setting.file}: experiment '{item.label}'"
+    source = setting.read(item)
+    if item.scenario is None:
+        made = experiment_without_scenario(item, source, setting)
+    else:
+        made = _experiment_of(item, item.scenario, source, setting)
+    return made if item.step is None else _with_step(made, item.step, f"{said}: step")
+
+
+def _with_step(experiment: Experiment, text: str, said: str) -> Experiment:
+    step = quantity_of(said, text, "s")
+    if not SHORTEST_STEP <= step <= LONGEST_STEP:
+        raise IdentificationError(f"{said} = '{text}': must be from {SHORTEST_STEP:g} s to {LONGEST_STEP:g} s")
+    return replace(experiment, scenario=replace(experiment.scenario, time_step=step))
+
+
+def _experiment_of(item: ExperimentSection, scenario: str, source: Source, setting: Setting) -> Experiment:
+    said = f"{setting.file}: experiment '{item.label}'"
     return Experiment(
         label=item.label,
-        scenario=_scenario(item, folder),
+        scenario=_scenario(scenario, item.overrides, setting),
         recording=source.recording,
-        start=_quantity(f"{said}: start", item.start, "s"),
+        start=quantity_of(f"{said}: start", item.start or "0 s", "s"),
         channels=item.channels,
-        noise=noise,
-        inputs=item.inputs,
-        initial_state=item.initial_state,
+        noise=noise_of_channels(item.noise, said),
+        inputs=item.inputs or (),
+        initial_state="scenario" if item.initial_state in (None, "scenario") else "recording",
         source=source.trace,
     )
 
 
-def _scenario(item: ExperimentSection, folder: Path) -> Scenario:
-    name = item.scenario if item.scenario in list_scenarios() else str(folder / item.scenario)
-    return load_scenario(name, item.overrides)
+def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenario:
+    found = name if name in list_scenarios() else str(setting.folder / name)
+    chosen = () if setting.valve is None else (f"{_VALVE}={setting.valve}",)
+    return load_scenario(found, (*chosen, *overrides), setting.parameter_set)
 
 
-def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], file: str) -> FreeParameter:
+def _candidate(item: CandidateSection, setting: Setting, noise: Mapping[str, float]) -> Candidate:
+    said = f"{setting.file}: candidate '{item.label}'"
+    interval = quantity_of(f"{said}: interval", item.interval, "s")
+    if interval <= 0.0:
+        raise IdentificationError(f"{said}: interval = '{item.interval}' must be above 0")
+    scenario = _scenario(item.scenario, item.overrides, setting)
+    return Candidate(item.label, scenario, noise_of_channels(item.noise, said) or noise, interval)
+
+
+def _nuisances(item: ExperimentSection, setting: Setting) -> list[FreeParameter]:
+    """Return the numbers that are fitted to one recording only because nobody knows them exactly."""
+    pressures = [FreeParameter(f"initial.{name}", recordings=(item.label,)) for name in _PRESSURES]
+    fitted = pressures if item.initial_state == "fitted" else []
+    return fitted if item.time_offset is None else [*fitted, _time_offset(item, setting)]
+
+
+def _time_offset(item: ExperimentSection, setting: Setting) -> FreeParameter:
+    said = f"{setting.file}: experiment '{item.label}': time_offset"
+    longest = quantity_of(said, item.time_offset or "", "s")
+    if longest <= 0.0:
+        raise IdentificationError(f"{said} = '{item.time_offset}' must be above 0")
+    return FreeParameter(TIME_OFFSET, low=-longest, high=longest, recordings=(item.label,))
+
+
+def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], setting: Setting) -> FreeParameter:
     scenario = next((scenarios[label] for label in item.recordings if label in scenarios), None)
-    quantity = declaration_of(item.path, scenario or next(iter(scenarios.values())))
-    atmosphere = (scenario or next(iter(scenarios.values()))).device.supply.atmospheric_pressure
+    acting = scenario or next(iter(scenarios.values()))
+    quantity = declaration_of(item.path, acting)
+    atmosphere = acting.device.supply.atmospheric_pressure
 
     def number(name: str, text: str | None) -> float | None:
-        said = f"{file}: parameter '{item.path}': {name}"
-        return None if text is None else _quantity(said, text, quantity.unit, atmosphere)
+        said = f"{setting.file}: parameter '{item.path}': {name}"
+        return None if text is None else quantity_of(said, text, quantity.unit, atmosphere)
 
-    mean = number("prior.mean", None if item.prior is None else item.prior.mean)
-    prior = None if item.prior is None or mean is None else Prior(mean, abs(mean) * item.prior.relative)
+    if item.prior == "bench":
+        prior: Prior | None = _bench_prior(item, full_path(item.path, acting), setting)
+    else:
+        mean = None if item.prior is None else number("prior.mean", item.prior.mean)
+        prior = None if item.prior is None or mean is None else Prior(mean, abs(mean) * item.prior.relative)
     return FreeParameter(
         path=item.path,
         start=number("start", item.start),
@@ -173,8 +163,13 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], file: 
     )
 
 
-def _quantity(said: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    try:
-        return parse_quantity(text, unit, atmosphere)
-    except UnitError as error:
-        raise IdentificationError(f"{said} = '{text}': {error}") from error
+def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
+    """Return what a bench procedure of the same problem found, as a prior."""
+    estimate = setting.bench.get(path)
+    if estimate is None or not estimate.is_usable:
+        have = ", ".join(path for path, one in setting.bench.items() if one.is_usable) or "none"
+        raise IdentificationError(
+            f"{setting.file}: parameter '{item.path}': prior = 'bench': no procedure of this problem identified it; "
+            f"identified: {have}"
+        )
+    return Prior(estimate.value, estimate.half_width / interval_factor(estimate.confidence))

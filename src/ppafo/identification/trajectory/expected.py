@@ -8,9 +8,10 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.columns import trajectories
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS
 from ppafo.identification.trajectory.information import covariance, data_information, directions_for
-from ppafo.identification.trajectory.preparation import Floats, Measured, Prepared, prepared_times
-from ppafo.identification.trajectory.problem import FITTED_CHANNELS, Range
+from ppafo.identification.trajectory.preparation import Floats, Measured, Prepared, Samples, prepared_times
+from ppafo.identification.trajectory.ranges import Range, reach_of
 from ppafo.identification.trajectory.residuals import Residuals, coordinate_bounds
 from ppafo.identification.trajectory.result import TrajectoryFit
 from ppafo.identification.trajectory.search import is_at_bound
@@ -51,10 +52,18 @@ class Expected:
 def expected_information(fit: TrajectoryFit, candidates: Sequence[Candidate]) -> tuple[Expected, ...]:
     """Return what each candidate would bring, the most informative first."""
     ranges, point = fit.optimum.residuals.ranges, fit.optimum.point
-    known = fit.information / fit.inflation + _what_bounds_say(ranges)
+    known = _known(fit) + _what_bounds_say(ranges)
     directions = directions_for(known, is_at_bound(point, ranges))
     brought = [_expected(fit, known, candidate, directions) for candidate in candidates]
     return tuple(sorted(brought, key=lambda one: -one.gain))
+
+
+def _known(fit: TrajectoryFit) -> Floats:
+    """Return the information that the covariance of a fit stands for."""
+    uncertainty = fit.uncertainty
+    if fit.problem.search.loss == "linear":
+        return np.asarray(uncertainty.curvature / uncertainty.inflation)
+    return covariance(uncertainty.covariance)
 
 
 def _expected(fit: TrajectoryFit, known: Floats, candidate: Candidate, directions: Floats) -> Expected:
@@ -83,10 +92,11 @@ def _imagined(candidate: Candidate, ranges: tuple[Range, ...], point: Floats) ->
     time: Floats = candidate.interval * np.arange(count + 1, dtype=np.float64)
     numbers = {item.path: item.number(float(z)) for item, z in zip(ranges, point, strict=True)}
     empty = tuple(Measured(name, np.zeros(time.size), noise) for name, noise in candidate.noise.items())
-    prepared = prepared_times(candidate.label, candidate.scenario, time, empty, numbers)
+    samples = Samples(time, empty, reach_of(ranges))
+    prepared = prepared_times(candidate.label, candidate.scenario, samples, numbers)
     signals = trajectories([prepared], ranges, point[None, :])[0]
     filled = tuple(Measured(one.name, signals[one.name][:, 0], one.noise) for one in empty)
-    return replace(prepared, channels=filled)
+    return replace(prepared, samples=replace(samples, channels=filled))
 
 
 def _what_bounds_say(ranges: Sequence[Range]) -> Floats:

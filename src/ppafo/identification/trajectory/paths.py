@@ -14,6 +14,12 @@ from ppafo.simulation.scenario import FreeMotion, Scenario
 
 _CHOSEN_VALVE = "valve."
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
+TIME_OFFSET = "recording.time_offset"
+"""Path of a number that no scenario has: the time by which the samples of a recording are later than the run."""
+
+RECORDING = (
+    Quantity("time_offset", "s", "time by which the samples are later than the run, a late trigger", 0.0, -1.0, 1.0),
+)
 _INITIAL = {"initial.pressure_1": "initial_pressure_1", "initial.pressure_2": "initial_pressure_2"}
 
 
@@ -32,7 +38,8 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     found |= {f"valves.{device.valve_name}.{item.name}": item for item in valve}
     if isinstance(scenario.motion, FreeMotion):
         found |= {f"motion.{item.name}": item for item in FREE}
-    return found | {f"initial.{item.name}": item for item in INITIAL}
+    found |= {f"initial.{item.name}": item for item in INITIAL}
+    return found | {f"recording.{item.name}": item for item in RECORDING}
 
 
 def declaration_of(path: str, scenario: Scenario) -> Quantity:
@@ -46,8 +53,10 @@ def declaration_of(path: str, scenario: Scenario) -> Quantity:
 
 
 def number_at(scenario: Scenario, path: str) -> float:
-    """Return the number at a path in SI units."""
+    """Return the number at a path in SI units; the time offset of a recording is 0 before it is fitted."""
     declaration_of(path, scenario)
+    if path == TIME_OFFSET:
+        return 0.0
     parts = _place(full_path(path, scenario), scenario)
     node: Any = scenario
     for part in parts:
@@ -56,9 +65,10 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 
 def with_numbers(scenario: Scenario, numbers: Mapping[str, float]) -> Scenario:
-    """Return the scenario with numbers replaced; every path must be one that ``declared_numbers`` has."""
+    """Return the scenario with numbers replaced, by paths of ``declared_numbers``; a time offset is none of it."""
     for path, number in numbers.items():
-        scenario = _replaced(scenario, _place(path, scenario), number)
+        if path != TIME_OFFSET:
+            scenario = _replaced(scenario, _place(path, scenario), number)
     return scenario
 
 

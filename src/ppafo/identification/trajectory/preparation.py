@@ -1,4 +1,4 @@
-"""Makes an experiment ready for fitting: measured inputs, initial state, noise, times, and one clock for all columns.
+"""Makes an experiment ready for fitting: its samples with their noise, and one clock for all columns.
 
 The division of the step is taken from the start values and stays as it is while the search goes on, because a step
 that changes with the numbers would make the residual jump. ``refined`` takes it anew at other numbers.
@@ -11,24 +11,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.replay import StepInputs
 from ppafo.engine.run import Run
 from ppafo.errors import IdentificationError
+from ppafo.identification.trajectory.completion import scenario_of
+from ppafo.identification.trajectory.experiment import Experiment
 from ppafo.identification.trajectory.paths import with_numbers
-from ppafo.identification.trajectory.problem import Experiment
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs
+from ppafo.simulation.scenario import Scenario
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FEWEST_SAMPLES = 10
-_OPEN_LOOP = "constant"
-_COMMAND_CHANGE = 1.0e-3
 _FITS = 1.0e-6
 _SPREAD_OF_MEDIAN = 1.4826
 _KEPT = 3.0
 _SHARE_OF_KEPT = 0.98658
 """Standard deviation of a normal distribution cut at 3 standard deviations, over that of the whole."""
+
+_READ_INTERVAL = 5.0e-5
+"""Seconds between two records that samples lie in between: a chamber fills within milliseconds ..."""
+_MOST_RECORDS = 100_000
+"""... and more where a recording is so long that memory would run out."""
 
 _GAIN_OF_DIFFERENCES = math.sqrt(20.0)
 """Standard deviation of the third difference of white noise over that of the noise."""
@@ -44,24 +50,55 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
+class Samples:
+    """What a run is compared with: times [s] of the run, channels, and how far [s] a fitted offset may move them."""
+
+    time: Floats
+    channels: tuple[Measured, ...]
+    reach: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Prepared:
     """An experiment by its label, with its scenario completed and its samples placed in the record of a run.
 
     ``run`` has the step and the clock of all columns; a sample is ``share`` [-] of the way from record ``place`` to the
-    next. ``time`` is in the time of the run [s].
+    next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
+    nothing. ``time_offset`` [s] is how much later the samples are than the run, where it is not fitted.
     """
 
     label: str
     scenario: Scenario
     run: Run
-    time: Floats
+    samples: Samples
     place: Indices
     share: Floats
-    channels: tuple[Measured, ...]
+    recorded: RecordedInputs | None = None
+    inputs: StepInputs | None = None
+    time_offset: float = 0.0
+
+    @property
+    def time(self) -> Floats:
+        """Times of the samples in the time of the run [s]."""
+        return self.samples.time
+
+    @property
+    def channels(self) -> tuple[Measured, ...]:
+        """The channels that are compared."""
+        return self.samples.channels
+
+    @property
+    def record_interval(self) -> float:
+        """Time between two records of the run [s]."""
+        return self.run.step * self.run.record_every
 
 
-def prepare(experiment: Experiment, numbers: Mapping[str, float]) -> Prepared:
-    """Return the experiment made ready; ``numbers`` by path are the start values, which decide the step."""
+def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float = 0.0) -> Prepared:
+    """Return the experiment made ready.
+
+    ``numbers`` by path are the start values, which decide the step; ``reach`` [s] is the largest time offset that is
+    tried.
+    """
     recording, said = experiment.recording, f"experiment '{experiment.label}'"
     inside = recording.time >= experiment.start - _FITS
     time = np.maximum(recording.time[inside] - experiment.start, 0.0)
@@ -70,25 +107,27 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float]) -> Prepared:
             f"{said}: {recording.label} has {time.size} samples after {experiment.start:g} s, "
             f"at least {FEWEST_SAMPLES} are needed"
         )
-    scenario = _with_initial_state(experiment, _with_inputs(experiment, inside))
-    scenario = replace(scenario, duration=float(time[-1]))
     channels = tuple(_measured(experiment, name, inside) for name in experiment.channels)
-    return prepared_times(experiment.label, scenario, time, channels, numbers)
+    scenario = replace(scenario_of(experiment), duration=float(time[-1]) + reach)
+    recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
+    return _planned(experiment.label, scenario, Samples(time, channels, reach), numbers, recorded)
 
 
-def prepared_times(
-    label: str, scenario: Scenario, time: Floats, channels: tuple[Measured, ...], numbers: Mapping[str, float]
-) -> Prepared:
-    """Return samples at times [s] of a scenario's run made ready, with the step that ``numbers`` by path need."""
-    return _placed(label, scenario, plan_run(with_numbers(scenario, numbers)), time, channels)
+def prepared_times(label: str, scenario: Scenario, samples: Samples, numbers: Mapping[str, float]) -> Prepared:
+    """Return samples of a scenario's run made ready, with the step that ``numbers`` by path need."""
+    return _planned(label, scenario, samples, numbers, None)
 
 
 def refined(prepared: Prepared, numbers: Mapping[str, float]) -> Prepared:
     """Return the experiment with the step that ``numbers`` by path need, if that is shorter than the present one."""
     run = plan_run(with_numbers(prepared.scenario, numbers))
-    if run.steps_per_sample <= prepared.run.steps_per_sample:
-        return prepared
-    return _placed(prepared.label, prepared.scenario, run, prepared.time, prepared.channels)
+    return prepared if run.steps_per_sample <= prepared.run.steps_per_sample else _placed(prepared, run)
+
+
+def halved(prepared: Prepared, numbers: Mapping[str, float]) -> Prepared:
+    """Return the experiment with steps half as long, or shorter where ``numbers`` by path need it."""
+    scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
+    return _placed(prepared, plan_run(with_numbers(scenario, numbers)))
 
 
 def noise_of(values: Floats) -> float:
@@ -104,23 +143,47 @@ def noise_of(values: Floats) -> float:
     return float(np.sqrt(np.mean(inner * inner)) / _SHARE_OF_KEPT / _GAIN_OF_DIFFERENCES)
 
 
-def _placed(label: str, scenario: Scenario, run: Run, time: Floats, channels: tuple[Measured, ...]) -> Prepared:
-    """Return the samples placed in a record that is no finer than they need."""
-    every = _steps_between_samples(time, run.step)
-    records = math.ceil(float(time[-1]) / (run.step * every) - _FITS)
-    position = time / (run.step * every)
+def _planned(
+    label: str,
+    scenario: Scenario,
+    samples: Samples,
+    numbers: Mapping[str, float],
+    recorded: RecordedInputs | None,
+) -> Prepared:
+    run = plan_run(with_numbers(scenario, numbers))
+    nowhere = np.zeros(samples.time.size)
+    return _placed(Prepared(label, scenario, run, samples, nowhere.astype(np.intp), nowhere, recorded), run)
+
+
+def _placed(prepared: Prepared, run: Run) -> Prepared:
+    """Return the samples placed in a record of a run that is no finer than they need."""
+    samples, recorded = prepared.samples, prepared.recorded
+    every = _steps_between_samples(samples, run.step)
+    records = math.ceil((float(samples.time[-1]) + samples.reach) / (run.step * every) - _FITS)
+    position = samples.time / (run.step * every)
     place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
     share = np.maximum(position - place, 0.0)
     share[share < _FITS] = 0.0
     frozen = replace(run, record_every=every, step_count=records * every)
-    return Prepared(label, scenario, frozen, time, place, share, channels)
+    inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
+    return replace(prepared, run=frozen, place=place, share=share, inputs=inputs)
 
 
-def _steps_between_samples(time: Floats, step: float) -> int:
-    """Return the steps between two records: as many as between two samples if all of these fall on records, else 1."""
-    every = max(1, round(float(np.min(np.diff(time))) / step))
-    position = time / (step * every)
-    return every if bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0))) else 1
+def _steps_between_samples(samples: Samples, step: float) -> int:
+    """Return the steps between two records: as many as between two samples, fewer where these are read in between."""
+    every = max(1, round(float(np.min(np.diff(samples.time))) / step))
+    position = samples.time / (step * every)
+    most = max(1, int(_read_interval(samples) / step * (1.0 + _FITS)))
+    if not bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0))):
+        return most
+    if samples.reach == 0.0:
+        return every
+    return max(count for count in range(1, most + 1) if every % count == 0)
+
+
+def _read_interval(samples: Samples) -> float:
+    """Return the longest time [s] between two records that are read at any time."""
+    return max(_READ_INTERVAL, float(samples.time[-1]) / _MOST_RECORDS)
 
 
 def _measured(experiment: Experiment, name: str, inside: NDArray[np.bool_]) -> Measured:
@@ -132,53 +195,3 @@ def _measured(experiment: Experiment, name: str, inside: NDArray[np.bool_]) -> M
             f"unknown: give its standard deviation in noise, for example from the sensor's data sheet"
         )
     return Measured(name, values, noise)
-
-
-def _with_inputs(experiment: Experiment, inside: NDArray[np.bool_]) -> Scenario:
-    scenario, recording = experiment.scenario, experiment.recording
-    if "supply_pressure" in experiment.inputs:
-        mean = float(np.mean(recording["supply_pressure"][inside]))
-        supply = replace(scenario.device.supply, pressure=mean)
-        scenario = replace(scenario, device=replace(scenario.device, supply=supply))
-    if "command" in experiment.inputs:
-        scenario = _with_command(experiment, scenario, recording["command"][inside])
-    return scenario
-
-
-def _with_command(experiment: Experiment, scenario: Scenario, command: Floats) -> Scenario:
-    said = f"experiment '{experiment.label}': the measured command"
-    changed = np.flatnonzero(np.abs(command - np.median(command)) > _COMMAND_CHANGE)
-    if changed.size:
-        raise IdentificationError(
-            f"{said} changes (sample {int(changed[0]) + 1} after the start); only a constant one is taken from a file"
-        )
-    if scenario.control.kind != _OPEN_LOOP:
-        raise IdentificationError(
-            f"{said} needs a scenario with controller '{_OPEN_LOOP}', not '{scenario.control.kind}'"
-        )
-    control = replace(scenario.control, settings={**scenario.control.settings, "command": float(np.median(command))})
-    return replace(scenario, control=control)
-
-
-def _with_initial_state(experiment: Experiment, scenario: Scenario) -> Scenario:
-    """Return the scenario that starts where the recording says: at the means of the samples up to the start."""
-    if experiment.initial_state == "scenario":
-        return scenario
-    recording = experiment.recording
-    before = recording.time <= experiment.start + _FITS
-    if not before.any():
-        raise IdentificationError(
-            f"experiment '{experiment.label}': {recording.label} has no sample up to {experiment.start:g} s, from "
-            f"which the initial state could be taken"
-        )
-    means = {name: float(np.mean(recording[name][before])) for name in recording.names}
-    scenario = replace(
-        scenario,
-        initial_pressure_1=means.get("pressure_1", scenario.initial_pressure_1),
-        initial_pressure_2=means.get("pressure_2", scenario.initial_pressure_2),
-    )
-    if "angle" in means and isinstance(scenario.motion, FreeMotion):
-        actuator = scenario.device.actuator
-        angle = float(np.clip(means["angle"], actuator.angle_min, actuator.angle_max))
-        scenario = replace(scenario, motion=replace(scenario.motion, angle=angle))
-    return scenario

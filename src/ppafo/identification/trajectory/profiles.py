@@ -6,9 +6,9 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.trajectory.information import cost_of, covariance, directions_for
-from ppafo.identification.trajectory.paths import full_path, with_numbers
+from ppafo.identification.trajectory.paths import TIME_OFFSET, full_path, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, Prepared
-from ppafo.identification.trajectory.problem import Range
+from ppafo.identification.trajectory.ranges import Range
 from ppafo.identification.trajectory.residuals import Residuals, coordinate_bounds
 from ppafo.identification.trajectory.result import TrajectoryFit
 from ppafo.identification.trajectory.search import descend, is_at_bound
@@ -39,22 +39,16 @@ class Profile:
 
 def profile(fit: TrajectoryFit, path: str) -> Profile:
     """Return the profile likelihood of one fitted number; each of its points is a search over all the others."""
-    ranges = fit.optimum.residuals.ranges
-    names = [item.name for item in ranges]
-    full = full_path(path, fit.scenarios[0])
-    if full not in names:
-        raise IdentificationError(f"'{path}' was not fitted{nearest_name(full, names)}; fitted: {', '.join(names)}")
-    index = names.index(full)
-    item, at = ranges[index], float(fit.optimum.point[index])
-    sides = [_side(fit, index, coordinates) for coordinates in _held(fit, index)]
-    below, above = (dict(side) for side in sides)
+    index = _index(fit, path)
+    item, at = fit.optimum.residuals.ranges[index], float(fit.optimum.point[index])
+    below, above = (dict(_side(fit, index, coordinates)) for coordinates in _held(fit, index))
     rises = {**below, at: 0.0, **above}
     places = np.array(sorted(rises))
     heights = np.array([rises[place] for place in places])
     threshold = interval_factor(fit.problem.search.confidence) ** 2
     middle = int(np.searchsorted(places, at))
     return Profile(
-        path=full,
+        path=item.name,
         unit=item.unit,
         numbers=np.array([item.number(float(place)) for place in places]),
         rises=heights,
@@ -64,11 +58,19 @@ def profile(fit: TrajectoryFit, path: str) -> Profile:
     )
 
 
+def _index(fit: TrajectoryFit, path: str) -> int:
+    names = [item.name for item in fit.optimum.residuals.ranges]
+    full = full_path(path, fit.scenarios[0])
+    if full not in names:
+        raise IdentificationError(f"'{path}' was not fitted{nearest_name(full, names)}; fitted: {', '.join(names)}")
+    return names.index(full)
+
+
 def _held(fit: TrajectoryFit, index: int) -> tuple[Floats, Floats]:
     """Return the coordinates at which a number is held, below and above its estimate, going away from it."""
     at = float(fit.optimum.point[index])
     low, high = (float(side[index]) for side in coordinate_bounds(fit.optimum.residuals.ranges))
-    error = float(np.sqrt(fit.inflation * covariance(fit.information)[index, index]))
+    error = float(np.sqrt(fit.uncertainty.covariance[index, index]))
     shares = np.arange(1, POINTS_PER_SIDE + 1) / POINTS_PER_SIDE
     down, up = min(REACH * error, at - low), min(REACH * error, high - at)
     return (at - down * shares if down > 0.0 else shares[:0]), (at + up * shares if up > 0.0 else shares[:0])
@@ -76,17 +78,24 @@ def _held(fit: TrajectoryFit, index: int) -> tuple[Floats, Floats]:
 
 def _side(fit: TrajectoryFit, index: int, coordinates: Floats) -> list[tuple[float, float]]:
     """Return coordinate and rise on one side; each search starts where the last one ended, moved along the valley."""
-    best = fit.optimum
-    information, point = fit.information, best.point.copy()
+    best, curvature = fit.optimum, fit.uncertainty.curvature
+    point = best.point.copy()
     others = np.arange(len(point)) != index
-    valley = _valley(information, index, others)
+    inflation = _inflation(fit, index)
+    valley = _valley(curvature, index, others)
     found = []
     for coordinate in coordinates:
         point[others] += valley * (coordinate - point[index])
         point[index] = coordinate
         cost, point[others] = _best_of_others(fit, index, point)
-        found.append((float(coordinate), max(0.0, 2.0 * (cost - best.cost)) / fit.inflation))
+        found.append((float(coordinate), max(0.0, 2.0 * (cost - best.cost)) / inflation))
     return found
+
+
+def _inflation(fit: TrajectoryFit, index: int) -> float:
+    """Return the variance of a coordinate over what the curvature of the cost alone would make it."""
+    uncertainty = fit.uncertainty
+    return float(uncertainty.covariance[index, index] / covariance(uncertainty.curvature)[index, index])
 
 
 def _valley(information: Floats, index: int, others: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> Floats:
@@ -106,7 +115,7 @@ def _best_of_others(fit: TrajectoryFit, index: int, point: Floats) -> tuple[floa
         return cost_of(residuals.of_data(point[None, :])[:, 0], search.loss) + prior, point[others]
     low, high = coordinate_bounds(held.ranges)
     start = np.clip(point[others], low, high)
-    part = fit.information[np.ix_(others, others)]
+    part = fit.uncertainty.curvature[np.ix_(others, others)]
     done = descend(held, start, directions_for(part, is_at_bound(start, held.ranges)), search)
     return done.cost + prior, done.point
 
@@ -117,8 +126,10 @@ def _holding(residuals: Residuals, index: int, coordinate: float) -> Residuals:
     number = item.number(coordinate)
 
     def held(prepared: Prepared) -> Prepared:
-        if item.recordings and prepared.label not in item.recordings:
+        if not item.acts_in(prepared.label):
             return prepared
+        if item.path == TIME_OFFSET:
+            return replace(prepared, time_offset=number)
         return replace(prepared, scenario=with_numbers(prepared.scenario, {item.path: number}))
 
     ranges = tuple(other for place, other in enumerate(residuals.ranges) if place != index)

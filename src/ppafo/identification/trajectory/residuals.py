@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.columns import numbers_in, trajectories
 from ppafo.identification.trajectory.preparation import Floats, Prepared, refined
-from ppafo.identification.trajectory.problem import Range
+from ppafo.identification.trajectory.ranges import Range
 
 Mask = NDArray[np.bool_]
 
@@ -40,6 +40,12 @@ class Residuals:
         """Return the residuals of the priors, one for each parameter that has one."""
         mean, deviation, has = prior_coordinates(self.ranges)
         return (point[has] - mean[has]) / deviation[has]
+
+    def channel_slices(self) -> tuple[slice, ...]:
+        """Return the place of each channel among the residuals of the samples."""
+        lengths = [len(channel.values) for item in self.experiments for channel in item.channels]
+        ends = np.cumsum(lengths).tolist()
+        return tuple(slice(end - length, end) for end, length in zip(ends, lengths, strict=True))
 
     def around(self, point: Floats, directions: Floats) -> "Neighbourhood":
         """Return the residuals at a point and one step away from it along each direction (the columns), all at once."""

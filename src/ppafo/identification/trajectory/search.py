@@ -1,14 +1,16 @@
 """The search for the optimum: several starts, each refined with scipy's bounded least squares."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ppafo.engine.lane_rows import LANES
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.information import ROBUST_SCALE, directions_for, precision, standard_errors
 from ppafo.identification.trajectory.preparation import Floats
-from ppafo.identification.trajectory.problem import Range, Search
+from ppafo.identification.trajectory.problem import Search
+from ppafo.identification.trajectory.ranges import Range
 from ppafo.identification.trajectory.residuals import FIRST_STEP, Mask, Neighbourhood, Residuals, coordinate_bounds
 
 DRAWS_PER_START = 8
@@ -37,11 +39,14 @@ class Optimum:
     has_converged: bool
 
 
-def optimum(residuals: Residuals, search: Search) -> Optimum:
-    """Return the best optimum of all starts."""
+def optimum(residuals: Residuals, search: Search, tell: Callable[[str], None] = lambda _text: None) -> Optimum:
+    """Return the best optimum of all starts; ``tell`` is called with what is being done."""
     best: Optimum | None = None
     evaluations = 0
-    for start in _starts(residuals, search):
+    starts = _starts(residuals, search)
+    for number, start in enumerate(starts, start=1):
+        least = "" if best is None else f", least misfit so far {best.cost:.6g}"
+        tell(f"trajectory fit: start {number} of {len(starts)}{least}")
         found = _refine(residuals, start, search)
         evaluations += found.evaluations
         if best is None or found.cost < best.cost:
@@ -143,7 +148,9 @@ def _best_draws(residuals: Residuals, first: Floats, search: Search) -> list[Flo
     low, high = _near(residuals.ranges, first)
     random = np.random.default_rng(search.seed)
     points = low + (high - low) * random.random((DRAWS_PER_START * search.other_starts, len(first)))
-    costs = np.sum(np.square(residuals.of_data(points)), axis=0)
+    # In blocks: the records of hundreds of runs at once would fill the memory.
+    blocks = [points[first : first + LANES] for first in range(0, len(points), LANES)]
+    costs = np.concatenate([np.sum(np.square(residuals.of_data(block)), axis=0) for block in blocks])
     order = [int(index) for index in np.argsort(costs) if np.isfinite(costs[index])]
     return [points[index] for index in order[: search.other_starts]]
 

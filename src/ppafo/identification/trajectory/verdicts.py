@@ -9,7 +9,8 @@ import numpy as np
 
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.trajectory.preparation import Floats
-from ppafo.identification.trajectory.problem import Range, Search
+from ppafo.identification.trajectory.problem import Search
+from ppafo.identification.trajectory.ranges import Range
 from ppafo.identification.trajectory.search import is_at_bound
 
 STRONG = 0.8

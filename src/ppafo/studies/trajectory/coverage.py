@@ -48,6 +48,7 @@ def coverage(
     choose: Callable[[Planted, np.random.Generator], tuple[FreeParameter, ...]] = eight_parameters,
     repetitions: int = REPETITIONS,
     seed: int = 1,
+    search: Search = Search(),  # noqa: B008  # a frozen value
 ) -> Coverage:
     """Return how often intervals hold the planted values, by default for eight parameters from two step responses.
 
@@ -59,7 +60,7 @@ def coverage(
     random = np.random.default_rng(seed)
     fits, seconds = [], []
     for _ in range(repetitions):
-        problem = planted_problem(chosen, choose(chosen, random), noisy_recordings(chosen, random), Search())
+        problem = planted_problem(chosen, choose(chosen, random), noisy_recordings(chosen, random), search)
         found, duration = _timed(problem)
         fits.append(found)
         seconds.append(duration)

@@ -8,13 +8,15 @@ import numpy as np
 
 from ppafo.identification.trajectory import Experiment, FreeParameter, Search, TrajectoryProblem
 from ppafo.identification.trajectory.paths import number_at
-from ppafo.signals.recording import Channel, Recording
+from ppafo.signals.recording import Channel, Floats, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
 
 NOISE: Mapping[str, float] = {"angle": math.radians(0.1), "pressure_1": 500.0, "pressure_2": 500.0}
 """Standard deviations [rad], [Pa] of a potentiometer and of pressure sensors of 0.1 % of 500 kPa."""
+
+_STRAY = 30.0
 
 EIGHT_PARAMETERS = (
     "valve.discharge_coefficient",
@@ -41,10 +43,14 @@ _BACK = (
 
 @dataclass(frozen=True, slots=True)
 class Planted:
-    """Scenarios whose devices hold the true values, and the noise of each channel [rad], [Pa]."""
+    """Scenarios whose devices hold the true values, and the noise of each channel [rad], [Pa].
+
+    ``stray`` is the share of samples whose noise is 30 times as large.
+    """
 
     scenarios: tuple[Scenario, ...]
     noise: Mapping[str, float]
+    stray: float = 0.0
 
     def truth(self, path: str) -> float:
         """Return the planted value at a path, in SI units."""
@@ -59,7 +65,7 @@ def two_step_responses(duration: float = 1.0) -> Planted:
 
 def noisy_recordings(planted: Planted, random: np.random.Generator) -> tuple[Recording, ...]:
     """Return what sensors with white noise would have recorded; the recordings say that they are synthetic."""
-    return tuple(_noisy(simulate(scenario).recording, planted.noise, random) for scenario in planted.scenarios)
+    return tuple(_noisy(simulate(scenario).recording, planted, random) for scenario in planted.scenarios)
 
 
 def planted_problem(
@@ -84,9 +90,17 @@ def eight_parameters(planted: Planted, random: np.random.Generator, spread: floa
     )
 
 
-def _noisy(recording: Recording, noise: Mapping[str, float], random: np.random.Generator) -> Recording:
+def _noisy(recording: Recording, planted: Planted, random: np.random.Generator) -> Recording:
     channels = {
-        name: Channel(recording[name] + deviation * random.standard_normal(len(recording)), recording.unit(name))
-        for name, deviation in noise.items()
+        name: Channel(recording[name] + deviation * _errors(planted, len(recording), random), recording.unit(name))
+        for name, deviation in planted.noise.items()
     }
     return Recording(f"synthetic {recording.label}", recording.time, channels, kind="synthetic")
+
+
+def _errors(planted: Planted, count: int, random: np.random.Generator) -> Floats:
+    """Return errors of samples over the standard deviation of the noise [-]."""
+    errors = random.standard_normal(count)
+    if planted.stray == 0.0:
+        return errors
+    return np.asarray(np.where(random.random(count) < planted.stray, _STRAY * errors, errors))

@@ -54,7 +54,7 @@ def test_residuals_are_white_and_as_large_as_the_noise(three: TrajectoryFit) -> 
         assert channel.is_given
         assert channel.chi_square == pytest.approx(1.0, abs=0.25)
         assert abs(channel.autocorrelation) < 0.2
-    assert three.inflation < 1.3
+    assert three.uncertainty.inflation < 1.3
     assert three.remarks == ()
 
 
@@ -128,7 +128,7 @@ def test_a_model_that_lacks_something_widens_its_intervals_and_says_so(experimen
         scenario=load_scenario("step-response", ["run.duration=0.35 s", "foot_plate.gravity_torque=0.4 N m"]),
     )
     poor = fitted(wrong, FLOW)
-    assert poor.inflation > 10.0
+    assert poor.uncertainty.inflation > 10.0
     assert poor.estimates[0].half_width > 3.0 * whole.estimates[0].half_width
     assert any("angle is not explained down to its noise" in remark for remark in poor.remarks)
 

@@ -2,6 +2,7 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.paths import (
+    TIME_OFFSET,
     broken_order,
     declaration_of,
     declared_numbers,
@@ -13,13 +14,18 @@ from ppafo.simulation.scenario import Scenario
 
 
 def test_every_declared_number_can_be_read_and_replaced(step: Scenario) -> None:
-    paths = list(declared_numbers(step))
+    paths = [path for path in declared_numbers(step) if path != TIME_OFFSET]
     assert len(paths) > 30
     for path in paths:
         changed = with_numbers(step, {path: number_at(step, path) + 0.125})
         assert number_at(changed, path) == number_at(step, path) + 0.125
         others = [other for other in paths if number_at(changed, other) != number_at(step, other)]
         assert others == [path]
+
+
+def test_a_time_offset_belongs_to_the_recording_and_leaves_the_scenario_alone(step: Scenario) -> None:
+    assert number_at(step, TIME_OFFSET) == 0.0
+    assert with_numbers(step, {TIME_OFFSET: 0.01}) is step
 
 
 def test_the_scenario_itself_is_left_as_it_was(step: Scenario) -> None:

@@ -52,7 +52,8 @@ def test_a_parameter_that_makes_no_sense_is_refused(
         ({"channels": ("torque",)}, "channel 'torque' cannot be fitted"),
         ({"channels": ()}, "no channel"),
         ({"noise": {"angle": 0.0}}, "must be above 0"),
-        ({"inputs": ("wind",)}, "no measured input"),
+        ({"inputs": ("comand",)}, "no measured input, did you mean 'command'"),
+        ({"inputs": ("supply_pressure",)}, "has no channel 'supply_pressure' to follow"),
     ],
 )
 def test_an_experiment_that_makes_no_sense_is_refused(
@@ -123,21 +124,3 @@ def test_the_initial_state_is_the_mean_of_the_samples_up_to_the_start(experiment
     assert before.sum() == 11
     assert prepared.scenario.initial_pressure_1 == pytest.approx(float(np.mean(clean["pressure_1"][before])))
     assert prepared.scenario.initial_pressure_2 == pytest.approx(float(np.mean(clean["pressure_2"][before])))
-
-
-def test_supply_pressure_and_command_are_taken_from_the_recording(experiment: Experiment) -> None:
-    count = len(experiment.recording)
-    recording = experiment.recording.with_channel("supply_pressure", np.full(count, 4.0e5), "Pa")
-    recording = recording.with_channel("command", np.full(count, 0.5), "-")
-    given = dataclasses.replace(experiment, recording=recording, inputs=("supply_pressure", "command"))
-    prepared = prepare(given, {})
-    assert prepared.scenario.device.supply.pressure == 4.0e5
-    assert prepared.scenario.control.settings["command"] == 0.5
-
-
-def test_a_command_that_changes_is_refused_by_sample(experiment: Experiment) -> None:
-    command = np.ones(len(experiment.recording))
-    command[40:60] = 0.0
-    recording = experiment.recording.with_channel("command", command, "-")
-    with pytest.raises(IdentificationError, match="sample 41 "):
-        prepare(dataclasses.replace(experiment, recording=recording, inputs=("command",)), {})

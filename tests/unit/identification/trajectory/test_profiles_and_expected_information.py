@@ -86,7 +86,7 @@ def test_the_same_experiment_again_narrows_everything_by_the_square_root_of_two(
 ) -> None:
     (again,) = expected_information(found, [Candidate("again", experiment.scenario, experiment.noise)])
     for share in again.shrinkage.values():
-        assert share == pytest.approx(1.0 / np.sqrt(2.0 / found.inflation), rel=0.12)
+        assert share == pytest.approx(1.0 / np.sqrt(2.0 / found.uncertainty.inflation), rel=0.12)
     assert again.gain == pytest.approx(1.5 * np.log(2.0), rel=0.2)
 
 

@@ -1,0 +1,57 @@
+"""What a recording must be before a run follows it; every refusal names file, sample and remedy."""
+
+import numpy as np
+
+from ppafo.errors import DataError
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded.inputs import COMMAND, SUPPLY
+
+PRESSURES = ("pressure_1", "pressure_2", SUPPLY)
+
+LONGEST_GAP = 0.05
+"""Seconds without a sample in which so much can happen that the inputs are not known any more ..."""
+GAP_SAMPLES = 10.0
+"""... unless the whole recording is as slow as that: a gap is this many times the usual time between samples."""
+
+_COMMAND_TOLERANCE = 1.0e-6
+_SMALLEST_ABSOLUTE = 0.3
+"""Share of the atmosphere; an absolute pressure below it is almost surely a gauge pressure under the wrong name."""
+
+
+def usual_interval(time: Floats) -> float:
+    """Return the median time between two samples [s]."""
+    return float(np.median(np.diff(time)))
+
+
+def check_gaps(recording: Recording, file: str) -> None:
+    """Refuse a recording with a gap in which its inputs are not known."""
+    gaps = np.diff(recording.time)
+    longest = int(np.argmax(gaps))
+    if gaps[longest] > max(LONGEST_GAP, GAP_SAMPLES * usual_interval(recording.time)):
+        raise DataError(
+            f"{file}: there is a gap of {gaps[longest]:.4g} s after {recording.time[longest]:.6g} s (sample "
+            f"{longest + 1}), in which the inputs are not known; cut the recording there"
+        )
+
+
+def check_command(recording: Recording, file: str) -> None:
+    """Refuse a command beyond -1 to 1."""
+    command = recording[COMMAND]
+    worst = int(np.argmax(np.abs(command)))
+    if abs(command[worst]) > 1.0 + _COMMAND_TOLERANCE:
+        raise DataError(
+            f"{file}: '{COMMAND}' is {command[worst]:.6g} at {recording.time[worst]:.6g} s (sample {worst + 1}); it "
+            "must be from -1 to 1, the share of full opening"
+        )
+
+
+def check_absolute(recording: Recording, atmosphere: float, file: str) -> None:
+    """Refuse pressures that cannot be absolute; ``atmosphere`` [Pa absolute]."""
+    for name in (name for name in PRESSURES if name in recording):
+        lowest = int(np.argmin(recording[name]))
+        if recording[name][lowest] < _SMALLEST_ABSOLUTE * atmosphere:
+            raise DataError(
+                f"{file}: '{name}' is {recording[name][lowest]:.6g} Pa absolute at {recording.time[lowest]:.6g} s "
+                f"(sample {lowest + 1}), far below the atmosphere; is it a gauge pressure ('{name} [psi_g]')?"
+            )

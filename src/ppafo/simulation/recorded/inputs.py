@@ -1,0 +1,90 @@
+"""Inputs of a run that were recorded: command, supply pressure and external torque, for every step."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.engine.replay import StepInputs
+from ppafo.engine.run import Run
+from ppafo.parameters.device import Device
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+
+COMMAND, SUPPLY, EXTERNAL_TORQUE = "command", "supply_pressure", "external_torque"
+
+LONGEST_STEP = 1.0e-3
+"""Seconds over which a recorded pressure or torque is averaged, and the longest step of a replay."""
+
+SHORTEST_SAMPLE = 1.0e-4
+"""Seconds; irregular samples are placed on a grid no finer than this."""
+
+_UNIFORM = 0.02
+"""Share of a sample by which a time may be off a regular grid; clocks write rounded times."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedInputs:
+    """Channels ``names`` of a recording that a run follows; ``start`` [s] of the recording is time 0 of the run."""
+
+    recording: Recording
+    names: tuple[str, ...]
+    start: float
+
+    def has(self, name: str) -> bool:
+        """True where the run follows this channel."""
+        return name in self.names
+
+
+def regular_interval(time: Floats) -> float | None:
+    """Return the time between samples [s] where they are regular, else None."""
+    interval = float(time[-1] - time[0]) / (time.size - 1)
+    away = time - time[0] - interval * np.arange(time.size)
+    return interval if float(np.abs(away).max()) < _UNIFORM * interval else None
+
+
+def sample_period(time: Floats) -> float:
+    """Return the time between samples [s], or of the grid on which irregular samples are placed."""
+    shortest = min(max(float(np.diff(time).min()), SHORTEST_SAMPLE), LONGEST_STEP)
+    return regular_interval(time) or shortest
+
+
+def supply_paths(device: Device) -> tuple[str, ...]:
+    """Return the parameters that follow a recorded supply: both regulators, unless they have two pressures."""
+    supply = device.supply
+    both = ("plant.supply_pressure", "plant.dorsiflexion_pressure")
+    return both if supply.pressure == supply.dorsiflexion_pressure else both[:1]
+
+
+def step_times(run: Run) -> Floats:
+    """Return the time [s] at which each step of a run begins."""
+    return run.step * np.arange(run.step_count, dtype=np.float64)
+
+
+def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
+    """Return what a run follows at each of its steps; ``device`` says which regulators follow the supply."""
+    command = held_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
+    return StepInputs(command, followed_parameters(inputs, device, run))
+
+
+def followed_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
+    """Return the parameters that follow a recording, for every step; each keeps its mean over a millisecond."""
+    followed: dict[str, Floats] = {}
+    if inputs.has(SUPPLY):
+        followed |= dict.fromkeys(supply_paths(device), _between_samples(inputs, SUPPLY, run))
+    if inputs.has(EXTERNAL_TORQUE):
+        followed["plant.external_torque"] = _between_samples(inputs, EXTERNAL_TORQUE, run)
+    return followed
+
+
+def held_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:
+    """Return the last value of a channel at each step; a change falls on the nearest step."""
+    own_times = inputs.recording.time - inputs.start
+    index = np.searchsorted(own_times, step_times(run) + 0.5 * run.step, side="right") - 1
+    return inputs.recording[name][np.maximum(index, 0)]
+
+
+def _between_samples(inputs: RecordedInputs, name: str, run: Run) -> Floats:
+    together = max(1, min(run.steps_per_sample, round(LONGEST_STEP / run.step)))
+    first = (np.arange(run.step_count) // together * together).astype(np.float64)
+    middle = run.step * (first + 0.5 * together)
+    return np.interp(middle, inputs.recording.time - inputs.start, inputs.recording[name])

@@ -1,0 +1,86 @@
+"""The commands of the page on trajectory fits are run as they stand there, on recordings of the virtual rig."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.parameters.loading import load_device, load_parameter_set
+
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "fit-trajectories.md").read_text(encoding="utf-8")
+COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL) for line in block.strip().splitlines()]
+PLANTED = {
+    "foot_plate.inertia": 0.010,
+    "friction.viscous_damping": 0.025,
+    "valves.proportional.discharge_coefficient": 0.13,
+    "friction.static_torque": 0.45,
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The working folder after the commands of the page."""
+    pytest.importorskip("sksundae")
+    home = tmp_path_factory.mktemp("page")
+    (toml,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    (home / "problem.toml").write_text(toml)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(home)
+        for command in COMMANDS:
+            assert main(shlex.split(command)[1:]) == 0
+    return home
+
+
+@pytest.fixture(scope="module")
+def document(folder: Path) -> dict[str, Any]:
+    """What the fit says of itself."""
+    found: dict[str, Any] = json.loads((folder / "identified" / "estimates.json").read_text())["trajectory"]
+    return found
+
+
+def test_the_page_records_twice_and_identifies_once() -> None:
+    assert [shlex.split(command)[:3] for command in COMMANDS] == [
+        ["ppafo", "rig", "record"],
+        ["ppafo", "rig", "record"],
+        ["ppafo", "identify", "problem.toml"],
+    ]
+
+
+def test_what_was_planted_in_the_rig_is_found(document: dict[str, Any]) -> None:
+    estimates = {item["path"]: item for item in document["estimates"]}
+    for path, planted in PLANTED.items():
+        half_width = 0.5 * (estimates[path]["high"] - estimates[path]["low"])
+        assert estimates[path]["verdict"] == "identified"
+        # Three standard errors: 3/1.96 half widths.
+        assert abs(estimates[path]["value"] - planted) < 3.0 / 1.96 * half_width, path
+        assert half_width < 0.01 * planted
+
+
+def test_the_trigger_was_not_late_and_nothing_is_left_but_noise(document: dict[str, Any]) -> None:
+    (offset,) = [item for item in document["estimates"] if item["path"].startswith("recording.time_offset")]
+    assert abs(offset["value"]) < 2e-6
+    assert document["remarks"] == []
+    assert document["recordings_are"] == "synthetic"
+
+
+def test_the_new_set_is_a_device_whose_values_name_both_recordings(folder: Path) -> None:
+    file = folder / "identified" / "fitted.toml"
+    assert load_device(file).foot_plate.inertia == pytest.approx(0.010, rel=1e-3)
+    entry = load_parameter_set(file).numbers["friction.viscous_damping"]
+    assert entry.origin == "identified"
+    assert len(re.findall(r"step-response\.csv sha256:[0-9a-f]{64}", entry.source)) == 2
+
+
+def test_the_output_on_the_page_is_that_of_the_command(folder: Path) -> None:
+    (shown,) = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)
+    printed = (folder / "identified" / "identify.txt").read_text()
+
+    def words(text: str) -> list[str]:
+        # Last digits may differ from computer to computer.
+        return re.sub(r"[-+]?\d[\d.e+-]*", "0", text).split()
+
+    assert words(shown) == words(printed)

@@ -1,0 +1,311 @@
+"""The section [trajectory] of a problem file, from recordings to the new set."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.errors import PpafoError
+from ppafo.identification.identify import Identification, identify
+from ppafo.identification.problem import json_schema
+from ppafo.parameters.loading import parse_parameter_set
+from ppafo.parameters.writing import parameter_set_toml
+from ppafo.reporting.identification_files import identification_document, identification_files
+from ppafo.reporting.identification_table import identification_table
+from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.simulate import simulate
+from ppafo.storage import write_csv
+
+HEAD = 'schema_version = 1\nname = "fitted"\ndevice.set = "ppafo2011"\n'
+NOISE = {"angle": 0.0017, "pressure_1": 500.0, "pressure_2": 500.0, "supply_pressure": 300.0}
+PLANTED = ("foot_plate.inertia=10 g m^2", "valve.discharge_coefficient=0.13", "run.duration=0.35 s")
+PARAMETERS = """
+[[trajectory.parameters]]
+path = "foot_plate.inertia"
+low = "2 g m^2"
+high = "50 g m^2"
+[[trajectory.parameters]]
+path = "valve.discharge_coefficient"
+"""
+STEP = """
+[[trajectory.experiments]]
+label = "step"
+recording = "step.csv"
+scenario = "step-response"
+"""
+REPLAYED = """
+[[trajectory.experiments]]
+label = "replayed"
+recording = "task.csv"
+initial_state = "fitted"
+"""
+SLOW = """
+[[trajectory.candidates]]
+label = "slow"
+scenario = "step-response"
+overrides = ["controller.command=0.2"]
+"""
+STATIC = '[[procedure]]\nkind = "static_torque"\nrecordings = ["static.csv"]\n'
+DECAY = '[[procedure]]\nkind = "free_decay"\nrecordings = ["decay.csv"]\ninertia = "10 g m^2"\n'
+FIT = f"[trajectory]\n{PARAMETERS}{STEP}"
+
+Solve = Callable[[str], Identification]
+
+
+def noisy(recording: Recording, seed: int) -> Recording:
+    random = np.random.default_rng(seed)
+    channels = {
+        name: Channel(channel.values + NOISE.get(name, 0.0) * random.standard_normal(len(recording)), channel.unit)
+        for name, channel in recording.channels.items()
+        if name in (*NOISE, "command")
+    }
+    return Recording(f"synthetic {recording.label}", recording.time, channels, kind="synthetic")
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory: pytest.TempPathFactory, planted: ModuleType) -> Path:
+    """A folder with recordings of a device whose inertia and valve are not those of the set."""
+    folder = tmp_path_factory.mktemp("laboratory")
+    task = simulate(
+        load_scenario("torque-task-proportional", [*PLANTED, "motion.kind=free", "motion.angle=60 deg"])
+    ).recording
+    supply = load_scenario("torque-task-proportional").device.supply.pressure
+    task = task.with_channel("supply_pressure", np.full(len(task), supply), "Pa")
+    write_csv(folder / "step.csv", noisy(simulate(load_scenario("step-response", PLANTED)).recording, 1))
+    write_csv(folder / "task.csv", noisy(task, 2))
+    write_csv(folder / "static.csv", planted.static().recording)
+    write_csv(folder / "decay.csv", planted.decay().recording)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def solve(laboratory: Path) -> Solve:
+    """Solves a problem in that folder."""
+
+    def solved(text: str) -> Identification:
+        path = laboratory / "problem.toml"
+        path.write_text(HEAD + text)
+        return identify(path)
+
+    return solved
+
+
+@pytest.fixture(scope="module")
+def both(solve: Solve) -> Identification:
+    """A step response beside a recording that has no scenario, with all that can be asked for."""
+    asked = 'profiles = ["foot_plate.inertia"]\nother_starts = 1\nloss = "soft_l1"\n'
+    return solve(f"[trajectory]\n{asked}{PARAMETERS}{STEP}time_offset = '5 ms'\n{REPLAYED}{SLOW}")
+
+
+def test_planted_values_are_found_from_a_scenario_and_from_a_recording_without_one(both: Identification) -> None:
+    assert both.trajectory is not None
+    truth = {"foot_plate.inertia": 0.010, "valves.proportional.discharge_coefficient": 0.13}
+    for estimate in both.trajectory.fit.estimates:
+        if estimate.path in truth:
+            assert estimate.verdict == "identified"
+            # Three standard errors: 3/1.96 half widths.
+            assert abs(estimate.value - truth[estimate.path]) < 3.0 / 1.96 * estimate.half_width
+    assert both.is_good
+    assert both.trajectory.remarks == ()
+
+
+def test_nuisances_of_one_recording_are_fitted_but_do_not_get_into_the_set(both: Identification) -> None:
+    assert {estimate.path for estimate in both.estimates} == {
+        "foot_plate.inertia",
+        "valves.proportional.discharge_coefficient",
+        "recording.time_offset of step",
+        "initial.pressure_1 of replayed",
+        "initial.pressure_2 of replayed",
+    }
+    assert set(both.new_set.written) == {"foot_plate.inertia", "valves.proportional.discharge_coefficient"}
+
+
+def test_the_new_set_says_where_its_values_come_from_and_reads_back(both: Identification) -> None:
+    new = both.new_set.parameter_set
+    entry = new.numbers["foot_plate.inertia"]
+    assert (entry.origin, entry.unit) == ("identified", "g m^2")
+    first, second = entry.source.split("; ")
+    assert first.startswith("step.csv sha256:")
+    assert second.startswith("task.csv sha256:")
+    assert entry.note is not None
+    assert "95% interval" in entry.note
+    assert parse_parameter_set(parameter_set_toml(new).encode(), "fitted.toml") == new
+
+
+def test_the_document_has_all_that_the_fit_says(both: Identification) -> None:
+    document = json.loads(json.dumps(identification_document(both)))["trajectory"]
+    assert document["recordings_are"] == "synthetic"
+    assert [item["inputs"] for item in document["recordings"]] == [[], ["command", "supply_pressure"]]
+    assert np.array(document["covariance"]).shape == np.array(document["correlation"]).shape == (5, 5)
+    assert len(document["channels"]) == 6
+    assert [item["path"] for item in document["profiles"]] == ["foot_plate.inertia"]
+    assert len(document["profiles"][0]["numbers"]) == len(document["profiles"][0]["rises"]) == 9
+    assert document["next_experiments"][0]["label"] == "slow"
+    assert document["next_experiments"][0]["gain"] > 0.0
+    assert document["search"]["loss"] == "soft_l1"
+    assert document["parameters"][0]["high"] == pytest.approx(0.05)
+
+
+def test_every_recording_has_a_figure_and_correlations_and_profiles_have_one(both: Identification) -> None:
+    names = {"fit-step", "fit-replayed", "correlation", "profiles"}
+    files = identification_files(both)
+    pictures = {f"trajectory-{name}.{kind}" for name in names for kind in ("png", "svg")}
+    assert set(files) == pictures | {"fitted.toml", "estimates.json", "identify.txt"}
+    assert files["trajectory-profiles.png"].startswith(b"\x89PNG")
+
+
+def test_the_table_shows_units_of_the_set_checks_profiles_and_the_next_experiment(both: Identification) -> None:
+    text = "\n".join(identification_table(both))
+    assert "trajectory (synthetic): 5 numbers fitted to 2 recordings" in text
+    assert "holds: what is left" in text
+    assert "profile: foot_plate.inertia: 9.9" in text
+    assert "g m^2" in text
+    assert "next experiment 1: slow: gain" in text
+
+
+def test_the_fit_starts_from_what_the_bench_found_and_keeps_the_rest_of_it(solve: Solve) -> None:
+    outcome = solve(STATIC + FIT)
+    assert outcome.trajectory is not None
+    (scenario,) = outcome.trajectory.fit.scenarios
+    static = outcome.results[0]
+    assert scenario.device.actuator.torque_constant == static["actuator.torque_constant"].value
+    assert scenario.device.friction.static_torque == static["friction.static_torque"].value
+    started = solve(f"{STATIC}{FIT}[[trajectory.parameters]]\npath = 'friction.static_torque'\n").trajectory
+    assert started is not None
+    friction = started.fit.optimum.residuals.ranges[-1]
+    assert friction.start == pytest.approx(static["friction.static_torque"].value)
+
+
+def test_a_value_that_both_found_is_that_of_the_fit_in_the_new_set(solve: Solve) -> None:
+    outcome = solve(f"{STATIC}{FIT}[[trajectory.parameters]]\npath = 'friction.static_torque'\n")
+    assert outcome.new_set.parameter_set.numbers["friction.static_torque"].source.startswith("step.csv")
+
+
+def test_the_interval_of_the_bench_can_be_the_prior_of_the_fit(solve: Solve) -> None:
+    prior = "[[trajectory.parameters]]\npath = 'friction.static_torque'\nprior = 'bench'\n"
+    outcome = solve(STATIC + FIT + prior)
+    assert outcome.trajectory is not None
+    known = outcome.results[0]["friction.static_torque"]
+    given = outcome.trajectory.fit.optimum.residuals.ranges[-1].prior
+    assert given is not None
+    assert given.mean == known.value
+    assert given.standard_deviation == pytest.approx(known.half_width / 1.96, rel=1e-3)
+    with pytest.raises(PpafoError, match="prior = 'bench': no procedure of this problem identified it"):
+        solve(FIT + prior)
+
+
+def test_a_fit_that_contradicts_the_bench_says_so(solve: Solve) -> None:
+    damping = "[[trajectory.parameters]]\npath = 'friction.viscous_damping'\n"
+    outcome = solve(DECAY + FIT + damping)
+    assert outcome.trajectory is not None
+    bench = outcome.results[0]["friction.viscous_damping"]
+    truth = load_scenario("step-response").device.friction.viscous_damping
+    assert not bench.low <= truth <= bench.high
+    assert any("friction.viscous_damping: fitted to" in remark for remark in outcome.trajectory.remarks)
+
+
+def test_a_model_that_leaves_much_fails_its_check(solve: Solve, laboratory: Path) -> None:
+    slow = 'scenario = "step-response"\noverrides = ["controller.command=0.1"]'
+    wrong = FIT.replace('scenario = "step-response"', slow).replace("valve.discharge_coefficient", "actuator.leak.area")
+    outcome = solve(wrong)
+    assert outcome.trajectory is not None
+    assert "what is left" in [check.name for check in outcome.trajectory.failed]
+    assert not outcome.is_good
+    assert main(["identify", str(laboratory / "problem.toml")]) == 1
+
+
+def test_a_scenario_file_beside_the_problem_and_a_column_map_are_found(solve: Solve, laboratory: Path) -> None:
+    scenario = 'schema_version = 1\nname = "own"\ndevice.set = "ppafo2011-printed"\n'
+    scenario += 'device.overrides = ["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g"]\n'
+    scenario += (
+        'run = { duration = "0.35 s", output_interval = "1 ms" }\nmotion = { kind = "free", angle = "20 deg" }\n'
+    )
+    scenario += 'initial = { pressure_2 = "dorsiflexion_supply" }\n'
+    scenario += 'controller = { kind = "constant", command = 1, rate = "1 kHz" }\n'
+    (laboratory / "own.toml").write_text(scenario)
+    table = np.loadtxt(laboratory / "step.csv", delimiter=",", skiprows=2)
+    header = (laboratory / "step.csv").read_text().splitlines()[1].split(",")
+    columns = [
+        next(index for index, name in enumerate(header) if name.startswith(f"{one} "))
+        for one in ("time", "angle", "pressure_1", "pressure_2")
+    ]
+    np.savetxt(laboratory / "logger.txt", table[:, columns], fmt="%.9g", delimiter=";")
+    mapped = """
+[columns.logger]
+delimiter = "semicolon"
+header = false
+[columns.logger.channels]
+time = { column = 1, unit = "s" }
+angle = { column = 2, unit = "rad" }
+pressure_1 = { column = 3, unit = "Pa_a" }
+pressure_2 = { column = 4, unit = "Pa_a" }
+"""
+    changed = FIT.replace("step.csv", "logger.txt").replace('"step-response"', '"own.toml"\ncolumns = "logger"')
+    outcome = solve(changed + mapped)
+    assert outcome.trajectory is not None
+    assert outcome.trajectory.fit.scenarios[0].device.name == "ppafo2011"
+    assert outcome.trajectory.fit.values["foot_plate.inertia"] == pytest.approx(0.010, rel=0.01)
+
+
+def test_the_published_schema_has_the_section() -> None:
+    section = json_schema()["$defs"]["TrajectorySection"]["properties"]
+    assert {"parameters", "experiments", "profiles", "candidates", "loss"} <= set(section)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "problem.toml: has nothing to do: neither a [[procedure]] nor a [trajectory]"),
+        (FIT.replace("scenario =", "scenaro ="), "did you mean 'scenario'"),
+        (FIT.replace('"step-response"', '"step-respons"'), "step-respons"),
+        (FIT.replace("step.csv", "nowhere.csv"), "nowhere.csv"),
+        (FIT.replace('"step"', '"Step 1"'), "trajectory.experiments.0.label"),
+        (FIT.replace("foot_plate.inertia", "foot_plate.inertial"), "did you mean 'foot_plate.inertia'"),
+        (FIT.replace("2 g m^2", "2 g m"), "parameter 'foot_plate.inertia': low = '2 g m': unit 'g m' does not fit"),
+        (FIT.replace("2 g m^2", "70 g m^2"), "problem.toml: trajectory: foot_plate.inertia: start 0.0084 must lie"),
+        (f"{FIT}columns = 'rig'\n", "experiment 'step': there is no column map 'rig'; there are none"),
+        (f"{FIT}inputs = ['comand']\n", "experiment 'step': 'comand' is no measured input, did you mean 'command'"),
+        (f"{FIT}inputs = ['external_torque']\n", "has no channel 'external_torque' to follow"),
+        (f"{FIT}channels = ['torque']\n", "channel 'torque' cannot be fitted"),
+        (f"{FIT}noise = {{ angel = '1 deg' }}\n", "noise of 'angel', did you mean 'angle'"),
+        (f"{FIT}time_offset = '0 s'\n", "experiment 'step': time_offset = '0 s' must be above 0"),
+        (f"{FIT}time_offset = '5 mm'\n", "time_offset = '5 mm': unit 'mm' does not fit"),
+        (f"{FIT}step = '1 min'\n", "step = '1 min': must be from"),
+        (f"{FIT}start = '9 s'\n", "has 0 samples after 9 s"),
+        (f"{FIT}{STEP}", "experiment 'step' is named twice"),
+        (f"{FIT}{REPLAYED}inputs = ['supply_pressure']\n", "has no scenario, so inputs must have 'command'"),
+        (
+            f"{FIT}{REPLAYED}".replace("task.csv", "decay.csv"),
+            "experiment 'replayed': has no scenario, so its recording needs a channel 'command'",
+        ),
+        (f"{FIT}{SLOW}interval = '0 s'\n", "candidate 'slow': interval = '0 s' must be above 0"),
+        (
+            FIT.replace("[trajectory]", "[trajectory]\nprofiles = ['foot_plate.inertias']"),
+            "did you mean 'foot_plate.inertia'",
+        ),
+        (FIT.replace("[trajectory]", "[trajectory]\nloss = 'cubic'"), "trajectory.loss = 'cubic' is not allowed"),
+    ],
+)
+def test_a_mistake_is_one_line_that_says_where(solve: Solve, text: str, message: str) -> None:
+    with pytest.raises(PpafoError) as caught:
+        solve(text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_command_says_what_it_does_and_writes_nothing_for_bad_input(
+    laboratory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (laboratory / "problem.toml").write_text(HEAD + FIT)
+    assert main(["identify", str(laboratory / "problem.toml"), "--out", str(tmp_path / "made")]) == 0
+    assert "trajectory fit: start 1 of 1" in capsys.readouterr().err
+    assert (tmp_path / "made" / "trajectory-fit-step.svg").is_file()
+    (laboratory / "problem.toml").write_text(HEAD + FIT.replace("foot_plate", "footplate"))
+    assert main(["identify", str(laboratory / "problem.toml"), "--out", str(tmp_path / "none")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "none").exists()

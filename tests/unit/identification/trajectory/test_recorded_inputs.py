@@ -1,0 +1,168 @@
+"""Runs that follow their recordings, and samples that are late."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError, IdentificationError
+from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit, profile
+from ppafo.identification.trajectory.columns import trajectories
+from ppafo.identification.trajectory.fitting import residuals_of
+from ppafo.identification.trajectory.preparation import prepare
+from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate
+
+NOISE = {"angle": 0.0017, "pressure_1": 500.0, "pressure_2": 500.0}
+FLOW = FreeParameter("valve.discharge_coefficient", start=0.10)
+INERTIA = FreeParameter("foot_plate.inertia", start=0.010)
+OFFSET = FreeParameter("recording.time_offset", recordings=("step",))
+LATE = 3.4e-3
+
+
+def with_input(experiment: Experiment, name: str, values: np.ndarray, unit: str) -> Experiment:
+    recording = experiment.recording.with_channel(name, values, unit)
+    return dataclasses.replace(experiment, recording=recording, inputs=(*experiment.inputs, name))
+
+
+@pytest.fixture(scope="module")
+def controlled() -> tuple[Scenario, Recording]:
+    """A free vane under PID control: the command changes at every sample."""
+    scenario = load_scenario(
+        "torque-task-proportional", ["motion.kind=free", "motion.angle=60 deg", "run.duration=0.3 s"]
+    )
+    return scenario, simulate(scenario).recording
+
+
+@pytest.fixture(scope="module")
+def late(experiment: Experiment) -> Experiment:
+    """The step response, recorded 3.4 ms later than the run."""
+    recording = dataclasses.replace(experiment.recording, time=experiment.recording.time + LATE)
+    return dataclasses.replace(experiment, recording=recording)
+
+
+def test_a_recorded_command_gives_the_run_that_the_controller_made(controlled: tuple[Scenario, Recording]) -> None:
+    scenario, recording = controlled
+    assert np.count_nonzero(np.diff(recording["command"])) > 100
+    followed = Experiment("task", scenario, recording, noise=NOISE, inputs=("command",))
+    residuals = residuals_of(TrajectoryProblem((FreeParameter("valve.discharge_coefficient"),), (followed,)))
+    truth = np.array([[residuals.ranges[0].coordinate(residuals.ranges[0].start)]])
+    (signals,) = trajectories(residuals.experiments, residuals.ranges, truth)
+    assert signals["angle"][:, 0] == pytest.approx(recording["angle"], abs=1e-9)
+    assert signals["pressure_1"][:, 0] == pytest.approx(recording["pressure_1"], rel=1e-9)
+
+
+def test_forty_runs_follow_the_same_command_as_one(controlled: tuple[Scenario, Recording]) -> None:
+    scenario, recording = controlled
+    followed = Experiment("task", scenario, recording, noise=NOISE, inputs=("command",))
+    residuals = residuals_of(TrajectoryProblem((FLOW,), (followed,)))
+    points = np.linspace(-2.3, -2.1, 40)[:, None]
+    (many,) = trajectories(residuals.experiments, residuals.ranges, points)
+    (last,) = trajectories(residuals.experiments, residuals.ranges, points[-1:])
+    assert np.array_equal(many["angle"][:, -1:], last["angle"])
+
+
+def test_a_recorded_supply_takes_the_place_of_both_regulators(
+    experiment: Experiment, step: Scenario, recorded: Callable[..., Recording]
+) -> None:
+    low = load_scenario(
+        "step-response",
+        ["run.duration=0.35 s", "supply.pressure=45 psi_g", "supply.dorsiflexion_pressure=45 psi_g"],
+    )
+    recording = recorded(low)
+    start = dataclasses.replace(step, initial_pressure_2=low.initial_pressure_2)
+    other = dataclasses.replace(experiment, recording=recording, scenario=start)
+    followed = with_input(other, "supply_pressure", np.full(len(recording), low.device.supply.pressure), "Pa")
+    found = fit(TrajectoryProblem((FLOW,), (followed,)))
+    assert found.values["valves.proportional.discharge_coefficient"] == pytest.approx(0.113, rel=2e-3)
+    blind = fit(TrajectoryProblem((FLOW,), (other,)))
+    assert abs(blind.values["valves.proportional.discharge_coefficient"] / 0.113 - 1.0) > 0.02
+
+
+def test_a_supply_that_changes_is_followed_millisecond_by_millisecond(experiment: Experiment) -> None:
+    count = len(experiment.recording)
+    supply = np.linspace(4.0e5, 4.4e5, count)
+    inputs = prepare(with_input(experiment, "supply_pressure", supply, "Pa"), {}).inputs
+    assert inputs is not None
+    assert inputs.command is None
+    followed = inputs.parameters["plant.supply_pressure"]
+    assert np.array_equal(followed, inputs.parameters["plant.dorsiflexion_pressure"])
+    assert np.unique(followed).size == count - 1
+    # In the middle of the first millisecond, half way from the first sample to the second.
+    assert followed[0] == pytest.approx(0.5 * (supply[0] + supply[1]))
+
+
+def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: Experiment) -> None:
+    followed = with_input(experiment, "supply_pressure", np.full(len(experiment.recording), 4.0e5), "Pa")
+    with pytest.raises(IdentificationError, match="follows the recorded 'supply_pressure'"):
+        TrajectoryProblem((FreeParameter("supply.pressure"),), (followed,))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit", "message"),
+    [
+        ("command", 1.5, "-", "'command' is 1.5 at 0 s .sample 1.; it must be from -1 to 1"),
+        ("supply_pressure", 2.0e4, "Pa", "far below the atmosphere"),
+    ],
+)
+def test_an_input_that_cannot_be_is_refused(
+    experiment: Experiment, name: str, values: float, unit: str, message: str
+) -> None:
+    followed = with_input(experiment, name, np.full(len(experiment.recording), values), unit)
+    with pytest.raises(DataError, match=message):
+        TrajectoryProblem((INERTIA,), (followed,))
+
+
+def test_a_gap_in_an_input_is_refused(experiment: Experiment) -> None:
+    whole = with_input(experiment, "command", np.ones(len(experiment.recording)), "-")
+    time = whole.recording.time.copy()
+    time[100:] += 0.2
+    broken = dataclasses.replace(whole, recording=dataclasses.replace(whole.recording, time=time))
+    with pytest.raises(DataError, match=r"experiment 'step': there is a gap of 0\.201 s"):
+        TrajectoryProblem((INERTIA,), (broken,))
+
+
+def test_a_late_trigger_is_found_and_leaves_the_other_numbers_alone(late: Experiment) -> None:
+    found = fit(TrajectoryProblem((INERTIA, FLOW, OFFSET), (late,)))
+    offset = found.estimate("recording.time_offset of step")
+    assert offset.half_width < 2e-4
+    assert abs(offset.value - LATE) < 3.0 / 1.96 * offset.half_width
+    inertia = found.estimate("foot_plate.inertia")
+    assert abs(inertia.value - 0.0084) < 3.0 / 1.96 * inertia.half_width
+    assert found.remarks == ()
+    ignored = fit(TrajectoryProblem((INERTIA, FLOW), (late,)))
+    assert abs(ignored.values["foot_plate.inertia"] / 0.0084 - 1.0) > 10.0 * inertia.relative_half_width
+
+
+def test_a_long_recording_whose_samples_are_moved_does_not_fill_the_memory(step: Scenario) -> None:
+    time = np.arange(0.0, 60.0, 1e-3)
+    flat = {
+        name: Channel(np.full(time.size, value), unit)
+        for name, value, unit in (("angle", 0.5, "rad"), ("pressure_1", 2e5, "Pa"), ("pressure_2", 2e5, "Pa"))
+    }
+    slow = Experiment("slow", step, Recording("slow", time, flat), noise=NOISE)
+    run = prepare(slow, {}, reach=0.02).run
+    assert run.step_count // run.record_every <= 200_000
+    assert run.steps_per_sample % run.record_every == 0
+
+
+def test_a_time_offset_can_be_held_in_a_profile(late: Experiment) -> None:
+    found = fit(TrajectoryProblem((INERTIA, OFFSET), (late,)))
+    curve, estimate = profile(found, "recording.time_offset of step"), found.estimate("recording.time_offset of step")
+    assert curve.low is not None
+    assert curve.high is not None
+    assert curve.low == pytest.approx(estimate.low, abs=0.3 * estimate.half_width)
+    assert curve.high == pytest.approx(estimate.high, abs=0.3 * estimate.half_width)
+
+
+def test_steps_that_are_long_for_the_noise_are_said(experiment: Experiment, step: Scenario) -> None:
+    clean = simulate(dataclasses.replace(step, time_step=2e-5)).recording
+    noise = {"angle": 1e-6, "pressure_1": 2.0, "pressure_2": 2.0}
+    quiet = dataclasses.replace(experiment, recording=clean, noise=noise)
+    remarks = fit(TrajectoryProblem((FLOW,), (quiet,))).remarks
+    assert any("are long for so little noise" in remark for remark in remarks)
+    fine = dataclasses.replace(quiet, scenario=dataclasses.replace(step, time_step=2e-5))
+    assert not any("are long" in remark for remark in fit(TrajectoryProblem((FLOW,), (fine,))).remarks)

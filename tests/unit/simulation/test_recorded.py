@@ -1,0 +1,82 @@
+"""What a run takes from a recording."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError, ParameterError
+from ppafo.parameters import apply_overrides, load_device, load_parameter_set
+from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.recorded.inputs import RecordedInputs, regular_interval, sample_period, step_inputs, supply_paths
+from ppafo.simulation.recorded.scenario import recorded_scenario, with_highest_supply
+from ppafo.simulation.recorded.start import Start, between_stops, samples_at_rest
+
+
+def recording(time: np.ndarray, command: np.ndarray, supply: np.ndarray) -> Recording:
+    channels = {"command": Channel(command, "-"), "supply_pressure": Channel(supply, "Pa")}
+    return Recording("bench", time, channels)
+
+
+def test_clocks_that_write_rounded_times_are_regular_and_others_are_not() -> None:
+    time = np.arange(0.0, 0.1, 1e-3)
+    assert regular_interval(np.round(time + 4e-6 * (-1.0) ** np.arange(time.size), 6)) == pytest.approx(1e-3, rel=1e-3)
+    bent = np.append(time, [0.2, 0.3])
+    assert regular_interval(bent) is None
+    # Irregular samples are placed on a grid as fine as the closest two, at most a millisecond.
+    assert sample_period(bent) == pytest.approx(1e-3)
+
+
+def test_inputs_begin_at_the_time_of_the_recording_that_is_zero_of_the_run() -> None:
+    time = np.arange(0.0, 0.1, 1e-3)
+    given = recording(time, (time >= 0.0495).astype(float), 4.0e5 + 1.0e6 * time)
+    device = load_device("ppafo2011")
+    run = plan_run(recorded_scenario(given, device, Start(0.5, 0.0, 2e5, 2e5), 0.05, "bench.csv"))
+    inputs = step_inputs(RecordedInputs(given, ("command", "supply_pressure"), 0.04), device, run)
+    assert inputs.command is not None
+    first_open = int(np.argmax(inputs.command))
+    assert first_open * run.step == pytest.approx(0.01, abs=run.step)
+    assert inputs.parameters["plant.supply_pressure"][0] == pytest.approx(4.405e5)
+    # After the last sample, at 0.059 s of the run, all stays as it was.
+    assert inputs.parameters["plant.supply_pressure"][-1] <= 4.99e5
+
+
+def test_both_regulators_follow_the_supply_unless_they_have_two_pressures() -> None:
+    one = load_device("ppafo2011")
+    two = dataclasses.replace(one, supply=dataclasses.replace(one.supply, dorsiflexion_pressure=3.0e5))
+    assert supply_paths(one) == ("plant.supply_pressure", "plant.dorsiflexion_pressure")
+    assert supply_paths(two) == ("plant.supply_pressure",)
+    given = recording(np.array([0.0, 1.0]), np.ones(2), np.array([5.0e5, 6.0e5]))
+    assert supply_paths(with_highest_supply(one, given)) == supply_paths(one)
+    assert with_highest_supply(one, given).supply.pressure == 6.0e5
+    assert with_highest_supply(two, given).supply.dorsiflexion_pressure == 3.0e5
+
+
+def test_rest_ends_at_the_first_command_and_lasts_fifty_milliseconds_at_most() -> None:
+    time = np.arange(0.0, 0.2, 1e-3)
+    assert samples_at_rest(recording(time, np.where(time > 0.0295, 1.0, 0.0), time + 4e5)) == 30
+    assert samples_at_rest(recording(time, np.where(time > 0.1, 1.0, 0.0), time + 4e5)) == 50
+    assert samples_at_rest(recording(time, np.ones(time.size), time + 4e5)) == 1
+
+
+def test_an_angle_slightly_beyond_a_stop_is_the_stop_and_one_far_beyond_is_refused() -> None:
+    device = load_device("ppafo2011")
+    lowest = device.actuator.angle_min
+    assert between_stops(np.array([lowest - 0.01]), device, "bench.csv").tolist() == [lowest]
+    with pytest.raises(DataError, match=r"bench\.csv: 'angle' is .* beyond the stops of ppafo2011"):
+        between_stops(np.array([lowest - 1.0]), device, "bench.csv")
+
+
+def test_a_scenario_runs_on_another_set_with_what_it_changes_in_its_own() -> None:
+    other = apply_overrides(
+        load_parameter_set("ppafo2011"), ["foot_plate.inertia=12 g m^2", "supply.pressure=20 psi_g"]
+    )
+    scenario = load_scenario("step-response", parameter_set=other)
+    assert scenario.device.foot_plate.inertia == pytest.approx(0.012)
+    own = load_scenario("step-response")
+    assert scenario.device.supply.pressure == own.device.supply.pressure
+    without = dataclasses.replace(other, valve_kinds={"main": "proportional"}, default_valve="main")
+    with pytest.raises(ParameterError, match="there is no valve 'proportional'"):
+        load_scenario("step-response", parameter_set=without)
