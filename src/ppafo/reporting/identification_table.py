@@ -33,9 +33,8 @@ def _procedure(result: BenchResult, before: ParameterSet, widths: list[int]) -> 
     lines = textwrap.wrap(f"{result.procedure}{kind}: {result.summary}", _WIDTH, subsequent_indent="  ")
     for item in result.estimates:
         path, value, unit, interval = _row(item, before)
-        lines.append(
-            f"  {path:<{widths[0]}}  {value:>{widths[1]}} {unit:<{widths[2]}}  {interval:<{widths[3]}}  {item.verdict}"
-        )
+        number = f"{value:>{widths[1]}} {unit:<{widths[2]}}"
+        lines.append(f"  {path:<{widths[0]}}  {number}  {interval:<{widths[3]}}  {item.verdict_in_words}")
     for check in result.checks:
         mark = "holds" if check.holds else "FAILS"
         lines += textwrap.wrap(f"  {mark}: {check.name}: {check.statement}", _WIDTH, subsequent_indent="         ")

@@ -31,6 +31,7 @@ CHANNELS: dict[str, ChannelKind] = {
     "mass_1": ChannelKind("kg", "gas in chamber 1"),
     "mass_2": ChannelKind("kg", "gas in chamber 2"),
     "supply_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve"),
+    "dorsiflexion_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve for chamber 2"),
     "pressure_difference": ChannelKind("Pa_d", "pressure in chamber 1 less that in chamber 2"),
     "upstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas comes from"),
     "downstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas goes to"),

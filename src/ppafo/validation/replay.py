@@ -25,7 +25,7 @@ from ppafo.simulation.scenario import (
     Sensors,
 )
 from ppafo.validation.compared import ANGLE
-from ppafo.validation.measured import COMMAND, EXTERNAL_TORQUE, SUPPLY, Measured
+from ppafo.validation.measured import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY, Measured
 from ppafo.validation.start import Start, between_stops
 
 Motion = Literal["free", "measured"]
@@ -65,7 +65,10 @@ def replay_recording(measured: Measured, device: Device, start: Start, motion: M
             f"{measured.file}: the model diverged {until:.6g} s after the first sample; look at the volumes, the "
             "inertia and the valve of the set (ppafo audit)"
         )
-    used = (COMMAND, *(name for name in (SUPPLY, EXTERNAL_TORQUE) if _is_used(measured, name, motion)))
+    used = (
+        COMMAND,
+        *(name for name in (SUPPLY, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE) if _is_used(measured, name, motion)),
+    )
     names = (*used, ANGLE) if motion == "measured" else used
     return Replayed(_recording(measured, run, outcome.record[:, :, 0]), run.step, names)
 
@@ -83,8 +86,8 @@ def _planned(measured: Measured, device: Device, start: Start, extra: float) -> 
     regular = regular_interval(time)
     period = regular or min(max(float(np.diff(time).min()), SHORTEST_SAMPLE), LONGEST_STEP)
     duration = measured.recording.duration + max(extra, period)
-    highest = float(measured.recording[SUPPLY].max()) if measured.has(SUPPLY) else 0.0
-    supply = replace(device.supply, pressure=max(device.supply.pressure, highest))
+    recorded = [float(measured.recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if measured.has(name)]
+    supply = replace(device.supply, pressure=max(device.supply.pressure, *recorded, 0.0))
     scenario = Scenario(
         name=measured.recording.label,
         description="replay of a recording",
@@ -128,6 +131,8 @@ def _parameters(measured: Measured, device: Device, motion: Motion, run: Run, ti
         followed["plant.supply_pressure"] = _between_samples(measured, SUPPLY, middle)
         if device.supply.pressure == device.supply.dorsiflexion_pressure:
             followed["plant.dorsiflexion_pressure"] = followed["plant.supply_pressure"]
+    if measured.has(DORSIFLEXION_SUPPLY):
+        followed["plant.dorsiflexion_pressure"] = _between_samples(measured, DORSIFLEXION_SUPPLY, middle)
     if _is_used(measured, EXTERNAL_TORQUE, motion):
         followed["plant.external_torque"] = _between_samples(measured, EXTERNAL_TORQUE, middle)
     if motion == "measured":
