@@ -170,6 +170,8 @@ def _parsed(unit: str) -> "tuple[pint.Unit, str]":
     except pint.UndefinedUnitError as error:
         unknown = error.unit_names
         raise _unknown_unit(unknown if isinstance(unknown, str) else next(iter(unknown))) from error
+    except ValueError as error:  # pint takes 'nan' and 'inf' for numbers
+        raise _unknown_unit(bare) from error
     if kind and parsed.dimensionality != _registry().parse_units("Pa").dimensionality:
         raise UnitError(f"'{unit}': {_KIND_BELONGS}")
     return parsed, kind

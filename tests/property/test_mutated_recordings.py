@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from ppafo.errors import PpafoError
 from ppafo.parameters import load_device
+from ppafo.storage.column_map import ColumnMap
 from ppafo.validation.measured import read_measured
 from ppafo.validation.validate import MOTIONS, ReplaySettings, compare_recording
 
@@ -15,19 +16,24 @@ DEVICE = load_device("ppafo2011")
 HEADER = "time [s],command [-],supply_pressure [psi_g],angle [deg],pressure_1 [psi_g],pressure_2 [psi_g]"
 ROWS = [f"{0.001 * n:.3f},{0 if n < 5 else 1},{50.1},{60 + n},{min(n, 45)},{45 - min(n, 45)}" for n in range(50)]
 TEXT = "\n".join([HEADER, *ROWS, ""])
+UNITS = dict(cell.removesuffix("]").split(" [") for cell in HEADER.split(","))
+MAP = ColumnMap.model_validate(
+    {"channels": {name: {"column": number, "unit": unit} for number, (name, unit) in enumerate(UNITS.items(), 1)}}
+)
 CELLS = st.sampled_from(["", "nan", "inf", "-1", "1e300", "-1e-300", "0", "130", "1e9", "x", '"', "\0", "½", ",", "\n"])
 
 
-@given(st.integers(0, len(TEXT) - 1), st.integers(0, 40), CELLS, st.sampled_from(MOTIONS))
-@example(len(HEADER) + 1, 5, "-1e300", "free")
+@given(st.integers(0, len(TEXT) - 1), st.integers(0, 40), CELLS, st.sampled_from(MOTIONS), st.booleans())
+@example(len(HEADER) + 1, 5, "-1e300", "free", False)
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_damaged_recording_is_compared_or_refused_in_one_line(
-    tmp_path: Path, start: int, length: int, cell: str, motion: str
+    tmp_path: Path, start: int, length: int, cell: str, motion: str, through_map: bool
 ) -> None:
     path = tmp_path / "bench.csv"
     path.write_text(TEXT[:start] + cell + TEXT[start + length :], encoding="utf-8")
     try:
-        agreement = compare_recording(read_measured(path, DEVICE), DEVICE, ReplaySettings(motion=motion))
+        measured = read_measured(path, DEVICE, MAP if through_map else None)
+        agreement = compare_recording(measured, DEVICE, ReplaySettings(motion=motion))
     except PpafoError as error:
         assert str(error).startswith(str(path))
         assert "\n" not in str(error)

@@ -125,6 +125,12 @@ def test_an_unknown_unit_names_the_nearest_one() -> None:
         check_unit("kPq")
 
 
+@pytest.mark.parametrize("unit", ["nan", "inf", "NaN", "m nan", "nan_g", "m/nan"])
+def test_what_a_parser_may_take_for_a_number_is_no_unit(unit: str) -> None:
+    with pytest.raises(UnitError, match="is not a known unit"):
+        check_unit(unit)
+
+
 def test_a_value_of_any_dimension_has_a_value_in_base_units() -> None:
     assert base_value(113.0, "ms/m") == pytest.approx(0.113)
     assert base_value(2.0, "kPa_a") == pytest.approx(2000.0)

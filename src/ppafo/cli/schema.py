@@ -10,6 +10,8 @@ FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.schema",
     "scenario": "ppafo.simulation.schema",
     "identification": "ppafo.identification.problem",
+    "columns": "ppafo.storage.column_map",
+    "rig": "ppafo.rig.schema",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 

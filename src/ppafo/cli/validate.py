@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
@@ -14,6 +15,9 @@ from ppafo.cli.output import (
     write_files,
 )
 from ppafo.cli.quick_imports import load_compiler, load_drawing
+
+if TYPE_CHECKING:
+    from ppafo.storage.column_map import ColumnMap
 
 _LONGEST_DELAY = "20 ms"
 
@@ -56,7 +60,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=_LONGEST_DELAY,
         help=f"largest delay of the measurement that is looked for; default '{_LONGEST_DELAY}', '0 s' for none",
     )
+    parser.add_argument(
+        "--columns",
+        metavar="FILE.toml[:NAME]",
+        help="a column map, [columns.NAME], for recordings with columns of their own; a problem file may hold it",
+    )
     add_output_arguments(parser)
+
+
+def _column_map(text: str | None) -> "ColumnMap | None":
+    """Return the map that is named as a file, and by name where the file has several."""
+    from ppafo.storage.column_map import load_column_map
+
+    if text is None:
+        return None
+    path, separator, name = text.rpartition(".toml:")
+    return load_column_map(f"{path}.toml", name) if separator and name else load_column_map(text)
 
 
 def run(parsed: argparse.Namespace) -> int:
@@ -77,8 +96,9 @@ def run(parsed: argparse.Namespace) -> int:
         longest_delay=parse_limit(parsed.longest_delay),
         thresholds=parse_thresholds(parsed.thresholds),
     )
+    columns = _column_map(parsed.columns)
     check_output(parsed.out, file_names(parsed.recordings))
-    validation = validate(parsed.parameters, parsed.recordings, parsed.valve, parsed.overrides, settings, tell)
+    validation = validate(parsed.parameters, parsed.recordings, parsed.valve, parsed.overrides, settings, tell, columns)
     lines = agreement_table(validation)
     if parsed.out is not None:
         load_drawing()

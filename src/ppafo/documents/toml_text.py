@@ -33,8 +33,9 @@ class TomlKind:
         if name in self.names():
             return (self.shipped / (name + _SUFFIX)).read_bytes()
         if path.suffix != _SUFFIX and not _exists(path):
-            hint, known = nearest_name(name, self.names()), ", ".join(self.names())
-            raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; known are {known}, or give a .toml file")
+            hint = nearest_name(name, self.names())
+            known = f"known are {', '.join(self.names())}, or " if self.names() else ""
+            raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; {known}give a .toml file")
         try:
             return read_regular_file(path, MOST_BYTES_TYPED)
         except (OSError, ValueError) as error:

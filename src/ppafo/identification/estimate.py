@@ -11,6 +11,7 @@ Verdict = Literal["identified", "weak", "not identifiable", "at its bound", "law
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 _USABLE: tuple[Verdict, ...] = ("identified", "weak")
+_WORTH_TELLING = 1.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,8 @@ class Estimate:
     has a path of its own, which no set knows. An estimate that could not be made has NaN for value and interval.
     ``explanation`` is one or two sentences: residual check, what the value trades against, what is assumed.
     ``recordings`` names each source with its hash: ``static.csv sha256:0123abcd...``.
+    ``widened`` is how many times as wide the interval is as the scatter alone would have it; 1 where the law describes
+    the recordings to within their scatter.
     """
 
     path: str
@@ -32,6 +35,7 @@ class Estimate:
     explanation: str
     recordings: tuple[str, ...]
     confidence: float = 0.95
+    widened: float = 1.0
 
     def __post_init__(self) -> None:
         if self.verdict not in _VERDICTS:
@@ -48,6 +52,13 @@ class Estimate:
     def is_usable(self) -> bool:
         """Whether the value may be written into a parameter set."""
         return self.verdict in _USABLE
+
+    @property
+    def verdict_in_words(self) -> str:
+        """The verdict, and by how much the interval was widened where the law misses the recordings."""
+        if self.is_usable and self.widened >= _WORTH_TELLING:
+            return f"{self.verdict}, widened {self.widened:.3g} times (lack of fit)"
+        return self.verdict
 
     @property
     def half_width(self) -> float:

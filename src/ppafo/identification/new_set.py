@@ -58,7 +58,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
         unit=unit,
         origin="identified",
         source="; ".join(estimate.recordings),
-        note=f"{estimate.verdict}, {interval}. {estimate.explanation} Before, {was}.",
+        note=f"{estimate.verdict_in_words}, {interval}. {estimate.explanation} Before, {was}.",
         uncertainty=max(high - value, value - low),
     )
     kept = {path: old for path, old in parameter_set.numbers.items() if path not in _other_form(estimate.path)}

@@ -20,9 +20,15 @@ _Columns = Annotated[
     _Text | None, Field(description="name of a column map; without one the file has units in its header")
 ]
 _Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="of the intervals; 0.95 unless given")]
+_Calibration = Annotated[
+    float, Field(ge=0.0, lt=0.5, description="relative uncertainty of the sensors' gain, at the same confidence")
+]
 _Start = Annotated[_Text | None, Field(description="first time to use, such as '2 s'")]
 _End = Annotated[_Text | None, Field(description="last time to use, such as '8 s'")]
 _Gas = Annotated[_Text | None, Field(description="species of the gas on the bench; the set's unless given")]
+_Temperature = Annotated[
+    _Text | None, Field(description="of the gas on the bench, such as '17 degC'; the set's unless given")
+]
 _Valve = Annotated[_Text | None, Field(description="name of the set's valve; the chosen one unless given")]
 
 _FILE = TomlKind(
@@ -39,7 +45,7 @@ class StaticTorqueProblem(BaseModel):
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
-    calibration: Annotated[float, Field(ge=0.0, lt=0.5, description="relative uncertainty of the sensors' gain")] = 0.0
+    calibration: _Calibration = 0.0
 
 
 class FreeDecayProblem(BaseModel):
@@ -51,6 +57,7 @@ class FreeDecayProblem(BaseModel):
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
+    calibration: _Calibration = 0.0
     start: _Start = None
     end: _End = None
     inertia: Annotated[_Text | None, Field(description="'8.4 g m^2', or 'unknown'; the set's unless given")] = None
@@ -65,7 +72,9 @@ class OpenValveFlowProblem(BaseModel):
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
+    calibration: _Calibration = 0.0
     gas: _Gas = None
+    temperature: _Temperature = None
     valve: _Valve = None
     law: Annotated[Literal["orifice", "iso6358"], Field(description="the form in which the set gets it")] = "orifice"
 
@@ -79,7 +88,9 @@ class VaneLeakProblem(BaseModel):
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
+    calibration: _Calibration = 0.0
     gas: _Gas = None
+    temperature: _Temperature = None
     start: _Start = None
     end: _End = None
     angle: Annotated[_Text | None, Field(description="vane angle, from which the set's volumes follow")] = None
@@ -96,7 +107,9 @@ class ValveMapProblem(BaseModel):
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
+    calibration: _Calibration = 0.0
     gas: _Gas = None
+    temperature: _Temperature = None
     valve: _Valve = None
 
 

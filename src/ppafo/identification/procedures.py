@@ -30,6 +30,7 @@ from ppafo.units import parse_quantity, to_si
 
 RECOMMENDED_ORDER = ("static_torque", "free_decay", "open_valve_flow", "valve_map", "vane_leak")
 UNKNOWN = "unknown"
+_COLDEST, _HOTTEST = 150.0, 600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,16 +57,36 @@ class Setting:
         except UnitError as error:
             raise IdentificationError(f"{self.place}: {name} = {text!r}: {error}") from error
 
-    def gas(self, species: str | None) -> GasAt:
-        """Return the gas of the bench at the set's temperature; the set's own where no species is named."""
-        temperature = self.number("gas.temperature")
+    def gas(self, species: str | None, text: str | None = None) -> GasAt:
+        """Return the gas of the bench; species and temperature are the set's where none is named."""
+        temperature, half_width = self._temperature(text)
         if species is None:
-            return GasAt(self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio"), temperature)
+            own = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
+            return GasAt(*own, temperature, half_width)
         if species not in SPECIES:
             hint = nearest_name(species, SPECIES)
             known = ", ".join(SPECIES)
             raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; known are {known}")
-        return GasAt(SPECIES[species].molar_mass, SPECIES[species].heat_capacity_ratio, temperature)
+        known_gas = SPECIES[species]
+        return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, half_width)
+
+    def _temperature(self, text: str | None) -> tuple[float, float]:
+        """Return the gas temperature [K] and half the width of its interval [K], which one that is given has not."""
+        given = self.given("temperature", text, "K")
+        if given is None:
+            return self.number("gas.temperature"), self.half_width("gas.temperature", "K")
+        if not _COLDEST <= given <= _HOTTEST:
+            raise IdentificationError(
+                f"{self.place}: temperature = {text!r} must be from {_COLDEST:g} to {_HOTTEST:g} K"
+            )
+        return given, 0.0
+
+    def half_width(self, path: str, unit: str) -> float:
+        """Return the uncertainty of a value as the set has it [unit], a difference; 0 where it has none."""
+        entry = self.parameter_set.numbers.get(path)
+        if entry is None or not entry.uncertainty:
+            return 0.0
+        return to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
 
     def valve_named(self, name: str | None) -> str:
         """Return the path of a valve in the set, ``valves.main``."""
@@ -84,7 +105,8 @@ def _static_torque(sources: tuple[Source, ...], problem: StaticTorqueProblem, _s
 def _free_decay(sources: tuple[Source, ...], problem: FreeDecayProblem, setting: Setting) -> BenchResult:
     start, end = (setting.given(name, getattr(problem, name), "s") for name in ("start", "end"))
     inertia, half_width, source = _inertia(problem, setting)
-    return free_decay(sources, FreeDecaySettings(start, end, inertia, half_width, source, problem.confidence))
+    settings = FreeDecaySettings(start, end, inertia, half_width, source, problem.confidence, problem.calibration)
+    return free_decay(sources, settings)
 
 
 def _inertia(problem: FreeDecayProblem, setting: Setting) -> tuple[float | None, float, str]:
@@ -100,30 +122,36 @@ def _inertia(problem: FreeDecayProblem, setting: Setting) -> tuple[float | None,
     if entry is None:
         return None, 0.0, ""
     value = setting.number("foot_plate.inertia")
-    half_width = to_si(entry.uncertainty or 0.0, entry.unit, "kg m^2")
-    return value, half_width, f"{entry.origin} in {setting.parameter_set.name}"
+    return value, setting.half_width("foot_plate.inertia", "kg m^2"), f"{entry.origin} in {setting.parameter_set.name}"
 
 
 def _open_valve_flow(sources: tuple[Source, ...], problem: OpenValveFlowProblem, setting: Setting) -> BenchResult:
     path = setting.valve_named(problem.valve)
     area = number_in_si(setting.parameter_set, f"{path}.area")
-    return open_valve_flow(
-        sources, OpenValveFlowSettings(setting.gas(problem.gas), problem.law, area, path, problem.confidence)
-    )
+    gas, sure = setting.gas(problem.gas, problem.temperature), (problem.confidence, problem.calibration)
+    return open_valve_flow(sources, OpenValveFlowSettings(gas, problem.law, area, path, *sure))
 
 
 def _valve_map(sources: tuple[Source, ...], problem: ValveMapProblem, setting: Setting) -> BenchResult:
-    return valve_map(
-        sources, ValveMapSettings(setting.gas(problem.gas), setting.valve_named(problem.valve), problem.confidence)
-    )
+    gas, path = setting.gas(problem.gas, problem.temperature), setting.valve_named(problem.valve)
+    return valve_map(sources, ValveMapSettings(gas, path, problem.confidence, problem.calibration))
 
 
 def _vane_leak(sources: tuple[Source, ...], problem: VaneLeakProblem, setting: Setting) -> BenchResult:
     start, end = (setting.given(name, getattr(problem, name), "s") for name in ("start", "end"))
     volume_1, volume_2 = _volumes(problem, setting)
-    coefficient = number_in_si(setting.parameter_set, "actuator.leak.discharge_coefficient")
+    forms = ("discharge_coefficient", "critical_ratio")
+    coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
     settings = VaneLeakSettings(
-        setting.gas(problem.gas), volume_1, volume_2, coefficient, start, end, problem.confidence
+        gas=setting.gas(problem.gas, problem.temperature),
+        volume_1=volume_1,
+        volume_2=volume_2,
+        discharge_coefficient=coefficient,
+        start=start,
+        end=end,
+        confidence=problem.confidence,
+        calibration=problem.calibration,
+        critical_ratio=ratio,
     )
     return vane_leak(sources, settings)
 

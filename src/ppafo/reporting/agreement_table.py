@@ -68,7 +68,7 @@ def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
         f"{_number(shown(channel.bias, name))} {unit}",
         f"{_number(shown(channel.largest, name))} {unit}",
         f"{channel.largest_time:.4g} s",
-        f"{_number(_MILLISECONDS * channel.delay)} ms",
+        f"{'limit, ' if channel.delay_is_at_limit else ''}{_number(_MILLISECONDS * channel.delay)} ms",
         "pass" if channel.passes else "FAIL",
     )
 
@@ -122,6 +122,7 @@ def _channel_document(channel: ChannelAgreement) -> dict[str, Any]:
         "largest": channel.largest,
         "largest_time": channel.largest_time,
         "delay": channel.delay,
+        "delay_is_at_limit": channel.delay_is_at_limit,
         "shown": {"unit": shown_unit(channel.channel), "rms": shown(channel.rms, channel.channel)},
     }
 

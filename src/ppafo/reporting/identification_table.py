@@ -81,7 +81,8 @@ def _candidate(one: Expected) -> str:
 
 def _estimate(item: Estimate, before: ParameterSet, widths: list[int]) -> str:
     path, value, unit, interval = _row(item, before)
-    return f"  {path:<{widths[0]}}  {value:>{widths[1]}} {unit:<{widths[2]}}  {interval:<{widths[3]}}  {item.verdict}"
+    number = f"{value:>{widths[1]}} {unit:<{widths[2]}}"
+    return f"  {path:<{widths[0]}}  {number}  {interval:<{widths[3]}}  {item.verdict_in_words}"
 
 
 def _checks(checks: Iterable[Check]) -> list[str]:

@@ -81,6 +81,8 @@ def _overridden(preset: Preset, path: str, text: str) -> Preset:
 
 def _parsed(document: dict[str, Any], file: str) -> Preset:
     """Check keys, units and ranges of a document; every value must be there."""
+    if not document:
+        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints what belongs in it")
     _check_names(document, (*_HEAD, *SECTIONS), "", file)
     if document.get("schema_version") != 1:
         raise ParameterError(f"{file}: schema_version must be 1, it is {shown(document.get('schema_version'))}")

@@ -24,8 +24,12 @@ CHANNEL_SENSORS = {
     "torque": "torque_sensor",
     "mass_flow": "flow_sensor",
     "friction": "",
+    "dorsiflexion_pressure": "pressure_sensor",
 }
-"""Sensor of each channel; the last one is no sensor but has a stream of random numbers too."""
+"""Sensor of each channel; ``friction`` is no sensor but has a stream of random numbers too.
+
+The order decides the streams: a new channel comes last, so that the numbers of the others stay.
+"""
 
 _STREAMS = {name: number for number, name in enumerate(CHANNEL_SENSORS)}
 

@@ -33,6 +33,7 @@ CHANNELS: dict[str, ChannelKind] = {
     "temperature_1": ChannelKind("K", "temperature of the gas in chamber 1, of a gas with an energy balance"),
     "temperature_2": ChannelKind("K", "temperature of the gas in chamber 2, of a gas with an energy balance"),
     "supply_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve"),
+    "dorsiflexion_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve for chamber 2"),
     "pressure_difference": ChannelKind("Pa_d", "pressure in chamber 1 less that in chamber 2"),
     "upstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas comes from"),
     "downstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas goes to"),

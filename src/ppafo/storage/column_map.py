@@ -1,11 +1,18 @@
 """Column maps: how a table from elsewhere, with its own columns, units and signs, becomes a recording.
 
-A map is part of a TOML file; ``storage.foreign`` reads a file through it.
+A map is part of a TOML file, ``[columns.NAME]``; ``storage.foreign`` reads a file through it.
 """
 
-from typing import Annotated, Literal
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ppafo.documents.models import published_schema
+from ppafo.documents.problems import first_problem
+from ppafo.documents.toml_text import TomlKind, label
+from ppafo.errors import DataError, nearest_name
 
 _STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 _Text = Annotated[str, Field(min_length=1)]
@@ -55,3 +62,35 @@ class ColumnMap(BaseModel):
     skip_rows: Annotated[int, Field(ge=0, description="rows of numbers to leave out at the start")] = 0
     channels: Annotated[dict[str, MappedChannel], Field(min_length=1, description="channels by name, with 'time'")]
     direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None
+
+
+class ColumnMaps(BaseModel):
+    """Column maps by name, as a file has them; a problem file of ``ppafo identify`` has more beside them."""
+
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+    columns: Annotated[dict[str, ColumnMap], Field(min_length=1, description="column maps by name")]
+
+
+_FILE = TomlKind("file of column maps", "columns", resources.files("ppafo.storage"), DataError)
+
+
+def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
+    """Return a column map of a TOML file by its name; without a name the file's only one."""
+    file = label(str(path))
+    document = _FILE.parse(_FILE.read(path), file)
+    try:
+        maps = ColumnMaps.model_validate(document).columns
+    except ValidationError as error:
+        raise DataError(f"{file}: {first_problem(error.errors(include_url=False), ColumnMaps)}") from error
+    known = ", ".join(maps)
+    if name is None and len(maps) > 1:
+        raise DataError(f"{file}: has several column maps; say which one as {file}:NAME; there are {known}")
+    if name is not None and name not in maps:
+        raise DataError(f"{file}: there is no column map '{name}'{nearest_name(name, maps)}; there are {known}")
+    return maps[name or next(iter(maps))]
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a file of column maps."""
+    return published_schema(ColumnMaps, "ppafo column maps")

@@ -1,6 +1,7 @@
 """The columns of a table of text: names and units from the header, numbers in SI units from the rows."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +50,18 @@ def _column(cell: str) -> Column:
         shown = cell if len(cell) <= 40 else f"{cell[:36]} ..."
         raise DataError(f"the header must name columns as 'name [unit]', parted by commas; '{shown}' is none")
     return Column(match[1], match[2])
+
+
+def check_clock(time: Floats, lines: Sequence[int]) -> None:
+    """Refuse a clock that goes backwards or stands still; ``lines`` are those of the rows in the file."""
+    stalled = np.flatnonzero(np.diff(time) <= 0.0)
+    if stalled.size:
+        index = int(stalled[0]) + 1
+        word = "stands still" if time[index] == time[index - 1] else "goes backwards"
+        raise DataError(
+            f"line {lines[index]}, column '{TIME}': the clock {word}: {time[index]:.9g} s follows "
+            f"{time[index - 1]:.9g} s; time must grow from sample to sample"
+        )
 
 
 def in_si(column: Column, values: Floats, atmosphere: float) -> Floats:

@@ -6,6 +6,7 @@ Files from elsewhere may use other units (``angle [deg]``, ``pressure_1 [psi_g]`
 import csv
 import difflib
 import io
+import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError
+from ppafo.errors import DataError, one_line
 from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.signals.channels import TIME, TIME_UNIT
 from ppafo.signals.recording import Floats
-from ppafo.storage.columns import Column, in_si, parse_header
+from ppafo.storage.columns import Column, check_clock, in_si, parse_header
 from ppafo.storage.files import read_bytes, write_file
 
 _MARKS: dict[RecordingKind, str] = {
@@ -27,6 +28,10 @@ _MARKS: dict[RecordingKind, str] = {
 """Lines of comment; when read, the word before the colon counts."""
 
 _MARK = re.compile(r"#\s*(\w+):.*")
+_LONGEST_CELL = 40
+_UNDERSCORE = "_"
+"""Python takes 1_000 for a thousand; in a table it is a slip."""
+
 _SIMILAR = 0.8
 """How near a word has to be to a kind to be a misspelling of it; 'measurement: run 3' is a remark like any other."""
 
@@ -64,7 +69,8 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         if len(rows) < 2:
             raise DataError("has a header but no samples" if rows else "has no header")
         columns = parse_header(rows[0])
-        values = _table(rows, len(columns), first)
+        values = _table(rows, first)
+        check_clock(values[:, 0], range(first + 2, first + 2 + len(values)))
         time, *channels = (_channel(column, values[:, index], atmosphere) for index, column in enumerate(columns))
         named = {column.name: channel for column, channel in zip(columns[1:], channels, strict=True)}
         return Recording(label or Path(path).stem, time.values, named, kind_of_comments(lines[:first]))
@@ -105,18 +111,38 @@ def _without_blank_end(rows: list[list[str]]) -> list[list[str]]:
     return rows[:filled]
 
 
-def _table(rows: list[list[str]], width: int, skipped: int) -> Floats:
+def _table(rows: list[list[str]], skipped: int) -> Floats:
     """Return the numbers below the header, row by row."""
-    table = np.empty((len(rows) - 1, width))
-    for index, row in enumerate(rows[1:]):
+    header, *samples = rows
+    table = np.empty((len(samples), len(header)))
+    for index, row in enumerate(samples):
         line = skipped + index + 2
-        if len(row) != width:
-            raise DataError(f"line {line} has {len(row)} values for {width} columns")
+        if len(row) != len(header):
+            raise DataError(f"line {line} has {len(row)} values for {len(header)} columns")
         try:
             table[index] = [float(cell) for cell in row]
         except ValueError as error:
-            raise DataError(f"line {line} holds something that is not a number: {str(error)[-60:]}") from error
+            raise _no_number(header, row, line) from error
+        if _UNDERSCORE in "".join(row):
+            raise _no_number(header, row, line)
+    wrong = np.flatnonzero(~np.isfinite(table).all(axis=1))
+    if wrong.size:
+        raise _no_number(header, samples[wrong[0]], skipped + int(wrong[0]) + 2)
     return table
+
+
+def _no_number(header: list[str], row: list[str], line: int) -> DataError:
+    """Return the error of a row in which a cell is no finite number."""
+    column = next((index for index, cell in enumerate(row) if not _is_finite(cell)), 0)
+    name, cell = header[column].strip(), one_line(row[column])[:_LONGEST_CELL]
+    return DataError(f"line {line}, column '{name}': {cell!r} is not a number, or not a finite one")
+
+
+def _is_finite(cell: str) -> bool:
+    try:
+        return math.isfinite(float(cell)) and _UNDERSCORE not in cell
+    except ValueError:
+        return False
 
 
 def _channel(column: Column, values: Floats, atmosphere: float) -> Channel:

@@ -14,7 +14,7 @@ from ppafo.signals import Channel, Recording
 from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.signals.recording import Floats
 from ppafo.storage.column_map import ColumnMap, MappedChannel, MappedDirection
-from ppafo.storage.columns import Column, in_si
+from ppafo.storage.columns import Column, check_clock, in_si
 from ppafo.storage.comma_separated import kind_of_comments
 from ppafo.storage.files import read_bytes
 
@@ -39,7 +39,7 @@ def read_foreign(
             for name, item in columns.channels.items()
         }
         time = channels.pop(TIME).values
-        _check_clock(time, rows)
+        check_clock(time, [line for line, _ in rows])
         recording = Recording(label or Path(path).stem, time, channels, kind_of_comments(_comments(lines)))
         return recording if columns.direction is None else _with_direction(recording, columns.direction)
     except DataError as error:
@@ -163,14 +163,6 @@ def _converted(name: str, item: MappedChannel, numbers: Floats, atmosphere: floa
         values, unit = values * multiple, f"{unit} {times_unit}".removeprefix(f"{PLAIN_NUMBER} ").strip()
     column = Column(name, unit)
     return Channel(in_si(column, values, atmosphere), TIME_UNIT if name == TIME else column.si_unit)
-
-
-def _check_clock(time: Floats, rows: Rows) -> None:
-    stalled = np.flatnonzero(np.diff(time) <= 0.0)
-    if stalled.size:
-        index = int(stalled[0]) + 1
-        word = "stands still" if time[index] == time[index - 1] else "goes backwards"
-        raise DataError(f"line {rows[index][0]}: the clock {word}: {time[index]:g} s follows {time[index - 1]:g} s")
 
 
 def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:

@@ -18,7 +18,8 @@ class ChannelAgreement:
     """Errors (model less measured) in one channel, in its SI unit, after the common delay was taken out.
 
     ``rms``, ``bias`` and ``largest`` (with its sign, at ``largest_time`` [s]); ``rms_unaligned`` is the RMS error
-    without any shift; ``delay`` [s] is what this channel alone would have. ``limit`` is the largest share of
+    without any shift; ``delay`` [s] is what this channel alone would have; ``delay_is_at_limit`` says that the
+    search for it ended at its limit, so that it is none of a sensor. ``limit`` is the largest share of
     ``full_range`` that passes.
     """
 
@@ -31,6 +32,7 @@ class ChannelAgreement:
     largest: float
     largest_time: float
     delay: float
+    delay_is_at_limit: bool
     limit: float
 
     @property
@@ -81,6 +83,7 @@ def channel_agreement(item: Comparison, delay: float, longest_delay: float) -> C
     weights = sample_weights(curve.times)
     error = errors(curve, delay)
     worst = int(np.argmax(np.abs(error)))
+    own = estimated_delay([curve], longest_delay)
     return ChannelAgreement(
         channel=item.channel,
         unit=item.unit,
@@ -90,7 +93,8 @@ def channel_agreement(item: Comparison, delay: float, longest_delay: float) -> C
         bias=float(weights @ error),
         largest=float(error[worst]),
         largest_time=float(curve.times[worst]),
-        delay=estimated_delay([curve], longest_delay).value,
+        delay=own.value,
+        delay_is_at_limit=own.is_at_limit,
         limit=item.limit,
     )
 

@@ -9,20 +9,24 @@ import numpy as np
 from ppafo.errors import DataError, nearest_name
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
+from ppafo.signals.faults import FEWEST_AT_LIMIT, Plateau, is_at_limit, is_noisy, lasting_change, plateaus
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded.checks import check_absolute, check_command, check_gaps, usual_interval
-from ppafo.simulation.recorded.inputs import COMMAND, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.checks import PRESSURES, check_absolute, check_command, check_gaps, usual_interval
+from ppafo.simulation.recorded.inputs import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.storage import read_recording
+from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.files import read_bytes
+from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.validation.compared import ANGLE, COMPARED, PRESSURE_1, PRESSURE_2
+
+FEWEST_SAMPLES = 10
+"""Fewer are a few readings and no course in time."""
 
 _REMARKED_GAP = 3.0
 _ABOVE_SUPPLY = 0.05
 _MOST_RANGES = 20.0
 _LEAST_CHANGE = 0.01
-_CLIPPED_SAMPLES = 20
-_NOISY_SHARE = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +43,17 @@ class Measured:
         return name in self.recording
 
 
-def read_measured(path: str | Path, device: Device) -> Measured:
-    """Return the recording of a file or result folder; DataError where it cannot be compared with a model."""
+def read_measured(path: str | Path, device: Device, columns: ColumnMap | None = None) -> Measured:
+    """Return the recording of a file or result folder; DataError where it cannot be compared with a model.
+
+    A file with columns of its own is read through a column map.
+    """
     place = Path(path)
-    recording = read_recording(place, device.supply.atmospheric_pressure)
+    atmosphere = device.supply.atmospheric_pressure
+    if columns is None or place.is_dir():
+        recording = read_recording(place, atmosphere)
+    else:
+        recording = read_foreign(place, columns, atmosphere=atmosphere)
     content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
     return checked(recording, device, str(path), hashlib.sha256(content).hexdigest())
 
@@ -56,18 +67,20 @@ def checked(recording: Recording, device: Device, file: str, sha256: str = "") -
     _check_size(recording, device, file)
     _check_pressures(recording, device, file)
     _check_change(recording, device, file)
-    remarks = (*unknown, *_gap_remarks(recording), *_clip_remarks(recording))
+    remarks = (*unknown, *_gap_remarks(recording), *_constant_remarks(recording), *_clip_remarks(recording))
     return Measured(file, sha256, recording, remarks)
 
 
 def _check_length(recording: Recording, file: str) -> None:
-    if len(recording) < 2:
-        raise DataError(f"{file}: has {len(recording)} sample; at least two are needed to replay anything")
+    count = len(recording)
+    if count < FEWEST_SAMPLES:
+        noun = "sample" if count == 1 else "samples"
+        raise DataError(f"{file}: has {count} {noun}; at least {FEWEST_SAMPLES} are needed to see a course in time")
 
 
 def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
     """Refuse a name that looks like a misspelt one of the channels in use; remark on any other unknown one."""
-    used = (COMMAND, SUPPLY, EXTERNAL_TORQUE, *COMPARED)
+    used = (COMMAND, SUPPLY, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, *COMPARED)
     missing = [name for name in used if name not in recording]
     unknown = [name for name in recording.names if name not in CHANNELS]
     for name in unknown:
@@ -85,8 +98,9 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
 def _check_size(recording: Recording, device: Device, file: str) -> None:
     """Refuse values that no such device can have: a damaged line, or a unit that is off by powers of ten."""
     highest = max(device.supply.pressure, device.supply.dorsiflexion_pressure)
-    for name in (name for name in (SUPPLY, *COMPARED) if name in recording):
-        full_range = highest if name == SUPPLY else COMPARED[name].full_range(device, highest)
+    supplies = (SUPPLY, DORSIFLEXION_SUPPLY)
+    for name in (name for name in (*supplies, *COMPARED) if name in recording):
+        full_range = highest if name in supplies else COMPARED[name].full_range(device, highest)
         worst = int(np.argmax(np.abs(recording[name])))
         if abs(recording[name][worst]) > _MOST_RANGES * full_range:
             where = f"{recording.time[worst]:.6g} s (sample {worst + 1})"
@@ -100,8 +114,10 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
     """Refuse pressures that cannot be absolute, and chambers that stand above the supply they are fed from."""
     supply = device.supply
     check_absolute(recording, supply.atmospheric_pressure, file)
-    given = recording[SUPPLY] if SUPPLY in recording else np.array([supply.pressure, supply.dorsiflexion_pressure])
-    highest = float(given.max())
+    recorded = {name: float(recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in recording}
+    first = recorded.get(SUPPLY, supply.pressure)
+    second = recorded.get(DORSIFLEXION_SUPPLY, recorded.get(SUPPLY, supply.dorsiflexion_pressure))
+    highest = max(first, second)
     allowed = highest + _ABOVE_SUPPLY * (highest - supply.atmospheric_pressure)
     for name in (name for name in (PRESSURE_1, PRESSURE_2) if name in recording):
         level = max(float(recording[name][0]), float(np.median(recording[name])))
@@ -121,7 +137,7 @@ def _above_supply(file: str, name: str, level: float, supply: float, device: Dev
 def _check_change(recording: Recording, device: Device, file: str) -> None:
     gauge = max(device.supply.pressure, device.supply.dorsiflexion_pressure) - device.supply.atmospheric_pressure
     compared = [name for name in COMPARED if name in recording]
-    shares = [float(np.ptp(recording[name])) / COMPARED[name].full_range(device, gauge) for name in compared]
+    shares = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
     if max(shares) < _LEAST_CHANGE:
         raise DataError(
             f"{file}: nothing happens in it: {', '.join(compared)} change by less than {_LEAST_CHANGE:.0%} of full "
@@ -140,26 +156,29 @@ def _gap_remarks(recording: Recording) -> tuple[str, ...]:
     return (f"{count} {noun} in time, the first after {first:.6g} s; inputs were carried across",)
 
 
+def _constant_remarks(recording: Recording) -> tuple[str, ...]:
+    """Remark on channels to compare that never change; a real sensor that is connected has noise."""
+    return tuple(
+        f"'{name}' is {recording[name][0]:.6g} {recording.unit(name)} throughout: sensor not connected?"
+        for name in COMPARED
+        if name in recording and recording[name].max() == recording[name].min()
+    )
+
+
 def _clip_remarks(recording: Recording) -> tuple[str, ...]:
-    """Remark on noisy channels that stay at exactly their largest or smallest value: a sensor at its limit."""
-    remarks = []
-    for name in (name for name in (ANGLE, PRESSURE_1, PRESSURE_2, SUPPLY) if name in recording):
-        values = recording[name]
-        for word, limit in (("largest", values.max()), ("smallest", values.min())):
-            longest = _longest_run(values == limit)
-            if longest >= _CLIPPED_SAMPLES and _is_noisy(values[values != limit]):
-                remarks.append(
-                    f"'{name}' stays at exactly its {word} value for {longest} samples: sensor at its limit?"
-                )
-    return tuple(remarks)
+    """Remark on channels that stay at exactly their largest or smallest value as a sensor at its limit does."""
+    return tuple(
+        f"'{name}' stays at exactly its {plateau.word} value for {plateau.count} samples, from "
+        f"{recording.time[plateau.first]:.6g} s (sample {plateau.first + 1}): sensor at its limit?"
+        for name in (ANGLE, *PRESSURES)
+        if name in recording
+        for plateau in plateaus(recording[name])
+        if _is_at_limit(recording[name], plateau, name)
+    )
 
 
-def _is_noisy(values: Floats) -> bool:
-    """True where the values go up and down from sample to sample, as no smooth curve does."""
-    ways = np.sign(np.diff(values))
-    return ways.size > 1 and float((ways[1:] * ways[:-1] < 0.0).mean()) > _NOISY_SHARE
-
-
-def _longest_run(flags: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+def _is_at_limit(values: Floats, plateau: Plateau, name: str) -> bool:
+    """Tell whether a sensor is at its limit; a vane runs into its stops, so that an angle has to be noisy elsewhere."""
+    if name == ANGLE:
+        return plateau.count >= FEWEST_AT_LIMIT and is_noisy(values[values != plateau.value])
+    return is_at_limit(values, plateau)

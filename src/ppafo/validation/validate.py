@@ -12,8 +12,9 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.inputs import SUPPLY, regular_interval
-from ppafo.validation.agreement import Comparison, RecordingAgreement, channel_agreement, common_delay
-from ppafo.validation.alignment import DEFAULT_LIMIT, Curve
+from ppafo.storage.column_map import ColumnMap
+from ppafo.validation.agreement import ChannelAgreement, Comparison, RecordingAgreement, channel_agreement, common_delay
+from ppafo.validation.alignment import DEFAULT_LIMIT, Curve, Delay
 from ppafo.validation.compared import ANGLE, COMPARED, PRESSURE_1, PRESSURE_2, PRESSURE_DIFFERENCE
 from ppafo.validation.measured import Measured, read_measured
 from ppafo.validation.replay import Motion, Replayed, replay_recording
@@ -23,6 +24,9 @@ from ppafo.validation.thresholds import Thresholds, parse_thresholds
 _OTHER_SUPPLY = 0.05
 """Share of the set's gauge pressure by which a recorded supply may differ before it is remarked on."""
 _AT_LIMIT = "model and measurement are further apart in time than a delay of {:g} s; no delay was taken out"
+_CHANNEL_AT_LIMIT = (
+    "own delay of {} is at the limit of {:g} s that was looked for: no delay of a sensor, another course"
+)
 MOTIONS: tuple[Motion, ...] = ("free", "measured")
 
 
@@ -63,16 +67,18 @@ def validate(
     overrides: Sequence[str] = (),
     settings: ReplaySettings | None = None,
     tell: Callable[[str], None] = lambda _text: None,
+    columns: ColumnMap | None = None,
 ) -> Validation:
     """Return how far the model with a parameter set is from each recording (a CSV or NetCDF file, or a result folder).
 
+    Files with columns of their own are read through a column map, ``columns``.
     ``tell`` is called with what is being done. DataError, ParameterError or SimulationError for bad input.
     """
     device = load_device(parameter_set, valve, overrides)
     chosen = settings or ReplaySettings()
     if not recordings:
         raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
-    read = [read_measured(path, device) for path in recordings]
+    read = [read_measured(path, device, columns) for path in recordings]
     agreements = []
     for measured in read:
         tell(f"replaying {measured.file}")
@@ -88,7 +94,7 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
     items = _comparisons(measured, replayed, device, settings)
     delay = common_delay(items, settings.longest_delay)
     channels = tuple(channel_agreement(item, delay.taken_out, settings.longest_delay) for item in items)
-    late = (_AT_LIMIT.format(settings.longest_delay),) if delay.is_at_limit else ()
+    late = _late_remarks(delay, channels, settings.longest_delay)
     return RecordingAgreement(
         file=measured.file,
         sha256=measured.sha256,
@@ -101,6 +107,14 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
         channels=channels,
         remarks=(*measured.remarks, *_remarks(measured, device, settings.motion), *late),
     )
+
+
+def _late_remarks(delay: Delay, channels: Sequence[ChannelAgreement], longest: float) -> tuple[str, ...]:
+    """Say where the search for a delay ended at its limit, for all channels together or for some alone."""
+    if delay.is_at_limit:
+        return (_AT_LIMIT.format(longest),)
+    alone = [channel.channel for channel in channels if channel.delay_is_at_limit]
+    return (_CHANNEL_AT_LIMIT.format(", ".join(alone), longest),) if alone else ()
 
 
 def measured_values(recording: Recording, name: str) -> Floats | None:

@@ -2,15 +2,17 @@
 
 import numpy as np
 
-from ppafo.identification.bench.free_decay import angle_of_decay
+from ppafo.identification.bench.decay_motion import angle_of_decay
 from ppafo.identification.bench.gas_flow import GasAt, orifice_shape
-from ppafo.identification.bench.leak_laws import Chambers, difference_in_time, laws_of
+from ppafo.identification.bench.leak_laws import LAMINAR, LINEAR, Chambers, difference_in_time
+from ppafo.identification.bench.leak_opening import Opening
 from ppafo.identification.bench.valve_map import area_of_command
 from ppafo.identification.source import Source
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 
 CO2 = GasAt(0.044, 1.3, 298.0)
+LAWS = (Opening(CO2).law(), LAMINAR, LINEAR)
 PSI = 6894.757293168361
 TORQUE_CONSTANT, STATIC_TORQUE, OFFSET = 1.451e-5, 0.45, 0.12
 DAMPING_RATE, DECELERATION = 0.4, 0.13
@@ -76,7 +78,7 @@ def leak(law: str, rate: float, ratio: float = 1.3, seed: int = 1, lost: float =
     """Two closed chambers, one at supply pressure and one at the atmosphere, for 20 s at 100 Hz."""
     time = np.arange(0.0, 20.0, 0.01)
     chambers = Chambers(ratio, ratio * SUPPLY + ROOM)
-    chosen = next(item for item in laws_of(CO2.heat_capacity_ratio) if item.name == law)
+    chosen = next(item for item in LAWS if item.name == law)
     first, second = chambers.pressures(difference_in_time(chosen, chambers, SUPPLY - ROOM, rate, time, 100.0))
     draw = np.random.default_rng(seed)
     first, second = (values + draw.normal(0.0, 300.0, time.size) - lost * time for values in (first, second))

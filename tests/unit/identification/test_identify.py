@@ -136,6 +136,8 @@ def test_the_published_schema_knows_every_procedure() -> None:
         (f'{DECAY}start = "2 m"\n', "procedure 1, free_decay: start = '2 m': unit 'm' does not fit"),
         (f'{DECAY}inertia = "0 kg m^2"\n', "must be above zero"),
         (f'{FLOW}valve = "proportionl"\n', "did you mean 'proportional'"),
+        (f'{FLOW}temperature = "17 K"\n', "temperature = '17 K' must be from 150 to 600 K"),
+        (f'{FLOW}temperature = "17 kg"\n', "temperature = '17 kg': unit 'kg' does not fit"),
         (f'{FLOW}gas = "CO3"\n', "gas = 'CO3' is unknown, did you mean 'CO2'"),
         (LEAK.replace('volume_1 = "60 cm^3"', 'angle = "200 deg"'), "lies beyond the stops"),
         (LEAK.replace("60 cm^3", "0 cm^3"), "volume_1 = '0 cm^3' must be above zero"),
@@ -178,3 +180,55 @@ def test_bad_input_writes_nothing_and_exits_with_two(
     assert main(["identify", str(bench / "problem.toml"), "--out", str(tmp_path / "made")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not (tmp_path / "made").exists()
+
+
+def test_a_leak_in_the_form_of_the_standard_is_written_in_that_form(bench: Path) -> None:
+    text = parameter_set_toml(load_parameter_set("ppafo2011"))
+    head, _, rest = text.partition("[actuator.leak.area]")
+    other = rest[rest.index("[friction") :]
+    entry = 'origin = "assumed"\nsource = "a test"\n'
+    sonic = f'[actuator.leak.sonic_conductance]\nvalue = 1e-10\nunit = "m^3/(s Pa)"\n{entry}\n'
+    sonic += f'[actuator.leak.critical_ratio]\nvalue = 0.5\nunit = ""\n{entry}\n'
+    (bench / "sonic.toml").write_text(head + sonic + other)
+    problem = HEAD.replace("ppafo2011", "sonic.toml") + LEAK
+    (bench / "problem.toml").write_text(problem)
+    outcome = identify(bench / "problem.toml")
+    assert outcome.new_set.written == ("actuator.leak.sonic_conductance",)
+    numbers = outcome.new_set.parameter_set.numbers
+    assert numbers["actuator.leak.sonic_conductance"].origin == "identified"
+    assert numbers["actuator.leak.critical_ratio"].origin == "assumed"
+    assert "actuator.leak.area" not in numbers
+    assert outcome.new_set.problem == ""
+
+
+@pytest.mark.parametrize("text", [STATIC, DECAY, FLOW, MAP])
+def test_every_procedure_takes_a_calibration(solved: Solve, text: str) -> None:
+    plain, told = (solved(f"{text}{more}").estimates for more in ("", "calibration = 0.05\n"))
+    wider = [b.path for a, b in zip(plain, told, strict=True) if b.half_width > 1.001 * a.half_width]
+    assert wider
+
+
+def test_a_decay_of_a_leak_takes_no_calibration(solved: Solve) -> None:
+    with pytest.raises(PpafoError, match="a decay has no use for it"):
+        solved(f"{LEAK}calibration = 0.05\n")
+
+
+def test_the_uncertainty_of_the_gas_temperature_is_in_the_interval_of_a_flow(solved: Solve, bench: Path) -> None:
+    path = "open_valve_flow.effective_area"
+    plain = solved(FLOW).results[0][path]
+    assert "taken as exact" in plain.explanation
+    text = parameter_set_toml(load_parameter_set("ppafo2011"))
+    known = '[gas.temperature]\nvalue = 298.0\nunit = "K"\n'
+    assert text.count(known) == 1
+    (bench / "warm.toml").write_text(text.replace(known, f"{known}uncertainty = 5.96\n"))
+    (bench / "problem.toml").write_text(HEAD.replace("ppafo2011", "warm.toml") + FLOW)
+    told = identify(bench / "problem.toml").results[0][path]
+    assert "known to 5.96 K" in told.explanation
+    assert told.relative_half_width == pytest.approx((plain.relative_half_width**2 + 0.01**2) ** 0.5)
+
+
+def test_a_measured_gas_temperature_takes_the_place_of_the_set_s(solved: Solve) -> None:
+    path = "open_valve_flow.effective_area"
+    plain, cool = (solved(f"{FLOW}{more}").results[0][path] for more in ("", 'temperature = "16.85 degC"\n'))
+    assert cool.value / plain.value == pytest.approx((290.0 / 298.0) ** 0.5, rel=1e-6)
+    assert "Gas at 290 K" in cool.explanation

@@ -1,5 +1,6 @@
 """What the rig records: channels, noise, rounding, the same bytes for the same seed."""
 
+import tomllib
 from importlib import resources
 from pathlib import Path
 
@@ -10,9 +11,10 @@ from ppafo.errors import DataError, ParameterError, PpafoError, SimulationError
 from ppafo.rig import list_presets, load_preset, record
 from ppafo.rig.bench.static_torque import on_scale
 from ppafo.rig.catalog import EXPERIMENTS
-from ppafo.rig.declaration import PATHS
+from ppafo.rig.declaration import PATHS, SECTIONS
 from ppafo.rig.folder import write_rig_recording
 from ppafo.rig.preset import Preset
+from ppafo.rig.schema import json_schema
 from ppafo.rig.solution import make_solver
 from ppafo.signals.channels import CHANNELS
 from ppafo.storage import read_csv
@@ -26,8 +28,25 @@ WANTED = {
     "vane-leak": {"pressure_1", "pressure_2"},
     "vane-leak-steady": {"pressure_1", "pressure_2", "mass_flow"},
     "valve-map": {"command", "mass_flow", "upstream_pressure", "downstream_pressure"},
-    "step-response": {"angle", "pressure_1", "pressure_2", "supply_pressure", "command", "torque"},
-    "torque-task": {"angle", "pressure_1", "pressure_2", "supply_pressure", "command", "torque", "reference"},
+    "step-response": {
+        "angle",
+        "pressure_1",
+        "pressure_2",
+        "supply_pressure",
+        "dorsiflexion_pressure",
+        "command",
+        "torque",
+    },
+    "torque-task": {
+        "angle",
+        "pressure_1",
+        "pressure_2",
+        "supply_pressure",
+        "dorsiflexion_pressure",
+        "command",
+        "torque",
+        "reference",
+    },
 }
 
 
@@ -217,3 +236,34 @@ def test_a_foreign_rig_file_is_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / "rig.json").write_text('{"mine": 1}')
     with pytest.raises(DataError, match="was not written by the rig"):
         write_rig_recording(tmp_path, record("static-torque"))
+
+
+def test_an_empty_preset_points_to_the_schema(tmp_path: Path) -> None:
+    for text in ("", "# nothing yet\n"):
+        (tmp_path / "mine.toml").write_text(text)
+        with pytest.raises(ParameterError, match="'ppafo schema rig' prints what belongs in it"):
+            load_preset(tmp_path / "mine.toml")
+
+
+def test_the_published_schema_takes_every_preset_and_names_every_value() -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    for name in list_presets():
+        text = (resources.files("ppafo.rig") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+        jsonschema.validate(tomllib.loads(text), json_schema())
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(tomllib.loads(text.replace("[line.delay]", "[line.dely]")), json_schema())
+    described = json_schema()["$defs"]
+    assert {item.name for item in SECTIONS["line"]} == set(described["Line"]["required"])
+
+
+def test_the_second_supply_sags_by_itself_and_leaves_the_noise_of_the_others_as_it_was(perfect: Preset) -> None:
+    sagging = perfect.changed("supply.droop", 3.0e6, "a test").changed("supply.recovery_time", 0.03, "a test")
+    recording = record("step-response", sagging, 1).recording
+    first, second = (recording[name] for name in ("supply_pressure", "dorsiflexion_pressure"))
+    # The valve feeds chamber 1 only, so only that regulator gives way.
+    assert np.ptp(first) > 5.0e3
+    assert np.ptp(second) < 0.1 * np.ptp(first)
+    noisy = perfect.changed("pressure_sensor.noise", 1000.0, "a test")
+    shown = record("step-response", noisy, 1).recording
+    likeness = np.corrcoef(shown["supply_pressure"], shown["dorsiflexion_pressure"])[0, 1]
+    assert abs(likeness) < 4.0 / np.sqrt(len(shown))

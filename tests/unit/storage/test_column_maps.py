@@ -1,5 +1,6 @@
 """Files from elsewhere: units, signs, marks and constants; and what is wrong is named with line and column."""
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ppafo.errors import DataError
-from ppafo.storage.column_map import ColumnMap
+from ppafo.storage.column_map import ColumnMap, json_schema, load_column_map
 from ppafo.storage.foreign import read_foreign
 
 TIME = {"column": 1, "unit": "ms"}
@@ -87,8 +88,8 @@ def test_a_synthetic_recording_stays_one_through_a_column_map(tmp_path: Path) ->
         ("0,1\n10,x\n", "line 2, column '2': 'x' is not a finite number"),
         ("0,1\n10,nan\n", "line 2, column '2': 'nan' is not a finite number"),
         ("0,1\n10,\n", "line 2, column '2': '' is not a finite number"),
-        ("0,1\n10,2\n10,3\n", "line 3: the clock stands still"),
-        ("0,1\n10,2\n5,3\n", "line 3: the clock goes backwards"),
+        ("0,1\n10,2\n10,3\n", "line 3, column 'time': the clock stands still"),
+        ("0,1\n10,2\n5,3\n", "line 3, column 'time': the clock goes backwards"),
         ("0,1\n10\n", "line 2 has 1 values for 2 columns"),
         ("\n\n", "has no rows"),
         ("0\n1\n", "channel 'torque' is to come from column 2, the file has 1"),
@@ -143,3 +144,51 @@ def test_any_bytes_are_read_or_refused_in_one_line(
         assert str(error).startswith(str(tmp_path / "raw.csv"))
     else:
         assert np.isfinite(recording["torque"]).all()
+
+
+MAPS = """
+[columns.logger.channels]
+time = { column = 1, unit = "s" }
+angle = { column = 2, unit = "deg" }
+"""
+
+
+def test_the_only_map_of_a_file_needs_no_name_and_a_problem_file_will_do(tmp_path: Path) -> None:
+    (tmp_path / "maps.toml").write_text(f'name = "a problem"{MAPS}')
+    assert load_column_map(tmp_path / "maps.toml").channels["angle"].unit == "deg"
+    assert load_column_map(tmp_path / "maps.toml", "logger") == load_column_map(tmp_path / "maps.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "message"),
+    [
+        ("", None, "is empty; 'ppafo schema columns' prints what belongs in it"),
+        ("a = 1\n", None, "columns"),
+        (MAPS + MAPS.replace("logger", "scope"), None, "has several column maps; say which one"),
+        (MAPS, "loger", "no column map 'loger', did you mean 'logger'"),
+        (MAPS.replace("column = 2", "colum = 2"), None, "did you mean 'column'"),
+        ("columns = 3\n", None, "columns"),
+        ("[columns\n", None, "is not valid TOML"),
+    ],
+)
+def test_a_file_of_maps_that_cannot_be_used_is_one_line(
+    tmp_path: Path, text: str, name: str | None, message: str
+) -> None:
+    (tmp_path / "maps.toml").write_text(text)
+    with pytest.raises(DataError) as caught:
+        load_column_map(tmp_path / "maps.toml", name)
+    assert str(caught.value).startswith(str(tmp_path / "maps.toml"))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_of_maps_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"nowhere\.toml: cannot be read"):
+        load_column_map(tmp_path / "nowhere.toml")
+
+
+def test_the_published_schema_of_maps_takes_a_map(tmp_path: Path) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.validate(tomllib.loads(MAPS), json_schema())
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(tomllib.loads(MAPS.replace("unit", "unti")), json_schema())

@@ -219,3 +219,17 @@ def test_only_what_was_recorded_is_compared_and_the_rest_of_the_start_is_asked_f
     agreement = agree(lean, device, initial=start)
     assert list(shares(agreement)) == ["angle"]
     assert shares(agreement)["angle"] < 1e-12
+
+
+def test_a_channel_whose_own_delay_is_at_the_limit_is_flagged(step: Step, agree: Agree) -> None:
+    device, recording = step
+    clean = agree(recording, device)
+    assert not any(channel.delay_is_at_limit for channel in clean.channels)
+    # One pressure comes 60 ms late: not the delay of a sensor, and the other channels do not share it.
+    moved = np.interp(recording.time - 0.06, recording.time, recording["pressure_2"])
+    kept = only(recording, "command", "angle", "pressure_1", "pressure_2")
+    agreement = agree(with_channels(kept, pressure_2=moved), device)
+    late_ones = {channel.channel for channel in agreement.channels if channel.delay_is_at_limit}
+    assert "pressure_2" in late_ones
+    assert "angle" not in late_ones
+    assert any(remark.startswith("own delay of pressure_2") for remark in agreement.remarks)

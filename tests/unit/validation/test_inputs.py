@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from ppafo.engine.replay import Segment, segment_value
@@ -112,3 +113,17 @@ def test_one_straight_piece_runs_through_its_samples() -> None:
     piece = Segment(2.0, 1.0, 0.5)
     assert segment_value(piece, 2.0) == (1.0, 0.5, 0.0)
     assert segment_value(piece, 4.0)[0] == 2.0
+
+
+def test_a_recorded_supply_of_chamber_2_is_followed_by_itself(step: tuple[Device, Recording], agree: Agree) -> None:
+    device, recording = step
+    own, lower = device.supply.dorsiflexion_pressure, device.supply.dorsiflexion_pressure - 1.0e5
+    followed = {}
+    for name, level in (("own", own), ("lower", lower)):
+        given = recording.with_channel("dorsiflexion_pressure", np.full(len(recording), level), "Pa")
+        # Towards dorsiflexion, chamber 2 is fed: it ends at its supply.
+        turned = given.with_channel("command", -np.abs(recording["command"]), "-")
+        followed[name] = agree(turned, device)
+    assert all("dorsiflexion_pressure" in agreement.inputs for agreement in followed.values())
+    ends = [followed[name].model["pressure_2"][-1] for name in ("own", "lower")]
+    assert ends[0] - ends[1] == pytest.approx(1.0e5, rel=0.05)

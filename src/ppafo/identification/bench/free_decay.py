@@ -7,26 +7,31 @@ the start, Coulomb friction ends it: that is what tells the two apart. Both foll
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
-from ppafo.identification.bench.inputs import check_moves, check_sources, kind_of, window
+from ppafo.identification.bench.decay_motion import angle_of_decay, stop_time, velocity_of_decay
+from ppafo.identification.bench.decay_samples import (
+    ANGLE,
+    FEWEST_SAMPLES,
+    FEWEST_SMOOTHED,
+    PROCEDURE,
+    Decay,
+    decay_of,
+    noise_of,
+    smoothed_rates,
+    smoothing_width,
+)
+from ppafo.identification.bench.evidence import Evidence, Number
+from ppafo.identification.bench.inputs import check_sources, kind_of
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, counted, verdict_of
+from ppafo.identification.bench.result import BenchResult, counted
 from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats
 
-PROCEDURE = "free_decay"
-CHANNELS = ("angle",)
-FEWEST_SAMPLES = 20
-_SMOOTHED_SHARE = 0.04
-_FEWEST_SMOOTHED = 5
-_SLOW = 1.0e-9
 _GOOD_SHARE = 0.0025
 
 
@@ -34,6 +39,7 @@ _GOOD_SHARE = 0.0025
 class FreeDecaySettings:
     """Times between which the vane turns freely [s], inertia [kg m^2] with half width of its interval and its source.
 
+    ``calibration`` is the relative uncertainty of the sensor's gain [-].
     Without a start the decay begins where the speed is largest; without an inertia only ratios over it are known.
     """
 
@@ -43,100 +49,24 @@ class FreeDecaySettings:
     inertia_half_width: float = 0.0
     inertia_source: str = "given"
     confidence: float = 0.95
-
-
-class Decay(NamedTuple):
-    """One decay: times from its start [s], angle [rad] measured, and its direction, 1 or -1."""
-
-    time: Floats
-    angle: Floats
-    sign: float
+    calibration: float = 0.0
 
 
 def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None = None) -> BenchResult:
     """Return viscous damping [N m s/rad] and dynamic friction [N m], or both over the inertia [1/s, rad/s^2]; (1).
 
+    The angular velocity is fitted with the angle where a recording has it, each weighted by its noise.
     Several recordings are several impulses to the same device: the ratios are common, each has its own start.
     """
     chosen = settings or FreeDecaySettings()
-    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
-    decays = tuple(_decay(source, chosen) for source in sources)
+    check_sources(sources, PROCEDURE, (ANGLE,), FEWEST_SAMPLES)
+    decays = tuple(decay_of(source, chosen.start, chosen.end) for source in sources)
     fit = _fit(decays, chosen.confidence)
-    estimates = _estimates(traces(sources), fit, chosen)
+    estimates = _estimates(Evidence(traces(sources), chosen.confidence, chosen.calibration), fit, chosen)
     checks = (_residual_check(decays, fit), _separated(fit), _stopped(decays, fit))
     return BenchResult(
         PROCEDURE, _summary(decays, fit, chosen), estimates, checks, _panels(decays, fit), kind_of(sources)
     )
-
-
-def angle_of_decay(
-    times: Floats, start_angle: float, start_velocity: float, damping_rate: float, deceleration: float
-) -> Floats:
-    """Return the angle [rad] after times [s] for beta/I [1/s] and T_c/I [rad/s^2]; start velocity above 0; eq. (1)."""
-    stop = stop_time(start_velocity, damping_rate, deceleration)
-    moving = np.minimum(times, stop)
-    run, creep = _decay_integrals(moving, damping_rate)
-    return np.asarray(start_angle + start_velocity * run - deceleration * creep)
-
-
-def stop_time(start_velocity: float, damping_rate: float, deceleration: float) -> float:
-    """Return when the decay ends [s], infinite without Coulomb friction: ln(1 + w_0 b / d) / b."""
-    if deceleration <= 0.0:
-        return math.inf
-    if damping_rate < _SLOW:
-        return start_velocity / deceleration
-    return math.log1p(start_velocity * damping_rate / deceleration) / damping_rate
-
-
-def _decay_integrals(times: Floats, rate: float) -> tuple[Floats, Floats]:
-    """Return the integral of exp(-b t), and the integral of that; series where b t is small."""
-    product = rate * times
-    small = product < 1.0e-4
-    safe_rate = max(rate, _SLOW)
-    run = np.where(small, times * (1.0 - product / 2.0 + product**2 / 6.0), -np.expm1(-product) / safe_rate)
-    creep = np.where(small, times**2 * (0.5 - product / 6.0 + product**2 / 24.0), (times - run) / safe_rate)
-    return run, creep
-
-
-def _decay(source: Source, settings: FreeDecaySettings) -> Decay:
-    check_moves(source, PROCEDURE, "angle")
-    part = window(source.recording, settings.start, settings.end)
-    if len(part) < FEWEST_SAMPLES:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE} needs at least {FEWEST_SAMPLES} samples between start and end, "
-            f"there are {len(part)}"
-        )
-    velocity, _ = smoothed_rates(part.time, part["angle"])
-    first = 0 if settings.start is not None else int(np.argmax(np.abs(velocity)))
-    sign = 1.0 if velocity[first] > 0.0 else -1.0
-    # A push ends a little after the highest speed of the smoothed signal; that much is left out.
-    first += 0 if settings.start is not None else _width(part.time.size) // 2
-    back = np.flatnonzero(sign * velocity[first:] < -0.02 * np.abs(velocity).max())
-    last = first + int(back[0]) if back.size else part.time.size
-    if last - first < FEWEST_SAMPLES:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: only {last - first} samples lie between the highest speed and the end or the "
-            f"first reversal, {FEWEST_SAMPLES} are needed; record longer, or give start and end"
-        )
-    time, angle = part.time[first:last], part["angle"][first:last]
-    return Decay(time - time[0], angle, sign)
-
-
-def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
-    """Return angular velocity [rad/s] and acceleration [rad/s^2] from local parabolas, at the times of the samples."""
-    from scipy.signal import savgol_filter
-
-    even = np.linspace(time[0], time[-1], time.size)
-    step, width = float(even[1] - even[0]), _width(time.size)
-    values = np.interp(even, time, angle)
-    rates = [savgol_filter(values, width, 2, deriv=order, delta=step) for order in (1, 2)]
-    velocity, acceleration = (np.interp(time, even, rate) for rate in rates)
-    return velocity, acceleration
-
-
-def _width(count: int) -> int:
-    """Return an odd number of samples to smooth over."""
-    return max(_FEWEST_SMOOTHED, int(_SMOOTHED_SHARE * count)) | 1
 
 
 def _modelled(decay: Decay, own: Floats, rates: Floats) -> Floats:
@@ -144,12 +74,21 @@ def _modelled(decay: Decay, own: Floats, rates: Floats) -> Floats:
     return np.asarray(own[0] + decay.sign * swept)
 
 
+def _misses(decay: Decay, own: Floats, rates: Floats) -> Floats:
+    """Return measured less modelled [rad]: of the angle, and of the velocity where it was measured, weighted."""
+    of_angle = decay.angle - _modelled(decay, own, rates)
+    if decay.velocity is None:
+        return np.asarray(of_angle)
+    speed = velocity_of_decay(decay.time, max(float(own[1]), 0.0), float(rates[0]), float(rates[1]))
+    return np.concatenate([of_angle, decay.velocity_weight * (decay.velocity - decay.sign * speed)])
+
+
 def _fit(decays: tuple[Decay, ...], confidence: float) -> CurveFit:
     """Fit b and d in common, start angle and speed each: values are b, d, then two for each decay."""
     starts, velocities, rates = [], [], []
     for decay in decays:
         velocity, _ = smoothed_rates(decay.time, decay.angle)
-        speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), 1e-6)
+        speed = max(float(np.abs(velocity[:FEWEST_SMOOTHED]).max()), 1e-6)
         starts += [float(decay.angle[0]), speed]
         swept = abs(float(decay.angle[-1] - decay.angle[0]))
         rates.append(speed / max(swept, 1e-9))
@@ -158,11 +97,9 @@ def _fit(decays: tuple[Decay, ...], confidence: float) -> CurveFit:
     guesses = [(rate, 0.1 * rate * velocities[0]), (0.3 * rate, 0.5 * rate * velocities[0])]
 
     def residuals(values: Floats) -> Floats:
-        parts = [
-            decay.angle - _modelled(decay, values[2 + 2 * number : 4 + 2 * number], values[:2])
-            for number, decay in enumerate(decays)
-        ]
-        return np.concatenate(parts)
+        return np.concatenate(
+            [_misses(decay, values[2 + 2 * number : 4 + 2 * number], values[:2]) for number, decay in enumerate(decays)]
+        )
 
     lower = np.array([0.0, 0.0, *(limit for _ in decays for limit in (-np.inf, 0.0))])
     upper = np.full(lower.size, np.inf)
@@ -170,62 +107,70 @@ def _fit(decays: tuple[Decay, ...], confidence: float) -> CurveFit:
     return min(fits, key=lambda fit: fit.rms)
 
 
-def _estimates(names: tuple[str, ...], fit: CurveFit, settings: FreeDecaySettings) -> tuple[Estimate, ...]:
-    (damping, friction), (wide_b, wide_d) = fit.values[:2], fit.half_widths[:2]
-    trade = f"errors of damping and Coulomb friction go together with {fit.correlation[0, 1]:+.2f}"
-    ratios = (
-        _estimate("free_decay.damping_over_inertia", "1/s", damping, wide_b, f"beta/I; {trade}.", names, settings),
-        _estimate("free_decay.friction_over_inertia", "rad/s^2", friction, wide_d, f"T_c/I; {trade}.", names, settings),
-    )
+def _estimates(evidence: Evidence, fit: CurveFit, settings: FreeDecaySettings) -> tuple[Estimate, ...]:
+    """Return both ratios and, with an inertia, both values; the gain of the sensor scales T_c/I and not beta/I."""
+    damping, friction = _ratios(fit, evidence)
     inertia = settings.inertia
     if inertia is None:
-        return tuple(_without_inertia(item) for item in ratios)
-    relative = settings.inertia_half_width / inertia
-    known = (
-        f"with an inertia of {inertia:.4g} kg m^2 ({settings.inertia_source}), "
-        f"{'whose uncertainty is in the interval' if relative else 'taken as exact'}; {trade}."
-    )
+        return tuple(evidence.at_or_above_zero(_without_inertia(item)) for item in (damping, friction))
+    share = settings.inertia_half_width / inertia
+    known = f"with an inertia of {inertia:.4g} kg m^2 ({settings.inertia_source}), "
+    known += "whose uncertainty is in the interval" if share else "taken as exact"
     absolute = (
-        ("friction.viscous_damping", "N m s/rad", damping, wide_b, "beta"),
-        ("friction.dynamic_torque", "N m", friction, wide_d, "T_c"),
+        _times_inertia(damping, inertia, share, "friction.viscous_damping", "N m s/rad", f"beta {known}"),
+        _times_inertia(friction, inertia, share, "friction.dynamic_torque", "N m", f"T_c {known}"),
     )
-    scaled = (
-        _estimate(
-            path,
-            unit,
-            inertia * value,
-            inertia * math.hypot(wide, relative * value),
-            f"{symbol} {known}",
-            names,
-            settings,
-        )
-        for path, unit, value, wide, symbol in absolute
+    return tuple(evidence.at_or_above_zero(item) for item in (*absolute, damping, friction))
+
+
+def _ratios(fit: CurveFit, evidence: Evidence) -> tuple[Number, Number]:
+    trade = f"errors of damping and Coulomb friction go together with {fit.correlation[0, 1]:+.2f}"
+    gain = f"; {evidence.calibration_told}" if evidence.calibration else ""
+    friction = math.hypot(float(fit.half_widths[1]), evidence.calibration * float(fit.values[1]))
+    return (
+        Number(
+            "free_decay.damping_over_inertia",
+            "1/s",
+            fit.values[0],
+            fit.half_widths[0],
+            f"beta/I; {trade}.",
+            widened=fit.widened[0],
+        ),
+        Number(
+            "free_decay.friction_over_inertia",
+            "rad/s^2",
+            fit.values[1],
+            friction,
+            f"T_c/I; {trade}{gain}.",
+            widened=fit.widened[1],
+        ),
     )
-    return (*scaled, *ratios)
 
 
-def _estimate(
-    path: str, unit: str, value: float, wide: float, text: str, names: tuple[str, ...], settings: FreeDecaySettings
-) -> Estimate:
-    low, high = max(0.0, float(value - wide)), float(value + wide)
-    verdict: Verdict = verdict_of(value, float(value - wide), high)
-    if value <= 1e-9 * high:
-        verdict = "at its bound"
-        text = f"The fit would have it below zero, so it is held at zero. {text}"
-    return Estimate(path, float(value), unit, low, high, verdict, text, names, settings.confidence)
+def _times_inertia(ratio: Number, inertia: float, share: float, path: str, unit: str, known: str) -> Number:
+    """Return a ratio times the inertia [kg m^2], whose relative uncertainty is ``share``."""
+    half_width = inertia * math.hypot(ratio.half_width, share * ratio.value)
+    told = f"{known}; {ratio.explanation.partition('; ')[2]}"
+    value = inertia * ratio.value
+    return replace(ratio, path=path, unit=unit, value=value, half_width=half_width, explanation=told)
 
 
-def _without_inertia(estimate: Estimate) -> Estimate:
-    text = f"{estimate.explanation} The inertia is not known, so there is no absolute value: give 'inertia'."
-    return replace(estimate, explanation=text)
+def _without_inertia(ratio: Number) -> Number:
+    text = f"{ratio.explanation} The inertia is not known, so there is no absolute value: give 'inertia'."
+    return replace(ratio, explanation=text)
 
 
 def _residual_check(decays: tuple[Decay, ...], fit: CurveFit) -> Check:
     swept = max(float(np.ptp(decay.angle)) for decay in decays)
-    noise = float(np.sqrt(np.mean(np.concatenate([np.diff(decay.angle, 2) for decay in decays]) ** 2) / 6.0))
-    share = fit.rms / swept
-    holds = fit.rms <= 3.0 * noise or share <= _GOOD_SHARE
-    text = f"the fitted decay misses the angle by {math.degrees(fit.rms):.3g} deg rms, {share:.2%} of what was swept"
+    noise = max(noise_of(decay.angle) for decay in decays)
+    misses = [
+        decay.angle - _modelled(decay, fit.values[2 + 2 * number : 4 + 2 * number], fit.values[:2])
+        for number, decay in enumerate(decays)
+    ]
+    missed = float(np.sqrt(np.mean(np.concatenate(misses) ** 2)))
+    share = missed / swept
+    holds = missed <= 3.0 * noise or share <= _GOOD_SHARE
+    text = f"the fitted decay misses the angle by {math.degrees(missed):.3g} deg rms, {share:.2%} of what was swept"
     return Check("residuals", holds, text if holds else f"{text}: another torque acts, such as gravity or an end stop")
 
 
@@ -249,9 +194,9 @@ def _stopped(decays: tuple[Decay, ...], fit: CurveFit) -> Check:
 
 def _summary(decays: tuple[Decay, ...], fit: CurveFit, settings: FreeDecaySettings) -> str:
     known = "" if settings.inertia is not None else "; the inertia is not known, so only ratios over it follow"
-    return (
-        f"{counted(len(decays), 'decay')}; beta/I = {fit.values[0]:.4g} 1/s, T_c/I = {fit.values[1]:.4g} rad/s^2{known}"
-    )
+    both = any(decay.velocity is not None for decay in decays)
+    what = f"{counted(len(decays), 'decay')}{' of angle and angular velocity' if both else ''}"
+    return f"{what}; beta/I = {fit.values[0]:.4g} 1/s, T_c/I = {fit.values[1]:.4g} rad/s^2{known}"
 
 
 def _panels(decays: tuple[Decay, ...], fit: CurveFit) -> tuple[Panel, ...]:
@@ -265,7 +210,7 @@ def _panels(decays: tuple[Decay, ...], fit: CurveFit) -> tuple[Panel, ...]:
         angles += [Series("fitted" if named else "", decay.time, modelled, "law")]
         velocity, acceleration = smoothed_rates(decay.time, decay.sign * decay.angle)
         moving = velocity > 0.03 * velocity.max()
-        inner = slice(_width(decay.time.size), None, max(1, decay.time.size // 200))
+        inner = slice(smoothing_width(decay.time.size), None, max(1, decay.time.size // 200))
         rates += [
             Series(
                 "measured" if named else "",

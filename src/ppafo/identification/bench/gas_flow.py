@@ -3,6 +3,7 @@
 ``GasAt`` is what they need to know of the gas.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -19,11 +20,12 @@ LINEAR_RATIO = 0.999
 
 @dataclass(frozen=True, slots=True)
 class GasAt:
-    """A gas at one temperature: molar mass [kg/mol], heat capacity ratio [-], temperature [K]."""
+    """A gas at one temperature: molar mass [kg/mol], heat capacity ratio [-], temperature [K], its uncertainty [K]."""
 
     molar_mass: float
     heat_capacity_ratio: float
     temperature: float
+    temperature_half_width: float = 0.0
 
     @property
     def specific_gas_constant(self) -> float:
@@ -39,6 +41,19 @@ class GasAt:
     def flow_per_sonic_conductance(self) -> float:
         """Choked mass flow over C times upstream pressure [kg/m^3], rho_0 sqrt(T_0 / T) of ISO 6358-1:2013."""
         return sonic_conductance_mass(1.0, self.specific_gas_constant, self.temperature)
+
+    def share_of_flow(self, calibration: float = 0.0) -> float:
+        """Return the relative uncertainty [-] of an area or a conductance from a flow, with that of the sensors' gain.
+
+        Mass flow goes with 1/sqrt(T), so an error of the temperature counts half; no residual shows it.
+        """
+        return math.hypot(calibration, 0.5 * self.temperature_half_width / self.temperature)
+
+    @property
+    def temperature_told(self) -> str:
+        """What is to be said of the temperature, as a sentence without its end."""
+        known = f"known to {self.temperature_half_width:.3g} K" if self.temperature_half_width else "taken as exact"
+        return f"Gas at {self.temperature:.4g} K, {known}"
 
 
 def orifice_shape(pressure_a: Floats, pressure_b: Floats, heat_capacity_ratio: float) -> Floats:

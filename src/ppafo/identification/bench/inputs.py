@@ -5,13 +5,16 @@ from collections.abc import Iterable
 import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
+from ppafo.identification.check import Check
 from ppafo.identification.source import Source
 from ppafo.signals import CHANNELS, Recording, RecordingKind
+from ppafo.signals.faults import longest_gap, plateaus
 from ppafo.signals.recording import Floats
 
 _SHARE_THAT_IS_CLIPPED = 0.05
 _FEWEST_CLIPPED = 4
 _SHARE_THAT_MOVES = 0.02
+_LARGEST_NUMBER = 1.0e12
 _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 
 
@@ -22,6 +25,7 @@ def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterabl
     for source in sources:
         for name in channels:
             _check_channel(source, procedure, name)
+        _check_sizes(source, procedure)
         if len(source.recording) < fewest:
             raise IdentificationError(
                 f"{source.name}: {procedure} needs at least {fewest} samples, it has {len(source.recording)}"
@@ -38,18 +42,44 @@ def check_moves(source: Source, procedure: str, name: str) -> None:
         )
 
 
-def check_not_clipped(source: Source, procedure: str, name: str, driver: str) -> None:
-    """Refuse a channel that stays exactly at its largest value while what drives it moves: a saturated sensor."""
-    values, driving = source.recording[name], source.recording[driver]
-    first, last = _longest_run(values == values.max())
-    count = last - first + 1
-    moves = float(np.ptp(driving[first : last + 1])) > _SHARE_THAT_MOVES * float(np.abs(driving).max())
-    if moves and count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
+def check_not_clipped(
+    source: Source, procedure: str, name: str, driver: str, driving: Floats, share: float = _SHARE_THAT_MOVES
+) -> None:
+    """Refuse a channel that stays exactly at its largest value while what drives it moves: a saturated sensor.
+
+    ``driving`` are the values of that, ``driver`` its name; ``share`` of its largest value is how far it must move [-].
+    """
+    values = source.recording[name]
+    longest, _ = plateaus(values)
+    moves = float(np.ptp(driving[longest.first : longest.last + 1])) > share * float(np.abs(driving).max())
+    if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
         raise IdentificationError(
             f"{source.name}: {procedure}: channel '{name}' stays at {values.max():g} {source.recording.unit(name)} for "
-            f"{count} samples, up to sample {last + 1}, while '{driver}' moves: the sensor is saturated; "
-            f"leave those samples out"
+            f"{longest.count} samples, up to sample {longest.last + 1}, while '{driver}' moves: the sensor is "
+            f"saturated; leave those samples out"
         )
+
+
+def check_absolute(source: Source, procedure: str, name: str) -> None:
+    """Refuse a pressure that is zero or less: it was recorded as gauge."""
+    values = source.recording[name]
+    low = int(np.argmin(values))
+    if values[low] <= 0.0:
+        raise IdentificationError(
+            f"{source.name}: {procedure}: '{name}' is {values[low]:g} Pa at sample {low + 1}, which is not absolute: "
+            f"say psi_g, bar_g, kPa_g for gauge"
+        )
+
+
+def pauses(sources: tuple[Source, ...]) -> tuple[Check, ...]:
+    """Return a remark on times without readings; steady readings lose nothing by them."""
+    found = [(source, gap) for source in sources if (gap := longest_gap(source.recording.time)) is not None]
+    if not found:
+        return ()
+    listed = [
+        f"{source.name} has no reading for {gap.duration:.4g} s after sample {gap.index + 1}" for source, gap in found
+    ]
+    return (Check("pauses", True, f"{'; '.join(listed)}; steady readings lose nothing by it"),)
 
 
 def window(recording: Recording, start: float | None, end: float | None) -> Recording:
@@ -72,6 +102,18 @@ def pooled(sources: tuple[Source, ...], name: str) -> Floats:
     return np.concatenate([source.recording[name] for source in sources])
 
 
+def _check_sizes(source: Source, procedure: str) -> None:
+    """Refuse numbers that no sensor shows in any unit: a damaged line."""
+    recording = source.recording
+    for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
+        worst = int(np.argmax(np.abs(values)))
+        if abs(values[worst]) > _LARGEST_NUMBER:
+            raise IdentificationError(
+                f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}, more than any "
+                f"sensor shows: the line is damaged"
+            )
+
+
 def _check_channel(source: Source, procedure: str, name: str) -> None:
     if name in source.recording:
         return
@@ -81,11 +123,3 @@ def _check_channel(source: Source, procedure: str, name: str) -> None:
         f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
         f"the file has {', '.join(source.recording.names) or 'only time'}; a column map can name it"
     )
-
-
-def _longest_run(flags: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> tuple[int, int]:
-    """Return the first and the last index of the longest run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
-    starts, ends = edges[::2], edges[1::2]
-    longest = int(np.argmax(ends - starts))
-    return int(starts[longest]), int(ends[longest] - 1)

@@ -1,11 +1,14 @@
 """The laws of a leak fitted to decays: of flow, a relaxation that no leak makes, and a curve without physics."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
+from ppafo.identification.bench.evidence import Evidence, Number
 from ppafo.identification.bench.leak_laws import Chambers, Law, decay_times, difference_in_time
+from ppafo.identification.bench.leak_opening import Opening
 from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.signals.recording import Floats
@@ -47,6 +50,7 @@ class FittedLaw:
     rms: float
     criterion: float
     curves: tuple[Floats, ...]
+    widened: float
 
 
 def smooth_curve(decay: Decay) -> Floats:
@@ -120,7 +124,7 @@ def _fitted(
 ) -> FittedLaw:
     rms = fit.rms * scale
     criterion = 2.0 * count * float(np.log(max(rms, 1e-12))) + 2.0 * fit.values.size
-    return FittedLaw(name, formula, rate, wide, unit, rms, criterion, tuple(curves))
+    return FittedLaw(name, formula, rate, wide, unit, rms, criterion, tuple(curves), float(fit.widened[0]))
 
 
 def best_law(fitted: list[FittedLaw]) -> FittedLaw:
@@ -157,7 +161,7 @@ def judge(fitted: list[FittedLaw], best: FittedLaw, noise: float, span: float, u
         return Judgement(
             "weak",
             f"{misses}: it is by far the best law, but something else takes part, such as the gas's temperature; "
-            f"the interval does not cover that",
+            f"the interval covers what of that shows in the residuals",
         )
     if not is_close:
         compared = f"the {best.name} law by {best.rms:.3g} {unit} (AIC {behind:.3g} better)"
@@ -187,9 +191,18 @@ def law_checks(
     )
 
 
-def no_area(judged: Judgement, names: tuple[str, ...], confidence: float) -> Estimate:
-    """Return the estimate that says why there is no area."""
-    nothing = float("nan")
-    return Estimate(
-        "actuator.leak.area", nothing, "m^2", nothing, nothing, judged.verdict, judged.sentence, names, confidence
-    )
+def opening_estimates(
+    evidence: Evidence, opening: Opening, numbers: list[Number], judged: Judgement
+) -> tuple[Estimate, ...]:
+    """Return the estimates of an opening; none but the reason where the law does not describe the data."""
+    if judged.verdict == "law does not describe the data":
+        nothing = math.nan
+        missing = Number(opening.path, opening.unit, nothing, nothing, judged.sentence)
+        return (evidence.estimate(missing, nothing, judged.verdict),)
+    return tuple(weakened(evidence.calibrated(number), judged) for number in numbers)
+
+
+def weakened(estimate: Estimate, judged: Judgement) -> Estimate:
+    """Return the estimate, called weak where its law is."""
+    is_too_sure = estimate.verdict == "identified" and judged.verdict == "weak"
+    return replace(estimate, verdict="weak") if is_too_sure else estimate

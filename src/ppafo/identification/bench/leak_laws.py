@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.identification.bench.gas_flow import orifice_shape
 from ppafo.signals.recording import Floats
 
 Shape = Callable[[Floats, Floats], Floats]
@@ -27,18 +26,9 @@ class Law:
     shape: Shape
 
 
-def laws_of(heat_capacity_ratio: float) -> tuple[Law, ...]:
-    """Return the laws of flow that are compared: orifice (6), (7), laminar, and linear in the pressure difference."""
-    return (
-        Law(
-            "orifice",
-            "Cd A C1 P psi(P2/P1)",
-            "1/s",
-            lambda first, second: orifice_shape(first, second, heat_capacity_ratio),
-        ),
-        Law("laminar", "k (P1^2 - P2^2)", "1/(s Pa)", lambda first, second: first**2 - second**2),
-        Law("linear", "k (P1 - P2), an exponential decay", "1/s", lambda first, second: first - second),
-    )
+LAMINAR = Law("laminar", "k (P1^2 - P2^2)", "1/(s Pa)", lambda first, second: first**2 - second**2)
+LINEAR = Law("linear", "k (P1 - P2), an exponential decay", "1/s", lambda first, second: first - second)
+"""Laws of flow that an opening's is compared with."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,15 +1,34 @@
 """Leak across the vane in steady flow: the flow that keeps up the pressure, at several pressures."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.curve_fit import fit_curve
-from ppafo.identification.bench.gas_flow import GasAt
-from ppafo.identification.bench.inputs import check_moves, check_sources, kind_of, pooled
-from ppafo.identification.bench.leak_fits import FittedLaw, best_law, judge, law_checks, no_area
-from ppafo.identification.bench.leak_laws import Law, laws_of
+from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
+from ppafo.identification.bench.evidence import Evidence, Number
+from ppafo.identification.bench.inputs import (
+    check_absolute,
+    check_moves,
+    check_not_clipped,
+    check_sources,
+    kind_of,
+    pauses,
+    pooled,
+)
+from ppafo.identification.bench.leak_fits import (
+    FittedLaw,
+    Judgement,
+    best_law,
+    judge,
+    law_checks,
+    opening_estimates,
+    weakened,
+)
+from ppafo.identification.bench.leak_laws import LAMINAR, LINEAR, Law
+from ppafo.identification.bench.leak_opening import Opening
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, verdict_of
+from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats
@@ -19,71 +38,117 @@ CHANNELS = ("pressure_1", "pressure_2", "mass_flow")
 FEWEST_SAMPLES = 8
 _DEGREE = 3
 _UNITS = {"orifice": "kg/(s Pa)", "laminar": "kg/(s Pa^2)", "linear": "kg/(s Pa)"}
+_SPREAD_FOR_A_ZERO = 0.3
+"""Range of the law's course over its largest value, from which the zero of the meter can be told from the leak."""
+
+
+class _Readings(NamedTuple):
+    """Steady readings: absolute pressures [Pa] in both chambers, flow [kg/s] from 1 to 2."""
+
+    first: Floats
+    second: Floats
+    flow: Floats
+
+    @property
+    def difference(self) -> Floats:
+        return self.first - self.second
 
 
 def steady_leak(
-    sources: tuple[Source, ...], gas: GasAt, discharge_coefficient: float | None, confidence: float
+    sources: tuple[Source, ...], opening: Opening, confidence: float, calibration: float = 0.0
 ) -> BenchResult:
-    """Return A_leak [m^2] where the orifice law (6), (7) describes flow over pressures, else the law that does."""
-    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
-    for source in sources:
-        check_moves(source, PROCEDURE, "mass_flow")
-    first, second, flow = (pooled(sources, name) for name in CHANNELS)
-    if min(first.min(), second.min()) <= 0.0:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the pressures are not absolute: one is zero or below"
-        )
-    difference = first - second
-    if float(difference @ flow) <= 0.0:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; turn its sign round"
-        )
-    fitted = [_fit(law, first, second, flow, confidence) for law in laws_of(gas.heat_capacity_ratio)]
-    curve = np.polynomial.Chebyshev.fit(difference, flow, _DEGREE)(difference)
-    noise = float(np.sqrt(np.mean((flow - curve) ** 2) * flow.size / (flow.size - _DEGREE)))
-    best, span = best_law(fitted), float(np.ptp(flow))
-    judged = judge(fitted, best, noise, span, "kg/s")
-    listed: list[Estimate] = []
-    names = traces(sources)
+    """Return the leak's size where the law of an opening describes flow over pressures, else the law that does.
 
-    def entry(path: str, unit: str, value: float, half: float, text: str) -> None:
-        verdict = verdict_of(value, value - half, value + half)
-        verdict = "weak" if verdict == "identified" and judged.verdict == "weak" else verdict
-        listed.append(
-            Estimate(path, value, unit, max(0.0, value - half), value + half, verdict, text, names, confidence)
-        )
-
-    if judged.verdict == "law does not describe the data":
-        listed.append(no_area(judged, names, confidence))
-    else:
-        area, half = (item / gas.choked_flow_constant for item in (fitted[0].rate, fitted[0].half_width))
-        if discharge_coefficient:
-            text = f"With Cd = {discharge_coefficient:g}; only its product with the area counts. {judged.sentence}"
-            entry("actuator.leak.area", "m^2", area / discharge_coefficient, half / discharge_coefficient, text)
-        entry("vane_leak.effective_area", "m^2", area, half, f"Cd A in steady flow. {judged.sentence}")
-    if best is not fitted[0]:
-        text = f"Coefficient of the law that fits best: {best.formula}."
-        entry(f"vane_leak.{best.name}_coefficient", best.rate_unit, best.rate, best.half_width, text)
+    Where the pressures differ enough, the zero of the flow meter is fitted with the law and reported.
+    """
+    readings = _readings(sources)
+    fitted = [_fit(law, readings, confidence) for law in (opening.law(), LAMINAR, LINEAR)]
+    laws = [item.law for item in fitted]
+    best, noise = best_law(laws), _noise(readings)
+    judged = judge(laws, best, noise, float(np.ptp(readings.flow)), "kg/s")
+    evidence = Evidence(traces(sources), confidence, opening.gas.share_of_flow(calibration))
     return BenchResult(
         PROCEDURE,
-        f"{flow.size} steady readings; best law: {best.name} ({best.formula}); orifice: {judged.verdict}",
-        tuple(listed),
-        law_checks(fitted, best, noise, judged, "kg/s"),
-        _panels(difference, flow, fitted[0], best),
+        f"{readings.flow.size} steady readings; best law: {best.name} ({best.formula}); orifice: {judged.verdict}",
+        _estimates(evidence, opening, fitted, best, judged),
+        (*law_checks(laws, best, noise, judged, "kg/s"), *pauses(sources)),
+        _panels(readings.difference, readings.flow, laws[0], best),
         kind_of(sources),
     )
 
 
-def _fit(law: Law, first: Floats, second: Floats, flow: Floats, confidence: float) -> FittedLaw:
-    shape = law.shape(first, second)
+def _readings(sources: tuple[Source, ...]) -> _Readings:
+    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
+    for source in sources:
+        check_moves(source, PROCEDURE, "mass_flow")
+        check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])
+    readings = _Readings(*(pooled(sources, name) for name in CHANNELS))
+    for source in sources:
+        for name in CHANNELS[:2]:
+            check_absolute(source, PROCEDURE, name)
+    if float(readings.difference @ readings.flow) <= 0.0:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; turn its sign round"
+        )
+    return readings
+
+
+def _noise(readings: _Readings) -> float:
+    """Return the scatter of the flow [kg/s] about a smooth curve without physics."""
+    curve = np.polynomial.Chebyshev.fit(readings.difference, readings.flow, _DEGREE)(readings.difference)
+    count = readings.flow.size
+    return float(np.sqrt(np.mean((readings.flow - curve) ** 2) * count / (count - _DEGREE)))
+
+
+class _Fitted(NamedTuple):
+    """A law fitted to steady readings, and the zero of the flow meter, None where it cannot be told apart."""
+
+    law: FittedLaw
+    zero: Number | None
+
+
+def _fit(law: Law, readings: _Readings, confidence: float) -> _Fitted:
+    """Fit the law's coefficient and, where the pressures differ enough to tell them apart, the meter's zero."""
+    shape, flow = law.shape(readings.first, readings.second), readings.flow
     guess, scale = float(shape @ flow / (shape @ shape)), float(np.abs(flow).max())
-    fit = fit_curve(
-        lambda values: (flow - guess * values[0] * shape) / scale, np.ones(1), np.zeros(1), np.full(1, 1e3), confidence
-    )
+    has_zero = float(np.ptp(shape)) > _SPREAD_FOR_A_ZERO * float(np.abs(shape).max())
+    count = 2 if has_zero else 1
+
+    def residuals(values: Floats) -> Floats:
+        zero = values[1] if has_zero else 0.0
+        return np.asarray((flow - guess * values[0] * shape) / scale - zero)
+
+    lower, upper = np.array([0.0, -1.0])[:count], np.array([1e3, 1.0])[:count]
+    fit = fit_curve(residuals, np.array([1.0, 0.0])[:count], lower, upper, confidence, (readings.difference,))
+    zero = _zero(fit, scale) if has_zero else None
     rms = fit.rms * scale
-    criterion = 2.0 * flow.size * float(np.log(max(rms, 1e-300))) + 2.0
+    criterion = 2.0 * flow.size * float(np.log(max(rms, 1e-300))) + 2.0 * count
     value, half = float(fit.values[0]) * guess, float(fit.half_widths[0]) * guess
-    return FittedLaw(law.name, law.formula, value, half, _UNITS[law.name], rms, criterion, (value * shape,))
+    curve = flow - fit.residuals * scale
+    unit, widened = _UNITS[law.name], float(fit.widened[0])
+    return _Fitted(FittedLaw(law.name, law.formula, value, half, unit, rms, criterion, (curve,), widened), zero)
+
+
+def _zero(fit: CurveFit, scale: float) -> Number:
+    value, half = float(fit.values[1]) * scale, float(fit.half_widths[1]) * scale
+    text = "What the flow meter shows without flow, from the law's course over pressure."
+    return Number("vane_leak.flow_zero", "kg/s", value, half, text, scale=scale, widened=float(fit.widened[1]))
+
+
+def _estimates(
+    evidence: Evidence, opening: Opening, fitted: list[_Fitted], best: FittedLaw, judged: Judgement
+) -> tuple[Estimate, ...]:
+    orifice, zero = fitted[0]
+    text = f"In steady flow. {opening.gas.temperature_told}; {evidence.calibration_told}. {judged.sentence}"
+    numbers = opening.numbers(orifice.rate, orifice.half_width, text, orifice.widened)
+    listed = list(opening_estimates(evidence, opening, numbers, judged))
+    listed += [] if zero is None else [evidence.plain(zero)]
+    if best is not orifice:
+        text = f"Coefficient of the law that fits best: {best.formula}."
+        path = f"vane_leak.{best.name}_coefficient"
+        number = Number(path, best.rate_unit, best.rate, best.half_width, text, lowest=0.0, widened=best.widened)
+        listed.append(weakened(evidence.calibrated(number), judged))
+    return tuple(listed)
 
 
 def _panels(difference: Floats, flow: Floats, orifice: FittedLaw, best: FittedLaw) -> tuple[Panel, ...]:

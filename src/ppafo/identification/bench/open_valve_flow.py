@@ -7,10 +7,19 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
+from ppafo.identification.bench.evidence import Evidence, Number
 from ppafo.identification.bench.gas_flow import GasAt, iso6358_shape, orifice_shape
-from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pooled
+from ppafo.identification.bench.inputs import (
+    check_absolute,
+    check_moves,
+    check_not_clipped,
+    check_sources,
+    kind_of,
+    pauses,
+    pooled,
+)
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, verdict_of
+from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
@@ -32,7 +41,8 @@ Law = Literal["orifice", "iso6358"]
 class OpenValveFlowSettings:
     """The gas, the law to report, the valve's path in a set (``valves.main``) and its area [m^2] where it is known.
 
-    With an area, Cd follows from Cd A; without one only the product is known.
+    With an area, Cd follows from Cd A; without one only the product is known. ``calibration`` is the relative
+    uncertainty of the sensors' gain [-].
     """
 
     gas: GasAt
@@ -40,6 +50,7 @@ class OpenValveFlowSettings:
     area: float | None = None
     path: str = "valve"
     confidence: float = 0.95
+    calibration: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +70,7 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
     """Return Cd A [m^2] and Cd [-], and C [m^3/(s Pa)] and b [-] where the pressure ratios span enough; (6), (7)."""
     check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
     for source in sources:
-        check_not_clipped(source, PROCEDURE, "mass_flow", "upstream_pressure")
+        _check_source(source, settings.gas)
     points = _points(sources)
     orifice = _orifice_fit(points, settings)
     sonic = _sonic_fit(points, settings) if _spans_enough(points, settings.gas) else None
@@ -68,13 +79,23 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
             f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
             f"{_SPREAD_OF_RATIOS:g} or more; these go from {points.ratio.min():.3g} to {points.ratio.max():.3g}"
         )
-    estimates = _estimates(traces(sources), settings, orifice, sonic)
-    checks = _checks(settings, orifice, sonic)
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow(settings.calibration))
+    estimates = _estimates(evidence, settings, orifice, sonic)
+    checks = (*_checks(settings, orifice, sonic), *pauses(sources))
     text = f"{points.flow.size} readings, pressure ratios {points.ratio.min():.3g} to {points.ratio.max():.3g}; "
     text += f"Cd A = {orifice.values[0] * 1e6:.4g} mm^2"
     text += "" if sonic is None else f"; C = {sonic.values[0]:.4g} m^3/(s Pa), b = {sonic.values[1]:.3g}"
     panels = _panels(points, settings, orifice, sonic)
     return BenchResult(PROCEDURE, text, estimates, checks, panels, kind_of(sources))
+
+
+def _check_source(source: Source, gas: GasAt) -> None:
+    """Refuse pressures that are not absolute, and a flow that stays where these would have it change."""
+    for name in CHANNELS[:2]:
+        check_absolute(source, PROCEDURE, name)
+    upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
+    driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
+    check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
 
 
 def _points(sources: tuple[Source, ...]) -> _Points:
@@ -85,13 +106,6 @@ def _points(sources: tuple[Source, ...]) -> _Points:
             f"{sources[0].name}: {PROCEDURE} needs {FEWEST_SAMPLES} readings with the valve fully open, "
             f"command 1 or -1; there are {int(is_open.sum())}"
         )
-    for name, values in (("upstream_pressure", upstream), ("downstream_pressure", downstream)):
-        bad = np.flatnonzero(values <= 0.0)
-        if bad.size:
-            raise IdentificationError(
-                f"{sources[0].name}: {PROCEDURE}: '{name}' is {values[bad[0]]:g} Pa at sample {bad[0] + 1}; "
-                f"it is absolute: say psi_g, bar_g, kPa_g for gauge"
-            )
     points = _Points(upstream[is_open], downstream[is_open], np.abs(flow[is_open]))
     wrong = np.flatnonzero(points.downstream >= points.upstream)
     if wrong.size > points.flow.size // 10:
@@ -130,6 +144,7 @@ def _orifice_fit(points: _Points, settings: OpenValveFlowSettings) -> CurveFit:
         np.array([0.0]),
         np.array([np.inf]),
         settings.confidence,
+        (points.ratio, points.flow),
     )
 
 
@@ -150,6 +165,7 @@ def _sonic_fit(points: _Points, settings: OpenValveFlowSettings) -> CurveFit:
             np.zeros(2),
             np.array([100.0, _LARGEST_CRITICAL_RATIO]),
             settings.confidence,
+            (points.ratio, points.flow),
         )
         for start in (0.2, 0.5)
     ]
@@ -159,40 +175,50 @@ def _sonic_fit(points: _Points, settings: OpenValveFlowSettings) -> CurveFit:
 
 
 def _estimates(
-    names: tuple[str, ...], settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None
+    evidence: Evidence, settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None
 ) -> tuple[Estimate, ...]:
-    def entry(path: str, value: float, unit: str, half: float, text: str) -> Estimate:
-        low, high = float(value - half), float(value + half)
-        return Estimate(
-            path,
-            float(value),
-            unit,
-            max(0.0, low),
-            high,
-            verdict_of(value, low, high),
-            text,
-            names,
-            settings.confidence,
-        )
+    given = f"{settings.gas.temperature_told}; {evidence.calibration_told}"
+    product = Number(
+        "open_valve_flow.effective_area",
+        "m^2",
+        orifice.values[0],
+        orifice.half_widths[0],
+        f"Cd A, the product; it alone sets the flow. {given}.",
+        lowest=0.0,
+        widened=orifice.widened[0],
+    )
+    told = [evidence.calibrated(number) for number in (*_coefficient(product, settings, given), product)]
+    return (*told, *_sonic_estimates(evidence, settings, sonic, given))
 
-    product, half = float(orifice.values[0]), float(orifice.half_widths[0])
-    listed = [
-        entry("open_valve_flow.effective_area", product, "m^2", half, "Cd A, the product; it alone sets the flow.")
-    ]
-    if settings.law == "orifice" and settings.area:
-        text = f"Cd A over the set's area of {settings.area * 1e6:.4g} mm^2, taken as exact."
-        listed.insert(
-            0, entry(f"{settings.path}.discharge_coefficient", product / settings.area, "", half / settings.area, text)
-        )
-    if sonic is not None:
-        (conductance, ratio), (wide_c, wide_b) = sonic.values, sonic.half_widths
-        section = settings.path if settings.law == "iso6358" else PROCEDURE
-        trade = f"Errors of C and b go together with {sonic.correlation[0, 1]:+.2f}."
-        listed += [
-            entry(f"{section}.sonic_conductance", conductance, "m^3/(s Pa)", wide_c, f"C of ISO 6358. {trade}"),
-            entry(f"{section}.critical_ratio", ratio, "", wide_b, f"b of ISO 6358. {trade}"),
-        ]
-    return tuple(listed)
+
+def _coefficient(product: Number, settings: OpenValveFlowSettings, given: str) -> list[Number]:
+    """Return Cd where the set has an area and the orifice law is asked for."""
+    if settings.law != "orifice" or not settings.area:
+        return []
+    text = f"Cd A over the set's area of {settings.area * 1e6:.4g} mm^2, taken as exact. {given}."
+    value, half = product.value / settings.area, product.half_width / settings.area
+    path = f"{settings.path}.discharge_coefficient"
+    return [replace(product, path=path, unit="", value=value, half_width=half, explanation=text)]
+
+
+def _sonic_estimates(
+    evidence: Evidence, settings: OpenValveFlowSettings, sonic: CurveFit | None, given: str
+) -> tuple[Estimate, ...]:
+    """Return C and b; a gain that both pressures share leaves b, their ratio, as it is."""
+    if sonic is None:
+        return ()
+    section = settings.path if settings.law == "iso6358" else PROCEDURE
+    trade = f"Errors of C and b go together with {sonic.correlation[0, 1]:+.2f}"
+    forms = (
+        ("sonic_conductance", "m^3/(s Pa)", f"C of ISO 6358. {trade}. {given}."),
+        ("critical_ratio", "", f"b of ISO 6358. {trade}."),
+    )
+    fitted = zip(forms, sonic.values, sonic.half_widths, sonic.widened, strict=True)
+    conductance, ratio = (
+        Number(f"{section}.{name}", unit, value, half, text, lowest=0.0, widened=widened)
+        for (name, unit, text), value, half, widened in fitted
+    )
+    return evidence.calibrated(conductance), evidence.plain(ratio)
 
 
 def _checks(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None) -> tuple[Check, ...]:

@@ -11,15 +11,23 @@ from ppafo.signals.recording import Floats
 Labels = NDArray[np.int64]
 _FEWEST_CLUSTERS = 3
 
+CHANCE = 0.01
+"""How often a law that is right may be said to miss the readings by more than they scatter [-]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Regression:
-    """Coefficients in the order of the design's columns, half widths of their intervals, and the residuals."""
+    """Coefficients in the order of the design's columns, half widths of their intervals, and the residuals.
+
+    ``widened`` says how many times as wide each interval is as independent readings would have it, 1 where the line
+    misses the cells by no more than the readings scatter in them.
+    """
 
     coefficients: Floats
     half_widths: Floats
     residuals: Floats
     widest: str
+    widened: Floats
 
     @property
     def scatter(self) -> float:
@@ -52,7 +60,11 @@ def regress(
     }
     stacked = np.array(list(candidates.values()))
     name = list(candidates)[int(np.argmax(stacked[:, judged_by]))]
-    return Regression(coefficients, stacked.max(axis=0), residuals, name)
+    half_widths = stacked.max(axis=0)
+    widened = np.ones_like(half_widths)
+    if _misses(residuals, cells, design.shape[1]):
+        np.divide(half_widths, stacked[0], out=widened, where=stacked[0] > 0.0)
+    return Regression(coefficients, half_widths, residuals, name, widened)
 
 
 def quantile(confidence: float, freedom: int) -> float:
@@ -62,10 +74,28 @@ def quantile(confidence: float, freedom: int) -> float:
     return float(t.ppf(0.5 + confidence / 2.0, freedom))
 
 
+def exceeds_chance(between: float, within: float, freedom: int, inner_freedom: int, chance: float) -> bool:
+    """Return whether a mean square between groups is larger than that within them, but for a chance [-]; F test."""
+    from scipy.stats import f
+
+    return between > within and (within <= 0.0 or bool(f.sf(between / within, freedom, inner_freedom) <= chance))
+
+
 def labels_of(parts: Sequence[Labels]) -> Labels:
     """Return one label for each combination of labels."""
     _, labels = np.unique(np.stack(parts), axis=1, return_inverse=True)
     return np.asarray(labels, dtype=np.int64).reshape(-1)
+
+
+def _misses(residuals: Floats, cells: Labels, columns: int) -> bool:
+    """Return whether the line misses the cells by more than the readings scatter in them: the test of lack of fit."""
+    counts = np.bincount(cells)
+    freedom, inner = counts.size - columns, residuals.size - counts.size
+    if freedom < 1 or inner < 1:
+        return False
+    means = np.bincount(cells, weights=residuals) / counts
+    between, within = counts @ means**2 / freedom, float(((residuals - means[cells]) ** 2).sum()) / inner
+    return exceeds_chance(float(between), within, freedom, inner, CHANCE)
 
 
 def _independent(design: Floats, inverse: Floats, residuals: Floats, confidence: float) -> Floats:

@@ -8,30 +8,26 @@ K is the common slope, T_s half the distance of the branches, g how the friction
 the scale. All are linear, so one regression gives them all.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pooled
+from ppafo.identification.bench.evidence import Evidence, Number
+from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pauses
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.regression import Labels, Regression, labels_of, regress
-from ppafo.identification.bench.result import BenchResult, verdict_of
+from ppafo.identification.bench.regression import Regression, labels_of, regress
+from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.bench.static_readings import PROCEDURE, Readings, readings_of
 from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats
 
-PROCEDURE = "static_torque"
-Flags = NDArray[np.bool_]
 CHANNELS = ("torque", "pressure_difference", "direction")
-FEWEST_SAMPLES = 6
-_FEWEST_LEVELS = 3
-_LEVEL_GAP = 1.0 / 40.0
-_WIDEST_LEVEL = 1.0 / 8.0
-_BINS = 20
-_FLAT = 0.002
+_MORE_THAN_FRICTION = 0.3
+"""Share of its range by which the torque may move at one pressure, as friction turns round."""
+
 _SAG_THAT_HARMS_NOBODY = 0.02
 _SLOPE, _ZERO, _FRICTION, _GROWTH = range(4)
 
@@ -44,21 +40,6 @@ class StaticTorqueSettings:
     calibration: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Readings:
-    """All readings that belong to a branch: pressure difference [Pa], torque [N m], branch (+1, -1), groups."""
-
-    pressure: Floats
-    torque: Floats
-    branch: Floats
-    clusters: Labels
-    levels: Labels
-
-    @property
-    def middle(self) -> float:
-        return float(np.mean(self.pressure))
-
-
 def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | None = None) -> BenchResult:
     """Return torque constant [m^3], static friction [N m] with its growth [m^3], and zero offset [N m]; equation (2).
 
@@ -69,96 +50,27 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     check_sources(sources, PROCEDURE, CHANNELS, 1)
     for source in sources:
         check_moves(source, PROCEDURE, "torque")
-        check_not_clipped(source, PROCEDURE, "torque", "pressure_difference")
-    readings = _readings(sources)
+        pressure = source.recording["pressure_difference"]
+        check_not_clipped(source, PROCEDURE, "torque", "pressure_difference", pressure)
+    readings = readings_of(sources)
+    for source in sources:
+        check_not_clipped(
+            source, PROCEDURE, "pressure_difference", "torque", source.recording["torque"], _MORE_THAN_FRICTION
+        )
     growing = _fit(readings, True, chosen.confidence)
     grows = growing.differs_from_zero(_GROWTH)
     fit = growing if grows else _fit(readings, False, chosen.confidence)
     _check_order(sources, fit)
-    estimates = _estimates(sources, readings, fit, growing, chosen)
-    checks = (_straight(readings, grows, chosen.confidence), _outliers(fit), _growth_check(growing, readings, grows))
+    evidence = Evidence(traces(sources), chosen.confidence, chosen.calibration)
+    estimates = _estimates(evidence, readings, fit, growing)
+    straight = _straight(readings, grows, chosen.confidence)
+    checks = (straight, _outliers(readings, fit), _growth_check(growing, readings, grows), *pauses(sources))
     return BenchResult(
         PROCEDURE, _summary(readings, fit, grows), estimates, checks, _panels(readings, fit), kind_of(sources)
     )
 
 
-def _readings(sources: tuple[Source, ...]) -> _Readings:
-    direction = pooled(sources, "direction")
-    for source in sources:
-        _check_direction(source)
-    used = direction != 0.0
-    used &= ~_not_broken_away(pooled(sources, "pressure_difference"), pooled(sources, "torque"), direction)
-    pressure, torque = pooled(sources, "pressure_difference")[used], pooled(sources, "torque")[used]
-    if pressure.size < FEWEST_SAMPLES:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE} needs at least {FEWEST_SAMPLES} readings, there are {pressure.size}"
-        )
-    for sign, name in ((1.0, "rising"), (-1.0, "falling")):
-        if not (direction[used] == sign).any():
-            raise IdentificationError(
-                f"{', '.join(source.name for source in sources)}: {PROCEDURE}: the {name} branch is missing: no "
-                f"reading has direction {sign:+.0f}; without both, friction cannot be told from the zero of the scale"
-            )
-    if pressure.max() == pressure.min():
-        check_moves(sources[0], PROCEDURE, "pressure_difference")
-    levels = _levels(pressure)
-    if levels.max() + 1 < _FEWEST_LEVELS:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE} needs readings at {_FEWEST_LEVELS} different pressures or more, "
-            f"there are {levels.max() + 1}"
-        )
-    return _Readings(pressure, torque, direction[used], _clusters(sources)[used], levels)
-
-
-def _not_broken_away(pressure: Floats, torque: Floats, direction: Floats) -> Flags:
-    """Return which rising readings lie on a flat start: a scale that only pulls shows none until friction is overcome.
-
-    A flat start is a lowest reading that belongs to two pressures or more, or is nothing at all.
-    """
-    lowest = torque.min()
-    resting = (direction > 0.0) & (torque <= lowest + _FLAT * np.ptp(torque))
-    is_flat = resting.any() and np.ptp(pressure[resting]) > _LEVEL_GAP * np.ptp(pressure)
-    return np.asarray(resting if is_flat or lowest == 0.0 else np.zeros_like(resting))
-
-
-def _check_direction(source: Source) -> None:
-    values = source.recording["direction"]
-    wrong = np.flatnonzero(~np.isin(values, (-1.0, 0.0, 1.0)))
-    if wrong.size:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: channel 'direction' is {values[wrong[0]]:g} at sample {wrong[0] + 1}; "
-            f"it is 1 while the pressure rises, -1 while it falls, 0 for neither"
-        )
-
-
-def _clusters(sources: tuple[Source, ...]) -> Labels:
-    """Return one label for each repetition of each recording; without repetitions a recording is one cluster."""
-    files = np.concatenate([np.full(len(source.recording), number) for number, source in enumerate(sources)])
-    repetitions = [
-        source.recording["repetition"] if "repetition" in source.recording else np.zeros(len(source.recording))
-        for source in sources
-    ]
-    _, labels = np.unique(np.concatenate(repetitions), return_inverse=True)
-    return labels_of([files.astype(np.int64), labels.astype(np.int64)])
-
-
-def _levels(pressure: Floats) -> Labels:
-    """Return which pressure level each reading belongs to: groups with gaps between them, else equal parts."""
-    span = float(pressure.max() - pressure.min())
-    if span == 0.0:
-        return np.zeros(pressure.size, dtype=np.int64)
-    order = np.argsort(pressure)
-    steps = np.diff(pressure[order]) > _LEVEL_GAP * span
-    levels = np.empty(pressure.size, dtype=np.int64)
-    levels[order] = np.concatenate(([0], np.cumsum(steps)))
-    widths = [float(np.ptp(pressure[levels == level])) for level in range(int(levels.max()) + 1)]
-    if max(widths) <= _WIDEST_LEVEL * span:
-        return levels
-    bins = np.minimum((pressure - pressure.min()) / span * _BINS, _BINS - 1).astype(np.int64)
-    return labels_of([bins])
-
-
-def _fit(readings: _Readings, with_growth: bool, confidence: float, extra: Floats | None = None) -> Regression:
+def _fit(readings: Readings, with_growth: bool, confidence: float, extra: Floats | None = None) -> Regression:
     columns = [readings.pressure, np.ones_like(readings.pressure), -readings.branch]
     columns += [-readings.branch * (readings.pressure - readings.middle)] if with_growth else []
     columns += [] if extra is None else [extra]
@@ -169,7 +81,7 @@ def _fit(readings: _Readings, with_growth: bool, confidence: float, extra: Float
     sides = (readings.branch > 0).astype(np.int64)
     cells = labels_of([readings.levels, sides])
     scaled = regress(design / scale, readings.torque, readings.clusters, cells, confidence)
-    return Regression(scaled.coefficients / scale, scaled.half_widths / scale, scaled.residuals, scaled.widest)
+    return replace(scaled, coefficients=scaled.coefficients / scale, half_widths=scaled.half_widths / scale)
 
 
 def _check_order(sources: tuple[Source, ...], fit: Regression) -> None:
@@ -185,14 +97,40 @@ def _check_order(sources: tuple[Source, ...], fit: Regression) -> None:
         )
 
 
-def _estimates(
-    sources: tuple[Source, ...],
-    readings: _Readings,
-    fit: Regression,
-    growing: Regression,
-    settings: StaticTorqueSettings,
-) -> tuple[Estimate, ...]:
-    friction, half = fit.coefficients[_FRICTION], fit.half_widths[_FRICTION]
+def _estimates(evidence: Evidence, readings: Readings, fit: Regression, growing: Regression) -> tuple[Estimate, ...]:
+    numbers = (
+        _torque_constant(evidence, fit),
+        _static_torque(readings, fit, growing),
+        Number(
+            "static_torque.zero_offset",
+            "N m",
+            fit.coefficients[_ZERO],
+            fit.half_widths[_ZERO],
+            "Torque that the scale shows at no pressure difference, midway between the branches.",
+            scale=float(np.ptp(readings.torque)),
+            widened=fit.widened[_ZERO],
+        ),
+        Number(
+            "static_torque.friction_per_pressure",
+            "m^3",
+            growing.coefficients[_GROWTH],
+            growing.half_widths[_GROWTH],
+            "Growth of the static friction with the pressure difference [N m per Pa].",
+            widened=growing.widened[_GROWTH],
+        ),
+    )
+    return tuple(evidence.calibrated(number) for number in numbers)
+
+
+def _torque_constant(evidence: Evidence, fit: Regression) -> Number:
+    source = {"independent readings": "the scatter of the readings"}.get(fit.widest, f"the {fit.widest}")
+    text = f"Common slope of both branches; residuals scatter by {fit.scatter:.3g} N m; "
+    text += f"the interval comes from {source}; {evidence.calibration_told}."
+    value, half = fit.coefficients[_SLOPE], fit.half_widths[_SLOPE]
+    return Number("actuator.torque_constant", "m^3", value, half, text, widened=fit.widened[_SLOPE])
+
+
+def _static_torque(readings: Readings, fit: Regression, growing: Regression) -> Number:
     growth = growing.coefficients[_GROWTH]
     at_rest = growing.coefficients[_FRICTION] - growth * readings.middle
     grown = (
@@ -200,60 +138,12 @@ def _estimates(
         if growing.differs_from_zero(_GROWTH)
         else "no growth with pressure shows in these readings"
     )
-    torque_span = float(np.ptp(readings.torque))
-
-    def entry(path: str, unit: str, value: float, width: float, text: str, scale: float | None = None) -> Estimate:
-        gain = settings.calibration * abs(value)
-        total = float(np.hypot(width, gain))
-        low, high = float(value - total), float(value + total)
-        verdict = verdict_of(value, low, high, scale)
-        return Estimate(path, float(value), unit, low, high, verdict, text, traces(sources), settings.confidence)
-
-    return (
-        entry(
-            "actuator.torque_constant",
-            "m^3",
-            fit.coefficients[_SLOPE],
-            fit.half_widths[_SLOPE],
-            f"Common slope of both branches; residuals scatter by {fit.scatter:.3g} N m; "
-            f"the interval comes from {_widest(fit)}{_calibration(settings)}.",
-        ),
-        entry(
-            "friction.static_torque",
-            "N m",
-            friction,
-            half,
-            f"Half the distance of the branches at the mean pressure difference of {readings.middle:.4g} Pa; {grown}.",
-        ),
-        entry(
-            "static_torque.zero_offset",
-            "N m",
-            fit.coefficients[_ZERO],
-            fit.half_widths[_ZERO],
-            "Torque that the scale shows at no pressure difference, midway between the branches.",
-            torque_span,
-        ),
-        entry(
-            "static_torque.friction_per_pressure",
-            "m^3",
-            growth,
-            growing.half_widths[_GROWTH],
-            "Growth of the static friction with the pressure difference [N m per Pa].",
-        ),
-    )
+    text = f"Half the distance of the branches at the mean pressure difference of {readings.middle:.4g} Pa; {grown}."
+    value, half = fit.coefficients[_FRICTION], fit.half_widths[_FRICTION]
+    return Number("friction.static_torque", "N m", value, half, text, widened=fit.widened[_FRICTION])
 
 
-def _widest(fit: Regression) -> str:
-    return {"independent readings": "the scatter of the readings"}.get(fit.widest, f"the {fit.widest}")
-
-
-def _calibration(settings: StaticTorqueSettings) -> str:
-    if settings.calibration:
-        return f" and {settings.calibration:.2%} of calibration"
-    return "; calibration of the sensors is not in it"
-
-
-def _straight(readings: _Readings, grows: bool, confidence: float) -> Check:
+def _straight(readings: Readings, grows: bool, confidence: float) -> Check:
     """Ask whether a square of the pressure would explain more, and how much torque it would move."""
     centred = readings.pressure - readings.middle
     square = centred**2 - np.mean(centred**2)
@@ -267,17 +157,17 @@ def _straight(readings: _Readings, grows: bool, confidence: float) -> Check:
     )
 
 
-def _outliers(fit: Regression) -> Check:
+def _outliers(readings: Readings, fit: Regression) -> Check:
     spread = 1.4826 * float(np.median(np.abs(fit.residuals - np.median(fit.residuals))))
     worst = int(np.argmax(np.abs(fit.residuals)))
     count = int((np.abs(fit.residuals) > 6.0 * max(spread, 1e-300)).sum())
     share = count / fit.residuals.size
     text = f"{count} of {fit.residuals.size} readings lie more than six scatters off ({spread:.3g} N m each)"
-    text += f"; the worst is reading {worst + 1}, {fit.residuals[worst]:+.3g} N m" if count else ""
+    text += f"; the worst is {readings.places[worst]}, {fit.residuals[worst]:+.3g} N m" if count else ""
     return Check("outliers", share <= 0.01, text)
 
 
-def _growth_check(growing: Regression, readings: _Readings, grows: bool) -> Check:
+def _growth_check(growing: Regression, readings: Readings, grows: bool) -> Check:
     """Say whether one number for the friction will do; it is told, not judged."""
     low, high = (
         growing.coefficients[_FRICTION] + growing.coefficients[_GROWTH] * (pressure - readings.middle)
@@ -290,7 +180,7 @@ def _growth_check(growing: Regression, readings: _Readings, grows: bool) -> Chec
     return Check("friction over pressure", True, text)
 
 
-def _summary(readings: _Readings, fit: Regression, grows: bool) -> str:
+def _summary(readings: Readings, fit: Regression, grows: bool) -> str:
     count, levels = readings.pressure.size, int(readings.levels.max()) + 1
     return (
         f"{count} readings at {levels} pressures, {int(readings.clusters.max()) + 1} repetitions; "
@@ -299,7 +189,7 @@ def _summary(readings: _Readings, fit: Regression, grows: bool) -> str:
     )
 
 
-def _panels(readings: _Readings, fit: Regression) -> tuple[Panel, ...]:
+def _panels(readings: Readings, fit: Regression) -> tuple[Panel, ...]:
     ends = np.array([readings.pressure.min(), readings.pressure.max()])
     nominal = fit.coefficients[_SLOPE] * ends + fit.coefficients[_ZERO]
     branches = (("pressure rising", 1.0, "rising"), ("pressure falling", -1.0, "falling"))

@@ -8,37 +8,42 @@ not look like a valve that saturates. What is left is the effective area Cd A(u)
 with s = +1 while the command rises and -1 while it falls: h is the width of the hysteresis.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
+from ppafo.identification.bench.evidence import Evidence, Number
 from ppafo.identification.bench.gas_flow import GasAt, orifice_shape
-from ppafo.identification.bench.inputs import check_moves, check_sources, kind_of
+from ppafo.identification.bench.inputs import check_absolute, check_moves, check_sources, kind_of, pauses
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, verdict_of
+from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
+from ppafo.signals.faults import FEWEST_AT_LIMIT, plateaus, scatters
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "valve_map"
 CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
 FEWEST_SAMPLES = 12
 _LEAST_RANGE = 0.5
+_SEEN_BEYOND = 0.02
+_SMALL_COMMAND = 0.2
 _GOOD_SHARE = 0.05
 _DEAD_BAND, _GAIN, _FULL, _HYSTERESIS = range(4)
 
 
 @dataclass(frozen=True, slots=True)
 class ValveMapSettings:
-    """The gas, the valve's path in a set (``valves.main``), and how sure the intervals are [-]."""
+    """The gas, the valve's path in a set (``valves.main``), how sure the intervals are [-], the sensors' gain [-]."""
 
     gas: GasAt
     path: str = "valve"
     confidence: float = 0.95
+    calibration: float = 0.0
 
 
 class _Map(NamedTuple):
@@ -48,15 +53,37 @@ class _Map(NamedTuple):
     area: Floats
     branch: Floats
 
+    @property
+    def is_two_way(self) -> bool:
+        return bool((self.branch > 0).any() and (self.branch < 0).any())
+
+
+class _Fitted(NamedTuple):
+    """The fitted map, and the area [m^2] in whose multiples gain and full area were fitted."""
+
+    fit: CurveFit
+    scale: float
+
+    def number(self, index: int, path: str, text: str) -> Number:
+        """Return a fitted number that is none of area."""
+        fit = self.fit
+        return Number(path, "", fit.values[index], fit.half_widths[index], text, lowest=0.0, widened=fit.widened[index])
+
+    def area(self, index: int, path: str, text: str) -> Number:
+        """Return a fitted area [m^2]."""
+        found = self.number(index, path, text)
+        return replace(found, unit="m^2", value=found.value * self.scale, half_width=found.half_width * self.scale)
+
 
 def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchResult:
     """Return dead band [-], gain [m^2], full area Cd A [m^2], saturation and hysteresis [-] from command and flow."""
     check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
     measured = _measured(sources, settings.gas)
-    two_way = bool((measured.branch > 0).any() and (measured.branch < 0).any())
-    fit, scale = _fit(measured, two_way, settings.confidence)
-    estimates = _estimates(traces(sources), measured, fit, scale, two_way, settings)
-    checks = _checks(measured, fit, two_way)
+    fitted = _fit(measured, settings.confidence)
+    fit, scale = fitted
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow(settings.calibration))
+    estimates = _estimates(evidence, measured, fitted, settings.path)
+    checks = (*_checks(measured, fit), _meter_check(sources), *pauses(sources))
     values = fit.values
     text = (
         f"{measured.command.size} readings; dead band {values[_DEAD_BAND]:.3g}, hysteresis {values[_HYSTERESIS]:.3g}, "
@@ -80,6 +107,8 @@ def _measured(sources: tuple[Source, ...], gas: GasAt) -> _Map:
         recording = source.recording
         check_moves(source, PROCEDURE, "command")
         check_moves(source, PROCEDURE, "mass_flow")
+        for name in CHANNELS[2:]:
+            check_absolute(source, PROCEDURE, name)
         command = recording["command"]
         wrong = np.flatnonzero(np.abs(command) > 1.0 + 1e-9)
         if wrong.size:
@@ -87,9 +116,7 @@ def _measured(sources: tuple[Source, ...], gas: GasAt) -> _Map:
                 f"{source.name}: {PROCEDURE}: channel 'command' is {command[wrong[0]]:g} at sample {wrong[0] + 1}; "
                 f"it goes from -1 to 1: scale it in a column map"
             )
-        shape = np.abs(
-            orifice_shape(_absolute(source, CHANNELS[2]), _absolute(source, CHANNELS[3]), gas.heat_capacity_ratio)
-        )
+        shape = np.abs(orifice_shape(recording[CHANNELS[2]], recording[CHANNELS[3]], gas.heat_capacity_ratio))
         usable = shape > 0.0
         areas.append(recording["mass_flow"][usable] / (gas.choked_flow_constant * shape[usable]))
         commands.append(command[usable])
@@ -108,16 +135,6 @@ def _measured(sources: tuple[Source, ...], gas: GasAt) -> _Map:
     return measured
 
 
-def _absolute(source: Source, name: str) -> Floats:
-    values = source.recording[name]
-    if values.min() <= 0.0:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: '{name}' is not absolute: it falls to {values.min():g} Pa; "
-            f"say bar_g for gauge"
-        )
-    return values
-
-
 def _branch(source: Source) -> Floats:
     """Return the direction of the command: what the recording says, else from the command's own last change."""
     if "direction" in source.recording:
@@ -127,10 +144,10 @@ def _branch(source: Source) -> Floats:
     return signs[last]
 
 
-def _fit(measured: _Map, two_way: bool, confidence: float) -> tuple[CurveFit, float]:
+def _fit(measured: _Map, confidence: float) -> _Fitted:
     """Fit on areas over the largest one; values are dead band, gain, full area (both over the largest), hysteresis."""
     scale = float(np.abs(measured.area).max())
-    widest = 0.5 if two_way else 1e-9
+    widest = 0.5 if measured.is_two_way else 1e-9
 
     def residuals(values: Floats) -> Floats:
         return np.asarray(measured.area / scale - area_of_command(measured.command, measured.branch, *values.tolist()))
@@ -138,66 +155,43 @@ def _fit(measured: _Map, two_way: bool, confidence: float) -> tuple[CurveFit, fl
     lower, upper = np.zeros(4), np.array([0.9, 100.0, 2.0, widest])
     lower[_GAIN], lower[_FULL] = 1e-3, 1e-2
     starts = [np.array([band, 1.0 / (1.0 - band), 0.95, 0.25 * widest]) for band in (0.02, 0.15, 0.35)]
-    fits = [fit_curve(residuals, start, lower, upper, confidence) for start in starts]
-    return min(fits, key=lambda fit: fit.rms), scale
+    fits = [fit_curve(residuals, start, lower, upper, confidence, (measured.command,)) for start in starts]
+    return _Fitted(min(fits, key=lambda fit: fit.rms), scale)
 
 
-def _estimates(
-    names: tuple[str, ...], measured: _Map, fit: CurveFit, scale: float, two_way: bool, settings: ValveMapSettings
-) -> tuple[Estimate, ...]:
-    values, wide = fit.values, fit.half_widths
-
-    def entry(path: str, unit: str, index: int, factor: float, text: str, size: float | None = None) -> Estimate:
-        value, half = float(values[index] * factor), float(wide[index] * factor)
-        verdict: Verdict = verdict_of(value, value - half, value + half, size)
-        return Estimate(
-            path, value, unit, max(0.0, value - half), value + half, verdict, text, names, settings.confidence
-        )
-
-    saturation = float(values[_DEAD_BAND] + values[_FULL] / values[_GAIN])
-    largest = float(np.abs(measured.command).max())
-    seen = saturation < largest - 0.02
-    told = (
-        f"The valve is fully open from a command of {saturation:.3g} on"
-        if seen
-        else f"No saturation shows up to a command of {largest:.3g}, so this is the area there, or more"
-    )
-    listed = [
-        entry(
-            f"{settings.path}.dead_band",
-            "",
-            _DEAD_BAND,
-            1.0,
-            "Command below which nothing flows, both ways alike.",
-            0.2,
-        ),
-        entry("valve_map.gain", "m^2", _GAIN, scale, "Effective area Cd A per command beyond the dead band."),
-    ]
-    if seen:
-        listed.append(entry("valve_map.full_area", "m^2", _FULL, scale, f"{told}; Cd A there."))
-        half = float(
-            np.hypot(wide[_DEAD_BAND], wide[_FULL] / values[_GAIN] + wide[_GAIN] * values[_FULL] / values[_GAIN] ** 2)
-        )
-        listed.append(
-            Estimate(
-                "valve_map.saturation_command",
-                saturation,
-                "",
-                saturation - half,
-                saturation + half,
-                verdict_of(saturation, saturation - half, saturation + half),
-                "Command from which the valve opens no further.",
-                names,
-                settings.confidence,
-            )
-        )
-    if two_way:
+def _estimates(evidence: Evidence, measured: _Map, fitted: _Fitted, path: str) -> tuple[Estimate, ...]:
+    """Return what the map has; a wrong gain of the sensors passes on to areas, not to commands."""
+    band = fitted.number(_DEAD_BAND, f"{path}.dead_band", "Command below which nothing flows, both ways alike.")
+    gain = fitted.area(_GAIN, "valve_map.gain", "Effective area Cd A per command beyond the dead band.")
+    listed = [evidence.plain(replace(band, scale=_SMALL_COMMAND)), evidence.calibrated(gain)]
+    saturation = _saturation(fitted.fit)
+    if saturation.value < float(np.abs(measured.command).max()) - _SEEN_BEYOND:
+        text = f"The valve is fully open from a command of {saturation.value:.3g} on; Cd A there."
+        listed.append(evidence.calibrated(fitted.area(_FULL, "valve_map.full_area", text)))
+        listed.append(evidence.plain(saturation))
+    if measured.is_two_way:
         text = "Width between the curves for a rising and a falling command."
-        listed.append(entry("valve_map.hysteresis", "", _HYSTERESIS, 1.0, text, 0.2))
+        width = fitted.number(_HYSTERESIS, "valve_map.hysteresis", text)
+        listed.append(evidence.plain(replace(width, scale=_SMALL_COMMAND)))
     return tuple(listed)
 
 
-def _checks(measured: _Map, fit: CurveFit, two_way: bool) -> tuple[Check, ...]:
+def _saturation(fit: CurveFit) -> Number:
+    """Return the command from which the valve opens no further: dead band + full area / gain."""
+    values, wide = fit.values, fit.half_widths
+    beyond = values[_FULL] / values[_GAIN]
+    of_slope = wide[_FULL] / values[_GAIN] + wide[_GAIN] * values[_FULL] / values[_GAIN] ** 2
+    return Number(
+        "valve_map.saturation_command",
+        "",
+        values[_DEAD_BAND] + beyond,
+        float(np.hypot(wide[_DEAD_BAND], of_slope)),
+        "Command from which the valve opens no further.",
+        widened=float(fit.widened.max()),
+    )
+
+
+def _checks(measured: _Map, fit: CurveFit) -> tuple[Check, ...]:
     fits = Check(
         "residuals", fit.rms <= _GOOD_SHARE, f"the map misses the opening by {fit.rms:.2%} of the full one (rms)"
     )
@@ -210,8 +204,27 @@ def _checks(measured: _Map, fit: CurveFit, two_way: bool) -> tuple[Check, ...]:
         listed.append(Check("both ways alike", apart <= _GOOD_SHARE, text))
     else:
         listed.append(Check("both ways alike", True, "only one direction was recorded"))
-    text = "rising and falling commands were recorded" if two_way else "the command went one way: hysteresis is unknown"
-    return (*listed, Check("hysteresis seen", two_way, text))
+    both_ways, one_way = "rising and falling commands were recorded", "the command went one way: hysteresis is unknown"
+    text = both_ways if measured.is_two_way else one_way
+    return (*listed, Check("hysteresis seen", measured.is_two_way, text))
+
+
+def _meter_check(sources: tuple[Source, ...]) -> Check:
+    """Ask whether the flow loses its scatter at its largest or smallest value, as a meter at its limit does.
+
+    A valve that is fully open keeps the scatter, unless the meter is too coarse to show it.
+    """
+    for source in sources:
+        flow = source.recording["mass_flow"]
+        for plateau in plateaus(flow):
+            if plateau.count >= FEWEST_AT_LIMIT and scatters(flow):
+                return Check(
+                    "flow meter",
+                    False,
+                    f"{source.name}: channel 'mass_flow' stays at exactly {plateau.value:g} kg/s for {plateau.count} "
+                    f"samples, from sample {plateau.first + 1}: saturated, or too coarse to show any scatter",
+                )
+    return Check("flow meter", True, "the flow scatters at its largest values too")
 
 
 def _panels(measured: _Map, fit: CurveFit, scale: float) -> tuple[Panel, ...]:

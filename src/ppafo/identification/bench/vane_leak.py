@@ -10,8 +10,9 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import effective_samples
+from ppafo.identification.bench.evidence import Evidence, Number
 from ppafo.identification.bench.gas_flow import GasAt
-from ppafo.identification.bench.inputs import check_moves, check_sources, kind_of, window
+from ppafo.identification.bench.inputs import check_absolute, check_moves, check_sources, kind_of, window
 from ppafo.identification.bench.leak_fits import (
     EDGE,
     Decay,
@@ -22,16 +23,19 @@ from ppafo.identification.bench.leak_fits import (
     fit_relaxation,
     judge,
     law_checks,
-    no_area,
+    opening_estimates,
     smooth_curve,
 )
-from ppafo.identification.bench.leak_laws import Chambers, laws_of
+from ppafo.identification.bench.leak_laws import LAMINAR, LINEAR, Chambers
+from ppafo.identification.bench.leak_opening import Opening
 from ppafo.identification.bench.leak_steady import steady_leak
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, counted, verdict_of
+from ppafo.identification.bench.result import BenchResult, counted
 from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
+from ppafo.signals import Recording
+from ppafo.signals.faults import longest_gap, plateaus, stands_out
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "vane_leak"
@@ -48,7 +52,8 @@ _NEARLY_EQUAL = 0.01
 class VaneLeakSettings:
     """The gas, chamber volumes [m^3] where known, the leak's discharge coefficient [-], and the times to use [s].
 
-    Without ``volume_1`` there is no area, only a rate.
+    Without ``volume_1`` there is no area, only a rate. A ``critical_ratio`` [-] asks for a sonic conductance.
+    ``calibration`` is the relative uncertainty of the flow meter's gain [-], for steady readings.
     """
 
     gas: GasAt
@@ -58,6 +63,13 @@ class VaneLeakSettings:
     start: float | None = None
     end: float | None = None
     confidence: float = 0.95
+    calibration: float = 0.0
+    critical_ratio: float | None = None
+
+    @property
+    def opening(self) -> Opening:
+        """The leak in the form in which the set has it."""
+        return Opening(self.gas, self.discharge_coefficient, self.critical_ratio)
 
 
 def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
@@ -66,20 +78,25 @@ def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchR
     Recordings with a ``mass_flow`` are steady: the flow that keeps up the pressure, at several pressures.
     """
     if sources and all("mass_flow" in source.recording for source in sources):
-        return steady_leak(sources, settings.gas, settings.discharge_coefficient, settings.confidence)
+        return steady_leak(sources, settings.opening, settings.confidence, settings.calibration)
+    if settings.calibration:
+        raise IdentificationError(
+            f"{PROCEDURE}: calibration = {settings.calibration:g}: a decay has no use for it, for a gain that both "
+            f"sensors share leaves its rate as it is; what counts is the volume. Leave it out"
+        )
     check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
     decays = tuple(_decay(source, settings) for source in sources)
     smooth = tuple(smooth_curve(decay) for decay in decays)
     residuals = np.concatenate([decay.difference - curve for decay, curve in zip(decays, smooth, strict=True)])
     noise, count = float(np.sqrt(np.mean(residuals**2))), effective_samples(residuals)
-    laws = laws_of(settings.gas.heat_capacity_ratio)
-    fitted = [fit_law(law, decays, count, settings.confidence) for law in laws]
+    fitted = [fit_law(law, decays, count, settings.confidence) for law in (settings.opening.law(), LAMINAR, LINEAR)]
     fitted.append(fit_relaxation(decays, count, settings.confidence))
     best = best_law(fitted)
     orifice = fitted[0]
     drop = max(float(np.ptp(decay.difference)) for decay in decays)
     judged = judge(fitted, best, noise, drop, "Pa")
-    estimates = _estimates(traces(sources), settings, orifice, best, judged)
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow())
+    estimates = _estimates(evidence, settings, orifice, best, judged)
     return BenchResult(
         PROCEDURE,
         f"{counted(len(decays), 'decay')}; best law: {best.name} ({best.formula}); orifice: {judged.verdict}",
@@ -93,12 +110,10 @@ def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchR
 def _decay(source: Source, settings: VaneLeakSettings) -> Decay:
     check_moves(source, PROCEDURE, "pressure_1")
     part = window(source.recording, settings.start, settings.end)
+    _check_samples(source, part)
     first, second = part["pressure_1"], part["pressure_2"]
     for name in CHANNELS:
-        if part[name].min() <= 0.0:
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: '{name}' is not absolute: it falls to zero or below"
-            )
+        check_absolute(source, PROCEDURE, name)
     difference = first - second
     sign = 1.0 if np.mean(difference[:EDGE]) > 0.0 else -1.0
     if sign < 0.0:
@@ -120,6 +135,25 @@ def _decay(source: Source, settings: VaneLeakSettings) -> Decay:
     chambers = Chambers(ratio, float(np.mean(total)))
     times = part.time[:last] - part.time[0]
     return Decay(times, difference[:last], chambers, lost / drop, float(difference[:last].min()))
+
+
+def _check_samples(source: Source, part: Recording) -> None:
+    """Refuse a gap, and a sensor that was at its limit when the decay began."""
+    skipped = int(np.searchsorted(source.recording.time, part.time[0]))
+    gap = longest_gap(part.time)
+    if gap is not None:
+        raise IdentificationError(
+            f"{source.name}: {PROCEDURE}: there is a gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s "
+            f"(sample {skipped + gap.index + 1}); give start or end, so that it lies outside"
+        )
+    for name in CHANNELS:
+        for plateau in plateaus(part[name]):
+            if plateau.first < EDGE and stands_out(part[name], plateau):
+                raise IdentificationError(
+                    f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {plateau.value:g} Pa for "
+                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and moves only then: the "
+                    f"sensor is saturated, or the chamber was not closed yet; give start"
+                )
 
 
 def _check_falls(source: Source, difference: Floats) -> None:
@@ -145,42 +179,32 @@ def _volume_ratio(first: Floats, second: Floats, settings: VaneLeakSettings, sig
 
 
 def _estimates(
-    names: tuple[str, ...], settings: VaneLeakSettings, orifice: FittedLaw, best: FittedLaw, judged: Judgement
+    evidence: Evidence, settings: VaneLeakSettings, orifice: FittedLaw, best: FittedLaw, judged: Judgement
 ) -> tuple[Estimate, ...]:
+    numbers = _numbers(settings, orifice, judged)
+    listed = opening_estimates(evidence, settings.opening, numbers, judged)
+    if best.name == orifice.name:
+        return listed
+    text = f"Rate of the law that fits best: {best.formula}."
+    path = f"vane_leak.{best.name}_rate"
+    rate = Number(path, best.rate_unit, best.rate, best.half_width, text, lowest=0.0, widened=best.widened)
+    return (*listed, evidence.plain(rate))
+
+
+def _numbers(settings: VaneLeakSettings, orifice: FittedLaw, judged: Judgement) -> list[Number]:
+    """Return the leak's size; its ratio to the volume of chamber 1 where that is not known."""
     gas = settings.gas
-    per_rate = 1.0 / (gas.choked_flow_constant * gas.specific_gas_constant * gas.temperature)
-
-    def entry(path: str, unit: str, value: float, half: float, text: str, verdict: Verdict | None = None) -> Estimate:
-        found = verdict or verdict_of(value, value - half, value + half)
-        if found == "identified" and judged.verdict == "weak":
-            found = "weak"
-        return Estimate(
-            path, value, unit, max(0.0, value - half), value + half, found, text, names, settings.confidence
-        )
-
-    refused = judged.verdict == "law does not describe the data"
-    listed = []
-    if refused:
-        listed.append(no_area(judged, names, settings.confidence))
-    elif settings.volume_1 is None:
+    per_volume = 1.0 / (gas.specific_gas_constant * gas.temperature)
+    if settings.volume_1 is None:
+        per_rate = per_volume / gas.choked_flow_constant
         text = f"Cd A over the volume of chamber 1, which is not known: no area. {judged.sentence}."
-        listed.append(
-            entry("vane_leak.area_over_volume", "1/m", orifice.rate * per_rate, orifice.half_width * per_rate, text)
-        )
-    else:
-        area, half = (item * per_rate * settings.volume_1 for item in (orifice.rate, orifice.half_width))
-        text = f"Cd A from a volume of {settings.volume_1 * 1e6:.4g} cm^3, taken as exact; {judged.reason}."
-        if settings.discharge_coefficient:
-            coefficient = settings.discharge_coefficient
-            told = f"With Cd = {coefficient:g}, of which only the product with the area counts. {text}"
-            listed.append(entry("actuator.leak.area", "m^2", area / coefficient, half / coefficient, told))
-        listed.append(entry("vane_leak.effective_area", "m^2", area, half, text))
-    if best.name != orifice.name:
-        text = f"Rate of the law that fits best: {best.formula}."
-        half = best.half_width
-        found = verdict_of(best.rate, best.rate - half, best.rate + half)
-        listed.append(entry(f"vane_leak.{best.name}_rate", best.rate_unit, best.rate, half, text, found))
-    return tuple(listed)
+        value, half = orifice.rate * per_rate, orifice.half_width * per_rate
+        path = "vane_leak.area_over_volume"
+        return [Number(path, "1/m", value, half, text, lowest=0.0, widened=orifice.widened)]
+    conductance, half = (item * per_volume * settings.volume_1 for item in (orifice.rate, orifice.half_width))
+    text = f"From a volume of {settings.volume_1 * 1e6:.4g} cm^3, taken as exact. {gas.temperature_told}; "
+    text += f"{judged.reason}."
+    return settings.opening.numbers(conductance, half, text, orifice.widened)
 
 
 def _kept(decays: tuple[Decay, ...]) -> Check:

@@ -18,7 +18,7 @@ from ppafo.identification.trajectory.ranges import Range
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import exact_orifice, initial_state
+from ppafo.simulation.plan import exact_orifice, initial_state, thermal_parameters
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import FreeMotion
 
@@ -65,6 +65,7 @@ def run_with(prepared: Prepared, numbers: Mapping[str, float]) -> Run:
     return replace(
         base,
         plant=plant,
+        thermal=thermal_parameters(scenario),
         valve_orifice=exact_orifice(device.valve.orifice, device),
         leak_orifice=exact_orifice(device.actuator.leak, device),
         initial=initial_state(scenario, plant),

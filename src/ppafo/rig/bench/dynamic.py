@@ -26,6 +26,8 @@ from ppafo.simulation.scenario import Scenario
 LEAK_RATE = 20.0
 """Samples in a second [Hz] of a leak that takes half a minute."""
 
+_SUPPLIES = {"supply_pressure": "supply_drop_1", "dorsiflexion_pressure": "supply_drop_2"}
+_IN_MOTION = ("angle", "pressure_1", "pressure_2", *_SUPPLIES, "command")
 _WHOLE = 1.0e-9
 _OPEN_LOOP = "constant"
 _CLOSED_VALVE = {"kind": "constant", "command": 0, "rate": "1 kHz"}
@@ -35,9 +37,7 @@ def record_step_response(request: Request) -> Outcome:
     """Return the step response of figure 7: the valve opens fully and the vane turns from stop to stop."""
     scenario = _of_package("step-response", request)
     given = rig_run(scenario, request, request.preset.values["sampling.rate"])
-    return _outcome(
-        "step-response", scenario, given, ("angle", "pressure_1", "pressure_2", "supply_pressure", "command", "torque")
-    )
+    return _outcome("step-response", scenario, given, (*_IN_MOTION, "torque"))
 
 
 def record_torque_task(request: Request) -> Outcome:
@@ -45,8 +45,7 @@ def record_torque_task(request: Request) -> Outcome:
     kind = load_device(request.parameter_set, request.valve).valve.kind
     scenario = _of_package(f"torque-task-{kind}", request)
     given = rig_run(scenario, request, request.preset.values["sampling.rate"])
-    names = ("angle", "pressure_1", "pressure_2", "supply_pressure", "command", "reference", "torque")
-    return _outcome("torque-task", scenario, given, names)
+    return _outcome("torque-task", scenario, given, (*_IN_MOTION, "reference", "torque"))
 
 
 def record_free_decay(request: Request) -> Outcome:
@@ -86,8 +85,7 @@ def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
         line_orifice=line_orifice(device, preset),
         initial=initial_state(scenario, run, physics),
         sensors={
-            name: sensor(preset, name, seed, times.size)
-            for name in ("angle", "pressure_1", "pressure_2", "supply_pressure")
+            name: sensor(preset, name, seed, times.size) for name in ("angle", "pressure_1", "pressure_2", *_SUPPLIES)
         },
         sample_times=times,
         control_period=2.0 * scenario.duration if is_open_loop else run.period,
@@ -132,8 +130,9 @@ def measured(scenario: Scenario, given: RigRun, solution: RigSolution) -> dict[s
     """Return what the sensors show at every sample; the torque is worked out from the measured pressures."""
     seen = [seen_signals(given, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
     true = dict(zip(("angle", "pressure_1", "pressure_2"), np.array(seen).T, strict=True))
-    drop = solution.states[:, RigState._fields.index("supply_drop_1")]
-    true["supply_pressure"] = given.run.plant.supply_pressure - drop
+    for name, drop in _SUPPLIES.items():
+        regulated = getattr(given.run.plant, name)
+        true[name] = regulated - solution.states[:, RigState._fields.index(drop)]
     shown = {name: given.sensors[name].readings(values) for name, values in true.items()}
     shown["command"] = solution.commands
     shown["torque"] = given.run.plant.torque_constant * (shown["pressure_1"] - shown["pressure_2"])

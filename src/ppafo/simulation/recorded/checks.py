@@ -4,15 +4,14 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.signals import Recording
+from ppafo.signals.faults import longest_gap
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded.inputs import COMMAND, SUPPLY
+from ppafo.simulation.recorded.inputs import COMMAND, DORSIFLEXION_SUPPLY, SUPPLY
 
-PRESSURES = ("pressure_1", "pressure_2", SUPPLY)
+PRESSURES = ("pressure_1", "pressure_2", SUPPLY, DORSIFLEXION_SUPPLY)
 
 LONGEST_GAP = 0.05
-"""Seconds without a sample in which so much can happen that the inputs are not known any more ..."""
-GAP_SAMPLES = 10.0
-"""... unless the whole recording is as slow as that: a gap is this many times the usual time between samples."""
+"""Seconds without a sample in which so much can happen that the inputs are not known any more, if it is a gap."""
 
 _COMMAND_TOLERANCE = 1.0e-6
 _SMALLEST_ABSOLUTE = 0.3
@@ -26,12 +25,11 @@ def usual_interval(time: Floats) -> float:
 
 def check_gaps(recording: Recording, file: str) -> None:
     """Refuse a recording with a gap in which its inputs are not known."""
-    gaps = np.diff(recording.time)
-    longest = int(np.argmax(gaps))
-    if gaps[longest] > max(LONGEST_GAP, GAP_SAMPLES * usual_interval(recording.time)):
+    gap = longest_gap(recording.time)
+    if gap is not None and gap.duration > LONGEST_GAP:
         raise DataError(
-            f"{file}: there is a gap of {gaps[longest]:.4g} s after {recording.time[longest]:.6g} s (sample "
-            f"{longest + 1}), in which the inputs are not known; cut the recording there"
+            f"{file}: there is a gap of {gap.duration:.4g} s after {recording.time[gap.index]:.6g} s (sample "
+            f"{gap.index + 1}), in which the inputs are not known; cut the recording there"
         )
 
 

@@ -11,6 +11,7 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
 COMMAND, SUPPLY, EXTERNAL_TORQUE = "command", "supply_pressure", "external_torque"
+DORSIFLEXION_SUPPLY = "dorsiflexion_pressure"
 
 LONGEST_STEP = 1.0e-3
 """Seconds over which a recorded pressure or torque is averaged, and the longest step of a replay."""
@@ -71,6 +72,8 @@ def followed_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dic
     followed: dict[str, Floats] = {}
     if inputs.has(SUPPLY):
         followed |= dict.fromkeys(supply_paths(device), _between_samples(inputs, SUPPLY, run))
+    if inputs.has(DORSIFLEXION_SUPPLY):
+        followed["plant.dorsiflexion_pressure"] = _between_samples(inputs, DORSIFLEXION_SUPPLY, run)
     if inputs.has(EXTERNAL_TORQUE):
         followed["plant.external_torque"] = _between_samples(inputs, EXTERNAL_TORQUE, run)
     return followed

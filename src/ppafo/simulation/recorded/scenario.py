@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
-from ppafo.simulation.recorded.inputs import LONGEST_STEP, SUPPLY, sample_period
+from ppafo.simulation.recorded.inputs import DORSIFLEXION_SUPPLY, LONGEST_STEP, SUPPLY, sample_period
 from ppafo.simulation.recorded.start import Start
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
@@ -45,10 +45,9 @@ def recorded_control(recording: Recording) -> Control:
 
 def with_highest_supply(device: Device, recording: Recording) -> Device:
     """Return the device with the highest supply that was recorded, for which the steps must be fine enough."""
-    if SUPPLY not in recording:
-        return device
     supply = device.supply
-    highest = max(supply.pressure, float(recording[SUPPLY].max()))
+    recorded = {name: float(recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in recording}
+    highest = max(supply.pressure, recorded.get(SUPPLY, 0.0))
     both = supply.pressure == supply.dorsiflexion_pressure
-    other = highest if both else supply.dorsiflexion_pressure
+    other = max(highest if both else supply.dorsiflexion_pressure, recorded.get(DORSIFLEXION_SUPPLY, 0.0))
     return replace(device, supply=replace(supply, pressure=highest, dorsiflexion_pressure=other))

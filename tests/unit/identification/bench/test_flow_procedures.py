@@ -17,7 +17,8 @@ from ppafo.identification.bench import (
     vane_leak,
 )
 from ppafo.identification.bench.gas_flow import orifice_shape
-from ppafo.identification.bench.leak_laws import Chambers, difference_in_time, laws_of
+from ppafo.identification.bench.leak_laws import LINEAR, Chambers, difference_in_time
+from ppafo.identification.bench.leak_opening import Opening
 from ppafo.identification.source import Source
 
 VOLUME = 60e-6
@@ -60,7 +61,7 @@ def test_gauge_pressures_passed_for_absolute_are_refused(planted: ModuleType) ->
     source = planted.flow()
     gauge = changed(source, "downstream_pressure", source.recording["downstream_pressure"] - planted.ROOM)
     gauge = changed(gauge, "downstream_pressure", np.minimum(gauge.recording["downstream_pressure"], 0.0))
-    with pytest.raises(IdentificationError, match="it is absolute"):
+    with pytest.raises(IdentificationError, match="at sample 1, which is not absolute"):
         open_valve_flow((gauge,), OpenValveFlowSettings(planted.CO2))
 
 
@@ -154,7 +155,7 @@ def test_a_tight_vane_is_said_to_show_no_leak(planted: ModuleType) -> None:
 def steady(planted: ModuleType, law: str, rate: float) -> Source:
     first = np.linspace(1.3e5, 6.0e5, 24)
     second = np.full(24, planted.ROOM)
-    chosen = next(item for item in laws_of(1.3) if item.name == law)
+    chosen = next(item for item in planted.LAWS if item.name == law)
     flow = rate * chosen.shape(first, second)
     flow *= 1.0 + np.random.default_rng(1).normal(0.0, 0.003, 24)
     channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
@@ -191,14 +192,16 @@ def test_an_orifice_that_is_the_best_law_but_not_all_of_it_is_called_weak(plante
 
 
 def test_the_linear_law_is_an_exponential() -> None:
-    law = next(item for item in laws_of(1.3) if item.name == "linear")
+    law = LINEAR
     time = np.linspace(0.0, 10.0, 50)
     found = difference_in_time(law, Chambers(0.5, 4e5), 2e5, 0.1, time, 1e4)
     assert np.allclose(found, 2e5 * np.exp(-0.15 * time), rtol=1e-6)
 
 
-def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pressure() -> None:
-    law = laws_of(1.3)[0]
+def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pressure(
+    planted: ModuleType,
+) -> None:
+    law = planted.LAWS[0]
     time = np.linspace(0.0, 3.0, 50)
     found = difference_in_time(law, Chambers(0.0, 1e5), 9e5, 0.2, time, 4e5) + 1e5
     assert np.allclose(found, 1e6 * np.exp(-0.2 * time), rtol=1e-5)
@@ -212,5 +215,58 @@ def test_flow_is_antisymmetric_under_exchange_of_sides() -> None:
 def test_a_leak_below_zero_absolute_pressure_is_refused(planted: ModuleType) -> None:
     source = planted.leak("linear", 0.05)
     gauge = replace(changed(source, "pressure_2", source.recording["pressure_2"] - 2.0e5))
-    with pytest.raises(IdentificationError, match="'pressure_2' is not absolute"):
+    with pytest.raises(IdentificationError, match=r"'pressure_2' is .* at sample 1, which is not absolute"):
         vane_leak((gauge,), VaneLeakSettings(planted.CO2))
+
+
+def test_calibration_widens_areas_and_leaves_commands_and_ratios(planted: ModuleType) -> None:
+    plain, told = (
+        open_valve_flow((planted.flow(),), OpenValveFlowSettings(planted.CO2, calibration=share))
+        for share in (0.0, 0.1)
+    )
+    path = "open_valve_flow.effective_area"
+    assert told[path].relative_half_width == pytest.approx(np.hypot(0.1, plain[path].relative_half_width))
+    ratio = "open_valve_flow.critical_ratio"
+    assert told[ratio].half_width == plain[ratio].half_width
+    plain, told = (valve_map((planted.sweep(),), ValveMapSettings(planted.CO2, calibration=c)) for c in (0.0, 0.1))
+    assert told["valve_map.gain"].relative_half_width > 0.1
+    assert told["valve.dead_band"].half_width == plain["valve.dead_band"].half_width
+
+
+def test_a_decay_has_no_use_for_a_calibration_and_says_why(planted: ModuleType) -> None:
+    with pytest.raises(IdentificationError, match="a gain that both sensors share leaves its rate as it is"):
+        vane_leak((planted.leak("orifice", 0.05),), VaneLeakSettings(planted.CO2, calibration=0.01))
+
+
+def test_the_zero_of_the_flow_meter_is_told_apart_from_a_steady_leak(planted: ModuleType) -> None:
+    source = steady(planted, "orifice", 0.3e-6 * 0.113 * planted.CO2.choked_flow_constant)
+    off = changed(source, "mass_flow", source.recording["mass_flow"] + 2.0e-6)
+    result = vane_leak((off,), VaneLeakSettings(planted.CO2, discharge_coefficient=0.113))
+    zero, area = result["vane_leak.flow_zero"], result["actuator.leak.area"]
+    assert zero.low <= 2.0e-6 <= zero.high
+    assert area.low <= 0.3e-6 <= area.high
+
+
+@pytest.mark.parametrize("kind", ["decay", "steady"])
+def test_a_leak_in_the_form_of_the_standard_gives_its_conductance(planted: ModuleType, kind: str) -> None:
+    critical, conductance = 0.25, 7.0e-11
+    opening = Opening(planted.CO2, critical_ratio=critical)
+    per_pressure = conductance * planted.CO2.flow_per_sonic_conductance
+    if kind == "steady":
+        first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, planted.ROOM)
+        flow = per_pressure * opening.law().shape(first, second)
+        channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
+        source = planted.source("steady", np.arange(24.0), **channels)
+    else:
+        gas = planted.CO2
+        rate = per_pressure * gas.specific_gas_constant * gas.temperature / VOLUME
+        time, chambers = np.arange(0.0, 20.0, 0.01), Chambers(1.3, 1.3 * planted.SUPPLY + planted.ROOM)
+        start = planted.SUPPLY - planted.ROOM
+        pair = chambers.pressures(difference_in_time(opening.law(), chambers, start, rate, time, 100.0))
+        noise = np.random.default_rng(1).normal(0.0, 100.0, (2, time.size))
+        channels = {f"pressure_{n + 1}": (pair[n] + noise[n], "Pa") for n in range(2)}
+        source = planted.source("leak", time, **channels)
+    settings = VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, critical_ratio=critical)
+    found = vane_leak((source,), settings)["actuator.leak.sonic_conductance"]
+    assert found.value == pytest.approx(conductance, rel=5e-3)
+    assert found.is_usable

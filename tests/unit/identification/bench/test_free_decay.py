@@ -7,7 +7,8 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import FreeDecaySettings, free_decay
-from ppafo.identification.bench.free_decay import angle_of_decay, stop_time
+from ppafo.identification.bench.decay_motion import angle_of_decay, stop_time, velocity_of_decay
+from ppafo.identification.source import Source
 
 
 def test_the_closed_form_satisfies_the_equation_of_motion() -> None:
@@ -90,3 +91,44 @@ def test_an_angle_that_never_moves_is_refused(planted: ModuleType) -> None:
 def test_too_few_samples_are_refused(planted: ModuleType) -> None:
     with pytest.raises(IdentificationError, match="at least 20 samples between start and end, there are 2"):
         free_decay((planted.decay(),), FreeDecaySettings(start=7.99))
+
+
+def with_velocity(planted: ModuleType, factor: float = 1.0, seed: int = 1) -> Source:
+    source = planted.decay(seed=seed)
+    time = source.recording.time
+    speed = velocity_of_decay(np.maximum(time - 1.0, 0.0), 2.5, planted.DAMPING_RATE, planted.DECELERATION)
+    speed = np.where(time < 1.0, 0.0, speed) + np.random.default_rng(seed + 50).normal(0.0, 0.003, time.size)
+    return Source(source.recording.with_channel("angular_velocity", factor * speed, "rad/s"))
+
+
+def test_the_velocity_is_the_slope_of_the_angle_in_the_closed_form() -> None:
+    time = np.linspace(0.0, 6.0, 6001)
+    slope = np.gradient(angle_of_decay(time, 0.3, 2.5, 0.7, 0.5), time)
+    assert np.allclose(velocity_of_decay(time, 2.5, 0.7, 0.5)[1:-1], slope[1:-1], atol=1e-3)
+
+
+def test_a_recorded_velocity_makes_the_intervals_narrower_and_covers_the_planted_values(planted: ModuleType) -> None:
+    inside, narrower = 0, 0
+    for seed in range(20):
+        alone = free_decay((planted.decay(seed=seed),))["free_decay.damping_over_inertia"]
+        both = free_decay((with_velocity(planted, seed=seed),))["free_decay.damping_over_inertia"]
+        inside += both.low <= planted.DAMPING_RATE <= both.high
+        narrower += both.half_width < 0.8 * alone.half_width
+    assert inside >= 17
+    assert narrower >= 18
+    assert "angular velocity" in free_decay((with_velocity(planted),)).summary
+
+
+@pytest.mark.parametrize(("factor", "shown"), [(57.29578, "57.3 times"), (-1.0, "-1 times")])
+def test_a_velocity_in_another_unit_or_direction_is_refused(planted: ModuleType, factor: float, shown: str) -> None:
+    with pytest.raises(IdentificationError, match=f"'angular_velocity' is {shown} as fast as 'angle' changes"):
+        free_decay((with_velocity(planted, factor),))
+
+
+def test_the_gain_of_the_sensor_touches_friction_and_not_damping(planted: ModuleType) -> None:
+    plain = free_decay((planted.decay(),), FreeDecaySettings(inertia=8.4e-3))
+    told = free_decay((planted.decay(),), FreeDecaySettings(inertia=8.4e-3, calibration=0.1))
+    assert told["friction.viscous_damping"].half_width == plain["friction.viscous_damping"].half_width
+    assert told["friction.dynamic_torque"].relative_half_width == pytest.approx(
+        np.hypot(0.1, plain["friction.dynamic_torque"].relative_half_width)
+    )

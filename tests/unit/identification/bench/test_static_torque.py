@@ -123,3 +123,13 @@ def test_one_pressure_is_too_few(planted: ModuleType) -> None:
 
 def test_synthetic_recordings_make_a_synthetic_result(planted: ModuleType) -> None:
     assert static_torque((planted.static(),)).kind == "synthetic"
+
+
+def test_an_outlier_is_named_with_its_file_and_sample(planted: ModuleType) -> None:
+    source = planted.static()
+    torque = source.recording["torque"].copy()
+    torque[[50, 90]] += [4.0, 3.0]
+    wild = Source(changed(source, "torque", torque).recording, "bench.csv sha256:0")
+    checks = static_torque((planted.static(seed=2), wild)).checks
+    told = next(check.statement for check in checks if check.name == "outliers")
+    assert "the worst is sample 51 of bench.csv" in told

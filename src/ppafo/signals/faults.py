@@ -1,0 +1,117 @@
+"""What can be wrong with recorded numbers, found in the numbers alone: gaps in time, and sensors at their limit."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.signals.recording import Floats
+
+GAP_SAMPLES = 10.0
+"""Usual times between samples that a gap has at least."""
+
+FEWEST_AT_LIMIT = 20
+"""Samples at exactly the same value from which a sensor may be at its limit."""
+
+_NOISY_SHARE = 0.2
+_ABRUPT_SHARE = 0.3
+_BEFORE = 5
+_EXCEPTIONAL = 5
+_PARTS = 20
+_SMOOTH = 1.0e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Samples missing after the sample with this index: the time [s] between it and the next one."""
+
+    index: int
+    duration: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plateau:
+    """The longest time at exactly the largest or smallest value: indices of first and last sample, and the value."""
+
+    first: int
+    last: int
+    value: float
+    word: Literal["largest", "smallest"]
+
+    @property
+    def count(self) -> int:
+        """Number of samples in it."""
+        return self.last - self.first + 1
+
+
+def longest_gap(time: Floats) -> Gap | None:
+    """Return the longest time without samples [s] where it is one of many usual intervals, else None."""
+    intervals = np.diff(time)
+    if intervals.size < 2:
+        return None
+    index = int(np.argmax(intervals))
+    longest = float(intervals[index])
+    return Gap(index, longest) if longest > GAP_SAMPLES * float(np.median(intervals)) else None
+
+
+def lasting_change(values: Floats) -> float:
+    """Return how far the values go in what lasts: largest less smallest mean of at most 20 equal parts."""
+    parts = np.array_split(values, min(_PARTS, values.size))
+    return float(np.ptp([part.mean() for part in parts]))
+
+
+def plateaus(values: Floats) -> tuple[Plateau, Plateau]:
+    """Return the longest times at exactly the largest and at exactly the smallest value."""
+    largest, smallest = float(values.max()), float(values.min())
+    return (
+        Plateau(*longest_run(values == largest), largest, "largest"),
+        Plateau(*longest_run(values == smallest), smallest, "smallest"),
+    )
+
+
+def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return the first and the last index of the longest run of True; at least one must be."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    starts, ends = edges[::2], edges[1::2]
+    longest = int(np.argmax(ends - starts))
+    return int(starts[longest]), int(ends[longest] - 1)
+
+
+def is_at_limit(values: Floats, plateau: Plateau) -> bool:
+    """Return whether a plateau is that of a sensor at its limit: noise stops there, or the signal runs into it.
+
+    A signal that comes to rest by itself has noise there too, or slows down before.
+    """
+    if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
+        return False
+    return is_noisy(values[values != plateau.value]) or _runs_into(values, plateau)
+
+
+def is_noisy(values: Floats) -> bool:
+    """Return whether the values go up and down from sample to sample, as no smooth curve does."""
+    ways = np.sign(np.diff(values))
+    return ways.size > 1 and float((ways[1:] * ways[:-1] < 0.0).mean()) > _NOISY_SHARE
+
+
+def scatters(values: Floats) -> bool:
+    """Return whether at least half of the values are off the line between their neighbours, as noise makes them."""
+    return values.size > 2 and float(np.median(np.abs(np.diff(values, 2)))) > _SMOOTH * float(np.ptp(values))
+
+
+def stands_out(values: Floats, plateau: Plateau) -> bool:
+    """Return whether a plateau lasts far longer than any other value does: it is no step of a coarse converter."""
+    if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
+        return False
+    rest = np.concatenate([values[: plateau.first], values[plateau.last + 1 :]])
+    changes = np.flatnonzero(np.diff(rest))
+    others = np.diff(np.concatenate(([-1], changes, [rest.size - 1])))
+    return plateau.count > _EXCEPTIONAL * int(others.max())
+
+
+def _runs_into(values: Floats, plateau: Plateau) -> bool:
+    """Return whether the signal was still moving fast, for this signal, just before the plateau."""
+    if plateau.first < _BEFORE:
+        return False
+    steps = np.abs(values[_BEFORE:] - values[:-_BEFORE])
+    return float(steps[plateau.first - _BEFORE]) > _ABRUPT_SHARE * float(steps.max())

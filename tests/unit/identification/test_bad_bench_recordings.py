@@ -1,0 +1,192 @@
+"""Every procedure of the bench refuses or flags what its recording cannot carry, by file, channel and sample."""
+
+from collections.abc import Callable
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.bench import (
+    BenchResult,
+    OpenValveFlowSettings,
+    ValveMapSettings,
+    VaneLeakSettings,
+    free_decay,
+    open_valve_flow,
+    static_torque,
+    valve_map,
+    vane_leak,
+)
+from ppafo.identification.source import Source
+from ppafo.signals import Recording
+
+VOLUME = 60e-6
+NEEDED = {
+    "static_torque": ("torque", "pressure_difference", "direction"),
+    "free_decay": ("angle",),
+    "open_valve_flow": ("upstream_pressure", "downstream_pressure", "mass_flow"),
+    "valve_map": ("command", "mass_flow", "upstream_pressure", "downstream_pressure"),
+    "vane_leak": ("pressure_1", "pressure_2"),
+}
+Solve = Callable[[Source], BenchResult]
+
+
+@pytest.fixture
+def bench(planted: ModuleType) -> dict[str, tuple[Source, Solve]]:
+    """A good recording for each procedure, and the procedure."""
+    co2 = planted.CO2
+    leak = planted.leak("orifice", planted.orifice_rate(3.39e-8, VOLUME))
+    leak_settings = VaneLeakSettings(co2, VOLUME, VOLUME / 1.3, 0.113)
+    return {
+        "static_torque": (planted.static(), lambda source: static_torque((source,))),
+        "free_decay": (planted.decay(), lambda source: free_decay((source,))),
+        "open_valve_flow": (planted.flow(), lambda source: open_valve_flow((source,), OpenValveFlowSettings(co2))),
+        "valve_map": (planted.sweep(), lambda source: valve_map((source,), ValveMapSettings(co2))),
+        "vane_leak": (leak, lambda source: vane_leak((source,), leak_settings)),
+    }
+
+
+def changed(source: Source, name: str, values: np.ndarray) -> Source:
+    return Source(source.recording.with_channel(name, values, source.recording.unit(name)), source.reference)
+
+
+def retimed(source: Source, time: np.ndarray) -> Source:
+    recording = source.recording
+    return Source(Recording(recording.label, time, recording.channels, recording.kind), source.reference)
+
+
+def refusal(solve: Solve, source: Source) -> str:
+    with pytest.raises(IdentificationError) as caught:
+        solve(source)
+    text = str(caught.value)
+    assert text.startswith(f"{source.name}: ")
+    assert "\n" not in text
+    return text
+
+
+@pytest.mark.parametrize(("kind", "channel"), [(kind, name) for kind, names in NEEDED.items() for name in names])
+def test_a_missing_channel_is_named(bench: dict[str, tuple[Source, Solve]], kind: str, channel: str) -> None:
+    source, solve = bench[kind]
+    kept = {name: item for name, item in source.recording.channels.items() if name != channel}
+    bare = Source(Recording(source.recording.label, source.recording.time, kept))
+    assert f"needs a channel '{channel} [" in refusal(solve, bare)
+
+
+@pytest.mark.parametrize("kind", NEEDED)
+def test_a_recording_that_is_too_short_is_refused(bench: dict[str, tuple[Source, Solve]], kind: str) -> None:
+    source, solve = bench[kind]
+    short = Source(source.recording.between(source.recording.time[0], source.recording.time[2]))
+    assert "needs" in refusal(solve, short)
+
+
+@pytest.mark.parametrize(
+    ("kind", "channel", "words"),
+    [
+        ("static_torque", "torque", "'torque' is"),
+        ("static_torque", "pressure_difference", "'pressure_difference' is"),
+        ("static_torque", "direction", "falling branch is missing"),
+        ("free_decay", "angle", "'angle' is"),
+        ("open_valve_flow", "mass_flow", "'mass_flow' stays at"),
+        ("valve_map", "command", "'command' is"),
+        ("valve_map", "mass_flow", "'mass_flow' is"),
+        ("vane_leak", "pressure_1", "'pressure_1' is"),
+    ],
+)
+def test_a_constant_channel_is_refused(
+    bench: dict[str, tuple[Source, Solve]], kind: str, channel: str, words: str
+) -> None:
+    source, solve = bench[kind]
+    value = 1.0 if channel in ("direction", "angle") else float(source.recording[channel].mean())
+    still = changed(source, channel, np.full(len(source.recording), value))
+    assert words in refusal(solve, still)
+
+
+@pytest.mark.parametrize(
+    ("kind", "channel", "share"),
+    [
+        ("static_torque", "torque", 0.8),
+        ("static_torque", "pressure_difference", 0.5),
+        ("free_decay", "angle", 0.6),
+        ("open_valve_flow", "mass_flow", 0.7),
+        ("vane_leak", "pressure_1", 0.9),
+    ],
+)
+def test_a_saturated_sensor_is_refused_with_its_sample(
+    bench: dict[str, tuple[Source, Solve]], kind: str, channel: str, share: float
+) -> None:
+    source, solve = bench[kind]
+    values = source.recording[channel]
+    limit = values.min() + share * np.ptp(values)
+    text = refusal(solve, changed(source, channel, np.minimum(values, limit)))
+    assert f"channel '{channel}' stays at" in text
+    assert "sample" in text
+    assert "saturated" in text
+
+
+@pytest.mark.parametrize("kind", ["free_decay", "vane_leak"])
+def test_a_gap_in_a_decay_is_refused_with_its_sample(bench: dict[str, tuple[Source, Solve]], kind: str) -> None:
+    source, solve = bench[kind]
+    time = source.recording.time.copy()
+    time[400:] += 3.0
+    assert "there is a gap of 3.0" in refusal(solve, retimed(source, time))
+    assert "(sample 400)" in refusal(solve, retimed(source, time))
+
+
+@pytest.mark.parametrize("kind", ["static_torque", "open_valve_flow", "valve_map"])
+def test_a_pause_between_steady_readings_is_told(bench: dict[str, tuple[Source, Solve]], kind: str) -> None:
+    source, solve = bench[kind]
+    time = source.recording.time.copy()
+    time[30:] += 1000.0
+    told = [check for check in solve(retimed(source, time)).checks if check.name == "pauses"]
+    assert len(told) == 1
+    assert told[0].holds
+    assert "after sample 30" in told[0].statement
+    assert not [check for check in solve(source).checks if check.name == "pauses"]
+
+
+def test_a_saturated_flow_meter_is_flagged_and_a_valve_that_is_open_is_not(
+    bench: dict[str, tuple[Source, Solve]],
+) -> None:
+    source, solve = bench["valve_map"]
+    flow = source.recording["mass_flow"]
+    clipped = solve(changed(source, "mass_flow", np.minimum(flow, 0.6 * flow.max())))
+    meter = next(check for check in clipped.failed if check.name == "flow meter")
+    assert "'mass_flow' stays at exactly" in meter.statement
+    assert "from sample 83" in meter.statement
+    assert solve(source).failed == ()
+
+
+def test_noise_alone_is_no_decay(bench: dict[str, tuple[Source, Solve]]) -> None:
+    source, solve = bench["free_decay"]
+    noise = np.random.default_rng(3).normal(0.0, 2e-3, len(source.recording))
+    assert "nothing moves" in refusal(solve, changed(source, "angle", noise))
+
+
+def test_a_vane_that_runs_into_a_stop_is_not_taken_for_one_that_comes_to_rest(
+    bench: dict[str, tuple[Source, Solve]], planted: ModuleType
+) -> None:
+    _, solve = bench["free_decay"]
+    smooth = planted.decay(noise=0.0)
+    angle = smooth.recording["angle"]
+    stopped = changed(smooth, "angle", np.minimum(angle, angle.min() + 0.7 * np.ptp(angle)))
+    assert "at a stop" in refusal(solve, stopped)
+    rests = planted.decay(noise=0.0, deceleration=0.8)
+    assert solve(rests).estimates
+
+
+def test_steps_of_a_coarse_converter_are_no_saturation(bench: dict[str, tuple[Source, Solve]]) -> None:
+    source, solve = bench["vane_leak"]
+    coarse = changed(source, "pressure_1", np.round(source.recording["pressure_1"], -4))
+    assert solve(coarse).estimates
+
+
+@pytest.mark.parametrize("kind", NEEDED)
+def test_a_number_that_no_sensor_shows_is_refused_with_its_sample(
+    bench: dict[str, tuple[Source, Solve]], kind: str
+) -> None:
+    source, solve = bench[kind]
+    name = NEEDED[kind][0]
+    values = source.recording[name].copy()
+    values[6] = 1e300
+    assert f"'{name}' is 1e+300 at sample 7" in refusal(solve, changed(source, name, values))
