@@ -16,6 +16,7 @@ from ppafo.signals import Channel, Recording
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.inputs import (
     COMMAND,
+    DORSIFLEXION_SUPPLY,
     EXTERNAL_TORQUE,
     SUPPLY,
     RecordedInputs,
@@ -71,7 +72,10 @@ def replay_recording(measured: Measured, device: Device, start: Start, motion: M
 
 def _inputs(measured: Measured, motion: Motion) -> RecordedInputs:
     """Return what the model is given: the command, and supply and torque where they are in the recording."""
-    names = (COMMAND, *(name for name in (SUPPLY, EXTERNAL_TORQUE) if _is_used(measured, name, motion)))
+    names = (
+        COMMAND,
+        *(name for name in (SUPPLY, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE) if _is_used(measured, name, motion)),
+    )
     return RecordedInputs(measured.recording, names, float(measured.recording.time[0]))
 
 
