@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ppafo.model.circle import TURN, sine_and_cosine
+from ppafo.model.turns import TURN, sine_and_cosine
 
 
 class Series(NamedTuple):

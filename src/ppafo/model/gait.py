@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ppafo.model.circle import TURN, sine_and_cosine
+from ppafo.model.turns import TURN, sine_and_cosine
 from ppafo.model.fourier import Series, acceleration_at, harmonics, rate_at, value_at
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.model.circle import sine_and_cosine
+from ppafo.model.turns import sine_and_cosine
 from ppafo.model.fourier import Series, acceleration_at, harmonics, rate_at, value_at
 
 FREQUENCY = 0.9

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from ppafo.control.kind import ProfileKind
-from ppafo.model.circle import TURN, sine_and_cosine
 from ppafo.model.declaration import Quantity
+from ppafo.model.turns import TURN, sine_and_cosine
 
 
 class Sine(NamedTuple):

@@ -92,9 +92,9 @@ KIND = ControllerKind(
     source="the paper, figures 1A and 6; profile of four parameters as in J. Zhang et al., Science 356 (2017) 1280",
     quantities=(
         Quantity("swing_angle", "rad", "angle at which the foot is held in the swing", 1.5707963267948966, 0.5, 2.5),
-        Quantity("angle_gain", "1/rad", "opening per angle error", 4.0, 0.0, 1.0e3),
-        Quantity("angle_rate_gain", "s/rad", "opening per angular velocity", 0.05, 0.0, 1.0e3),
-        Quantity("torque_gain", "1/(N m)", "opening per torque error", 0.3, 0.0, 1.0e3),
+        Quantity("angle_gain", "1/rad", "opening per angle error", 3.0, 0.0, 1.0e3),
+        Quantity("angle_rate_gain", "s/rad", "opening per angular velocity", 0.2, 0.0, 1.0e3),
+        Quantity("torque_gain", "1/(N m)", "opening per torque error", 0.6, 0.0, 1.0e3),
         Quantity("torque_integral_gain", "1/(N m s)", "opening per integral of the torque error", 1.0, 0.0, 1.0e3),
         Quantity("peak_torque", "N m", "peak of the torque in push-off", 5.0, 0.0, 1.0e3),
         Quantity("peak_time", "1", "phase of the peak, share of the stride time", 0.53, 0.1, 0.9),

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from ppafo.engine.scheme.motion import FreeStep, begin_free, bounded, end_free, with_motion
 from ppafo.model import contact as ground
-from ppafo.model.circle import TURN, sine_and_cosine
+from ppafo.model.turns import TURN, sine_and_cosine
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import (
     LegParameters,

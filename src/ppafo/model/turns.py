@@ -1,4 +1,4 @@
-"""Sine and cosine in many lanes at once: power series instead of the library, which takes one number at a time."""
+"""Sine and cosine of an angle in turns, written so that they run in many lanes at once."""
 
 TURN = 6.283185307179586
 
