@@ -10,6 +10,8 @@ FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.schema",
     "scenario": "ppafo.simulation.schema",
     "identification": "ppafo.identification.problem",
+    "gait": "ppafo.gait.document",
+    "gait-map": "ppafo.gait.recorded.mapping",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 
