@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from ppafo.model.turns import TURN, sine_and_cosine
 from ppafo.model.fourier import Series, acceleration_at, harmonics, rate_at, value_at
+from ppafo.model.turns import TURN, sine_and_cosine
 
 
 class GaitSeries(NamedTuple):

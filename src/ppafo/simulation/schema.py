@@ -44,10 +44,12 @@ def quantity_fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = (
 
 
 def kind_field(kind: str, summary: str) -> dict[str, Any]:
+    """Return the field that tells one kind of table from another."""
     return {"kind": (Literal[kind], Field(description=summary))}
 
 
 def titled(name: str) -> str:
+    """Return a name as that of a model: ``ramp_hold`` as ``RampHold``."""
     return "".join(part.capitalize() for part in name.split("_"))
 
 
@@ -106,6 +108,7 @@ def _gas_model() -> Any:
 
 
 def device_fields() -> dict[str, Any]:
+    """Return the fields of a device section."""
     return {
         "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
         "valve": optional(str, "name of one of the set's valves; its default valve unless given"),

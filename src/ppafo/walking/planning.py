@@ -150,8 +150,8 @@ def controller_parameters(kind: ControllerKind, settings: dict[str, float]) -> A
 def vented(plant: PlantParameters, angle: float, angular_velocity: float) -> PlantState:
     """State at an angle [rad] with both chambers at the atmosphere."""
     volumes = chamber_volumes(plant, angle)
-    masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
-    return PlantState(angle, angular_velocity, *masses, 0.0, 0.0, 0.0)
+    mass_1, mass_2 = (chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes)
+    return PlantState(angle, angular_velocity, mass_1, mass_2, 0.0, 0.0, 0.0)
 
 
 def gait_series(gait: Gait) -> GaitSeries:

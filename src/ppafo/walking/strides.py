@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +58,7 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
 def averaged(time: Floats, values: Floats, unit: str, starts: NDArray[np.intp]) -> Curves:
     """Mean and deviation over strides of a channel, each stride brought to the same phases."""
     strides = [
-        np.interp(time[first] + PHASES * (time[last] - time[first]), time, values)
-        for first, last in zip(starts[:-1], starts[1:], strict=True)
+        np.interp(time[first] + PHASES * (time[last] - time[first]), time, values) for first, last in pairwise(starts)
     ]
     together = np.array(strides)
     return Curves(together.mean(axis=0), together.std(axis=0), unit)

@@ -135,13 +135,13 @@ def _recording(configuration: Configuration, run: Run, time: Floats, record: Map
 
 
 def _knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
-    """T_1 of equation (11) [N m]: what moves the shank and the foot as prescribed, without the ground; for the swing."""
-    assert run.walk is not None  # noqa: S101  # a walk has a leg
+    """T_1 of equation (11) [N m]: what moves shank and foot as prescribed, without the ground; for the swing."""
+    assert run.walk is not None, "a walk has a leg"
     leg = run.walk.leg
     theta, phi = record["state.angle"], record["walk.now.shank"]
     alpha = phi - theta + 0.5 * np.pi
     ankle_acceleration = np.gradient(record["state.angular_velocity"], time)
-    matrix = mass_matrix(leg, np.cos(theta))
+    matrix = mass_matrix(leg, np.cos(theta))  # type: ignore[arg-type]
     turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])  # type: ignore[arg-type]
     forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
     weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)  # type: ignore[arg-type]

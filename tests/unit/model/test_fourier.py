@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.model.turns import sine_and_cosine
 from ppafo.model.fourier import Series, acceleration_at, harmonics, rate_at, value_at
+from ppafo.model.turns import sine_and_cosine
 
 FREQUENCY = 0.9
 

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 from ppafo.engine.scheme.motion import FreeStep, begin_free, bounded, end_free, with_motion
 from ppafo.model import contact as ground
-from ppafo.model.turns import TURN, sine_and_cosine
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import (
     LegParameters,
@@ -15,6 +14,7 @@ from ppafo.model.leg import (
     passive_torque,
 )
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures
+from ppafo.model.turns import TURN, sine_and_cosine
 from ppafo.model.vane import actuator_torque
 
 
