@@ -45,8 +45,8 @@ class Program:
     to the caller, sample by sample. ``ideal_sensors`` False adds noise, quantisation and delay of the signals.
     ``late_commands`` True adds a dead time before the valve; a step is then done in two parts, before and after the
     instant at which a command arrives, each with valve parameters of its own length. ``is_thermal`` True gives the
-    gas an energy balance instead of a constant temperature. ``walks`` True puts the device on a walking leg: the foot is
-    free, or where the ground and a gait lead it (``angle`` is None then).
+    gas an energy balance instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose
+    foot is free or where the ground and a gait lead it (``angle`` is None then).
     """
 
     valve: ValveModel

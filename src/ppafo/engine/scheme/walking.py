@@ -35,8 +35,8 @@ class WalkState(NamedTuple):
     ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
     ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``slap_rate`` of the foot at the last landing
     [rad/s]; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, landings,
-    strikes with the toes first, sums of slap rates [rad/s] and clearances [m], work of T_ex while the foot rolls over the
-    toes [J].
+    strikes with the toes first, sums of slap rates [rad/s] and clearances [m], work of T_ex while the foot rolls over
+    the toes [J].
     """
 
     contact: float
