@@ -6,6 +6,7 @@ COMMANDS: dict[str, str] = {
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": "bench recordings in, parameter set with uncertainty out",
+    "endurance": "how long a bottle of gas lasts for a gas use, and why it ends",
     "plot": "draw a result folder again",
     "sets": "list parameter sets, or show one with the source of every value",
     "audit": "check a parameter set for contradictions",

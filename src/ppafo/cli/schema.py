@@ -10,6 +10,7 @@ FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.schema",
     "scenario": "ppafo.simulation.schema",
     "identification": "ppafo.identification.problem",
+    "bottle": "ppafo.studies.endurance.declaration",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 
