@@ -12,6 +12,7 @@ FORMATS: dict[str, str] = {
     "identification": "ppafo.identification.problem",
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",
+    "bottle": "ppafo.studies.endurance.declaration",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 
