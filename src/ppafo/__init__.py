@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         SimulationError,
         UnitError,
     )
+    from ppafo.gait import Gait, list_gaits, load_gait
     from ppafo.metrics import Metric, evaluate
     from ppafo.model.sensors import Measurement
     from ppafo.parameters import ParameterSet, apply_overrides, list_sets, load_device, load_parameter_set
@@ -39,6 +40,7 @@ __all__ = [
     "Channel",
     "DataError",
     "Device",
+    "Gait",
     "IdentificationError",
     "Measurement",
     "Metric",
@@ -55,9 +57,11 @@ __all__ = [
     "apply_overrides",
     "audit",
     "evaluate",
+    "list_gaits",
     "list_scenarios",
     "list_sets",
     "load_device",
+    "load_gait",
     "load_parameter_set",
     "load_scenario",
     "read_recording",
@@ -77,6 +81,7 @@ _HOMES = {
         "SimulationError",
         "UnitError",
     ),
+    "ppafo.gait": ("Gait", "list_gaits", "load_gait"),
     "ppafo.metrics": ("Metric", "evaluate"),
     "ppafo.model.sensors": ("Measurement",),
     "ppafo.parameters": ("ParameterSet", "apply_overrides", "list_sets", "load_device", "load_parameter_set"),

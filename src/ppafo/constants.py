@@ -16,3 +16,6 @@ PASCALS_PER_PSI = 6894.757293168361
 """Pa in one pound-force per square inch, 4.4482216152605 N on (25.4 mm)^2."""
 
 GRAMS_PER_KILOGRAM = 1.0e3
+
+STANDARD_GRAVITY = 9.80665
+"""m/s^2; weight per mass where forces are given in body weights."""

@@ -6,6 +6,8 @@ COMMANDS: dict[str, str] = {
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": "bench recordings in, parameter set with uncertainty out",
+    "gait": "list, show and import gaits; export recordings for OpenSim",
+    "endurance": "how long a bottle of gas lasts for a gas use, and why it ends",
     "plot": "draw a result folder again",
     "sets": "list parameter sets, or show one with the source of every value",
     "audit": "check a parameter set for contradictions",

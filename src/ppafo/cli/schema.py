@@ -12,6 +12,9 @@ FORMATS: dict[str, str] = {
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.column_map",
     "rig": "ppafo.rig.schema",
+    "gait": "ppafo.gait.document",
+    "gait-map": "ppafo.gait.recorded.mapping",
+    "bottle": "ppafo.studies.endurance.declaration",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 

@@ -1,6 +1,7 @@
 """What the lanes do at a sample: sense, control, and keep what sensors and valve get late."""
 
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
+from ppafo.model.gait_sensors import GaitMeasurement, GaitSeen, measure_gait
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
 from ppafo.model.vane import actuator_torque
@@ -14,12 +15,12 @@ def control_loop(rows: LaneRows) -> list[str]:
     groups = ("timing", "plant", "state", "controller", "controller_state", "reference")
     lines = [
         *[rows.load(group) for group in groups],
-        *sense(rows),
+        *(sense_gait(rows) if rows.program.walks else sense(rows)),
         f"wanted = {rows.add(rows.program.reference.value)}(reference, step_index * timing.step)[0]",
         f"command, controller_state = {rows.add(controller.update)}"
         "(controller, controller_state, wanted, seen, timing.period)",
         *rows.store("controller_state"),
-        f"x[{rows.state_at['result.command']}, lane] = command",
+        f"{rows.cells['result.command']} = command",
     ]
     loop = over_lanes(lines)
     return ["if step_index % steps_per_sample == 0:", *indented(loop)]
@@ -49,9 +50,33 @@ def sense(rows: LaneRows) -> list[str]:
     ]
 
 
+def sense_gait(rows: LaneRows) -> list[str]:
+    """Lines that make the measurement ``seen`` of a walking leg."""
+    pressures = (
+        f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}(plant, state.angle, state.mass_1, state.mass_2)"
+    )
+    if rows.program.ideal_sensors:
+        return [
+            rows.load("walk"),
+            pressures,
+            f"torque = {rows.add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
+            f"seen = {rows.add(GaitMeasurement)}"
+            "(state.angle, pressure_1, pressure_2, torque, walk.heel_force, walk.toe_force)",
+        ]
+    return [
+        *[rows.load(group) for group in ("walk", "sensors", "gait_sensors", "gait_seen")],
+        pressures,
+        f"seen = {rows.add(measure_gait)}(sensors, gait_sensors, gait_seen, state.angle, pressure_1, pressure_2, "
+        "walk.heel_force, walk.toe_force, plant.torque_constant, step_index * timing.step, "
+        "step_index // steps_per_sample)",
+        f"gait_seen = {rows.add(GaitSeen)}(seen.heel_force, seen.toe_force, seen.angle)",
+        *rows.store("gait_seen"),
+    ]
+
+
 def remember_signals(rows: LaneRows) -> list[str]:
     """Keeps the signals of every step, where they are seen late."""
-    if rows.program.ideal_sensors or rows.program.controller is None:
+    if rows.program.ideal_sensors or rows.program.controller is None or rows.program.walks:
         return []
     lines = [
         rows.load("plant"),
@@ -74,6 +99,6 @@ def remember_commands(rows: LaneRows) -> list[str]:
     if not rows.program.late_commands:
         return []
     lines = [
-        f"command_history[step_index % command_history.shape[0], lane] = x[{rows.state_at['result.command']}, lane]",
+        f"command_history[step_index % command_history.shape[0], lane] = {rows.cells['result.command']}",
     ]
     return over_lanes(lines)

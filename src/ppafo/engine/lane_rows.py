@@ -12,17 +12,22 @@ LANES = 32
 
 @final
 class LaneRows:
-    """Where each number of a program lies: parameters in ``p``, state in ``x``, what a step hands on in ``t``."""
+    """Where each number of a program lies in the rows of ``x``: state, parameters, what a step hands on, part lengths.
+
+    One array for all of them lets the compiler see that no two rows overlap.
+    """
 
     def __init__(self, program: Program, collector: SourceCollector) -> None:
         self.program = program
         self.add: Callable[[Callable[..., Any] | type], str] = collector.add
-        self.parameter_at = _row_numbers(program.parameter_rows())
-        self.state_at = _row_numbers(program.state_rows())
-        self.step_at = _row_numbers(program.step_rows())
-        self.cells = {path: f"p[{row}, lane]" for path, row in self.parameter_at.items()}
-        self.cells |= {path: f"x[{row}, lane]" for path, row in self.state_at.items()}
-        self.cells |= {path: f"t[{row}, lane]" for path, row in self.step_at.items()}
+        self.state_at = _row_numbers(program.state_rows(), 0)
+        self.parameter_at = _row_numbers(program.parameter_rows(), len(self.state_at))
+        self.step_at = _row_numbers(program.step_rows(), len(self.state_at) + len(self.parameter_at))
+        numbered = self.state_at | self.parameter_at | self.step_at
+        self.cells = {path: f"x[{row}, lane]" for path, row in numbered.items()}
+        self.length = f"x[{len(numbered)}, lane]"
+        self.before = f"x[{len(numbered) + 1}, lane]"
+        self.count = len(numbered) + 2
 
     def load(self, group: str) -> str:
         """Line that makes the NamedTuple ``group`` from its rows."""
@@ -45,9 +50,9 @@ class LaneRows:
         return [self.load(name) for name in self.program.step_rows()]
 
 
-def _row_numbers(groups: dict[str, type]) -> dict[str, int]:
+def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    return {path: number for number, path in enumerate(paths)}
+    return {path: first + number for number, path in enumerate(paths)}
 
 
 def indented(lines: list[str], levels: int = 1) -> list[str]:

@@ -39,16 +39,13 @@ def lane_source(program: Program) -> str:
         f"def advance({ARGUMENTS}):",
         *indented(
             [
-                f"x = np.empty(({len(rows.state_at)}, {LANES}))",
-                f"p = np.empty(({len(rows.parameter_at)}, {LANES}))",
-                f"t = np.empty(({len(rows.step_at)}, {LANES}))",
-                f"lengths = np.empty((2, {LANES}))",
+                f"x = np.empty(({rows.count}, {LANES}))",
                 "width = states.shape[1]",
-                *_copy("x", "states", len(rows.state_at)),
-                *_copy("p", "parameters", len(rows.parameter_at)),
+                *_copy("x", 0, "states", 0, len(rows.state_at)),
+                *_copy("x", len(rows.state_at), "parameters", 0, len(rows.parameter_at)),
                 "for step_index in range(first_step, first_step + step_count):",
                 *indented([*remember_signals(rows), *control, *RECORD, *remember_commands(rows), *plant]),
-                *_copy("states", "x", len(rows.state_at)),
+                *_copy("states", 0, "x", 0, len(rows.state_at)),
             ]
         ),
     ]
@@ -63,9 +60,9 @@ RECORD = [
 ]
 
 
-def _copy(target: str, source: str, rows: int) -> list[str]:
+def _copy(target: str, target_row: int, source: str, source_row: int, rows: int) -> list[str]:
     return [
         f"for row in range({rows}):",
         "    for lane in range(width):",
-        f"        {target}[row, lane] = {source}[row, lane]",
+        f"        {target}[{target_row} + row, lane] = {source}[{source_row} + row, lane]",
     ]

@@ -1,7 +1,8 @@
 """What the lanes do in a step: valve, gas and vane, whole or in parts where something changes abruptly inside it."""
 
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
-from ppafo.engine.scheme import motion, parts, pneumatics, thermal_gas
+from ppafo.engine.scheme import motion, parts, pneumatics, thermal_gas, walking
+from ppafo.model.gait import gait_at
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -9,13 +10,16 @@ IMPOSSIBLE_MASS = 1.0e3
 MOST_PARTS = 16
 """More parts than a step may sensibly have: two coils, each with an order and a change, several times over."""
 
-SKIP_EMPTY = [
-    "longest = 0.0",
-    "for lane in range(width):",
-    "    longest = max(longest, lengths[0, lane])",
-    "if longest == 0.0:",
-    "    break",
-]
+
+def skip_empty(rows: LaneRows) -> list[str]:
+    """Lines that end the parts of a step where no lane has anything left."""
+    return [
+        "longest = 0.0",
+        "for lane in range(width):",
+        f"    longest = max(longest, {rows.length})",
+        "if longest == 0.0:",
+        "    break",
+    ]
 
 
 def plant_loop(rows: LaneRows) -> list[str]:
@@ -31,35 +35,36 @@ def opening(rows: LaneRows) -> list[str]:
     """Lines that load what a step needs."""
     names = ["timing", "plant", "valve", "result", "state", "valve_state"]
     names += ["thermal", "masses"] if rows.program.is_thermal else []
+    names += ["leg", "share", "gait_timing", "walk"] if rows.program.walks else []
     return [*[rows.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
 
 
 def jump_loop(rows: LaneRows) -> list[str]:
     """As many parts as the valve's jumps ask for; a part that no lane needs ends the step.
 
-    ``lengths[0]`` is the length of a part and ``lengths[1]`` the time before it, both from the beginning of the step.
+    Two rows keep the length of a part and the time before it, from the beginning of the step.
     """
     valve = rows.program.valve
     functions = f"{rows.add(valve.next_event)}, {rows.add(valve.settle)}"
     measure = [
         *opening(rows),
-        "before = lengths[1, lane]",
+        f"before = {rows.before}",
         "remaining = timing.step - before",
         f"until = {rows.add(parts.part_length)}(valve, valve_state, command, time + before, remaining, {functions})",
-        f"lengths[0, lane] = remaining if part == {MOST_PARTS - 1} else until",
+        f"{rows.length} = remaining if part == {MOST_PARTS - 1} else until",
     ]
-    begin = ["length = lengths[0, lane]", "time += lengths[1, lane]"]
+    begin = [f"length = {rows.length}", f"time += {rows.before}"]
     # The end of the last part is the end of the step to the last bit, so that no sliver is left over.
     add_up = [
-        f"step = p[{rows.parameter_at['timing.step']}, lane]",
-        "whole = lengths[0, lane] >= step - lengths[1, lane]",
-        "lengths[1, lane] = step if whole else lengths[1, lane] + lengths[0, lane]",
+        f"step = {rows.cells['timing.step']}",
+        f"whole = {rows.length} >= step - {rows.before}",
+        f"{rows.before} = step if whole else {rows.before} + {rows.length}",
     ]
     return [
-        *over_lanes(["lengths[1, lane] = 0.0"]),
+        *over_lanes([f"{rows.before} = 0.0"]),
         f"for part in range({MOST_PARTS}):",
         *indented(over_lanes(measure)),
-        *indented(SKIP_EMPTY),
+        *indented(skip_empty(rows)),
         *indented(part(rows, [*opening(rows), *begin])),
         *indented(over_lanes(add_up)),
     ]
@@ -67,12 +72,12 @@ def jump_loop(rows: LaneRows) -> list[str]:
 
 def late_loop(rows: LaneRows) -> list[str]:
     """Two parts, before and after a late command arrives; the first is passed over where no lane has it."""
-    lag = f"p[{rows.parameter_at['timing.command_lag']}, lane] * p[{rows.parameter_at['timing.step']}, lane]"
+    lag = f"{rows.cells['timing.command_lag']} * {rows.cells['timing.step']}"
     before = [
         *opening(rows),
         rows.load("early_valve"),
         "valve = early_valve",
-        "length = lengths[0, lane]",
+        f"length = {rows.length}",
         "command = command_history[(step_index - command_delay - 1) % command_history.shape[0], lane]",
     ]
     after = [
@@ -83,9 +88,9 @@ def late_loop(rows: LaneRows) -> list[str]:
     ]
     return [
         "for lane in range(width):",
-        f"    lengths[0, lane] = {lag}",
+        f"    {rows.length} = {lag}",
         "for part in range(1):",
-        *indented(SKIP_EMPTY),
+        *indented(skip_empty(rows)),
         *indented(part(rows, before)),
         *part(rows, after),
     ]
@@ -117,9 +122,16 @@ def begin(rows: LaneRows) -> list[str]:
 def lead(rows: LaneRows) -> list[str]:
     """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
     program, add = rows.program, rows.add
+    if program.walks:
+        return [
+            rows.load("gait"),
+            f"next_gait = {add(gait_at)}(gait, gait_timing, leg.body_mass, leg.gravity, time + length)",
+            f"begun = {add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)",
+            f"next_angle = {add(walking.next_angle)}(plant, walk, begun)",
+        ]
     if program.angle is None:
         return [
-            f"begun = {add(motion.begin_free)}(plant, state, length)",
+            f"begun = {add(motion.begin_free)}(plant, state, 0.0, length)",
             f"next_angle = {add(motion.bounded)}(plant, begun.free_angle)",
         ]
     if program.is_held:
@@ -167,7 +179,11 @@ def end_gas(rows: LaneRows) -> list[str]:
 
 def end_free(rows: LaneRows) -> list[str]:
     """Where a free vane is at the end."""
-    return [f"state = {rows.add(motion.end_free)}(plant, state, begun, length)"]
+    if not rows.program.walks:
+        return [f"state = {rows.add(motion.end_free)}(plant, state, begun, 0.0, length)"]
+    follow = rows.cells["gait_sensors.follow_rate"]
+    given = f"plant, leg, share, gait_timing, {follow}, state, walk, begun, length"
+    return [f"state, walk = {rows.add(walking.end_walk)}({given})", *rows.store("walk")]
 
 
 def judge(rows: LaneRows) -> list[str]:
@@ -179,5 +195,5 @@ def judge(rows: LaneRows) -> list[str]:
         f"possible = (abs(state.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
         f"and max({gas}) < {IMPOSSIBLE_MASS})",
         "failed = result.failure_time if possible else min(result.failure_time, time + length)",
-        f"x[{rows.state_at['result.failure_time']}, lane] = failed",
+        f"{rows.cells['result.failure_time']} = failed",
     ]

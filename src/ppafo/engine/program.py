@@ -8,6 +8,10 @@ from ppafo.control.profiles import constant
 from ppafo.engine.scheme.motion import FreeStep, LedStep
 from ppafo.engine.scheme.pneumatics import MovingGas, StillGas
 from ppafo.engine.scheme.thermal_gas import ThermalGas
+from ppafo.engine.scheme.walking import DeviceShare, WalkState, WalkStep
+from ppafo.model.gait import GaitSeries, GaitTiming
+from ppafo.model.gait_sensors import GaitSeen, GaitSensors
+from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
@@ -41,7 +45,8 @@ class Program:
     to the caller, sample by sample. ``ideal_sensors`` False adds noise, quantisation and delay of the signals.
     ``late_commands`` True adds a dead time before the valve; a step is then done in two parts, before and after the
     instant at which a command arrives, each with valve parameters of its own length. ``is_thermal`` True gives the
-    gas an energy balance instead of a constant temperature.
+    gas an energy balance instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose
+    foot is free or where the ground and a gait lead it (``angle`` is None then).
     """
 
     valve: ValveModel
@@ -51,6 +56,7 @@ class Program:
     ideal_sensors: bool
     late_commands: bool
     is_thermal: bool = False
+    walks: bool = False
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
@@ -64,6 +70,8 @@ class Program:
             "reference": self.reference.parameters,
             "path": NoParameters if self.angle is None else self.angle.parameters,
             "sensors": SensorParameters,
+            **({"leg": LegParameters, "share": DeviceShare, "gait": GaitSeries} if self.walks else {}),
+            **({"gait_timing": GaitTiming, "gait_sensors": GaitSensors} if self.walks else {}),
         }
 
     def state_rows(self) -> dict[str, type]:
@@ -74,6 +82,7 @@ class Program:
             "masses": ThermalState if self.is_thermal else NoParameters,
             "valve_state": self.valve.state,
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
+            **({"walk": WalkState, "gait_seen": GaitSeen} if self.walks else {}),
         }
 
     @property
@@ -83,7 +92,8 @@ class Program:
 
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that the first stage of a step hands to the later phases, in order."""
-        begun = FreeStep if self.angle is None else (NoParameters if self.is_held else LedStep)
+        free = WalkStep if self.walks else FreeStep
+        begun = free if self.angle is None else (NoParameters if self.is_held else LedStep)
         isothermal = StillGas if self.is_held else MovingGas
         _, shown, _ = get_type_hints(self.valve.connect).values()
         return {"begun": begun, "gas": ThermalGas if self.is_thermal else isothermal, "shown": shown}

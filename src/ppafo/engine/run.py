@@ -10,11 +10,27 @@ from ppafo.engine.lanes import Batch, BatchResult, Clock, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.rows import numbers
+from ppafo.engine.scheme.walking import DeviceShare, WalkState
+from ppafo.model.gait import GaitSeries, GaitTiming
+from ppafo.model.gait_sensors import GaitSeen, GaitSensors
+from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.sensors import SensorParameters
 
 NEVER_FAILED = 1.0e300
 WHOLE = 1.0e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """What a walking leg adds to a run."""
+
+    leg: LegParameters
+    share: DeviceShare
+    gait: GaitSeries
+    timing: GaitTiming
+    sensors: GaitSensors
+    initial: WalkState
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +60,7 @@ class Run:
     record_every: int
     signal_delay: float
     command_delay: float
+    walk: Walk | None = None
 
     @property
     def period(self) -> float:
@@ -66,12 +83,21 @@ def batch_of(run: Run) -> Batch:
     clock = Clock(run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     timing = LaneTiming(run.step, run.period, command_lag, signal_lag)
     plant, valve = [run.plant, run.thermal], [run.valve, run.early_valve]
-    parameters = [timing, *plant, *valve, run.controller, run.reference, run.path, run.sensors]
+    walk, walk_states = _walk_groups(run.walk)
+    parameters = [timing, *plant, *valve, run.controller, run.reference, run.path, run.sensors, *walk]
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
     masses = ThermalState(run.initial.mass_1, run.initial.mass_2) if program.is_thermal else NoParameters()
     states = [LaneResult(0.0, NEVER_FAILED), run.initial, masses, program.valve.initial(), controller_state]
-    return Batch(program, clock, _column(parameters), _column(states))
+    return Batch(program, clock, _column(parameters), _column([*states, *walk_states]))
+
+
+def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:
+    """Parameters and initial states of a walking leg, in the order of ``Program``."""
+    if walk is None:
+        return [], []
+    parameters = [walk.leg, walk.share, walk.gait, walk.timing, walk.sensors]
+    return parameters, [walk.initial, GaitSeen(0.0, 0.0, 0.0)]
 
 
 def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchResult]:

@@ -98,13 +98,24 @@ class _Renamer(ast.NodeTransformer):
                 return node
             raise SimulationError(f"cannot compile {self.function.__qualname__}: it uses the unknown name '{node.id}'")
         value = scope[node.id]
+        if isinstance(value, types.ModuleType) and value.__name__ in ALLOWED_MODULES:
+            return node
+        return self._stand_in(value, node.id, node.ctx)
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        """Replace ``module.name`` of a module of this package."""
+        module = self.function.__globals__.get(node.value.id) if isinstance(node.value, ast.Name) else None
+        is_global = isinstance(node.value, ast.Name) and node.value.id not in self.local
+        if is_global and isinstance(module, types.ModuleType) and module.__name__ not in ALLOWED_MODULES:
+            return self._stand_in(getattr(module, node.attr), f"{module.__name__}.{node.attr}", node.ctx)
+        return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
+
+    def _stand_in(self, value: Any, name: str, context: ast.expr_context) -> ast.expr:
         if isinstance(value, bool | int | float):
             return ast.Constant(value)
         if isinstance(value, types.FunctionType) or is_row(value):
-            return ast.Name(self.collector.add(value), node.ctx)
-        if isinstance(value, types.ModuleType) and value.__name__ in ALLOWED_MODULES:
-            return node
+            return ast.Name(self.collector.add(value), context)
         raise SimulationError(
-            f"cannot compile {self.function.__qualname__}: '{node.id}' is not a number, a plain function, "
+            f"cannot compile {self.function.__qualname__}: '{name}' is not a number, a plain function, "
             f"a NamedTuple or the module {' or '.join(ALLOWED_MODULES)}"
         )

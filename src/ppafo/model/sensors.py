@@ -49,6 +49,11 @@ def standard_noise(seed: int, sample: int, channel: int) -> float:
     return (total + 6.0) / 65536.0 - 6.0
 
 
+def unit_noise(seed: int, sample: int, channel: int) -> float:
+    """Random number from 0 to 1 for one sample of one channel, as ``standard_noise`` draws them."""
+    return float(mixed(mixed(mixed(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))) / 4294967296.0
+
+
 def quantised(value: float, quantum: float) -> float:
     """``value`` rounded to a whole number of ``quantum`` (half upwards); unchanged where that is 0."""
     safe = quantum if quantum > 0.0 else 1.0

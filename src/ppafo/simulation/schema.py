@@ -19,7 +19,7 @@ _STARTS_WITH_NUMBER = r"^\s*[+-]?(\d|\.\d)"
 _QUANTITY_TEXT = {"type": "string", "pattern": _STARTS_WITH_NUMBER}
 
 
-def _number(quantity: Quantity, words: tuple[str, ...] = ()) -> Any:
+def number_type(quantity: Quantity, words: tuple[str, ...] = ()) -> Any:
     """Return the type of a value: a text with its unit, a plain number where there is no unit, or one of some words."""
     forms: list[dict[str, Any]] = [_QUANTITY_TEXT]
     forms += [{"type": "number"}] if quantity.unit in declaration.PLAIN else []
@@ -32,22 +32,24 @@ def _described(quantity: Quantity) -> str:
     return f"{quantity.summary} [{quantity.unit or '-'}]{default}".lstrip()
 
 
-def _fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = ()) -> dict[str, Any]:
+def quantity_fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the fields of a section; one without a default has to be given, unless a word stands in for it."""
     fields: dict[str, Any] = {}
     for item in quantities:
-        kind = _number(item, words)
+        kind = number_type(item, words)
         required = item.default is None and not words
         text = _described(item)
         fields[item.name] = (kind, Field(description=text)) if required else optional(kind, text)
     return fields
 
 
-def _kind(kind: str, summary: str) -> dict[str, Any]:
+def kind_field(kind: str, summary: str) -> dict[str, Any]:
+    """Return the field that tells one kind of table from another."""
     return {"kind": (Literal[kind], Field(description=summary))}
 
 
-def _title(name: str) -> str:
+def titled(name: str) -> str:
+    """Return a name as that of a model: ``ramp_hold`` as ``RampHold``."""
     return "".join(part.capitalize() for part in name.split("_"))
 
 
@@ -55,8 +57,9 @@ def _profile(prescribed: Quantity, purpose: str) -> Any:
     return one_of(
         [
             table(
-                f"{_title(kind.name)}{purpose}",
-                _kind(kind.name, kind.summary) | _fields(declaration.profile_settings(kind.name, prescribed)),
+                f"{titled(kind.name)}{purpose}",
+                kind_field(kind.name, kind.summary)
+                | quantity_fields(declaration.profile_settings(kind.name, prescribed)),
             )
             for kind in PROFILES.values()
         ]
@@ -67,19 +70,25 @@ def _motion() -> Any:
     led = {"profile": (_profile(declaration.ANGLE_LEVEL, "Angle"), Field(description="angle in time"))}
     return one_of(
         [
-            table("FreeMotion", _kind("free", "the vane moves as the torques demand") | _fields(declaration.FREE)),
-            table("HeldMotion", _kind("held", "the vane stays at one angle") | _fields((declaration.ANGLE,))),
-            table("LedMotion", _kind("led", "the vane is led along an angle in time") | led),
+            table(
+                "FreeMotion",
+                kind_field("free", "the vane moves as the torques demand") | quantity_fields(declaration.FREE),
+            ),
+            table(
+                "HeldMotion", kind_field("held", "the vane stays at one angle") | quantity_fields((declaration.ANGLE,))
+            ),
+            table("LedMotion", kind_field("led", "the vane is led along an angle in time") | led),
         ]
     )
 
 
 def _controller() -> Any:
-    sampling = {item.name: optional(_number(item), _described(item)) for item in declaration.SAMPLING}
+    sampling = {item.name: optional(number_type(item), _described(item)) for item in declaration.SAMPLING}
     return one_of(
         [
             table(
-                f"{_title(kind.name)}Controller", _kind(kind.name, kind.summary) | sampling | _fields(kind.quantities)
+                f"{titled(kind.name)}Controller",
+                kind_field(kind.name, kind.summary) | sampling | quantity_fields(kind.quantities),
             )
             for kind in CONTROLLERS.values()
         ]
@@ -90,13 +99,16 @@ def _gas_model() -> Any:
     warm = "the gas warms and cools: energy balance, heat through the walls"
     return one_of(
         [
-            table("IsothermalGas", _kind(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")),
-            table("ThermalGas", _kind(declaration.THERMAL, warm) | _fields(declaration.THERMAL_GAS)),
+            table(
+                "IsothermalGas", kind_field(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")
+            ),
+            table("ThermalGas", kind_field(declaration.THERMAL, warm) | quantity_fields(declaration.THERMAL_GAS)),
         ]
     )
 
 
-def _device() -> dict[str, Any]:
+def device_fields() -> dict[str, Any]:
+    """Return the fields of a device section."""
     return {
         "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
         "valve": optional(str, "name of one of the set's valves; its default valve unless given"),
@@ -106,7 +118,7 @@ def _device() -> dict[str, Any]:
 
 def _sensors() -> dict[str, Any]:
     seed = Annotated[int, Field(ge=0, le=declaration.LARGEST_SEED)]
-    return _fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
+    return quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
 
 
 @functools.cache
@@ -114,13 +126,13 @@ def scenario_file() -> type[BaseModel]:
     """Return the model of a scenario file, for the controllers and profiles that are in the catalogues."""
     words = tuple(declaration.PRESSURE_WORDS)
     reference = _profile(declaration.TORQUE_LEVEL, "Reference")
-    initial = table("Initial", _fields(declaration.INITIAL, words))
+    initial = table("Initial", quantity_fields(declaration.INITIAL, words))
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),
         "description": (str, Field("", description="what is tried here, and why")),
-        "device": (table("Device", _device()), Field(description="the hardware")),
-        "run": (table("Run", _fields(declaration.RUN)), Field(description="times of the run")),
+        "device": (table("Device", device_fields()), Field(description="the hardware")),
+        "run": (table("Run", quantity_fields(declaration.RUN)), Field(description="times of the run")),
         "motion": (_motion(), Field(description="what the vane does")),
         "initial": optional(initial, "state of the gas at the start; atmosphere unless given"),
         "controller": (_controller(), Field(description="what sets the valve")),

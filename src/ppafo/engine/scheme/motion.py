@@ -124,26 +124,34 @@ def first_event(
     return Departure(share, angle, rebound if hits_first else 0.0)
 
 
-def begin_free(plant: PlantParameters, state: PlantState, step: float) -> FreeStep:
-    """Where one step [s] would lead a vane that is free between its stops. Equations (1), (2), (10)."""
+def begin_free(plant: PlantParameters, state: PlantState, added_torque: float, step: float) -> FreeStep:
+    """Where one step [s] would lead a vane that is free between its stops. Equations (1), (2), (10).
+
+    ``added_torque`` [N m] drives the vane beside the plant's own torques at the beginning of the step.
+    """
     velocity = state.angular_velocity
     way = direction_of(velocity)
     pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
-    torque = driving_torque(plant, state.angle, pressure_1, pressure_2)
+    torque = driving_torque(plant, state.angle, pressure_1, pressure_2) + added_torque
     sliding = (torque - way * plant.dynamic_torque - plant.viscous_damping * velocity) / plant.inertia
     acceleration = sliding if way != 0.0 else 0.0
     free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
     return FreeStep(free_angle, acceleration, torque)
 
 
-def end_free(plant: PlantParameters, state: PlantState, begun: FreeStep, step: float) -> PlantState:
-    """State at the end of the step [s] of a free vane, from ``state`` with the new gas and the angle of the begin."""
+def end_free(
+    plant: PlantParameters, state: PlantState, begun: FreeStep, added_torque: float, step: float
+) -> PlantState:
+    """State at the end of the step [s] of a free vane, from ``state`` with the new gas and the angle of the begin.
+
+    ``added_torque`` [N m] drives the vane beside the plant's own torques at the end of the step.
+    """
     velocity = state.angular_velocity
     way = direction_of(velocity)
     moving = way != 0.0
     predicted = bounded(plant, begun.free_angle)
     next_1, next_2 = chamber_pressures(plant, predicted, state.mass_1, state.mass_2)
-    next_torque = driving_torque(plant, predicted, next_1, next_2)
+    next_torque = driving_torque(plant, predicted, next_1, next_2) + added_torque
     sliding_torque = next_torque - way * plant.dynamic_torque
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
 

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from ppafo.model.command import VENTS_ABOVE
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant import Openings, PlantParameters
 from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
@@ -56,7 +57,7 @@ class PairState(NamedTuple):
 
 def energised(command: float) -> tuple[float, float]:
     """What a command asks of valves A and B: 1 energised, 0 not. Equation (14)'s two voltages."""
-    return (1.0 if command > 0.0 else 0.0), (1.0 if command < 0.0 else 0.0)
+    return (1.0 if command > 0.0 and command < VENTS_ABOVE else 0.0), (1.0 if command < 0.0 else 0.0)
 
 
 def advance_ideal(

@@ -1,0 +1,130 @@
+"""``ppafo endurance``: how long a bottle lasts for a gas use, how cold it gets, and why it ends."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, print_result
+from ppafo.cli.quick_imports import load_drawing
+from ppafo.errors import DataError, ParameterError, UnitError
+
+if TYPE_CHECKING:
+    from ppafo.storage.owned_folder import FolderKind
+    from ppafo.studies.endurance import Draw
+
+_STEP_TIME = "1.1 s"
+_WALK, _REST, _LONGEST = "10 min", "0 s", "1440 min"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument(
+        "recording",
+        metavar="RECORDING",
+        nargs="?",
+        type=Path,
+        help="a .csv or .nc file with supplied_mass, or a result folder; repeated for ever",
+    )
+    parser.add_argument("--gas-per-step", metavar="MASS", help="gas of one step, for example '0.3 g'")
+    parser.add_argument(
+        "--step-time",
+        metavar="TIME",
+        help=f"time of one step; default '{_STEP_TIME}', or all of the recording",
+    )
+    parser.add_argument("--peak-flow", metavar="FLOW", help="largest flow, for example '4.5 g/s'; default the mean one")
+    parser.add_argument("--bottle", metavar="BOTTLE", help="name of a bottle or a .toml file; default the paper's")
+    parser.add_argument("--list", action="store_true", help="list the bottles that come with the package")
+    parser.add_argument("--walk", metavar="TIME", default=_WALK, help=f"walking between two rests; default '{_WALK}'")
+    parser.add_argument("--rest", metavar="TIME", default=_REST, help="rest after it; default '0 s', no rest at all")
+    parser.add_argument(
+        "--longest", metavar="TIME", default=_LONGEST, help=f"where to stop in any case; default '{_LONGEST}'"
+    )
+    parser.add_argument(
+        "--reuse",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="reuse the exhaust for dorsiflexion, for example 'reservoir_volume=50 cm^3'; may be given again",
+    )
+    add_override_argument(parser)
+    add_json_argument(parser)
+    parser.add_argument("--out", metavar="DIR", type=Path, help="also write report, figure, course and JSON here")
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Follow the bottle, print and write."""
+    if parsed.list:
+        return _list(parsed)
+    from ppafo.reporting.endurance_report import endurance_document, endurance_files, endurance_text
+    from ppafo.storage.owned_folder import check_owned_folder, write_owned_folder
+    from ppafo.studies.endurance import Schedule, endurance, load_bottle, parse_reuse
+    from ppafo.studies.endurance.bottle import PAPER_BOTTLE
+
+    kind = _folder_kind()
+    if parsed.out is not None:
+        check_owned_folder(parsed.out, kind)
+    bottle = load_bottle(parsed.bottle or PAPER_BOTTLE, parsed.overrides)
+    schedule = Schedule(
+        _quantity("--walk", parsed.walk, "s"),
+        _quantity("--rest", parsed.rest, "s"),
+        _quantity("--longest", parsed.longest, "s"),
+    )
+    cycle = parse_reuse(parsed.reuse, bottle) if parsed.reuse else None
+    made = endurance(bottle, _draw(parsed), schedule, cycle)
+    lines = endurance_text(made)
+    if parsed.out is not None:
+        load_drawing()
+        write_owned_folder(parsed.out, endurance_files(made), kind)
+        lines += ["", f"written: {parsed.out}"]
+    print_result("\n".join(lines), endurance_document(made), parsed.json)
+    return EXIT_GOOD
+
+
+def _draw(parsed: argparse.Namespace) -> "Draw":
+    from ppafo.studies.endurance import draw_of_numbers, draw_of_recording
+
+    if (parsed.recording is None) == (parsed.gas_per_step is None):
+        raise ParameterError("give either a recording or --gas-per-step, for example --gas-per-step '0.3 g'")
+    step_time = None if parsed.step_time is None else _quantity("--step-time", parsed.step_time, "s")
+    if parsed.recording is None:
+        mass = _quantity("--gas-per-step", parsed.gas_per_step, "kg")
+        peak = None if parsed.peak_flow is None else _quantity("--peak-flow", parsed.peak_flow, "kg/s")
+        return draw_of_numbers(mass, _quantity("", _STEP_TIME, "s") if step_time is None else step_time, peak)
+    if parsed.peak_flow is not None:
+        raise ParameterError("--peak-flow belongs to --gas-per-step; a recording says its largest flow itself")
+    from ppafo.storage.recordings import read_recording
+
+    return draw_of_recording(read_recording(parsed.recording), step_time)
+
+
+def _quantity(option: str, text: str, unit: str) -> float:
+    from ppafo.units import parse_quantity
+
+    try:
+        return parse_quantity(text, unit)
+    except UnitError as error:
+        raise ParameterError(f"{option} {text}: {error}") from error
+
+
+def _folder_kind() -> "FolderKind":
+    from ppafo.reporting.endurance_report import DOCUMENT, FILES, FORMAT
+    from ppafo.storage.owned_folder import FolderKind, read_json
+
+    def files_of(folder: Path) -> tuple[str, ...]:
+        document = read_json(folder / DOCUMENT)
+        if not isinstance(document, dict) or document.get("format") != FORMAT:
+            raise DataError(f"{folder / DOCUMENT}: is not of 'ppafo endurance' (its 'format' is not '{FORMAT}')")
+        return FILES
+
+    return FolderKind("result of 'ppafo endurance'", DOCUMENT, files_of)
+
+
+def _list(parsed: argparse.Namespace) -> int:
+    from ppafo.studies.endurance import list_bottles, load_bottle
+
+    titles = {name: load_bottle(name).title for name in list_bottles()}
+    width = max(map(len, titles))
+    text = "\n".join(f"{name:<{width}}  {title}" for name, title in titles.items())
+    bottles = [{"name": name, "title": title} for name, title in titles.items()]
+    print_result(text, {"bottles": bottles}, parsed.json)
+    return EXIT_GOOD

@@ -1,0 +1,177 @@
+"""``ppafo gait``: the gaits that there are, a gait from recorded files, and recordings for OpenSim."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ppafo.cli.output import (
+    EXIT_GOOD,
+    add_json_argument,
+    add_output_arguments,
+    check_output,
+    print_result,
+    write_files,
+)
+from ppafo.cli.quick_imports import load_drawing
+from ppafo.errors import DataError, UnitError
+
+if TYPE_CHECKING:
+    from ppafo.gait import Gait
+    from ppafo.gait.recorded import ImportedGait, ImportSettings
+
+_SIDES = ("right", "left")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    add_json_argument(_action(actions, "list", "list the gaits that come with the package"))
+    showing = _action(actions, "show", "show and draw a gait")
+    showing.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
+    showing.add_argument("--speed", metavar="SPEED", help="at another walking speed, such as '1.2 m/s'")
+    add_output_arguments(showing)
+    _add_import_arguments(_action(actions, "import", "make a gait of recorded files (.mot, .sto, .csv, .c3d)"))
+    recording = _action(actions, "record", "write some strides of a gait as a synthetic recording")
+    recording.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
+    recording.add_argument("--strides", metavar="N", default="10", help="number of strides; default 10")
+    add_json_argument(recording)
+    recording.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .csv file to write")
+    exporting = _action(actions, "export", "write a recording or result as .sto for OpenSim")
+    exporting.add_argument("recording", metavar="RECORDING", type=Path, help="a .csv or .nc file, or a result folder")
+    add_json_argument(exporting)
+    exporting.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .sto file to write")
+
+
+def _action(
+    actions: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, summary: str
+) -> argparse.ArgumentParser:
+    return actions.add_parser(name, help=summary, description=f"{summary[:1].upper()}{summary[1:]}.")
+
+
+def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="files of one walk, on one clock")
+    parser.add_argument("--body-mass", metavar="MASS", required=True, help="mass of the wearer, such as '62 kg'")
+    parser.add_argument("--side", metavar="right|left", default="right", help="which foot; default right")
+    parser.add_argument("--map", metavar="FILE", type=Path, help="gait map (.toml): which columns, units and signs")
+    parser.add_argument(
+        "--speed", metavar="SPEED", help="walking speed, such as '1.2 m/s'; needed to scale the gait later"
+    )
+    parser.add_argument("--low-pass", metavar="FREQUENCY", help="smooth the curves, such as '6 Hz'; not unless given")
+    parser.add_argument("--least-strides", metavar="N", default="2", help="refuse fewer whole strides; default 2")
+    parser.add_argument("--name", metavar="NAME", default="imported-gait", help="name of the gait and of its file")
+    parser.add_argument("--title", metavar="TEXT", default="", help="one line on who walks how")
+    add_output_arguments(parser)
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Do what was asked for."""
+    actions = {"list": _list, "show": _show, "import": _import, "record": _record, "export": _export}
+    return actions[parsed.action](parsed)
+
+
+def _list(parsed: argparse.Namespace) -> int:
+    from ppafo.gait import list_gaits, load_gait
+
+    titles = {name: load_gait(name).title for name in list_gaits()}
+    width = max(map(len, titles))
+    lines = [f"{name:<{width}}  {title}" for name, title in titles.items()]
+    document = {"gaits": [{"name": name, "title": title} for name, title in titles.items()]}
+    print_result("\n".join(lines), document, parsed.json)
+    return EXIT_GOOD
+
+
+def _show(parsed: argparse.Namespace) -> int:
+    from ppafo.gait import at_speed, load_gait
+
+    gait = load_gait(parsed.gait)
+    if parsed.speed is not None:
+        gait = at_speed(gait, _quantity("--speed", parsed.speed, "m/s"))
+    return _deliver(gait, None, parsed)
+
+
+def _import(parsed: argparse.Namespace) -> int:
+    from ppafo.gait.recorded import import_gait
+
+    settings = _settings(parsed)
+    _check_folder(settings.name, parsed.out)
+    imported = import_gait(parsed.files, settings)
+    return _deliver(imported.gait, imported, parsed)
+
+
+def _settings(parsed: argparse.Namespace) -> "ImportSettings":
+    from ppafo.gait.recorded import ImportSettings
+    from ppafo.gait.recorded.mapping import load_map
+
+    if parsed.side not in _SIDES:
+        raise DataError(f"--side {parsed.side!r} is not known; it is right or left")
+    return ImportSettings(
+        body_mass=_quantity("--body-mass", parsed.body_mass, "kg"),
+        side=parsed.side,
+        columns=None if parsed.map is None else load_map(parsed.map),
+        walking_speed=None if parsed.speed is None else _quantity("--speed", parsed.speed, "m/s"),
+        low_pass=None if parsed.low_pass is None else _quantity("--low-pass", parsed.low_pass, "Hz"),
+        least_strides=_whole("--least-strides", parsed.least_strides),
+        name=parsed.name,
+        title=parsed.title,
+    )
+
+
+def _whole(option: str, text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 7):
+        raise DataError(f"{option} {text!r} is not a whole number, such as 2")
+    return int(text)
+
+
+def _quantity(option: str, text: str, si_unit: str) -> float:
+    from ppafo.units import parse_quantity
+
+    try:
+        return parse_quantity(text, si_unit)
+    except UnitError as error:
+        raise DataError(f"{option} {text!r}: {error}") from error
+
+
+def _check_folder(name: str, folder: Path | None) -> None:
+    from ppafo.reporting.gait_files import file_names
+
+    check_output(folder, file_names(name))
+
+
+def _deliver(gait: "Gait", imported: "ImportedGait | None", parsed: argparse.Namespace) -> int:
+    from ppafo.reporting.gait_files import gait_document, gait_files, gait_table
+
+    lines = gait_table(gait, imported)
+    if parsed.out is not None:
+        _check_folder(gait.name, parsed.out)
+        load_drawing()
+        files = gait_files(gait, imported)
+        write_files(parsed.out, files)
+        lines.append(f"written: {parsed.out} ({', '.join(files)})")
+    print_result("\n".join(lines), gait_document(gait, imported), parsed.json)
+    return EXIT_GOOD
+
+
+def _record(parsed: argparse.Namespace) -> int:
+    from ppafo.gait import load_gait, walk_recording
+    from ppafo.storage import write_csv
+
+    if parsed.out.suffix.lower() != ".csv":
+        raise DataError(f"--out {parsed.out}: a recording is written as .csv")
+    recording = walk_recording(load_gait(parsed.gait), _whole("--strides", parsed.strides))
+    write_csv(parsed.out, recording)
+    document = {"file": str(parsed.out), "samples": len(recording), "channels": list(recording.names)}
+    print_result(f"written: {parsed.out} ({len(recording)} samples, synthetic)", document, parsed.json)
+    return EXIT_GOOD
+
+
+def _export(parsed: argparse.Namespace) -> int:
+    from ppafo.storage import read_recording
+    from ppafo.storage.opensim import write_opensim
+
+    if parsed.out.suffix.lower() != ".sto":
+        raise DataError(f"--out {parsed.out}: OpenSim's name for such a file ends in .sto")
+    recording = read_recording(parsed.recording)
+    write_opensim(parsed.out, recording)
+    document = {"file": str(parsed.out), "samples": len(recording), "channels": list(recording.names)}
+    print_result(f"written: {parsed.out} ({len(recording)} samples)", document, parsed.json)
+    return EXIT_GOOD

@@ -1,0 +1,72 @@
+"""Event-based control of a pair of solenoid valves: each phase of the gait has its valve configuration.
+
+Landing and swing: the dorsiflexion side holds the foot up, at neutral within a band. Mid-stance: both chambers vented,
+free motion. Push-off: the plantarflexion side. The functional tasks of figure 1A of the paper.
+"""
+
+from typing import NamedTuple
+
+from ppafo.control.kind import ControllerKind
+from ppafo.control.walking import phases, safety
+from ppafo.control.walking.declaration import PHASE_QUANTITIES, SAFETY_QUANTITIES
+from ppafo.control.walking.phases import PhaseRules, PhaseState
+from ppafo.control.walking.safety import SafetyRules, SafetyState
+from ppafo.model.command import VENT
+from ppafo.model.declaration import Quantity
+from ppafo.model.gait_sensors import GaitMeasurement
+
+
+class EventOnOffParameters(NamedTuple):
+    """Angle of the foot in the swing [rad], band about it [rad], and the rules of phases and safety."""
+
+    swing_angle: float
+    band: float
+    phases: PhaseRules
+    safety: SafetyRules
+
+
+class EventOnOffState(NamedTuple):
+    """Phase, safety, and whether the dorsiflexion side is on (1)."""
+
+    phase: PhaseState
+    safety: SafetyState
+    lifting: float
+
+
+def update(
+    parameters: EventOnOffParameters,
+    state: EventOnOffState,
+    reference: float,
+    measurement: GaitMeasurement,
+    period: float,
+) -> tuple[float, EventOnOffState]:
+    """Command: 1 plantarflexion, -1 dorsiflexion, ``VENT`` free; the reference is not used."""
+    phase = phases.followed_phase(parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period)
+    watch = safety.watched(parameters.safety, state.safety, state.phase, phase, measurement, period)
+    above = measurement.angle > parameters.swing_angle + parameters.band
+    below = measurement.angle < parameters.swing_angle - parameters.band
+    lifting = 0.0 if below else (1.0 if above else state.lifting)
+    held = phases.lifts(phase.phase)
+    command = -1.0 if lifting > 0.5 else VENT
+    command = command if held else VENT
+    command = 1.0 if phase.phase == phases.PUSH_OFF else command
+    command = VENT if watch.vented > 0.5 else command
+    return command, EventOnOffState(phase, watch, lifting if held else 0.0)
+
+
+KIND = ControllerKind(
+    name="event_on_off",
+    summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
+    source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
+    quantities=(
+        Quantity("swing_angle", "rad", "angle at which the foot is held in the swing", 1.5707963267948966, 0.5, 2.5),
+        Quantity(
+            "band", "rad", "the foot is lifted above the angle plus this, let go below it less this", 0.03, 0.0, 0.5
+        ),
+        *PHASE_QUANTITIES,
+        *SAFETY_QUANTITIES,
+    ),
+    parameters=EventOnOffParameters,
+    initial=EventOnOffState(phases.START, safety.START, 0.0),
+    update=update,
+)

@@ -1,0 +1,102 @@
+"""Where a controller believes the wearer to be: heel strike, mid-stance, push-off or swing, from two force sensors.
+
+Each sensor is loaded above one threshold and unloaded below another (hysteresis), and a change counts only when it has
+lasted (debounce). The time between two heel strikes is followed by a moving average, and the push-off begins at a
+share of it.
+"""
+
+from typing import NamedTuple
+
+SWING = 0.0
+LANDING = 1.0
+MID_STANCE = 2.0
+PUSH_OFF = 3.0
+
+LONG_AGO = 1.0e3
+
+
+class PhaseRules(NamedTuple):
+    """Thresholds [N], debounce [s], first stride time [s], weight of a new stride [-], start of push-off [turns]."""
+
+    load_threshold: float
+    unload_threshold: float
+    debounce: float
+    first_stride_time: float
+    stride_weight: float
+    push_off_start: float
+
+
+class Switch(NamedTuple):
+    """A debounced force sensor: loaded (1) or not (0), and how long it has contradicted that [s]."""
+
+    loaded: float
+    contradicted: float
+
+
+class PhaseState(NamedTuple):
+    """Phase, both switches, time in the phase and since the last heel strike [s], stride time [s], strikes seen."""
+
+    phase: float
+    heel: Switch
+    toe: Switch
+    in_phase: float
+    since_strike: float
+    stride_time: float
+    strikes: float
+
+
+START = PhaseState(SWING, Switch(0.0, 0.0), Switch(0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
+
+
+def lifts(phase: float) -> bool:
+    """True in the swing and the landing, in which the foot is held up. Tasks 1 and 3 of the paper."""
+    return phase < 1.5
+
+
+def switched(rules: PhaseRules, switch: Switch, force: float, period: float) -> Switch:
+    """A switch after a sample of a force [N]."""
+    wanted = 0.0 if force < rules.unload_threshold else switch.loaded
+    wanted = 1.0 if force > rules.load_threshold else wanted
+    against = switch.contradicted + period if wanted != switch.loaded else 0.0
+    turns = against >= rules.debounce and wanted != switch.loaded
+    return Switch(wanted if turns else switch.loaded, 0.0 if turns else against)
+
+
+def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float) -> float:
+    """Phase from the present one and both switches (0 or 1); ``since_strike`` and ``stride_time`` as in ``state``."""
+    on_heel = heel > 0.5
+    on_toe = toe > 0.5
+    late = state.since_strike >= rules.push_off_start * state.stride_time
+    phase = state.phase
+    after_swing = LANDING if on_heel else (MID_STANCE if on_toe else SWING)
+    after_landing = MID_STANCE if on_toe else (LANDING if on_heel else SWING)
+    leaves_ground = not on_heel and not on_toe
+    after_mid_stance = SWING if leaves_ground else (PUSH_OFF if late and on_toe else MID_STANCE)
+    after_push_off = SWING if leaves_ground else PUSH_OFF
+    found = after_swing if phase == SWING else after_landing
+    found = after_mid_stance if phase == MID_STANCE else found
+    return after_push_off if phase == PUSH_OFF else found
+
+
+def followed_phase(
+    rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, period: float
+) -> PhaseState:
+    """State after a sample of both forces [N]; ``period`` [s]."""
+    heel = switched(rules, state.heel, heel_force, period)
+    toe = switched(rules, state.toe, toe_force, period)
+    since = state.since_strike + period
+    known = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
+    aged = PhaseState(state.phase, heel, toe, state.in_phase + period, since, known, state.strikes)
+    phase = next_phase(rules, aged, heel.loaded, toe.loaded)
+    strikes = state.phase == SWING and phase == LANDING
+    plausible = state.strikes > 0.5 and since > 0.5 * known and since < 2.0 * known
+    learnt = known + rules.stride_weight * (since - known) if plausible else known
+    return PhaseState(
+        phase,
+        heel,
+        toe,
+        0.0 if phase != state.phase else aged.in_phase,
+        0.0 if strikes else since,
+        learnt if strikes else known,
+        state.strikes + (1.0 if strikes else 0.0),
+    )

@@ -1,0 +1,215 @@
+"""One step of a leg that walks with the device: the free foot, the foot on the ground, and the change between them."""
+
+from typing import NamedTuple
+
+from ppafo.engine.scheme.motion import FreeStep, begin_free, bounded, end_free, with_motion
+from ppafo.model import contact as ground
+from ppafo.model.gait import GaitNow, GaitTiming
+from ppafo.model.leg import (
+    LegParameters,
+    centrifugal_torques,
+    foot_inertia_about_ankle,
+    gravity_torques,
+    mass_matrix,
+    passive_torque,
+)
+from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures
+from ppafo.model.turns import TURN, sine_and_cosine
+from ppafo.model.vane import actuator_torque
+
+
+class DeviceShare(NamedTuple):
+    """What the foot plate and the vane add to the leg: inertia [kg m^2], damping [N m s/rad], largest gravity [N m].
+
+    The plant of a walking leg carries the sums of leg and device, and no gravity of its own.
+    """
+
+    inertia: float
+    viscous_damping: float
+    gravity_torque: float
+
+
+class WalkState(NamedTuple):
+    """Where the foot stands, the gait now, what the wearer gets, and totals since the start.
+
+    ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
+    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``slap_rate`` of the foot at the last landing
+    [rad/s]; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, landings,
+    strikes with the toes first, sums of slap rates [rad/s] and clearances [m], work of T_ex while the foot rolls over
+    the toes [J].
+    """
+
+    contact: float
+    offset: float
+    now: GaitNow
+    external_torque: float
+    heel_force: float
+    toe_force: float
+    slap_rate: float
+    clearance: float
+    strides: float
+    landings: float
+    toe_landings: float
+    slap_rates: float
+    clearances: float
+    push_off_work: float
+
+
+class WalkStep(NamedTuple):
+    """First stage: the free foot, where the ground would lead the ankle, the fading difference, the gait at the end."""
+
+    free: FreeStep
+    led: ground.Ankle
+    offset: float
+    next: GaitNow
+
+
+NO_CLEARANCE = 1.0e3
+
+
+def leg_torque(leg: LegParameters, share: DeviceShare, contact: float, now: GaitNow, angle: float) -> float:
+    """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
+
+    The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the weight of the foot plate, and
+    the ground under the heel.
+    """
+    alpha = ground.foot_angle(now.shank, angle)
+    sine_alpha, cosine_alpha = sine_and_cosine(alpha / TURN)
+    # theta is phi - alpha + 90 deg.
+    sine_theta = now.cosine_shank * cosine_alpha + now.sine_shank * sine_alpha
+    cosine_theta = now.cosine_shank * sine_alpha - now.sine_shank * cosine_alpha
+    matrix = mass_matrix(leg, cosine_theta)
+    turning = centrifugal_torques(leg, sine_theta, now.shank_rate, 0.0)
+    weight = gravity_torques(
+        leg, now.sine_shank, now.cosine_shank, sine_alpha, cosine_alpha, now.knee_forward, now.knee_up
+    )
+    # The measured moment is that of muscles and tissue together.
+    muscles = now.moment - passive_torque(leg, now.ankle)
+    wearer = leg.residual_share * muscles + passive_torque(leg, angle)
+    heel = now.force * leg.heel_lever if contact == ground.HEEL else 0.0
+    inertial = matrix.coupling * now.shank_acceleration + turning.ankle + weight.ankle
+    return wearer + heel + share.gravity_torque * cosine_alpha - inertial
+
+
+def begin_walk(
+    plant: PlantParameters,
+    leg: LegParameters,
+    share: DeviceShare,
+    timing: GaitTiming,
+    state: PlantState,
+    walk: WalkState,
+    next_gait: GaitNow,
+    step: float,
+) -> WalkStep:
+    """Where one step [s] leads the foot, by its own dynamics and by the ground."""
+    torque = leg_torque(leg, share, walk.contact, walk.now, state.angle)
+    free = begin_free(plant, state, torque, step)
+    offset = walk.offset / (1.0 + step / ground.FADING_TIME)
+    prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle)
+    led = ground.Ankle(
+        bounded(plant, prescribed.angle + offset),
+        prescribed.rate - offset / ground.FADING_TIME,
+        prescribed.acceleration,
+    )
+    return WalkStep(free, led, offset, next_gait)
+
+
+def next_angle(plant: PlantParameters, walk: WalkState, begun: WalkStep) -> float:
+    """Angle [rad] to which the volumes run."""
+    return bounded(plant, begun.free.free_angle) if ground.is_free(walk.contact) else begun.led.angle
+
+
+def external_torque(
+    plant: PlantParameters,
+    leg: LegParameters,
+    share: DeviceShare,
+    state: PlantState,
+    torque: float,
+    led: ground.Ankle,
+    acceleration: float,
+    angle_is_free: bool,
+) -> float:
+    """T_ex [N m]: what the free foot needs, or what equation (1) leaves of the actuator where the ground leads."""
+    speed = state.angular_velocity
+    passive_damping = leg.ankle_damping * speed
+    needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - torque
+    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
+    actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+    way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
+    given = actuator - way * plant.dynamic_torque - share.viscous_damping * speed - share.inertia * led.acceleration
+    return needed if angle_is_free else given
+
+
+def end_walk(
+    plant: PlantParameters,
+    leg: LegParameters,
+    share: DeviceShare,
+    timing: GaitTiming,
+    follow_rate: float,
+    state: PlantState,
+    walk: WalkState,
+    begun: WalkStep,
+    step: float,
+) -> tuple[PlantState, WalkState]:
+    """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin."""
+    now = begun.next
+    free = ground.is_free(walk.contact)
+    predicted = bounded(plant, begun.free.free_angle)
+    torque = leg_torque(leg, share, walk.contact, now, predicted)
+    moved = end_free(plant, state, begun.free, torque, step)
+    after = with_motion(
+        state,
+        moved.angle if free else begun.led.angle,
+        moved.angular_velocity if free else begun.led.rate,
+    )
+    acceleration = (after.angular_velocity - state.angular_velocity) / max(step, 1.0e-30)
+    # Without the weight of the foot plate: it belongs to the device.
+    sine_alpha, cosine_alpha = sine_and_cosine(ground.foot_angle(now.shank, after.angle) / TURN)
+    bare = torque - share.gravity_torque * cosine_alpha
+    given = external_torque(plant, leg, share, after, bare, begun.led, acceleration, free)
+    landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset)
+    height = leg.toe_lever * (sine_alpha - now.sine_healthy_foot)
+    turned = after.angle - state.angle
+    return after, counted(timing, walk, after, now, landed, given, height, follow_rate, turned, step)
+
+
+def counted(
+    timing: GaitTiming,
+    walk: WalkState,
+    state: PlantState,
+    now: GaitNow,
+    landed: ground.Landing,
+    given: float,
+    height: float,
+    follow_rate: float,
+    turned: float,
+    step: float,
+) -> WalkState:
+    """What the sensors show and what adds up over the strides.
+
+    ``height`` of the toes [m] against the healthy gait at the same instant, ``turned`` [rad] in this step.
+    """
+    heel, toe = ground.ground_forces(landed.contact, timing, now)
+    share = follow_rate * step / (1.0 + follow_rate * step)
+    foot_rate = now.shank_rate - state.angular_velocity
+    touches_first = ground.foot_angle(now.shank, state.angle) < timing.ground_angle
+    watched = now.phase >= timing.clearance_from and now.phase <= timing.clearance_to
+    lowest = min(walk.clearance, height if watched else walk.clearance)
+    strikes = landed.strikes > 0.5
+    on_toes = walk.contact == ground.TOE
+    return WalkState(
+        landed.contact,
+        landed.offset,
+        now,
+        given,
+        walk.heel_force + (heel - walk.heel_force) * share,
+        walk.toe_force + (toe - walk.toe_force) * share,
+        foot_rate if landed.slaps > 0.5 else walk.slap_rate,
+        NO_CLEARANCE if strikes else lowest,
+        walk.strides + landed.strikes,
+        walk.landings + landed.slaps,
+        walk.toe_landings + (1.0 if strikes and touches_first else 0.0),
+        walk.slap_rates + (foot_rate if landed.slaps > 0.5 else 0.0),
+        walk.clearances + (lowest if strikes and lowest < NO_CLEARANCE else 0.0),
+        walk.push_off_work + (0.5 * (given + walk.external_torque) * turned if on_toes else 0.0),
+    )

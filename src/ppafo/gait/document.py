@@ -1,0 +1,211 @@
+"""The layout of a gait file, and how one becomes a ``Gait`` and a ``Gait`` one."""
+
+import functools
+import json
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field, ValidationError
+
+from ppafo.documents.models import NAME, optional, published_schema, table
+from ppafo.documents.problems import first_problem
+from ppafo.errors import DataError, UnitError
+from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait
+from ppafo.units import from_si, parse_quantity, to_si
+
+WRITTEN_UNITS: dict[str, str] = {"rad": "deg"}
+"""Angles are written in degrees; every other curve in its own unit."""
+
+_MOST_HARMONICS = 40
+_DIGITS = 12
+"""Written of a coefficient; degrees made of radians carry noise behind these."""
+_PLAIN = "-"
+_SUMMARIES = {
+    "shank_angle": "shank angle from the vertical, above 0 while the ankle is in front of the knee",
+    "ankle_angle": "ankle angle, 90 deg neutral, growing in plantarflexion",
+    "ankle_moment": "internal ankle moment per body mass, above 0 in plantarflexion",
+    "vertical_force": "vertical ground reaction on this foot in body weights, above 0 upwards",
+    "centre_of_pressure": "where it acts, forward of the ankle along the foot; without meaning in swing",
+}
+_LIMITS = {
+    "subject.body_mass": ("kg", 1.0, 500.0),
+    "subject.walking_speed": ("m/s", 0.05, 4.0),
+    "subject.recorded_speed": ("m/s", 0.05, 4.0),
+    "stride.time": ("s", 0.3, 5.0),
+    "stride.time_deviation": ("s", 0.0, 2.0),
+    "stride.stance_share": ("", 0.2, 0.95),
+    "stride.stance_share_deviation": ("", 0.0, 0.5),
+}
+"""Unit, lowest and highest value of every quantity; wide, to exclude slips of the pen only."""
+
+
+@functools.cache
+def gait_file() -> type[BaseModel]:
+    """Return the model of a gait file."""
+    text = Annotated[str, Field(pattern=r"^\s*[+-]?(\d|\.\d)")]
+    subject = {
+        "body_mass": (text, Field(description="mass of the wearer, such as '62 kg'")),
+        "walking_speed": optional(text, "speed of this gait, such as '1.33 m/s'"),
+        "recorded_speed": optional(text, "speed at which the curves were recorded, where it is another one"),
+    }
+    stride = {
+        "time": (text, Field(description="from one heel strike to the next of the same foot, such as '1.04 s'")),
+        "time_deviation": optional(text, "its standard deviation between strides"),
+        "stance_share": (text, Field(description="share of the stride until toe-off, such as '62 percent'")),
+        "stance_share_deviation": optional(text, "its standard deviation between strides"),
+        "count": (Annotated[int, Field(ge=0)], Field(0, description="number of strides behind the curves; 0: unknown")),
+    }
+    fields: dict[str, Any] = {
+        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "name": (str, Field(pattern=NAME, max_length=100)),
+        "title": (str, Field("", description="one line on who walks how")),
+        "origin": (Literal["measured", "synthetic"], Field(description="synthetic: made by a model, nobody walked so")),
+        "source": (Annotated[str, Field(min_length=1)], Field(description="where the numbers come from")),
+        "notes": (str, Field("", description="what else should be known")),
+        "subject": (table("Subject", subject), Field(description="the wearer")),
+        "stride": (table("Stride", stride), Field(description="times of the stride")),
+    }
+    for name, unit in CURVES.items():
+        required = name in REQUIRED
+        fields[name] = (
+            (_curve_table(name, unit), Field(description=_SUMMARIES[name]))
+            if required
+            else optional(_curve_table(name, unit), _SUMMARIES[name])
+        )
+    return table("GaitFile", fields)
+
+
+def _curve_table(name: str, unit: str) -> type[BaseModel]:
+    units: Any = Literal["deg", "rad"] if unit == "rad" else Literal[unit]
+    number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
+    series = Annotated[list[number], Field(min_length=1, max_length=_MOST_HARMONICS)]
+    return table(
+        "".join(part.capitalize() for part in name.split("_")),
+        {
+            "unit": (units, Field(description="unit of every number of this curve")),
+            "mean": (number, Field(description="mean over the stride")),
+            "cosine": (series, Field(description="amplitudes of the cosines, first harmonic first")),
+            "sine": (series, Field(description="amplitudes of the sines, as many")),
+            "deviation": (
+                Annotated[number, Field(ge=0.0)],
+                Field(0.0, description="standard deviation between strides, root mean square over the stride"),
+            ),
+        },
+    )
+
+
+def gait_of(document: dict[str, Any], file: str) -> Gait:
+    """Return the gait in the document of a gait file; ``file`` is what messages call it."""
+    try:
+        gait_file().model_validate(document)
+    except ValidationError as error:
+        raise DataError(f"{file}: {first_problem(error.errors(include_url=False), gait_file())}") from error
+    numbers = {path: _number(document, path, file) for path in _LIMITS}
+    curves = {name: _curve(document[name], name, file) for name in CURVES if name in document}
+    if numbers["stride.time"] is None or numbers["stride.stance_share"] is None or numbers["subject.body_mass"] is None:
+        raise DataError(f"{file}: [subject] and [stride] are not complete")
+    return Gait(
+        name=document["name"],
+        title=document.get("title", ""),
+        origin=document["origin"],
+        source=document["source"],
+        body_mass=numbers["subject.body_mass"],
+        walking_speed=numbers["subject.walking_speed"],
+        recorded_speed=numbers["subject.recorded_speed"],
+        stride_time=numbers["stride.time"],
+        stance_share=numbers["stride.stance_share"],
+        stride_time_deviation=numbers["stride.time_deviation"] or 0.0,
+        stance_share_deviation=numbers["stride.stance_share_deviation"] or 0.0,
+        strides=document["stride"].get("count", 0),
+        notes=document.get("notes", ""),
+        shank_angle=curves["shank_angle"],
+        ankle_angle=curves["ankle_angle"],
+        ankle_moment=curves.get("ankle_moment"),
+        vertical_force=curves.get("vertical_force"),
+        centre_of_pressure=curves.get("centre_of_pressure"),
+    )
+
+
+def _number(document: dict[str, Any], path: str, file: str) -> float | None:
+    section, _, key = path.partition(".")
+    text = document[section].get(key)
+    if text is None:
+        return None
+    unit, low, high = _LIMITS[path]
+    try:
+        value = parse_quantity(text, unit)
+    except UnitError as error:
+        raise DataError(f"{file}: {path} = {text!r}: {error}") from error
+    if not low <= value <= high:
+        raise DataError(
+            f"{file}: {path} = {text!r} is not allowed; it lies between {low:g} and {high:g} {unit}".strip()
+        )
+    return value
+
+
+def _curve(given: dict[str, Any], name: str, file: str) -> Curve:
+    if len(given["cosine"]) != len(given["sine"]):
+        counts = f"{len(given['cosine'])} numbers in cosine and {len(given['sine'])} in sine"
+        raise DataError(f"{file}: {name} has {counts}; a series has as many of both")
+
+    def si(value: float) -> float:
+        return to_si(float(value), _spelled(given["unit"]), _spelled(CURVES[name]))
+
+    return Curve(
+        si(given["mean"]),
+        tuple(map(si, given["cosine"])),
+        tuple(map(si, given["sine"])),
+        si(given.get("deviation", 0.0)),
+    )
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a gait file."""
+    return published_schema(gait_file(), "ppafo gait")
+
+
+def gait_toml(gait: Gait) -> str:
+    """Return the text of a gait file; reading it back gives the same gait, to rounding of the angles."""
+    return "\n".join(_lines(gait)) + "\n"
+
+
+def _lines(gait: Gait) -> Iterator[str]:
+    yield "schema_version = 1"
+    texts = {"name": gait.name, "title": gait.title, "origin": gait.origin, "source": gait.source, "notes": gait.notes}
+    yield from (f"{key} = {_text(value)}" for key, value in texts.items() if value)
+    yield from ("", "[subject]", f'body_mass = "{gait.body_mass!r} kg"')
+    for key in ("walking_speed", "recorded_speed"):
+        speed = getattr(gait, key)
+        if speed is not None:
+            yield f'{key} = "{speed!r} m/s"'
+    yield from ("", "[stride]", f'time = "{gait.stride_time!r} s"', f'stance_share = "{gait.stance_share!r}"')
+    if gait.stride_time_deviation:
+        yield f'time_deviation = "{gait.stride_time_deviation!r} s"'
+    if gait.stance_share_deviation:
+        yield f'stance_share_deviation = "{gait.stance_share_deviation!r}"'
+    yield f"count = {gait.strides}"
+    for name, curve in gait.curves.items():
+        yield from ("", f"[{name}]", *_series(curve, CURVES[name]))
+
+
+def _series(curve: Curve, si_unit: str) -> Iterator[str]:
+    unit = WRITTEN_UNITS.get(si_unit, si_unit)
+
+    def written(value: float) -> str:
+        return repr(float(f"{from_si(value, _spelled(unit), _spelled(si_unit)):.{_DIGITS}g}"))
+
+    yield f"unit = {_text(unit)}"
+    yield f"mean = {written(curve.mean)}"
+    yield f"cosine = [{', '.join(map(written, curve.cosines))}]"
+    yield f"sine = [{', '.join(map(written, curve.sines))}]"
+    yield f"deviation = {written(curve.deviation)}"
+
+
+def _spelled(unit: str) -> str:
+    """Return the unit as ``ppafo.units`` writes it: a plain number has none."""
+    return "" if unit == _PLAIN else unit
+
+
+def _text(text: str) -> str:
+    """Return a basic string of TOML; what JSON escapes is escaped in the same way there, but for DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

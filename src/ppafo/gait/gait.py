@@ -1,0 +1,133 @@
+"""A gait: one periodic stride as Fourier series, in SI units and in the signs of the package.
+
+- ``shank_angle`` phi [rad]: from the vertical, above 0 while the ankle is in front of the knee.
+- ``ankle_angle`` theta [rad]: 90 deg neutral (foot square to the shank), growing in plantarflexion (toes down).
+- ``ankle_moment`` [N m/kg]: internal moment of the wearer per body mass, above 0 in plantarflexion.
+- ``vertical_force`` [body weights]: ground reaction on this foot, above 0 upwards.
+- ``centre_of_pressure`` [m]: where it acts, forward of the ankle along the foot; without meaning while the foot is off.
+
+With a flat foot theta is 90 deg plus phi. The phase counts strides from one heel strike of the foot to its next.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from ppafo.errors import DataError, nearest_name
+from ppafo.model.periodic import periodic_motion, periodic_value
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ppafo.signals.recording import Floats
+
+Origin = Literal["measured", "synthetic"]
+
+CURVES: dict[str, str] = {
+    "shank_angle": "rad",
+    "ankle_angle": "rad",
+    "ankle_moment": "N m/kg",
+    "vertical_force": "-",
+    "centre_of_pressure": "m",
+}
+"""The curves of a gait and the unit in which each is kept; the first two are always there."""
+
+REQUIRED = ("shank_angle", "ankle_angle")
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One periodic curve: coefficients of its series in SI units, and how much strides differ.
+
+    ``deviation`` is the standard deviation between strides, root mean square over the stride; 0 where it is not known.
+    """
+
+    mean: float
+    cosines: tuple[float, ...]
+    sines: tuple[float, ...]
+    deviation: float = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.cosines) != len(self.sines) or not self.cosines:
+            raise DataError(f"a series has as many cosines as sines, not {len(self.cosines)} and {len(self.sines)}")
+
+    @property
+    def harmonics(self) -> int:
+        """Number of harmonics."""
+        return len(self.cosines)
+
+    def value(self, phase: float) -> float:
+        """Return the value at a phase [strides]."""
+        return periodic_value(self.mean, self.cosines, self.sines, phase)
+
+    def motion(self, phase: float, stride_time: float) -> tuple[float, float, float]:
+        """Return value, rate and acceleration by time at a phase [strides], for a stride of this time [s]."""
+        return periodic_motion(self.mean, self.cosines, self.sines, phase, stride_time)
+
+    def rate(self, phase: float, stride_time: float) -> float:
+        """Return the first derivative by time at a phase [strides], for a stride of this time [s]."""
+        return self.motion(phase, stride_time)[1]
+
+    def acceleration(self, phase: float, stride_time: float) -> float:
+        """Return the second derivative by time at a phase [strides], for a stride of this time [s]."""
+        return self.motion(phase, stride_time)[2]
+
+    def sampled(self, phases: "ArrayLike") -> "Floats":
+        """Return the values at many phases [strides], for figures."""
+        import numpy as np
+
+        turns = 2.0 * np.pi * np.multiply.outer(np.asarray(phases, dtype=np.float64), 1.0 + np.arange(self.harmonics))
+        values = self.mean + np.cos(turns) @ np.array(self.cosines) + np.sin(turns) @ np.array(self.sines)
+        return np.asarray(values, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Gait:
+    """One stride of one wearer, as curves over the phase; those that nobody recorded are None.
+
+    ``body_mass`` [kg], ``stride_time`` [s], ``stance_share`` (share of the stride until toe-off), ``walking_speed``
+    [m/s], None where nobody recorded it. The two deviations are between strides, 0 where not known. ``recorded_speed``
+    is the speed at which the curves were recorded, where it is another than ``walking_speed``.
+    """
+
+    name: str
+    title: str
+    origin: Origin
+    source: str
+    body_mass: float
+    walking_speed: float | None
+    stride_time: float
+    stance_share: float
+    shank_angle: Curve
+    ankle_angle: Curve
+    ankle_moment: Curve | None = None
+    vertical_force: Curve | None = None
+    centre_of_pressure: Curve | None = None
+    stride_time_deviation: float = 0.0
+    stance_share_deviation: float = 0.0
+    strides: int = 0
+    recorded_speed: float | None = None
+    notes: str = ""
+
+    def __post_init__(self) -> None:
+        if not (self.body_mass > 0.0 and self.stride_time > 0.0 and 0.0 < self.stance_share < 1.0):
+            raise DataError(
+                f"gait '{self.name}': body mass {self.body_mass:g} kg and stride time {self.stride_time:g} s must be "
+                f"above 0, and the stance share {self.stance_share:g} between 0 and 1"
+            )
+
+    @property
+    def curves(self) -> dict[str, Curve]:
+        """The curves that there are, by name, in the order of ``CURVES``."""
+        return {name: curve for name in CURVES if (curve := getattr(self, name)) is not None}
+
+    def curve(self, name: str) -> Curve:
+        """Return a curve by its name; DataError where this gait does not have it."""
+        curves = self.curves
+        if name not in curves:
+            hint = nearest_name(name, curves)
+            raise DataError(f"gait '{self.name}' has no curve '{name}'{hint}; it has {', '.join(curves)}")
+        return curves[name]
+
+    def is_stance(self, phase: float) -> bool:
+        """Tell whether the foot is on the ground at a phase [strides]."""
+        return phase % 1.0 < self.stance_share

@@ -1,0 +1,166 @@
+"""Gait maps: which columns of recorded files make the curves of a gait, in which unit and with which sign.
+
+A map is a TOML file or one of ``CONVENTIONS``. A term is the name of a column; ``-`` before it takes it away.
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from ppafo.documents.models import published_schema
+from ppafo.documents.problems import first_problem
+from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
+from ppafo.documents.toml_text import label
+from ppafo.errors import DataError, reason
+
+_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True)
+_Text = Annotated[str, Field(min_length=1)]
+_Terms = Annotated[
+    tuple[_Text, ...], Field(strict=False, min_length=1, description="columns to add up; '-' before one takes it away")
+]
+_Unit = Annotated[_Text | None, Field(description="unit of the columns, where the file does not say it")]
+_Flexion = Literal["plantarflexion", "dorsiflexion"]
+
+
+class ShankMap(BaseModel):
+    """Shank angle: a sum of columns, or two markers and the axes of the laboratory."""
+
+    model_config = _STRICT
+
+    terms: _Terms | None = None
+    unit: _Unit = None
+    positive: Annotated[Literal["ankle_in_front", "ankle_behind"], Field(description="which lean counts above 0")] = (
+        "ankle_in_front"
+    )
+    knee: Annotated[_Text | None, Field(description="marker at the knee, instead of terms")] = None
+    ankle: Annotated[_Text | None, Field(description="marker at the ankle")] = None
+    forward: Annotated[Literal["x", "y", "z", "-x", "-y", "-z"], Field(description="axis along the walk")] = "x"
+    vertical: Annotated[Literal["x", "y", "z"], Field(description="axis upwards")] = "z"
+
+    @model_validator(mode="after")
+    def _one_way(self) -> "ShankMap":
+        if (self.terms is None) == (self.knee is None) or (self.knee is None) != (self.ankle is None):
+            raise ValueError("give either terms, or both knee and ankle")
+        return self
+
+
+class AngleMap(BaseModel):
+    """Ankle angle."""
+
+    model_config = _STRICT
+
+    terms: _Terms
+    unit: _Unit = None
+    positive: Annotated[_Flexion, Field(description="which motion counts above 0")]
+    neutral: Annotated[_Text, Field(description="what the file shows when the foot is square to the shank")] = "0 deg"
+
+
+class MomentMap(BaseModel):
+    """Ankle moment, in N m or N m/kg."""
+
+    model_config = _STRICT
+
+    terms: _Terms
+    unit: _Unit = None
+    positive: Annotated[_Flexion, Field(description="which internal moment counts above 0")]
+
+
+class ForceMap(BaseModel):
+    """Vertical ground reaction on this foot, in N or, as a plain number '-', in body weights."""
+
+    model_config = _STRICT
+
+    terms: _Terms
+    unit: _Unit = None
+    positive: Annotated[Literal["up", "down"], Field(description="which force counts above 0")] = "up"
+
+
+class PressureMap(BaseModel):
+    """Centre of pressure along the foot, from the ankle."""
+
+    model_config = _STRICT
+
+    terms: _Terms
+    unit: _Unit = None
+    positive: Annotated[Literal["forward", "backward"], Field(description="which way counts above 0")] = "forward"
+
+
+class GaitMap(BaseModel):
+    """What the columns of recorded files mean; a curve that is not named is not imported."""
+
+    model_config = _STRICT
+
+    schema_version: Annotated[Literal[1], Field(description="version of this layout")] = 1
+    shank_angle: ShankMap
+    ankle_angle: AngleMap
+    ankle_moment: MomentMap | None = None
+    vertical_force: ForceMap | None = None
+    centre_of_pressure: PressureMap | None = None
+
+
+Side = Literal["right", "left"]
+
+
+def package_map(_side: Side) -> GaitMap:
+    """Return the map of a CSV file whose columns have the names and signs of the package."""
+    return GaitMap(
+        shank_angle=ShankMap(terms=("shank_angle",)),
+        ankle_angle=AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
+        ankle_moment=MomentMap(terms=("ankle_moment",), positive="plantarflexion"),
+        vertical_force=ForceMap(terms=("vertical_force",)),
+        centre_of_pressure=PressureMap(terms=("centre_of_pressure",)),
+    )
+
+
+def opensim_map(side: Side) -> GaitMap:
+    """Return the map of OpenSim's gait models: knee below 0 in flexion as in gait2392, ankle above 0 in dorsiflexion.
+
+    The shank angle is the sum of pelvis tilt, hip and knee flexion: what the sagittal plane shows of them.
+    """
+    foot = side[0]
+    force = "ground_force_vy" if side == "right" else "l_ground_force_vy"
+    return GaitMap(
+        shank_angle=ShankMap(terms=("pelvis_tilt", f"hip_flexion_{foot}", f"knee_angle_{foot}")),
+        ankle_angle=AngleMap(terms=(f"ankle_angle_{foot}",), positive="dorsiflexion"),
+        ankle_moment=MomentMap(terms=(f"ankle_angle_{foot}_moment",), positive="dorsiflexion"),
+        vertical_force=ForceMap(terms=(force,)),
+    )
+
+
+def plug_in_gait_map(side: Side) -> GaitMap:
+    """Return the map of C3D files with the markers and outputs of the Plug-in Gait model; the walk goes along x."""
+    foot = side[0].upper()
+    return GaitMap(
+        shank_angle=ShankMap(knee=f"{foot}KNE", ankle=f"{foot}ANK"),
+        ankle_angle=AngleMap(terms=(f"{foot}AnkleAngles.x",), positive="dorsiflexion", unit="deg"),
+        ankle_moment=MomentMap(terms=(f"{foot}AnkleMoment.x",), positive="plantarflexion", unit="N mm/kg"),
+        vertical_force=ForceMap(terms=(f"{foot}GroundReactionForce.z",), unit="N/kg"),
+    )
+
+
+CONVENTIONS = {"csv": package_map, "opensim": opensim_map, "c3d": plug_in_gait_map}
+"""The map of each form of file, for a side; taken where none is given."""
+
+
+def load_map(path: str | Path) -> GaitMap:
+    """Return the map in a TOML file."""
+    import tomllib
+
+    file = label(str(path))
+    try:
+        content = read_regular_file(Path(path), MOST_BYTES_TYPED)
+        return GaitMap.model_validate(tomllib.loads(content.decode("utf-8")))
+    except ValidationError as error:
+        raise DataError(f"{file}: {first_problem(error.errors(include_url=False), GaitMap)}") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise DataError(f"{file}: is not valid TOML: {error}") from error
+    except (OSError, ValueError) as error:
+        raise DataError(f"{file}: cannot be read: {reason(error)}") from error
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a gait map."""
+    return published_schema(GaitMap, "ppafo gait map")

@@ -1,0 +1,45 @@
+"""One signal of a recorded walk, and its low pass."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.errors import DataError
+from ppafo.signals.recording import Floats
+
+_LEAST_SAMPLES = 20
+_ORDER = 2
+_DOUBLE_PASS = (2.0**0.5 - 1.0) ** 0.25
+"""A filter passed twice has its -3 dB lower by this; so it is designed higher (Winter, Biomechanics, section 2.4)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """Values over time [s], evenly enough sampled, of one file."""
+
+    file: str
+    time: Floats
+    values: Floats
+
+    @property
+    def rate(self) -> float:
+        """Samples per second."""
+        return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
+
+
+def low_passed(signal: Signal, cut_off: float) -> Signal:
+    """Return the signal through a Butterworth filter passed forwards and backwards, -3 dB at ``cut_off`` [Hz]."""
+    from scipy.signal import butter, sosfiltfilt
+
+    if signal.time.size < _LEAST_SAMPLES:
+        raise DataError(f"{signal.file}: {signal.time.size} rows are too short for a stride; give a longer recording")
+    even = np.linspace(signal.time[0], signal.time[-1], signal.time.size)
+    relative = cut_off / _DOUBLE_PASS / (0.5 * signal.rate)
+    if relative >= 1.0:
+        raise DataError(
+            f"{signal.file}: cannot be low-passed at {cut_off:g} Hz: it has {signal.rate:.4g} samples a second; "
+            f"choose less than {0.5 * signal.rate * _DOUBLE_PASS:.3g} Hz"
+        )
+    sections = butter(_ORDER, relative, output="sos")
+    values = sosfiltfilt(sections, np.interp(even, signal.time, signal.values))
+    return Signal(signal.file, even, np.asarray(values, dtype=np.float64))

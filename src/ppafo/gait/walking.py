@@ -1,0 +1,24 @@
+"""A gait walked over and over: the recording of a wearer who takes every stride alike."""
+
+import numpy as np
+
+from ppafo.errors import DataError
+from ppafo.gait.gait import CURVES, Gait
+from ppafo.signals import Channel, Recording
+
+_RATE = 200.0
+_MOST_STRIDES = 100_000
+
+
+def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:
+    """Return so many equal strides at about ``rate`` samples a second, marked synthetic; SI units, package signs."""
+    if not 1 <= strides <= _MOST_STRIDES:
+        raise DataError(f"{strides} strides cannot be recorded; choose 1 to {_MOST_STRIDES}")
+    per_stride = max(10, round(rate * gait.stride_time))
+    phase = np.arange(strides * per_stride + 1) / per_stride
+    one = np.arange(per_stride) / per_stride
+    channels = {
+        name: Channel(np.append(np.tile(curve.sampled(one), strides), curve.value(0.0)), CURVES[name])
+        for name, curve in gait.curves.items()
+    }
+    return Recording(f"{gait.name}, {strides} equal strides", phase * gait.stride_time, channels, "synthetic")

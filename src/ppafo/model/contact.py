@@ -1,0 +1,88 @@
+"""The foot on the ground: four states, which of them a step ends in, and the forces under heel and toes.
+
+In the swing and while it rolls on the heel the foot moves by its own dynamics; flat on the ground it stands still and
+the ankle follows the shank; rolling over the toes the ankle follows the measured gait. A difference of angle at a
+hand-over fades, so that the ankle does not jump.
+"""
+
+from typing import NamedTuple
+
+from ppafo.model.gait import GaitNow, GaitTiming
+
+SWING = 0.0
+HEEL = 1.0
+FLAT = 2.0
+TOE = 3.0
+QUARTER_TURN = 1.5707963267948966
+
+FADING_TIME = 0.02
+"""Time [s] in which a difference of angle at a hand-over falls to a third: about that of a foot slap."""
+
+
+class Ankle(NamedTuple):
+    """Angle [rad], rate [rad/s] and acceleration [rad/s^2] of the ankle that the ground and the shank prescribe."""
+
+    angle: float
+    rate: float
+    acceleration: float
+
+
+class Landing(NamedTuple):
+    """Contact after a step, offset [rad] of the ankle to what the contact prescribes, and 1 for what just happened."""
+
+    contact: float
+    offset: float
+    strikes: float
+    slaps: float
+    leaves: float
+
+
+def is_free(contact: float) -> bool:
+    """True where the foot moves by its own dynamics."""
+    return contact < 1.5
+
+
+def foot_angle(shank: float, ankle: float) -> float:
+    """Angle [rad] of the foot over the horizontal, above 0 with the toes up."""
+    return shank - ankle + QUARTER_TURN
+
+
+def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float) -> Ankle:
+    """What the ground prescribes: a flat foot leaves the ankle to the shank, on the toes it is as measured."""
+    flat = contact < 2.5
+    return Ankle(
+        now.shank + QUARTER_TURN - ground_angle if flat else now.ankle,
+        now.shank_rate if flat else now.ankle_rate,
+        now.shank_acceleration if flat else now.ankle_acceleration,
+    )
+
+
+def landing(contact: float, timing: GaitTiming, now: GaitNow, angle: float, offset: float) -> Landing:
+    """Contact at the end of a step from that of the step, the gait then, and the ankle angle [rad] then."""
+    stance = now.phase < timing.toe_off
+    strikes = contact == SWING and stance
+    flat_angle = now.shank + QUARTER_TURN - timing.ground_angle
+    slaps = contact == HEEL and angle >= flat_angle and now.phase < timing.heel_off
+    rises = contact > 0.5 and contact < 2.5 and now.phase >= timing.heel_off
+    leaves = contact != SWING and not stance
+    after = HEEL if strikes else contact
+    after = FLAT if slaps else after
+    after = TOE if rises else after
+    after = SWING if leaves else after
+    difference = angle - flat_angle if slaps else offset
+    difference = angle - now.ankle if rises else difference
+    return Landing(after, difference, 1.0 if strikes else 0.0, 1.0 if slaps else 0.0, 1.0 if leaves else 0.0)
+
+
+def heel_share(contact: float, timing: GaitTiming, phase: float) -> float:
+    """Share of the ground force under the heel: all while it rolls there, none on the toes, straight between."""
+    passed = max(0.0, min(1.0, phase / timing.heel_off))
+    flat = 1.0 - passed if contact == FLAT else 0.0
+    return 1.0 if contact == HEEL else flat
+
+
+def ground_forces(contact: float, timing: GaitTiming, now: GaitNow) -> tuple[float, float]:
+    """Forces [N] under heel and toes; none in the swing."""
+    total = 0.0 if contact == SWING else now.force
+    share = heel_share(contact, timing, now.phase)
+    return total * share, total * (1.0 - share)

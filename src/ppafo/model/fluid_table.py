@@ -1,0 +1,79 @@
+"""Properties of a real fluid read from a table: its gas, and where it has one its liquid at the same pressure.
+
+The table is over temperature and, for the gas, over the share of the densest gas that it holds at that temperature:
+saturated vapour where there is a liquid, else a fixed density. Between the nodes all columns run straight, so nothing
+overshoots. Whoever makes the table says where its numbers come from.
+"""
+
+from bisect import bisect_right
+from typing import NamedTuple
+
+Column = tuple[float, ...]
+
+
+class FluidTable(NamedTuple):
+    """Nodes of a fluid: ``temperatures`` [K], ``shares`` of the densest gas [-] from 0 to 1, and values at them.
+
+    By temperature: ``densest`` gas [kg/m^3], ``liquid_densities`` [kg/m^3] and ``liquid_energies`` [J/kg], both empty
+    for a fluid without liquid here. By temperature and share: ``factors`` P/(rho R T) [-], ``energies`` [J/kg].
+    """
+
+    gas_constant: float
+    temperatures: Column
+    shares: Column
+    densest: Column
+    liquid_densities: Column
+    liquid_energies: Column
+    factors: tuple[Column, ...]
+    energies: tuple[Column, ...]
+
+
+def has_liquid(table: FluidTable) -> bool:
+    """Tell whether the densest gas of the table is vapour over liquid."""
+    return bool(table.liquid_densities)
+
+
+def densest_gas(table: FluidTable, temperature: float) -> float:
+    """Density [kg/m^3] of the densest gas at a temperature [K]: saturated vapour where the fluid has a liquid."""
+    return _along(table.densest, *_place(table.temperatures, temperature))
+
+
+def liquid_density(table: FluidTable, temperature: float) -> float:
+    """Density [kg/m^3] of the liquid under its own vapour at a temperature [K]."""
+    return _along(table.liquid_densities, *_place(table.temperatures, temperature))
+
+
+def liquid_energy(table: FluidTable, temperature: float) -> float:
+    """Specific internal energy [J/kg] of the liquid under its own vapour at a temperature [K]."""
+    return _along(table.liquid_energies, *_place(table.temperatures, temperature))
+
+
+def fluid_pressure(table: FluidTable, temperature: float, density: float) -> float:
+    """Absolute pressure [Pa] of gas at a density [kg/m^3]; above the densest gas there is, that gas's pressure."""
+    held = min(density, densest_gas(table, temperature))
+    factor = _across(table.factors, table, temperature, density)
+    return factor * held * table.gas_constant * temperature
+
+
+def gas_specific_energy(table: FluidTable, temperature: float, density: float) -> float:
+    """Specific internal energy [J/kg] of gas at a density [kg/m^3], at most that of the densest gas there is."""
+    return _across(table.energies, table, temperature, density)
+
+
+def _across(rows: tuple[Column, ...], table: FluidTable, temperature: float, density: float) -> float:
+    """Value at a temperature and a density, straight in the temperature and in the share of the densest gas."""
+    index, weight = _place(table.temperatures, temperature)
+    share = min(density / _along(table.densest, index, weight), 1.0)
+    place = _place(table.shares, share)
+    return (1.0 - weight) * _along(rows[index], *place) + weight * _along(rows[index + 1], *place)
+
+
+def _along(column: Column, index: int, weight: float) -> float:
+    return (1.0 - weight) * column[index] + weight * column[index + 1]
+
+
+def _place(nodes: Column, at: float) -> tuple[int, float]:
+    """Node below a place and the share of the way to the next; the ends of the table hold outside it."""
+    index = min(max(bisect_right(nodes, at) - 1, 0), len(nodes) - 2)
+    weight = (at - nodes[index]) / (nodes[index + 1] - nodes[index])
+    return index, min(max(weight, 0.0), 1.0)

@@ -1,0 +1,101 @@
+"""Shank and foot as a planar two-link pendulum. Equations (11) and (12).
+
+Coordinates: the shank angle phi from the vertical, above 0 where the ankle is in front of the knee, and the ankle angle
+theta, 90 deg neutral, growing in plantarflexion. The foot then stands at ``alpha = phi - theta + 90 deg`` over the
+horizontal, above 0 with the toes up. The knee may accelerate; x points forward, y up. Lengths count from the joint
+above: the shank's mass centre from the knee, the foot's from the ankle, on the line to the toes.
+"""
+
+from typing import NamedTuple
+
+
+class LegParameters(NamedTuple):
+    """Segments of one leg and the wearer's ankle, SI units.
+
+    ``ankle_stiffness`` [N m/rad] pulls the ankle to ``ankle_rest_angle`` [rad]; ``ankle_damping`` [N m s/rad].
+    ``residual_share`` [-] of the measured ankle moment is what the wearer still has: 0 is the paper's full deficit.
+    ``heel_lever`` and ``toe_lever`` [m] reach from the ankle back to the heel and forward to the toes.
+    """
+
+    shank_length: float
+    shank_mass_centre: float
+    shank_mass: float
+    shank_inertia: float
+    foot_mass_centre: float
+    foot_mass: float
+    foot_inertia: float
+    body_mass: float
+    ankle_stiffness: float
+    ankle_rest_angle: float
+    ankle_damping: float
+    residual_share: float
+    heel_lever: float
+    toe_lever: float
+    gravity: float
+
+
+class MassMatrix(NamedTuple):
+    """The symmetric matrix M of equation (11) [kg m^2]: shank, coupling, foot."""
+
+    shank: float
+    coupling: float
+    foot: float
+
+
+class LegTorques(NamedTuple):
+    """Torques on shank angle and ankle angle [N m]."""
+
+    knee: float
+    ankle: float
+
+
+def foot_inertia_about_ankle(leg: LegParameters) -> float:
+    """Inertia of the foot about the ankle [kg m^2]; the lower right entry of M in equation (11)."""
+    return leg.foot_inertia + leg.foot_mass * leg.foot_mass_centre * leg.foot_mass_centre
+
+
+def link_product(leg: LegParameters) -> float:
+    """Mass of the foot times shank length times distance of its mass centre [kg m^2]; what couples both links."""
+    return leg.foot_mass * leg.shank_length * leg.foot_mass_centre
+
+
+def mass_matrix(leg: LegParameters, cosine_theta: float) -> MassMatrix:
+    """The inertia matrix M [kg m^2] at an ankle angle, of which the cosine is given. Equation (11)."""
+    foot = foot_inertia_about_ankle(leg)
+    product = link_product(leg) * cosine_theta
+    shank = leg.shank_inertia + leg.shank_mass * leg.shank_mass_centre * leg.shank_mass_centre
+    shank += leg.foot_mass * leg.shank_length * leg.shank_length
+    return MassMatrix(shank + foot - 2.0 * product, product - foot, foot)
+
+
+def centrifugal_torques(
+    leg: LegParameters, sine_theta: float, shank_rate: float, angular_velocity: float
+) -> LegTorques:
+    """The centrifugal and Coriolis torques C q' [N m]; rates of the shank and of the ankle [rad/s]. Equation (11)."""
+    product = link_product(leg) * sine_theta
+    knee = product * angular_velocity * (2.0 * shank_rate - angular_velocity)
+    return LegTorques(knee, -product * shank_rate * shank_rate)
+
+
+def gravity_torques(
+    leg: LegParameters,
+    sine_phi: float,
+    cosine_phi: float,
+    sine_alpha: float,
+    cosine_alpha: float,
+    knee_forward: float,
+    knee_up: float,
+) -> LegTorques:
+    """The vector G [N m], with the acceleration of the knee forward and up [m/s^2] as a part of gravity. Equation (11).
+
+    phi is the shank angle and alpha that of the foot over the horizontal.
+    """
+    up = leg.gravity + knee_up
+    shank = leg.shank_mass * leg.shank_mass_centre + leg.foot_mass * leg.shank_length
+    foot = leg.foot_mass * leg.foot_mass_centre * (cosine_alpha * up - sine_alpha * knee_forward)
+    return LegTorques(shank * (sine_phi * up + cosine_phi * knee_forward) + foot, -foot)
+
+
+def passive_torque(leg: LegParameters, angle: float) -> float:
+    """Torque of tissue on the ankle [N m], positive in plantarflexion, without its damping."""
+    return leg.ankle_stiffness * (leg.ankle_rest_angle - angle)

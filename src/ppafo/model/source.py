@@ -1,0 +1,179 @@
+"""The gas supply: a bottle of gas, with or without liquid under it, and the regulator behind it.
+
+A bottle has a fixed volume. What it holds has one temperature; liquid and vapour are in equilibrium, so that drawing
+vapour boils liquid, cools it and lowers the pressure. Heat comes from the bottle's wall, and to the wall from the
+room. When the liquid is used up the rest is a bottle of gas. The gas that leaves takes its enthalpy along:
+``dU/dt = -m' h + heat from the wall``. The regulator has no dynamics.
+"""
+
+from typing import NamedTuple
+
+from ppafo.model.fluid_table import (
+    FluidTable,
+    densest_gas,
+    fluid_pressure,
+    gas_specific_energy,
+    has_liquid,
+    liquid_density,
+    liquid_energy,
+)
+from ppafo.model.gas import choked_flow_constant
+from ppafo.model.orifice import isentropic_flow_function
+
+_NARROW_ENOUGH = 1e-9
+_MOST_HALVINGS = 60
+
+
+class BottleWall(NamedTuple):
+    """Heat capacity of the wall [J/K], and heat per kelvin [W/K] from the wall to the content and room to wall."""
+
+    wall_heat_capacity: float
+    content_heat_transfer: float
+    room_heat_transfer: float
+
+
+class BottleState(NamedTuple):
+    """What changes in a bottle: mass [kg] and internal energy [J] of the content, temperature of its wall [K]."""
+
+    mass: float
+    energy: float
+    wall_temperature: float
+
+
+class BottleContent(NamedTuple):
+    """What a bottle holds: temperature [K], absolute pressure [Pa], liquid [kg], enthalpy of what leaves [J/kg]."""
+
+    temperature: float
+    pressure: float
+    liquid_mass: float
+    outflow_enthalpy: float
+
+
+class BottleRates(NamedTuple):
+    """Time derivatives of ``BottleState``, and what crosses the border: enthalpy out and heat from the room, both W."""
+
+    mass_rate: float
+    content_energy_rate: float
+    wall_temperature_rate: float
+    outflow_power: float
+    room_heat: float
+
+
+class Regulator(NamedTuple):
+    """A regulator: set pressure [Pa absolute], how it falls with the flow [Pa s/kg], and what it needs.
+
+    ``pressure_margin`` [Pa] is inlet above outlet; ``seat_area`` [m^2] is the fully open seat, area times discharge
+    coefficient.
+    """
+
+    set_pressure: float
+    droop: float
+    pressure_margin: float
+    seat_area: float
+
+
+def bottle_content(table: FluidTable, mass: float, volume: float, temperature: float) -> BottleContent:
+    """Return what a bottle of a volume [m^3] with ``mass`` [kg] at a temperature [K] holds."""
+    density = mass / volume
+    vapour = min(density, densest_gas(table, temperature))
+    pressure = fluid_pressure(table, temperature, density)
+    enthalpy = gas_specific_energy(table, temperature, density) + pressure / vapour
+    return BottleContent(temperature, pressure, liquid_mass(table, mass, volume, temperature), enthalpy)
+
+
+def liquid_mass(table: FluidTable, mass: float, volume: float, temperature: float) -> float:
+    """Liquid [kg] in a bottle of a volume [m^3], from the densities of both phases; 0 where all is gas."""
+    vapour = densest_gas(table, temperature)
+    if mass <= volume * vapour or not has_liquid(table):
+        return 0.0
+    liquid = liquid_density(table, temperature)
+    return min((mass - volume * vapour) / (1.0 - vapour / liquid), mass)
+
+
+def content_energy(table: FluidTable, mass: float, volume: float, temperature: float) -> float:
+    """Internal energy [J] of the content of a bottle, at the reference of the table."""
+    liquid = liquid_mass(table, mass, volume, temperature)
+    gas = gas_specific_energy(table, temperature, mass / volume)
+    energy = (mass - liquid) * gas
+    return energy + liquid * liquid_energy(table, temperature) if liquid > 0.0 else energy
+
+
+def content_temperature(table: FluidTable, mass: float, volume: float, energy: float) -> float:
+    """Temperature [K] of a content with an internal energy [J]: the inverse of ``content_energy``.
+
+    The ends of the table where the energy lies beyond them.
+    """
+    nodes = table.temperatures
+    below, above = 0, len(nodes) - 1
+    if energy <= content_energy(table, mass, volume, nodes[below]):
+        return nodes[below]
+    if energy >= content_energy(table, mass, volume, nodes[above]):
+        return nodes[above]
+    while above - below > 1:
+        middle = (below + above) // 2
+        if content_energy(table, mass, volume, nodes[middle]) <= energy:
+            below = middle
+        else:
+            above = middle
+    return _between_nodes(table, mass, volume, energy, (nodes[below], nodes[above]))
+
+
+def _between_nodes(table: FluidTable, mass: float, volume: float, energy: float, bracket: tuple[float, float]) -> float:
+    """Return the root between two nodes, by the Illinois form of false position: the energy grows with temperature."""
+    low, high = bracket
+    miss_low = content_energy(table, mass, volume, low) - energy
+    miss_high = content_energy(table, mass, volume, high) - energy
+    for _ in range(_MOST_HALVINGS):
+        middle = (low * miss_high - high * miss_low) / (miss_high - miss_low)
+        miss = content_energy(table, mass, volume, middle) - energy
+        if abs(miss) <= _NARROW_ENOUGH * abs(miss_high - miss_low) or high - low <= _NARROW_ENOUGH:
+            return middle
+        if miss > 0.0:
+            high, miss_high, miss_low = middle, miss, 0.5 * miss_low
+        else:
+            low, miss_low, miss_high = middle, miss, 0.5 * miss_high
+    return 0.5 * (low + high)
+
+
+def bottle_rates(
+    content: BottleContent, state: BottleState, draw: float, wall: BottleWall, room_temperature: float
+) -> BottleRates:
+    """Return how a bottle changes under a draw of vapour [kg/s]: balances of mass and of energy of content and wall."""
+    to_content = wall.content_heat_transfer * (state.wall_temperature - content.temperature)
+    from_room = wall.room_heat_transfer * (room_temperature - state.wall_temperature)
+    outflow = draw * content.outflow_enthalpy
+    return BottleRates(
+        mass_rate=-draw,
+        content_energy_rate=to_content - outflow,
+        wall_temperature_rate=(from_room - to_content) / wall.wall_heat_capacity,
+        outflow_power=outflow,
+        room_heat=from_room,
+    )
+
+
+def regulated_pressure(regulator: Regulator, mass_flow: float) -> float:
+    """Absolute pressure [Pa] behind a regulator that can regulate: its set pressure less the droop of a flow [kg/s]."""
+    return regulator.set_pressure - regulator.droop * mass_flow
+
+
+def delivered_pressure(regulator: Regulator, bottle_pressure: float, mass_flow: float) -> float:
+    """Absolute pressure [Pa] behind a regulator: regulated, or where the bottle has too little, bottle less margin."""
+    return min(regulated_pressure(regulator, mass_flow), bottle_pressure - regulator.pressure_margin)
+
+
+def pressure_reserve(regulator: Regulator, bottle_pressure: float, mass_flow: float) -> float:
+    """Pressure [Pa] that a bottle has above what its regulator needs for a flow [kg/s]; below 0 it cannot hold it."""
+    return bottle_pressure - regulator.pressure_margin - regulated_pressure(regulator, mass_flow)
+
+
+def regulator_flow_limit(
+    regulator: Regulator,
+    bottle_pressure: float,
+    temperature: float,
+    heat_capacity_ratio: float,
+    gas_constant: float,
+) -> float:
+    """Largest flow [kg/s] that a regulator passes at its set pressure: its seat fully open. Equations (6), (7)."""
+    ratio = min(regulator.set_pressure / bottle_pressure, 1.0)
+    choked = choked_flow_constant(heat_capacity_ratio, gas_constant, temperature)
+    return regulator.seat_area * choked * bottle_pressure * isentropic_flow_function(ratio, heat_capacity_ratio)

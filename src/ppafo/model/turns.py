@@ -1,0 +1,30 @@
+"""Sine and cosine of an angle in turns, written so that they run in many lanes at once."""
+
+TURN = 6.283185307179586
+
+
+def sine_and_cosine(turns: float) -> tuple[float, float]:
+    """Sine and cosine of a number of turns, good to 1e-9: power series within a quarter turn of the nearest half turn.
+
+    A library sine cannot run in many lanes at once.
+    """
+    half_turns = float(int(2.0 * turns + (0.5 if turns >= 0.0 else -0.5)))
+    odd = half_turns - 2.0 * float(int(0.5 * half_turns))
+    sign = 1.0 - 2.0 * odd * odd
+    angle = TURN * (turns - 0.5 * half_turns)
+    square = angle * angle
+    sine = -1.0 / 1307674368000.0 * square + 1.0 / 6227020800.0
+    sine = sine * square - 1.0 / 39916800.0
+    sine = sine * square + 1.0 / 362880.0
+    sine = sine * square - 1.0 / 5040.0
+    sine = sine * square + 1.0 / 120.0
+    sine = sine * square - 1.0 / 6.0
+    sine = (sine * square + 1.0) * angle
+    cosine = -1.0 / 87178291200.0 * square + 1.0 / 479001600.0
+    cosine = cosine * square - 1.0 / 3628800.0
+    cosine = cosine * square + 1.0 / 40320.0
+    cosine = cosine * square - 1.0 / 720.0
+    cosine = cosine * square + 1.0 / 24.0
+    cosine = cosine * square - 0.5
+    cosine = cosine * square + 1.0
+    return sign * sine, sign * cosine

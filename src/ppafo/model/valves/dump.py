@@ -1,0 +1,127 @@
+"""A proportional valve with a dump valve behind it, which vents both chambers when the command says so.
+
+A spool valve alone cannot leave the foot free: in its middle it holds the gas in both chambers. The dump valve has the
+area of the proportional one and follows at once.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from ppafo.model.command import VENTS_ABOVE
+from ppafo.model.plant import Openings, PlantParameters, single_ports
+from ppafo.model.ports import SinglePort
+from ppafo.model.valves import proportional
+from ppafo.model.valves.kind import ValveModel
+from ppafo.model.valves.proportional import IdealProportional, MovingProportional, NoValveState, SpoolState
+
+
+class DumpedOpening(NamedTuple):
+    """Opening of the proportional valve from -1 to 1, and 1 where the dump valve vents."""
+
+    opening: float
+    vents: float
+
+
+def spool_command(command: float) -> float:
+    """What the proportional valve is told: nothing while both chambers vent."""
+    return 0.0 if command > VENTS_ABOVE else command
+
+
+def vented(openings: Openings, command: float) -> Openings:
+    """Openings with both chambers vented where the command says so."""
+    vents = command > VENTS_ABOVE
+    return Openings(
+        0.0 if vents else openings.source_1,
+        1.0 if vents else openings.vent_1,
+        0.0 if vents else openings.source_2,
+        1.0 if vents else openings.vent_2,
+    )
+
+
+def advance_ideal(
+    valve: IdealProportional, state: NoValveState, command: float, time: float, step: float
+) -> tuple[DumpedOpening, NoValveState]:
+    """What the valves show during the step."""
+    opening, after = proportional.advance_ideal(valve, state, spool_command(command), time, step)
+    return DumpedOpening(opening, 1.0 if command > VENTS_ABOVE else 0.0), after
+
+
+def connect_ideal(plant: PlantParameters, shown: DumpedOpening) -> tuple[SinglePort, SinglePort]:
+    """Ports of both chambers. Equation (8)."""
+    port_1, port_2 = single_ports(plant, shown.opening)
+    vents = shown.vents > 0.5
+    full, room = plant.valve_conductance, plant.atmospheric_pressure
+    return (
+        SinglePort(
+            full if vents else port_1.conductance,
+            room if vents else port_1.node_pressure,
+            0.0 if vents else port_1.source_share,
+        ),
+        SinglePort(
+            full if vents else port_2.conductance,
+            room if vents else port_2.node_pressure,
+            0.0 if vents else port_2.source_share,
+        ),
+    )
+
+
+def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
+    """Openings at an instant."""
+    return vented(proportional.instant_ideal(valve, state, spool_command(command)), command)
+
+
+def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
+    """The opening that the command asks for."""
+    return proportional.settle_ideal(valve, state, spool_command(command), time)
+
+
+def advance_moving(
+    valve: MovingProportional, state: SpoolState, command: float, time: float, step: float
+) -> tuple[Openings, SpoolState]:
+    """Mean openings during the step and the spool at its end."""
+    openings, after = proportional.advance_moving(valve, state, spool_command(command), time, step)
+    return vented(openings, command), after
+
+
+def instant_moving(valve: MovingProportional, state: SpoolState, command: float) -> Openings:
+    """Openings at an instant."""
+    return vented(proportional.instant_moving(valve, state, spool_command(command)), command)
+
+
+def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -> SpoolState:
+    """Rates of the spool."""
+    return proportional.rates_moving(valve, state, spool_command(command))
+
+
+def next_moving_event(valve: MovingProportional, state: SpoolState, command: float, time: float) -> float:
+    """Time [s] at which what is asked for arrives at the command."""
+    return proportional.next_moving_event(valve, state, spool_command(command), time)
+
+
+def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
+    """The state with what is asked for at its target, where it has arrived."""
+    return proportional.settle_moving(valve, state, spool_command(command), time)
+
+
+IDEAL = replace(
+    proportional.IDEAL,
+    advance=advance_ideal,
+    connect=connect_ideal,
+    instant=instant_ideal,
+    settle=settle_ideal,
+)
+
+MOVING = replace(
+    proportional.MOVING,
+    advance=advance_moving,
+    instant=instant_moving,
+    rates=rates_moving,
+    next_event=next_moving_event,
+    settle=settle_moving,
+)
+
+
+def choose(settings: Mapping[str, float]) -> ValveModel:
+    """The ideal model where nothing moves, else the moving one."""
+    return IDEAL if proportional.choose(settings) is proportional.IDEAL else MOVING

@@ -1,0 +1,211 @@
+"""Tables of OpenSim, ``.mot`` and ``.sto``: read with both styles of header, and written so that OpenSim reads them.
+
+A header is lines until ``endheader``: ``nRows=211`` and ``inDegrees=yes`` (or the sentence "Angles are in degrees."),
+or in the older style ``datarows 9009``. Then come one line of labels and the rows.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.errors import DataError, one_line
+from ppafo.signals import Recording
+from ppafo.signals.channels import TIME
+from ppafo.signals.recording import Floats
+from ppafo.storage.files import read_bytes, write_file
+
+_MOST_BYTES = 500_000_000
+_END = "endheader"
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)", re.IGNORECASE)
+_DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
+_SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
+_LONGEST_SHOWN = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenSimTable:
+    """A table: time [s] and columns by label; ``in_degrees`` is None where the header does not say.
+
+    ``first_line`` is the line of the file in which the first row stands.
+    """
+
+    name: str
+    time: Floats
+    columns: Mapping[str, Floats]
+    in_degrees: bool | None
+    first_line: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    name: str
+    rows: int | None
+    width: int | None
+    in_degrees: bool | None
+    end: int
+
+
+def read_opensim(path: str | Path) -> OpenSimTable:
+    """Return the table in a ``.mot`` or ``.sto`` file; DataError names file, line and column of what is wrong."""
+    try:
+        lines = _lines(read_bytes(path, _MOST_BYTES))
+        header = _header(lines)
+        number, labels = _labels(lines, header)
+        values = _rows(lines, number + 1, labels, header)
+        time = values[:, 0]
+        _check_clock(time, number + 1)
+    except DataError as error:
+        raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
+    columns = {label: values[:, index] for index, label in enumerate(labels) if index > 0}
+    return OpenSimTable(header.name, time, columns, header.in_degrees, number + 1)
+
+
+def _lines(content: bytes) -> list[str]:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise DataError(f"is not a text file in UTF-8 (byte {error.start})") from error
+    if "\0" in text:
+        raise DataError(f"is not a text file (byte {text.index(chr(0))} is zero)")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def _header(lines: list[str]) -> _Header:
+    end = next((index for index, line in enumerate(lines) if line.strip().lower() == _END), None)
+    if end is None:
+        raise DataError(f"has no line '{_END}': it is cut off in its header, or is no .mot or .sto file")
+    counts: dict[str, int] = {}
+    in_degrees: bool | None = None
+    for number, line in enumerate(lines[:end], start=1):
+        match = _COUNT.match(line.strip())
+        if match is not None:
+            counts[match[1].lower()] = _whole(match[2], match[1], number)
+        said = _said_degrees(line, number)
+        if said is not None and in_degrees is not None and said != in_degrees:
+            raise DataError(f"line {number}: the header says degrees and radians; correct the one that is wrong")
+        in_degrees = in_degrees if said is None else said
+    first = lines[0].strip()
+    name = first.removeprefix("name ").strip() if end > 0 and first else "unnamed"
+    rows, width = (
+        counts.get(new, counts.get(old)) for new, old in (("nrows", "datarows"), ("ncolumns", "datacolumns"))
+    )
+    return _Header(one_line(name), rows, width, in_degrees, end)
+
+
+def _whole(text: str, key: str, number: int) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 12):
+        raise DataError(f"line {number}: {key} is {one_line(text)[:_LONGEST_SHOWN]!r}, not a whole number")
+    return int(text)
+
+
+def _said_degrees(line: str, number: int) -> bool | None:
+    match = _DEGREES.match(line.strip())
+    if match is not None:
+        word = match[1].lower()
+        if word not in ("yes", "no"):
+            raise DataError(f"line {number}: inDegrees is {one_line(match[1])[:_LONGEST_SHOWN]!r}; it is 'yes' or 'no'")
+        return word == "yes"
+    sentence = _SENTENCE.search(line)
+    return None if sentence is None else sentence[1].lower() == "degrees"
+
+
+def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
+    """Return the number of the line of labels (from 1) and the labels."""
+    for number in range(header.end + 2, len(lines) + 1):
+        if lines[number - 1].strip():
+            labels = _cells(lines[number - 1])
+            _check_labels(labels, number, header)
+            return number, labels
+    raise DataError(f"has nothing after '{_END}': the file is cut off")
+
+
+def _check_labels(labels: list[str], number: int, header: _Header) -> None:
+    if labels[0].lower() != TIME:
+        raise DataError(
+            f"line {number}: the first column must be '{TIME}', it is {one_line(labels[0])[:_LONGEST_SHOWN]!r}"
+        )
+    twice = next((label for label in labels if labels.count(label) > 1), None)
+    if twice is not None:
+        raise DataError(f"line {number}: there are two columns {twice!r}; rename or remove one")
+    if "" in labels:
+        raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
+    if header.width is not None and header.width != len(labels):
+        raise DataError(f"line {number} names {len(labels)} columns, the header says {header.width}")
+
+
+def _cells(line: str) -> list[str]:
+    """Return the cells of a line; labels may hold blanks where tabs part them."""
+    if "\t" in line:
+        return [cell.strip() for cell in line.strip().split("\t")]
+    return line.split()
+
+
+def _rows(lines: list[str], first: int, labels: list[str], header: _Header) -> Floats:
+    """Return the numbers, row by row; blank lines may only follow the last row."""
+    last = len(lines)
+    while last >= first and not lines[last - 1].strip():
+        last -= 1
+    count = last - first + 1
+    if count <= 0:
+        raise DataError("has labels but no rows")
+    if header.rows is not None and header.rows != count:
+        raise DataError(
+            f"has {count} rows, its header says {header.rows}: the file is cut off or was edited; "
+            "get it again, or correct the header"
+        )
+    table = np.empty((count, len(labels)))
+    for index in range(count):
+        cells = lines[first - 1 + index].split()
+        if len(cells) != len(labels):
+            raise DataError(f"line {first + index} has {len(cells)} values for {len(labels)} columns")
+        table[index] = [_number(cell, first + index, label) for cell, label in zip(cells, labels, strict=True)]
+    return table
+
+
+def _number(cell: str, line: int, label: str) -> float:
+    value = float(cell) if _NUMBER.fullmatch(cell) else float("nan")
+    if not np.isfinite(value):
+        shown = one_line(cell)[:_LONGEST_SHOWN]
+        raise DataError(
+            f"line {line}, column {label!r}: {shown!r} is not a finite number; fill the gap or cut the file there"
+        )
+    return value
+
+
+def _check_clock(time: Floats, first_line: int) -> None:
+    stalled = np.flatnonzero(np.diff(time) <= 0.0)
+    if stalled.size:
+        index = int(stalled[0]) + 1
+        word = "stands still" if time[index] == time[index - 1] else "goes backwards"
+        raise DataError(f"line {first_line + index}: the clock {word}: {time[index]:g} s follows {time[index - 1]:g} s")
+
+
+def opensim_bytes(recording: Recording) -> bytes:
+    """Return a recording as a ``.sto`` file: SI units, angles in radians, labels ``time`` and the channels' names.
+
+    Units stand in the header, where OpenSim keeps them as text; so does the kind of a recording that nobody measured.
+    """
+    units = ", ".join(f"{name} [{recording.unit(name)}]" for name in recording.names)
+    head = [
+        one_line(recording.label),
+        "version=1",
+        f"nRows={len(recording)}",
+        f"nColumns={1 + len(recording.names)}",
+        "inDegrees=no",
+        f"kind={recording.kind}",
+        f"units={units}",
+        _END,
+        "\t".join((TIME, *recording.names)),
+    ]
+    columns = [recording.time, *(recording[name] for name in recording.names)]
+    rows = ["\t".join(map(repr, row)) for row in zip(*(column.tolist() for column in columns), strict=True)]
+    return ("\n".join([*head, *rows]) + "\n").encode()
+
+
+def write_opensim(path: str | Path, recording: Recording) -> Path:
+    """Write a recording as a ``.sto`` file that OpenSim reads; returns the path."""
+    return write_file(path, opensim_bytes(recording))

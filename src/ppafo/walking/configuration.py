@@ -1,0 +1,47 @@
+"""A walk file: device, controller, wearer, sensors and faults, as frozen values in SI units."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ppafo.control.kind import ControllerKind
+from ppafo.gait import Gait
+from ppafo.model.gait_sensors import GaitSensors
+from ppafo.model.sensors import SensorParameters
+from ppafo.parameters.device import Device
+from ppafo.walking.wearer import Wearer
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """One device on one wearer; ``settings`` of the controller in SI, ``period`` and ``step`` in seconds.
+
+    ``assumed`` has the values that no source gives, by path, with the reason for each.
+    """
+
+    name: str
+    description: str
+    device: Device
+    gait: Gait
+    wearer: Wearer
+    controller: ControllerKind
+    settings: Mapping[str, float]
+    sensors: SensorParameters
+    gait_sensors: GaitSensors
+    period: float
+    step: float
+    assumed: Mapping[str, str]
+    file: str
+    overrides: tuple[str, ...]
+
+    @property
+    def has_ideal_sensors(self) -> bool:
+        """True where nothing but the bandwidth of the force sensors stands between foot and controller."""
+        noise = self.sensors[:4]
+        gait = self.gait_sensors
+        faults = (gait.heel_fault, gait.toe_fault, gait.angle_fault)
+        failing = any(fault.time < NEVER for fault in faults)
+        return not (any(noise) or gait.force_noise or gait.force_quantum or gait.lost_share or failing)
+
+
+NEVER = 1.0e9
+"""Time [s] of a fault that does not happen."""

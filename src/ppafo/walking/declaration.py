@@ -1,0 +1,47 @@
+"""Every value that a walk file can hold beside those of its controller and its wearer."""
+
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.model.declaration import Quantity
+from ppafo.simulation.declaration import PERIOD, RATE, SENSORS
+from ppafo.walking.wearer import WEARER
+
+LARGEST_SEED = 2**32 - 1
+SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
+STEP = Quantity("step", "s", "largest step; 1 ms unless given", 1.0e-3, 1.0e-6, 0.01)
+
+WALK_SENSORS = (
+    *(item for item in SENSORS if item.name != "delay"),
+    Quantity("force_bandwidth", "Hz", "up to which the force sensors follow", 30.0, 0.1, 1.0e4),
+    Quantity("force_noise", "N", "standard deviation of the measured forces", 0.0, 0.0, 1.0e4),
+    Quantity("force_resolution", "N", "step of the measured forces", 0.0, 0.0, 1.0e3),
+    Quantity("lost_share", "1", "share of the force samples that are lost; the last one stands then", 0.0, 0.0, 1.0),
+)
+
+FAULTY = ("heel", "toe", "angle")
+FAULT_TIME = Quantity("time", "s", "when the sensor fails", None, 0.0, 1.0e6)
+READINGS = {
+    "heel": Quantity("reading", "N", "what it shows from then on", 0.0, -1.0e6, 1.0e6),
+    "toe": Quantity("reading", "N", "what it shows from then on", 0.0, -1.0e6, 1.0e6),
+    "angle": Quantity("reading", "rad", "what it shows from then on", 0.0, -100.0, 100.0),
+}
+FAULT_KINDS = {"frozen": "shows its last value", "stuck": "shows one reading"}
+
+
+def controller_settings(kind: str) -> tuple[Quantity, ...]:
+    """Return the settings of a walking controller, none where it is unknown."""
+    return WALKING_CONTROLLERS[kind].quantities if kind in WALKING_CONTROLLERS else ()
+
+
+def quantities(controller: str) -> dict[str, Quantity]:
+    """Return the declaration of every number that a walk file with this controller can hold, by path."""
+    sections = {
+        "wearer": WEARER,
+        "controller": (RATE, PERIOD, *controller_settings(controller)),
+        "sensors": (*WALK_SENSORS, SEED),
+        "run": (STEP,),
+    }
+    found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
+    for sensor in FAULTY:
+        found[f"faults.{sensor}.time"] = FAULT_TIME
+        found[f"faults.{sensor}.reading"] = READINGS[sensor]
+    return found

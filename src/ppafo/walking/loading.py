@@ -1,0 +1,167 @@
+"""From a name or a file to a walk configuration; every mistake is one clear line."""
+
+import copy
+import math
+from collections.abc import Iterable
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.documents.problems import first_problem
+from ppafo.documents.toml_text import TomlKind, label
+from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
+from ppafo.gait import NORMATIVE, Gait, load_gait
+from ppafo.model.gait_sensors import Fault, GaitSensors
+from ppafo.model.sensors import SensorParameters
+from ppafo.parameters import apply_overrides, build_device, load_parameter_set
+from ppafo.parameters.device import Device
+from ppafo.simulation.declaration import PERIOD, RATE, kind_at, value_at
+from ppafo.simulation.overriding import device_paths, is_of_device, split_override
+from ppafo.simulation.reading import Reading
+from ppafo.walking.configuration import NEVER, Configuration
+from ppafo.walking.declaration import (
+    FAULT_TIME,
+    FAULTY,
+    READINGS,
+    SEED,
+    STEP,
+    WALK_SENSORS,
+    controller_settings,
+    quantities,
+)
+from ppafo.walking.schema import walk_file
+from ppafo.walking.wearer import WEARER, Wearer
+
+_FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
+_TURN = 2.0 * math.pi
+_TEXTS = ("gait", "controller.kind", *(f"faults.{sensor}.kind" for sensor in FAULTY))
+DEFAULT_PERIOD = 1.0e-3
+
+
+def list_configurations() -> tuple[str, ...]:
+    """Return the names of the walk configurations that come with the package."""
+    return _FILE.names()
+
+
+def load_configuration(
+    name_or_path: str | Path, overrides: Iterable[str] = (), gait: str | Path | None = None
+) -> Configuration:
+    """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
+
+    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` replaces the
+    gait of the file.
+    """
+    file = label(str(name_or_path))
+    given = tuple(overrides)
+    document = _changed(_FILE.parse(_FILE.read(name_or_path), file), given, file)
+    try:
+        walk_file().model_validate(document)
+    except ValidationError as error:
+        problem = first_problem(error.errors(include_url=False), walk_file())
+        raise ScenarioError(f"{file}: {problem}") from error
+    reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
+    folder = Path(name_or_path).parent
+    kind = WALKING_CONTROLLERS[kind_at(document, "controller")]
+    return Configuration(
+        name=document["name"],
+        description=document.get("description", ""),
+        device=_device(document, [text for text in given if is_of_device(split_override(text)[0])], file),
+        gait=_gait(gait or document.get("gait", NORMATIVE), folder, gait is None),
+        wearer=Wearer(**reading.section("wearer", WEARER)),
+        controller=kind,
+        settings=reading.section("controller", kind.quantities),
+        sensors=_sensors(reading),
+        gait_sensors=_gait_sensors(reading),
+        period=_period(reading),
+        step=reading.number("run.step", STEP),
+        assumed=dict(document.get("assumed", {})),
+        file=str(name_or_path),
+        overrides=given,
+    )
+
+
+def _changed(document: dict[str, Any], overrides: tuple[str, ...], file: str) -> dict[str, Any]:
+    """Return a copy of the document with the overrides of the walk in it; those of the device are left out."""
+    changed = copy.deepcopy(document)
+    for override in overrides:
+        path, text = split_override(override)
+        known = (*quantities(kind_at(changed, "controller")), *_TEXTS)
+        if path in known:
+            _set(changed, path, text)
+        elif not is_of_device(path):
+            hint = nearest_name(path, [*known, *device_paths()])
+            raise ScenarioError(f"override '{one_line(override)}': {file} has no value '{path}'{hint}")
+    return changed
+
+
+def _set(document: dict[str, Any], path: str, text: str) -> None:
+    section, _, name = path.rpartition(".")
+    table = document
+    for part in section.split(".") if section else ():
+        table = table.setdefault(part, {})
+    if path == "controller.kind" and table.get("kind") != text:
+        kept = {item.name for item in (RATE, PERIOD, *controller_settings(text))}
+        for key in set(table) - kept:
+            del table[key]
+    table[name] = int(text) if path == "sensors.seed" and text.isdecimal() else text
+
+
+def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device:
+    section = document["device"]
+    valve = section.get("valve")
+    try:
+        parameters = apply_overrides(load_parameter_set(section["set"]), section.get("overrides", ()), valve)
+        return build_device(apply_overrides(parameters, overrides, valve), valve)
+    except ParameterError as error:
+        raise ParameterError(f"{file}: [device]: {one_line(error)}") from error
+
+
+def _gait(name: str | Path, folder: Path, relative: bool) -> Gait:
+    path = Path(name)
+    is_path = path.suffix == ".toml"
+    return load_gait(folder / path if is_path and relative and not path.is_absolute() else name)
+
+
+def _sensors(reading: Reading) -> SensorParameters:
+    values = reading.section("sensors", WALK_SENSORS)
+    return SensorParameters(
+        values["angle_noise"],
+        values["pressure_noise"],
+        values["angle_resolution"],
+        values["pressure_resolution"],
+        reading.number("sensors.seed", SEED),
+    )
+
+
+def _gait_sensors(reading: Reading) -> GaitSensors:
+    values = reading.section("sensors", WALK_SENSORS)
+    faults = [_fault(reading, sensor) for sensor in FAULTY]
+    return GaitSensors(
+        _TURN * values["force_bandwidth"],
+        values["force_noise"],
+        values["force_resolution"],
+        values["lost_share"],
+        *faults,
+    )
+
+
+def _fault(reading: Reading, sensor: str) -> Fault:
+    section = f"faults.{sensor}"
+    kind = kind_at(reading.document, section)
+    if not kind:
+        return Fault(NEVER, 0.0, 0.0)
+    time = reading.number(f"{section}.time", FAULT_TIME)
+    return Fault(time, 1.0 if kind == "frozen" else 0.0, reading.number(f"{section}.reading", READINGS[sensor]))
+
+
+def _period(reading: Reading) -> float:
+    """Return the sample period [s] from a rate or a period, 1 ms where neither is given."""
+    rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
+    if rate is not None and period is not None:
+        raise reading.refusal("controller.rate", "give either controller.rate or controller.period, not both")
+    if rate is not None:
+        return 1.0 / reading.number("controller.rate", RATE)
+    return DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)

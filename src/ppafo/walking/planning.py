@@ -1,0 +1,195 @@
+"""From a wearer, a gait, a device and a controller to a run of the engine."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ppafo.control.catalog import PROFILES
+from ppafo.control.kind import ControllerKind
+from ppafo.engine.program import NoParameters, Program
+from ppafo.engine.refinement import filling_time
+from ppafo.engine.rows import rebuild
+from ppafo.engine.run import Run, Walk
+from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState
+from ppafo.gait import Gait
+from ppafo.model.chambers import chamber_mass
+from ppafo.model.contact import HEEL
+from ppafo.model.fourier import Series
+from ppafo.model.gait import GaitSeries, GaitTiming, gait_at
+from ppafo.model.gait_sensors import GaitSensors
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle
+from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
+from ppafo.model.sensors import SensorParameters
+from ppafo.model.valves import dump
+from ppafo.model.valves.catalog import VALVES
+from ppafo.model.valves.kind import ValveModel
+from ppafo.parameters.device import Device, Valve
+from ppafo.parameters.plant import plant_parameters
+from ppafo.simulation.plan import exact_orifice
+from ppafo.walking.wearer import Wearer
+
+HARMONICS = 8
+"""Harmonics that the engine follows; those of the built-in gait above are below 0.04 deg and 0.4 % of body weight."""
+
+FLAT_FROM, FLAT_TO = 0.15, 0.35
+"""Phases between which every foot stands flat; the angle of the foot is taken from there."""
+
+HEEL_RISE = math.radians(3.0)
+"""The heel has left the ground when the foot is steeper than flat by this."""
+
+CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
+"""Shares of the swing between which the toes must clear the ground."""
+
+ANGLES = (math.radians(60.0), math.radians(115.0))
+"""Angles that the ankle keeps to in walking; the step is made for the chambers between them."""
+
+STEPS_PER_FILLING = 15.0
+"""Steps while the fastest of these chambers fills: at 1 kHz metrics then are good to 1 % (docs/decisions/0008)."""
+
+ZERO = Series(*(0.0,) * 17)
+
+
+@dataclass(frozen=True, slots=True)
+class WalkPlan:
+    """What a walk is made of; ``settings`` of the controller in SI; ``period`` and ``step`` [s]."""
+
+    device: Device
+    wearer: Wearer
+    gait: Gait
+    controller: ControllerKind
+    settings: dict[str, float]
+    sensors: SensorParameters
+    gait_sensors: GaitSensors
+    has_ideal_sensors: bool
+    duration: float
+    period: float = 1.0e-3
+    step: float = 1.0e-3
+    record_interval: float = 1.0e-3
+
+
+def plan_walk(plan: WalkPlan) -> Run:
+    """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
+    leg = plan.wearer.leg()
+    bare = plant_parameters(plan.device)
+    plant = with_leg(bare, leg)
+    gait, timing = gait_series(plan.gait), gait_timing(plan.gait)
+    valve = walking_valve(plan.device.valve)
+    settings = plan.device.valve.settings
+    program = Program(
+        valve=valve,
+        reference=PROFILES["constant"],
+        controller=plan.controller,
+        angle=None,
+        ideal_sensors=plan.has_ideal_sensors,
+        late_commands=False,
+        walks=True,
+    )
+    coarse = max(1, math.ceil(plan.period / plan.step - 1.0e-9))
+    steps = coarse * _parts(plant, plan.period / coarse)
+    step = plan.period / steps
+    record_every = max(1, round(plan.record_interval / step))
+    start = gait_at(gait, timing, leg.body_mass, leg.gravity, 0.0)
+    return Run(
+        program=program,
+        plant=plant,
+        thermal=NoParameters(),
+        valve_orifice=exact_orifice(plan.device.valve.orifice, plan.device),
+        leak_orifice=exact_orifice(plan.device.actuator.leak, plan.device),
+        initial=vented(plant, start.ankle, start.ankle_rate),
+        valve=valve.prepare(settings, step),
+        early_valve=(),
+        controller=controller_parameters(plan.controller, plan.settings),
+        reference=PROFILES["constant"].parameters(0.0),
+        path=(),
+        sensors=plan.sensors,
+        step=step,
+        step_count=math.ceil(plan.duration / (step * record_every) - 1.0e-9) * record_every,
+        steps_per_sample=steps,
+        record_every=record_every,
+        signal_delay=0.0,
+        command_delay=0.0,
+        walk=Walk(
+            leg=leg,
+            share=DeviceShare(bare.inertia, bare.viscous_damping, bare.gravity_torque),
+            gait=gait,
+            timing=timing,
+            sensors=plan.gait_sensors,
+            initial=WalkState(HEEL, 0.0, start, *(0.0,) * 4, NO_CLEARANCE, *(0.0,) * 6),
+        ),
+    )
+
+
+def _parts(plant: PlantParameters, step: float) -> int:
+    """Parts of a step [s] that follow the chambers at the angles of walking."""
+    volume = min(chamber_volumes(plant, ANGLES[0])[0], chamber_volumes(plant, ANGLES[1])[1])
+    return max(1, math.ceil(step * STEPS_PER_FILLING / filling_time(plant, volume) - 1.0e-9))
+
+
+def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
+    """The plant with the inertia of the foot and the damping of the ankle in it; its own gravity goes to the leg."""
+    return plant._replace(
+        inertia=plant.inertia + foot_inertia_about_ankle(leg),
+        viscous_damping=plant.viscous_damping + leg.ankle_damping,
+        gravity_torque=0.0,
+        external_torque=0.0,
+    )
+
+
+def walking_valve(valve: Valve) -> ValveModel:
+    """The valve of a walking device; a proportional one has a dump valve for free motion."""
+    return dump.choose(valve.settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(valve.settings)
+
+
+def controller_parameters(kind: ControllerKind, settings: dict[str, float]) -> Any:
+    """The NamedTuple of a controller, nested ones filled in the order of its quantities."""
+    return rebuild(kind.parameters, [settings[item.name] for item in kind.quantities])
+
+
+def vented(plant: PlantParameters, angle: float, angular_velocity: float) -> PlantState:
+    """State at an angle [rad] with both chambers at the atmosphere."""
+    volumes = chamber_volumes(plant, angle)
+    mass_1, mass_2 = (chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes)
+    return PlantState(angle, angular_velocity, mass_1, mass_2, 0.0, 0.0, 0.0)
+
+
+def gait_series(gait: Gait) -> GaitSeries:
+    """The gait as the engine takes it; a moment or a force that nobody measured is 0."""
+    return GaitSeries(
+        _series(gait, "shank_angle"),
+        _series(gait, "ankle_angle"),
+        _series(gait, "ankle_moment"),
+        _series(gait, "vertical_force"),
+        ZERO,
+        ZERO,
+    )
+
+
+def _series(gait: Gait, name: str) -> Series:
+    curve = gait.curves.get(name)
+    if curve is None:
+        return ZERO
+    missing = (0.0,) * HARMONICS
+    pairs = zip((*curve.cosines, *missing)[:HARMONICS], (*curve.sines, *missing)[:HARMONICS], strict=True)
+    return Series(curve.mean, *[number for pair in pairs for number in pair])
+
+
+def gait_timing(gait: Gait) -> GaitTiming:
+    """Events of the gait, the heel's rise and the flat foot's angle from its own angles."""
+    phases = np.linspace(0.0, 1.0, 1001)
+    foot = gait.shank_angle.sampled(phases) - gait.ankle_angle.sampled(phases) + 0.5 * math.pi
+    flat = (phases >= FLAT_FROM) & (phases <= FLAT_TO)
+    ground_angle = float(np.median(foot[flat]))
+    steep = np.flatnonzero((phases > FLAT_TO) & (foot < ground_angle - HEEL_RISE))
+    heel_off = float(phases[steep[0]]) if steep.size else 0.6 * gait.stance_share
+    swing = 1.0 - gait.stance_share
+    return GaitTiming(
+        frequency=1.0 / gait.stride_time,
+        start=0.0,
+        heel_off=min(heel_off, 0.95 * gait.stance_share),
+        toe_off=gait.stance_share,
+        clearance_from=gait.stance_share + CLEARANCE_FROM * swing,
+        clearance_to=gait.stance_share + CLEARANCE_TO * swing,
+        ground_angle=ground_angle,
+    )

@@ -1,0 +1,65 @@
+"""The layout of a walk file, built from the declarations."""
+
+import functools
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
+
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.documents.models import NAME, one_of, optional, published_schema, table
+from ppafo.simulation.declaration import SAMPLING
+from ppafo.simulation.schema import device_fields, kind_field, number_type, quantity_fields, titled
+from ppafo.walking import declaration
+from ppafo.walking.wearer import WEARER
+
+
+def _controller() -> Any:
+    sampling = {item.name: optional(number_type(item), item.summary) for item in SAMPLING}
+    return one_of(
+        [
+            table(
+                f"{titled(kind.name)}Walking",
+                kind_field(kind.name, kind.summary) | sampling | quantity_fields(kind.quantities),
+            )
+            for kind in WALKING_CONTROLLERS.values()
+        ]
+    )
+
+
+def _fault(sensor: str) -> Any:
+    time = quantity_fields((declaration.FAULT_TIME,))
+    reading = quantity_fields((declaration.READINGS[sensor],))
+    return one_of(
+        [
+            table(f"{titled(sensor)}Frozen", kind_field("frozen", declaration.FAULT_KINDS["frozen"]) | time),
+            table(f"{titled(sensor)}Stuck", kind_field("stuck", declaration.FAULT_KINDS["stuck"]) | time | reading),
+        ]
+    )
+
+
+@functools.cache
+def walk_file() -> type[BaseModel]:
+    """Return the model of a walk file."""
+    seed = Annotated[int, Field(ge=0, le=declaration.LARGEST_SEED)]
+    sensors = quantity_fields(declaration.WALK_SENSORS)
+    sensors["seed"] = (seed, Field(1, description=declaration.SEED.summary))
+    faults = {name: optional(_fault(name), f"fault of the {name} sensor") for name in declaration.FAULTY}
+    fields: dict[str, Any] = {
+        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "name": (str, Field(pattern=NAME, max_length=100)),
+        "description": (str, Field("", description="what is tried here, and why")),
+        "gait": optional(str, "name of a gait, or the path of a gait file; the built-in one unless given"),
+        "device": (table("WalkDevice", device_fields()), Field(description="the hardware")),
+        "controller": (_controller(), Field(description="what sets the valve")),
+        "wearer": optional(table("Wearer", quantity_fields(WEARER)), "who walks; the paper's subject unless given"),
+        "sensors": optional(table("WalkSensors", sensors), "what the controller sees; ideal unless given"),
+        "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
+        "run": optional(table("WalkRun", quantity_fields((declaration.STEP,))), "how it is computed"),
+        "assumed": (dict[str, str], Field(default_factory=dict, description="values that no source gives, and why")),
+    }
+    return table("WalkFile", fields)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a walk file."""
+    return published_schema(walk_file(), "ppafo walk")

@@ -1,0 +1,70 @@
+"""Who wears the device: segments of one leg and the ankle, in SI units."""
+
+from dataclasses import dataclass
+
+from ppafo.constants import STANDARD_GRAVITY
+from ppafo.model.declaration import Quantity
+from ppafo.model.leg import LegParameters
+
+WEARER = (
+    Quantity("body_mass", "kg", "mass of the body", 72.5, 10.0, 300.0),
+    Quantity("shank_length", "m", "knee to ankle", 0.46, 0.1, 1.0),
+    Quantity("shank_mass_centre", "m", "knee to the mass centre of the shank", 0.199, 0.0, 1.0),
+    Quantity("shank_mass", "kg", "mass of the shank", 4.5, 0.1, 30.0),
+    Quantity("shank_inertia", "kg m^2", "inertia of the shank about its mass centre", 0.1, 1.0e-4, 5.0),
+    Quantity("foot_mass_centre", "m", "ankle to the mass centre of the foot", 0.09, 0.0, 0.5),
+    Quantity("foot_mass", "kg", "mass of the foot", 1.0, 0.05, 10.0),
+    Quantity("foot_inertia", "kg m^2", "inertia of the foot about its mass centre", 0.001, 1.0e-5, 1.0),
+    Quantity("heel_lever", "m", "ankle back to the heel", 0.05, 0.0, 0.2),
+    Quantity("toe_lever", "m", "ankle forward to the toes", 0.18, 0.0, 0.5),
+    Quantity("ankle_stiffness", "N m/rad", "stiffness of tissue at the ankle", 4.0, 0.0, 500.0),
+    Quantity("ankle_rest_angle", "rad", "angle at which tissue pulls neither way", 1.92, 0.5, 3.0),
+    Quantity("ankle_damping", "N m s/rad", "damping of tissue at the ankle", 0.2, 0.0, 50.0),
+    Quantity("residual_share", "1", "share of the healthy ankle moment that the wearer still has", 0.0, 0.0, 1.0),
+)
+"""Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wearer:
+    """One leg of a person; lengths [m], masses [kg], inertias [kg m^2], the ankle as in ``LegParameters``."""
+
+    body_mass: float
+    shank_length: float
+    shank_mass_centre: float
+    shank_mass: float
+    shank_inertia: float
+    foot_mass_centre: float
+    foot_mass: float
+    foot_inertia: float
+    heel_lever: float
+    toe_lever: float
+    ankle_stiffness: float
+    ankle_rest_angle: float
+    ankle_damping: float
+    residual_share: float
+
+    def leg(self) -> LegParameters:
+        """The leg as the engine takes it."""
+        return LegParameters(
+            shank_length=self.shank_length,
+            shank_mass_centre=self.shank_mass_centre,
+            shank_mass=self.shank_mass,
+            shank_inertia=self.shank_inertia,
+            foot_mass_centre=self.foot_mass_centre,
+            foot_mass=self.foot_mass,
+            foot_inertia=self.foot_inertia,
+            body_mass=self.body_mass,
+            ankle_stiffness=self.ankle_stiffness,
+            ankle_rest_angle=self.ankle_rest_angle,
+            ankle_damping=self.ankle_damping,
+            residual_share=self.residual_share,
+            heel_lever=self.heel_lever,
+            toe_lever=self.toe_lever,
+            gravity=STANDARD_GRAVITY,
+        )
+
+
+def paper_subject() -> Wearer:
+    """The wearer of the defaults."""
+    return Wearer(**{item.name: float(item.default or 0.0) for item in WEARER})

@@ -1,0 +1,114 @@
+"""``ppafo endurance``: what it prints and writes, and what it refuses."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.reporting.endurance_report import FILES
+from ppafo.signals import Channel, Recording
+from ppafo.storage.comma_separated import read_csv, write_csv
+from ppafo.studies.endurance import list_bottles
+
+QUICK = ["endurance", "--gas-per-step", "1 g", "--step-time", "1.1 s"]
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Path:
+    """A recording of 4 s in which 2 g are taken evenly."""
+    time = np.linspace(0.0, 4.0, 101)
+    recording = Recording("walk", time, {"supplied_mass": Channel(time * 5e-4, "kg")}, kind="simulated")
+    return write_csv(tmp_path / "walk.csv", recording)
+
+
+def test_the_bottles_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["endurance", "--list"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in list_bottles())
+
+
+def test_text_says_run_time_steps_and_why_it_ended(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(QUICK) == 0
+    text = capsys.readouterr().out
+    assert "run time" in text
+    assert "too cold: its pressure does not hold the supply pressure" in text
+
+
+def test_json_is_in_si_and_says_simulated(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*QUICK, "--json", "--set", "bottle.gas_mass=100 g"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["kind"] == "simulated"
+    assert document["bottle"]["gas_mass"] == pytest.approx(0.1)
+    assert document["bottle"]["values"]["bottle.gas_mass"]["source"] == "override"
+    result = document["result"]
+    assert result["walking_time"] == pytest.approx(1.1 * result["steps"])
+    assert "CoolProp" in document["bottle"]["properties"]
+
+
+def test_a_recording_is_repeated(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["endurance", str(walk), "--step-time", "2 s", "--json"]) == 0
+    repeated = json.loads(capsys.readouterr().out)
+    assert repeated["draw"]["mass_per_step"] == pytest.approx(1e-3)
+    assert main(["endurance", "--gas-per-step", "1 g", "--step-time", "2 s", "--json"]) == 0
+    given = json.loads(capsys.readouterr().out)
+    assert repeated["result"]["steps"] == pytest.approx(given["result"]["steps"], rel=1e-6)
+
+
+def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main([*QUICK, "--out", str(out)]) == 0
+    assert main([*QUICK, "--reuse", "reservoir_volume=50 cm^3", "--out", str(out)]) == 0
+    assert {path.name for path in out.iterdir()} == set(FILES)
+    course = read_csv(out / "bottle.csv")
+    assert course.kind == "simulated"
+    assert course["bottle_mass"][0] == pytest.approx(0.255)
+    report = (out / "endurance.md").read_text(encoding="utf-8")
+    assert "without reuse" in report
+    assert "| `reservoir_volume` | 50 cm^3 |" in report
+    assert "| `fill_pressure` | 64.7 psi absolute |" in report
+    assert "`bottle.room_heat_transfer` | 0.5 W/K | assumed" in report
+    assert (out / "endurance.png").stat().st_size > 10_000
+
+
+def test_a_folder_of_somebody_else_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    assert main([*QUICK, "--out", str(tmp_path)]) == 2
+    (tmp_path / "mine.txt").rename(tmp_path / "endurance.json")
+    (tmp_path / "endurance.json").write_text("{}")
+    assert main([*QUICK, "--out", str(tmp_path)]) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["endurance.json"]
+    assert capsys.readouterr().err.count("\n") == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "give either a recording or --gas-per-step"),
+        (["--gas-per-step", "0.3"], "--gas-per-step 0.3: a number without a unit does not fit"),
+        (["--gas-per-step", "0.3 g", "--step-time", "1 m"], "--step-time 1 m"),
+        (["--gas-per-step", "0.3 g", "--peak-flow", "0.1 g/s"], "at least the mean one"),
+        (["--gas-per-step", "0.3 g", "--bottle", "paper-co2"], "did you mean 'paper-co2-9oz'"),
+        (["--gas-per-step", "0.3 g", "--set", "room.temprature=0 degC"], "did you mean 'room.temperature'"),
+        (["--gas-per-step", "0.3 g", "--rest", "-1 min"], "rest must be at least 0 s"),
+        (["--gas-per-step", "0.3 g", "--reuse", "reservoir_volume=50 cm^3"], "more than the 0.3 g"),
+        (["absent.csv"], "absent.csv: cannot be read"),
+    ],
+)
+def test_mistakes_are_one_line(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["endurance", *words]) == 2
+    printed = capsys.readouterr()
+    assert said in printed.err
+    assert printed.err.count("\n") == 1
+    assert printed.out == ""
+
+
+def test_a_largest_flow_beside_a_recording_is_refused(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["endurance", str(walk), "--peak-flow", "5 g/s"]) == 2
+    assert "--peak-flow belongs to --gas-per-step" in capsys.readouterr().err
+
+
+def test_the_schema_of_a_bottle_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema", "bottle"]) == 0
+    assert json.loads(capsys.readouterr().out)["title"] == "ppafo bottle"

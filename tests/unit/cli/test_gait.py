@@ -1,0 +1,92 @@
+"""``ppafo gait``: lists, shows, imports, records, exports, and refuses in one line."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.gait import load_gait
+
+
+@pytest.fixture
+def walk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    path = tmp_path / "walk.csv"
+    assert main(["gait", "record", "falisse2019-subject1", "--strides", "4", "--out", str(path)]) == 0
+    capsys.readouterr()
+    return path
+
+
+def test_the_list_names_the_gaits(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gait", "list", "--json"]) == 0
+    assert [item["name"] for item in json.loads(capsys.readouterr().out)["gaits"]] == ["falisse2019-subject1"]
+
+
+def test_a_gait_is_shown_in_numbers(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gait", "show", "falisse2019-subject1", "--speed", "1.2 m/s", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["walking_speed"] == 1.2
+    assert document["recorded_speed"] == 1.33
+    assert len(document["curves"]["ankle_angle"]["series"]) == len(document["phases"]) == 101
+
+
+def test_an_imported_gait_is_written_whole_and_can_be_used_by_its_file(
+    walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "gait"
+    words = ["gait", "import", str(walk), "--body-mass", "62 kg", "--name", "mine", "--out", str(out), "--json"]
+    assert main(words) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert {path.name for path in out.iterdir()} == {"mine.toml", "gait.json", "gait.png", "gait.svg"}
+    assert json.loads((out / "gait.json").read_text()) == document
+    assert document["origin"] == "synthetic"
+    assert len(document["imported"]["strides"]) == document["strides"] == 3
+    gait = load_gait(out / "mine.toml")
+    assert (gait.origin, gait.strides) == ("synthetic", 3)
+
+
+def test_the_schemas_describe_a_gait_file_and_a_map(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, table in (("gait", "stride"), ("gait-map", "vertical_force")):
+        assert main(["schema", name]) == 0
+        schema = json.loads(capsys.readouterr().out)
+        jsonschema.Draft202012Validator.check_schema(schema)
+        assert table in schema["properties"]
+
+
+def test_a_recording_is_exported_for_opensim(walk: Path, tmp_path: Path) -> None:
+    assert main(["gait", "export", str(walk), "--out", str(tmp_path / "walk.sto")]) == 0
+    assert "kind=synthetic" in (tmp_path / "walk.sto").read_text().splitlines()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["show", "falisse"], "there is no gait 'falisse'"),
+        (["show", "falisse2019-subject1", "--speed", "3 m/s"], "can be scaled from 1.06 to 1.6 m/s, not to 3 m/s"),
+        (["show", "falisse2019-subject1", "--speed", "1.2"], "--speed '1.2': a number without a unit"),
+        (["import", "WALK", "--body-mass", "62"], "--body-mass '62': a number without a unit"),
+        (["import", "WALK", "--body-mass", "62 kg", "--side", "rigth"], "--side 'rigth' is not known"),
+        (["import", "WALK", "--body-mass", "62 kg", "--least-strides", "-"], "--least-strides '-' is not a whole"),
+        (["import", "WALK", "--body-mass", "62 kg", "--least-strides", "9"], "has 3 whole strides within"),
+        (["import", "none.mot", "--body-mass", "62 kg"], "none.mot: cannot be read: no such file"),
+        (["import", "WALK", "--body-mass", "62 kg", "--map", "none.toml"], "none.toml: cannot be read"),
+        (["record", "falisse2019-subject1", "--out", "walk.txt"], "a recording is written as .csv"),
+        (["record", "falisse2019-subject1", "--strides", "0", "--out", "w.csv"], "0 strides cannot be recorded"),
+        (["export", "WALK", "--out", "walk.mot"], "ends in .sto"),
+        (["draw"], "invalid choice: 'draw'"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(
+    walk: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str
+) -> None:
+    assert main(["gait", *(str(walk) if word == "WALK" else word for word in words)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert message in said
+
+
+def test_nothing_is_written_where_the_import_is_refused(walk: Path, tmp_path: Path) -> None:
+    out = tmp_path / "gait"
+    assert main(["gait", "import", str(walk), "--body-mass", "6000 kg", "--out", str(out)]) == 2
+    assert not out.exists()

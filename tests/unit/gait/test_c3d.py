@@ -1,0 +1,121 @@
+"""C3D files: markers and model outputs, through ezc3d."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.gait import Gait
+from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, ShankMap
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+
+PHASES = np.linspace(0.0, 1.0, 101)
+
+
+@pytest.fixture
+def written(walk: Recording, normative: Gait, tmp_path: Path) -> Callable[..., Path]:
+    """Writes the walk as a C3D file of 100 frames a second; points may be added or changed, channels too."""
+    ezc3d = pytest.importorskip("ezc3d", reason="the extra c3d is not installed")
+
+    def write(points: dict[str, Floats] | None = None, plate: bool = False, walk_along: float = 1.0) -> Path:
+        frames = np.arange(0.0, walk.duration, 0.01)
+        at = walk.resampled(frames)
+        shank, nothing = at["shank_angle"], np.zeros(frames.size)
+        knee = np.array([walk_along * 1300.0 * frames, nothing, nothing + 500.0])
+        lean = np.array([walk_along * np.sin(shank), nothing, -np.cos(shank)])
+        mass = normative.body_mass
+        known = {
+            "RKNE": knee,
+            "RANK": knee + 400.0 * lean,
+            "RAnkleAngles": np.array([90.0 - np.degrees(at["ankle_angle"]), nothing, nothing]),
+            "RAnkleMoment": np.array([1000.0 * at["ankle_moment"], nothing, nothing]),
+            "RGroundReactionForce": np.array([nothing, nothing, 9.80665 * at["vertical_force"]]),
+        } | (points or {})
+        file = ezc3d.c3d()
+        file["parameters"]["POINT"]["RATE"]["value"] = [100.0]
+        file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+        file["parameters"]["POINT"]["LABELS"]["value"] = [f"Walker:{label}" for label in known]
+        file["data"]["points"] = np.array([np.vstack([xyz, np.ones(frames.size)]) for xyz in known.values()]).transpose(
+            1, 0, 2
+        )
+        if plate:
+            fast = np.repeat(9.80665 * mass * at["vertical_force"], 10)
+            file["parameters"]["ANALOG"]["RATE"]["value"] = [1000.0]
+            file["parameters"]["ANALOG"]["LABELS"]["value"] = ["Fz1"]
+            file["parameters"]["ANALOG"]["UNITS"]["value"] = ["N"]
+            file["data"]["analogs"] = fast[None, None, :]
+        path = tmp_path / "walk.c3d"
+        file.write(str(path))
+        return path
+
+    return write
+
+
+def same(gait: Gait, truth: Gait) -> bool:
+    """True where the curves agree, but for the 0.4 % of the stride by which the events differ."""
+    shift = np.linspace(0.0, 0.01, 101)
+    errors = [np.max(np.abs(gait.ankle_angle.sampled(PHASES) - truth.ankle_angle.sampled(PHASES + s))) for s in shift]
+    lean = [np.max(np.abs(gait.shank_angle.sampled(PHASES) - truth.shank_angle.sampled(PHASES + s))) for s in shift]
+    return min(errors) < 0.004 and min(lean) < 0.004
+
+
+def test_markers_and_outputs_of_plug_in_gait_are_read_by_convention(
+    written: Callable[..., Path], normative: Gait
+) -> None:
+    found = import_gait([written()], ImportSettings(normative.body_mass)).gait
+    assert same(found, normative)
+    assert found.curve("ankle_moment").mean == pytest.approx(normative.curve("ankle_moment").mean, abs=0.01)
+    assert found.curve("vertical_force").mean == pytest.approx(normative.curve("vertical_force").mean, abs=0.01)
+
+
+def test_a_force_plate_and_a_walk_the_other_way_need_a_map(written: Callable[..., Path], normative: Gait) -> None:
+    columns = GaitMap(
+        shank_angle=ShankMap(knee="RKNE", ankle="RANK", forward="-x"),
+        ankle_angle=AngleMap(terms=("RAnkleAngles.x",), positive="dorsiflexion", unit="deg"),
+        vertical_force=ForceMap(terms=("Fz1",)),
+    )
+    path = written(plate=True, walk_along=-1.0)
+    assert same(import_gait([path], ImportSettings(normative.body_mass, columns=columns)).gait, normative)
+    with pytest.raises(DataError, match="shank_angle grows while the foot stands"):
+        import_gait([path], ImportSettings(normative.body_mass))
+
+
+def test_a_gap_in_a_marker_is_named(written: Callable[..., Path], walk: Recording) -> None:
+    frames = np.arange(0.0, walk.duration, 0.01)
+    knee = np.zeros((3, frames.size))
+    knee[:, 120:140] = np.nan
+    path = written({"RKNE": knee})
+    with pytest.raises(DataError, match=r"'RKNE.x' has a gap of 20 samples, the first in row 121 at 1.2 s; fill it"):
+        import_gait([path], ImportSettings(62.0))
+
+
+def test_a_missing_marker_is_named_with_the_nearest(written: Callable[..., Path]) -> None:
+    with pytest.raises(DataError, match=r"shank_angle: there is no column 'LKNE.x', did you mean 'RKNE.x'"):
+        import_gait([written()], ImportSettings(62.0, side="left"))
+
+
+def test_what_is_no_c3d_file_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("ezc3d", reason="the extra c3d is not installed")
+    path = tmp_path / "walk.c3d"
+    path.write_bytes(b"time,angle\n" * 50)
+    with pytest.raises(DataError, match=r"walk.c3d: is not a C3D file"):
+        import_gait([path], ImportSettings(62.0))
+
+
+def test_a_file_that_is_cut_off_is_refused(written: Callable[..., Path]) -> None:
+    path = written()
+    path.write_bytes(path.read_bytes()[:700])
+    with pytest.raises(DataError, match=r"walk.c3d: "):
+        import_gait([path], ImportSettings(62.0))
+
+
+def test_without_the_library_the_message_says_what_to_install(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setitem(sys.modules, "ezc3d", None)
+    with pytest.raises(DataError, match=r"C3D files need ezc3d; install it with 'pip install ppafo\[c3d\]'"):
+        import_gait([tmp_path / "walk.c3d"], ImportSettings(62.0))

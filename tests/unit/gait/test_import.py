@@ -1,0 +1,241 @@
+"""Recorded files become the gait that is in them, whatever their form, unit and sign."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.gait import CURVES, Gait, walk_recording
+from ppafo.gait.document import gait_toml
+from ppafo.gait.loading import parse_gait
+from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, MomentMap, PressureMap, ShankMap
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+
+PHASES = np.linspace(0.0, 1.0, 101)
+
+
+def largest_difference(gait: Gait, truth: Gait, name: str) -> float:
+    """Largest distance of a curve from the true one, both begun at the same heel strike."""
+    shift = gait_start(truth)
+    return float(np.max(np.abs(gait.curves[name].sampled(PHASES) - truth.curves[name].sampled(PHASES + shift))))
+
+
+def gait_start(truth: Gait) -> float:
+    """Phase at which the true vertical force passes the threshold of a heel strike, 5 % of body weight."""
+    phases = np.linspace(0.0, 0.05, 5001)
+    return float(phases[np.argmax(truth.curve("vertical_force").sampled(phases) > 0.05)])
+
+
+LIMITS = {"shank_angle": 2e-3, "ankle_angle": 2e-3, "ankle_moment": 5e-3, "vertical_force": 5e-3}
+
+
+def assert_same(gait: Gait, truth: Gait, names: tuple[str, ...] = tuple(LIMITS)) -> None:
+    assert gait.stride_time == pytest.approx(truth.stride_time, rel=1e-4)
+    assert gait.stance_share == pytest.approx(truth.stance_share, abs=0.01)
+    assert {name for name in names if largest_difference(gait, truth, name) > LIMITS[name]} == set()
+
+
+def test_a_csv_file_in_the_units_and_signs_of_the_package(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], normative: Gait
+) -> None:
+    found = import_gait([csv_of(columns)], ImportSettings(62.0, walking_speed=1.33))
+    assert_same(found.gait, normative)
+    assert found.events == "vertical_force"
+    assert found.gait.strides == len(found.strides) == 5
+    assert found.gait.walking_speed == 1.33
+    assert found.gait.stride_time_deviation == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_csv_file_in_other_units(csv_of: Callable[..., Path], columns: dict[str, Floats], normative: Gait) -> None:
+    changed = {
+        "shank_angle [deg]": np.degrees(columns["shank_angle [rad]"]),
+        "ankle_angle [deg]": np.degrees(columns["ankle_angle [rad]"]),
+        "ankle_moment [N m]": 62.0 * columns["ankle_moment [N m/kg]"],
+        "vertical_force [kN]": 0.062 * 9.80665 * columns["vertical_force [-]"],
+    }
+    assert_same(import_gait([csv_of(changed)], ImportSettings(62.0)).gait, normative)
+
+
+def test_a_map_names_columns_signs_and_zero(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], normative: Gait
+) -> None:
+    changed = {
+        "thigh [deg]": np.degrees(0.5 * columns["shank_angle [rad]"]),
+        "lean [deg]": np.degrees(-0.5 * columns["shank_angle [rad]"]),
+        "dorsiflexion [deg]": 95.0 - np.degrees(columns["ankle_angle [rad]"]),
+        "moment [N m/kg]": -columns["ankle_moment [N m/kg]"],
+        "plate [N]": -62.0 * 9.80665 * columns["vertical_force [-]"],
+    }
+    columns_map = GaitMap(
+        shank_angle=ShankMap(terms=("lean", "-thigh"), positive="ankle_behind"),
+        ankle_angle=AngleMap(terms=("dorsiflexion",), positive="dorsiflexion", neutral="5 deg"),
+        ankle_moment=MomentMap(terms=("moment",), positive="dorsiflexion"),
+        vertical_force=ForceMap(terms=("plate",), positive="down"),
+    )
+    assert_same(import_gait([csv_of(changed)], ImportSettings(62.0, columns=columns_map)).gait, normative)
+
+
+def test_opensim_tables_of_one_walk(opensim_files: dict[str, Path], normative: Gait) -> None:
+    found = import_gait(list(opensim_files.values()), ImportSettings(normative.body_mass))
+    assert_same(found.gait, normative)
+    assert found.gait.origin == "measured"
+
+
+def test_a_knee_that_counts_flexion_above_zero_is_recognised(opensim_files: dict[str, Path], normative: Gait) -> None:
+    path = opensim_files["ik"]
+    head, _, rows = path.read_text().partition("time\t")
+    labels, *lines = rows.splitlines()
+    cells = [line.split("\t") for line in lines]
+    flipped = ["\t".join([*row[:3], str(-float(row[3])), row[4]]) for row in cells]
+    path.write_text(head + "time\t" + "\n".join([labels, *flipped]) + "\n")
+    assert_same(import_gait(list(opensim_files.values()), ImportSettings(normative.body_mass)).gait, normative)
+
+
+def test_without_a_force_the_strides_come_from_the_shank(opensim_files: dict[str, Path], normative: Gait) -> None:
+    found = import_gait([opensim_files["ik"]], ImportSettings(normative.body_mass))
+    assert found.events == "shank_angle"
+    assert found.gait.stride_time == pytest.approx(normative.stride_time, rel=0.01)
+    assert found.gait.stance_share == pytest.approx(normative.stance_share, abs=0.05)
+    assert set(found.gait.curves) == {"shank_angle", "ankle_angle"}
+    assert any("come from the shank" in remark for remark in found.remarks)
+
+
+def test_a_centre_of_pressure_is_bridged_over_swing(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, normative: Gait
+) -> None:
+    phase = (walk.time / normative.stride_time) % 1.0
+    pressure = np.where(phase < normative.stance_share, -0.05 + 0.25 * phase / normative.stance_share, -9.0)
+    found = import_gait([csv_of({**columns, "centre_of_pressure [m]": pressure})], ImportSettings(62.0))
+    curve = found.gait.curve("centre_of_pressure").sampled(PHASES)
+    assert -0.1 < curve.min() < curve.max() < 0.25, "what the file shows in swing is not in it"
+    middle = 0.5 * normative.stance_share
+    assert found.gait.curve("centre_of_pressure").value(middle) == pytest.approx(0.075, abs=0.01)
+
+
+def test_the_low_pass_takes_noise_away_and_leaves_the_curve(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], normative: Gait
+) -> None:
+    noise = np.random.default_rng(3).normal(0.0, 0.03, columns["ankle_angle [rad]"].size)
+    path = csv_of({**columns, "ankle_angle [rad]": columns["ankle_angle [rad]"] + noise})
+    rough, smooth = (import_gait([path], ImportSettings(62.0, low_pass=cut)).curves for cut in (None, 10.0))
+    assert smooth["ankle_angle"].spread < 0.5 * rough["ankle_angle"].spread
+    truth = normative.ankle_angle.sampled(PHASES + gait_start(normative))
+    assert np.sqrt(np.mean((smooth["ankle_angle"].mean - truth) ** 2)) < 0.012
+
+
+def test_the_low_pass_is_at_its_half_power_where_it_says() -> None:
+    from ppafo.gait.recorded.signal import Signal, low_passed
+
+    time = np.arange(0.0, 20.0, 0.005)
+    passed = low_passed(Signal("sine", time, np.sin(2.0 * np.pi * 6.0 * time)), 6.0)
+    assert np.max(passed.values[1000:3000]) == pytest.approx(2.0**-0.5, rel=0.01)
+
+
+def test_strides_differ_as_much_as_they_were_made_to(csv_of: Callable[..., Path], normative: Gait) -> None:
+    rng = np.random.default_rng(5)
+    lengths = rng.normal(1.0, 0.03, 40)
+    offsets = rng.normal(0.0, 0.04, 40)
+    one = walk_recording(normative, 1)
+    time = np.concatenate(
+        [length * one.time[:-1] + start for length, start in zip(lengths, _starts(one, lengths), strict=True)]
+    )
+    parts = {f"{name} [{one.unit(name)}]": np.tile(one[name][:-1], 40) for name in one.names}
+    parts["ankle_angle [rad]"] = parts["ankle_angle [rad]"] + np.repeat(offsets, one.time.size - 1)
+    found = import_gait([csv_of(parts, time)], ImportSettings(62.0))
+    assert found.gait.stride_time_deviation == pytest.approx(
+        np.std(lengths[1:-1], ddof=1) * normative.stride_time, rel=0.1
+    )
+    assert found.gait.ankle_angle.deviation == pytest.approx(np.std(offsets, ddof=1), rel=0.1)
+    assert found.curves["ankle_angle"].curves.shape == (found.gait.strides, 101)
+
+
+def _starts(one: Recording, lengths: Floats) -> Floats:
+    return np.concatenate([[0.0], np.cumsum(lengths * one.duration)[:-1]])
+
+
+def test_a_stride_with_a_missed_event_is_left_out_and_said(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, normative: Gait
+) -> None:
+    during = (walk.time > 2.9 * normative.stride_time) & (walk.time < 3.75 * normative.stride_time)
+    force = np.where(during, 0.0, columns["vertical_force [-]"])
+    found = import_gait([csv_of({**columns, "vertical_force [-]": force})], ImportSettings(62.0))
+    assert len(found.left_out) == 1
+    assert found.left_out[0].time == pytest.approx(2.0 * normative.stride_time, rel=0.01)
+    assert found.gait.stride_time == pytest.approx(normative.stride_time, rel=1e-3)
+    assert any("left out: 2.08 s long" in remark for remark in found.remarks)
+
+
+def test_what_is_imported_can_be_written_and_loaded(csv_of: Callable[..., Path], columns: dict[str, Floats]) -> None:
+    gait = import_gait([csv_of(columns)], ImportSettings(62.0, name="mine")).gait
+    again = parse_gait(gait_toml(gait).encode(), "mine.toml")
+    assert (again.name, again.strides, again.stance_share) == ("mine", gait.strides, gait.stance_share)
+    assert all(name in CURVES for name in again.curves)
+
+
+def test_real_treadmill_walking_from_opensim(shared_data: Path) -> None:
+    folder = shared_data / "gait" / "opensim_subject01"
+    files = [folder / "subject01_walk1_ik.mot", folder / "subject01_walk1_grf_15s.mot"]
+    right, left = (import_gait(files, ImportSettings(72.6, side=side)) for side in ("right", "left"))
+    assert [round(item.start, 2) for item in right.strides] == [0.62, 1.86]
+    assert [round(item.toe_off, 2) for item in right.strides] == [1.41, 2.63]
+    for found in (right, left):
+        assert found.gait.strides == 2
+        assert found.gait.stride_time == pytest.approx(1.22, abs=0.015)
+        assert found.gait.stance_share == pytest.approx(0.632, abs=0.01)
+        assert np.degrees(found.gait.shank_angle.value(0.0)) == pytest.approx(21.0, abs=3.0)
+        assert found.gait.curve("vertical_force").mean == pytest.approx(0.5, abs=0.05)
+    difference = np.degrees(right.gait.shank_angle.sampled(PHASES) - left.gait.shank_angle.sampled(PHASES))
+    assert np.abs(difference).max() < 6.0, "both legs of a healthy walker move alike"
+
+
+def test_strides_from_the_shank_are_near_those_from_the_force_plates(shared_data: Path) -> None:
+    folder = shared_data / "gait" / "opensim_subject01"
+    ik, grf = folder / "subject01_walk1_ik.mot", folder / "subject01_walk1_grf_15s.mot"
+    for side in ("right", "left"):
+        forced = import_gait([ik, grf], ImportSettings(72.6, side=side))
+        moved = import_gait([ik], ImportSettings(72.6, side=side))
+        assert moved.gait.stride_time == pytest.approx(forced.gait.stride_time, abs=0.01)
+        assert moved.gait.stance_share == pytest.approx(forced.gait.stance_share, abs=0.03)
+        early = [min((item.start - other.start for item in forced.strides), key=abs) for other in moved.strides]
+        assert all(0.02 < seconds < 0.035 for seconds in early)
+
+
+def test_the_eleven_real_strides_one_after_the_other_give_the_built_in_gait(
+    shared_data: Path, csv_of: Callable[..., Path], normative: Gait
+) -> None:
+    folder = shared_data / "gait" / "falisse2019_derived"
+    strides = np.genfromtxt(folder / "falisse2019_s1_all_strides.csv", delimiter=",", names=True)
+    trials = np.genfromtxt(folder / "falisse2019_s1_trials.csv", delimiter=",", names=True)
+    kept = strides["pct"] < 100.0
+    times = trials["stride_time_s_est"][strides["trial"][kept].astype(int) - 1]
+    starts = np.concatenate([[0.0], np.cumsum(trials["stride_time_s_est"])[:-1]])
+    time = starts[strides["trial"][kept].astype(int) - 1] + times * strides["pct"][kept] / 100.0
+    columns = {
+        "shank_angle [deg]": strides["phi_deg"][kept],
+        "ankle_angle [deg]": 90.0 - strides["ankle_deg"][kept],
+        "ankle_moment [N m/kg]": strides["ankle_moment_Nm_kg"][kept],
+        "vertical_force [-]": strides["vGRF_BW"][kept],
+    }
+    found = import_gait([csv_of(columns, time)], ImportSettings(62.0, walking_speed=1.33)).gait
+    assert found.strides >= 9
+    assert found.stride_time == pytest.approx(normative.stride_time, rel=0.01)
+    assert found.stance_share == pytest.approx(normative.stance_share, abs=0.015)
+    assert np.degrees(largest_difference(found, normative, "shank_angle")) < 1.0
+    assert np.degrees(largest_difference(found, normative, "ankle_angle")) < 1.5
+    assert largest_difference(found, normative, "ankle_moment") < 0.06
+    assert found.stride_time_deviation == pytest.approx(normative.stride_time_deviation, rel=0.3)
+
+
+def test_pressure_counts_forward(csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording) -> None:
+    backward = {**columns, "pressure_back [cm]": -5.0 - 0.0 * walk.time}
+    columns_map = GaitMap(
+        shank_angle=ShankMap(terms=("shank_angle",)),
+        ankle_angle=AngleMap(terms=("ankle_angle",), positive="plantarflexion", neutral="90 deg"),
+        vertical_force=ForceMap(terms=("vertical_force",)),
+        centre_of_pressure=PressureMap(terms=("pressure_back",), positive="backward"),
+    )
+    found = import_gait([csv_of(backward)], ImportSettings(62.0, columns=columns_map))
+    assert found.gait.curve("centre_of_pressure").mean == pytest.approx(0.05, abs=1e-6)

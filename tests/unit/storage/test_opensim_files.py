@@ -1,0 +1,153 @@
+"""OpenSim tables: both styles of header are read, mistakes are named, and what is written OpenSim reads."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.signals import Channel, Recording
+from ppafo.storage.opensim import read_opensim, write_opensim
+
+NEW = "Walk\nversion=1\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\tknee_angle_r\tankle_angle_r\n"
+OLD = (
+    "name walk.mot\t\t\ndatacolumns 3\t\ndatarows 3\t\nrange 0 0.02\nendheader\n"
+    "   time\t knee_angle_r\t ankle_angle_r\n"
+)
+ROWS = "0.00\t-1.5\t2\n 0.01   -1.6 3e0\n0.02\t-1.7\t.5\n"
+
+
+def table(text: str, folder: Path) -> Path:
+    path = folder / "walk.mot"
+    path.write_bytes(text.encode())
+    return path
+
+
+@pytest.mark.parametrize(("head", "in_degrees"), [(NEW, True), (OLD, None)], ids=["new header", "old header"])
+def test_both_styles_of_header_are_read(tmp_path: Path, head: str, in_degrees: bool | None) -> None:
+    found = read_opensim(table(head + ROWS, tmp_path))
+    assert found.time.tolist() == [0.0, 0.01, 0.02]
+    assert {name: values.tolist() for name, values in found.columns.items()} == {
+        "knee_angle_r": [-1.5, -1.6, -1.7],
+        "ankle_angle_r": [2.0, 3.0, 0.5],
+    }
+    assert found.in_degrees is in_degrees
+
+
+@pytest.mark.parametrize(("text", "said"), [("degrees", True), ("radians", False)])
+def test_the_sentence_of_the_inverse_kinematics_tool_says_the_unit(tmp_path: Path, text: str, said: bool) -> None:
+    head = NEW.replace("inDegrees=yes", f"Angles are in {text}.")
+    assert read_opensim(table(head + ROWS, tmp_path)).in_degrees is said
+
+
+def test_line_ends_of_every_system_are_read(tmp_path: Path) -> None:
+    found = read_opensim(table((NEW + ROWS).replace("\n", "\r\n"), tmp_path))
+    assert found.time.size == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (NEW.replace("endheader\n", "") + ROWS, "has no line 'endheader': it is cut off in its header"),
+        ("Walk\nnRows=3\n", "has no line 'endheader'"),
+        (NEW.partition("time")[0], "has nothing after 'endheader': the file is cut off"),
+        (NEW, "has labels but no rows"),
+        (NEW + ROWS.rpartition("0.02")[0], "has 2 rows, its header says 3: the file is cut off or was edited"),
+        (OLD + ROWS + "0.03 1 1\n", "has 4 rows, its header says 3"),
+        (NEW.replace("nRows=3", "nRows=three") + ROWS, "line 3: nRows is 'three', not a whole number"),
+        (NEW.replace("nColumns=3", "nColumns=4") + ROWS, "line 7 names 3 columns, the header says 4"),
+        (NEW.replace("inDegrees=yes", "inDegrees=maybe") + ROWS, "line 5: inDegrees is 'maybe'; it is 'yes' or 'no'"),
+        (NEW.replace("endheader", "Angles are in radians.\nendheader") + ROWS, "the header says degrees and radians"),
+        (NEW.replace("ankle_angle_r", "knee_angle_r") + ROWS, "line 7: there are two columns 'knee_angle_r'"),
+        (NEW.replace("time\t", "frame\t") + ROWS, "line 7: the first column must be 'time', it is 'frame'"),
+        (NEW + ROWS.replace("\t2\n", "\tnan\n"), "line 8, column 'ankle_angle_r': 'nan' is not a finite number"),
+        (NEW + ROWS.replace("-1.6", "1,6"), "line 9, column 'knee_angle_r': '1,6' is not a finite number"),
+        (NEW + ROWS.replace("-1.7", "1e999"), "line 10, column 'knee_angle_r': '1e999' is not a finite number"),
+        (NEW + ROWS.replace("\t.5", ""), "line 10 has 2 values for 3 columns"),
+        (NEW + ROWS.replace("0.02", "0.01"), "line 10: the clock stands still: 0.01 s follows 0.01 s"),
+        (NEW + ROWS.replace("0.02", "-0.5"), "line 10: the clock goes backwards: -0.5 s follows 0.01 s"),
+        (NEW + ROWS + "\0", "is not a text file"),
+    ],
+)
+def test_a_damaged_table_is_refused_with_line_and_column(tmp_path: Path, text: str, message: str) -> None:
+    path = table(text, tmp_path)
+    with pytest.raises(DataError) as refused:
+        read_opensim(path)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert str(refused.value).count(str(path)) == 1
+    assert message in str(refused.value)
+
+
+def test_an_empty_or_missing_file_is_refused_once_by_name(tmp_path: Path) -> None:
+    (tmp_path / "empty.sto").touch()
+    with pytest.raises(DataError, match=r"^[^:]*empty.sto: is empty$"):
+        read_opensim(tmp_path / "empty.sto")
+    with pytest.raises(DataError, match=r"^[^:]*none.sto: cannot be read: no such file or directory$"):
+        read_opensim(tmp_path / "none.sto")
+
+
+@pytest.fixture
+def recording() -> Recording:
+    time = np.array([0.0, 0.1, 0.25])
+    channels = {"angle": Channel(time + 1.0 / 3.0, "rad"), "torque": Channel(-time, "N m")}
+    return Recording("walk of a model", time, channels, "simulated")
+
+
+def test_a_written_table_is_read_back_bit_by_bit(tmp_path: Path, recording: Recording) -> None:
+    found = read_opensim(write_opensim(tmp_path / "walk.sto", recording))
+    assert np.array_equal(found.time, recording.time)
+    assert all(np.array_equal(found.columns[name], recording[name]) for name in recording.names)
+    assert (found.name, found.in_degrees) == ("walk of a model", False)
+
+
+def test_the_written_format_is_that_of_opensim(tmp_path: Path, recording: Recording) -> None:
+    lines = write_opensim(tmp_path / "walk.sto", recording).read_text().splitlines()
+    assert lines[:5] == ["walk of a model", "version=1", "nRows=3", "nColumns=3", "inDegrees=no"]
+    assert "kind=simulated" in lines
+    end = lines.index("endheader")
+    assert lines[end + 1] == "time\tangle\ttorque"
+    assert len(lines[end + 2 :]) == 3
+
+
+@pytest.fixture
+def opensim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The package opensim, which begins a log file in the working folder when it is imported."""
+    monkeypatch.chdir(tmp_path)
+    package = pytest.importorskip("opensim", reason="the package opensim is not installed")
+    package.Logger.removeFileSink()
+    return package
+
+
+def test_opensim_itself_reads_what_is_written(tmp_path: Path, recording: Recording, opensim: Any) -> None:
+    path = str(write_opensim(tmp_path / "walk.sto", recording))
+    found = opensim.TimeSeriesTable(path)
+    assert list(found.getColumnLabels()) == ["angle", "torque"]
+    assert list(found.getIndependentColumn()) == recording.time.tolist()
+    for name in recording.names:
+        assert found.getDependentColumn(name).to_numpy().tolist() == recording[name].tolist()
+    assert found.getTableMetaDataAsString("inDegrees") == "no"
+    assert found.getTableMetaDataAsString("kind") == "simulated"
+    assert opensim.Storage(path).getSize() == 3
+
+
+def test_a_table_that_opensim_writes_is_read(tmp_path: Path, recording: Recording, opensim: Any) -> None:
+    source = opensim.TimeSeriesTable(str(write_opensim(tmp_path / "walk.sto", recording)))
+    opensim.STOFileAdapter.write(source, str(tmp_path / "again.sto"))
+    found = read_opensim(tmp_path / "again.sto")
+    assert found.columns["torque"].tolist() == recording["torque"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "columns", "in_degrees"),
+    [
+        ("subject01_walk1_ik.mot", 211, 23, True),
+        ("subject01_walk1_grf_15s.mot", 9009, 18, None),
+        ("std_subject01_InverseDynamics.sto", 73, 23, None),
+    ],
+)
+def test_real_files_of_opensim_are_read(
+    shared_data: Path, name: str, rows: int, columns: int, in_degrees: bool | None
+) -> None:
+    found = read_opensim(shared_data / "gait" / "opensim_subject01" / name)
+    assert (found.time.size, len(found.columns), found.in_degrees) == (rows, columns, in_degrees)

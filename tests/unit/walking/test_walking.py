@@ -1,0 +1,168 @@
+"""The leg on the ground and in the swing, with and without the device."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.model import contact as ground
+from ppafo.model.command import VENT
+from ppafo.model.gait import gait_at
+from ppafo.model.gait_sensors import Fault
+from ppafo.walking.planning import plan_walk
+
+CONTROLLERS = ("off", "event_on_off", "event_proportional")
+STRIDE = 1.0384
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_contacts_follow_each_other_in_every_stride(walked: Callable[[str], Any], name: str) -> None:
+    contact = walked(name)["walk.contact"]
+    assert set(np.unique(contact)) == {ground.SWING, ground.HEEL, ground.FLAT, ground.TOE}
+    changes = [int(value) for value in contact[np.flatnonzero(np.diff(contact)) + 1]]
+    turn = [int(ground.FLAT), int(ground.TOE), int(ground.SWING), int(ground.HEEL)]
+    assert changes == [turn[index % 4] for index in range(len(changes))]
+    assert len(changes) > 4 * 6
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_the_ankle_does_not_jump_at_a_hand_over(walked: Callable[[str], Any], name: str) -> None:
+    walk = walked(name)
+    speed = np.abs(walk["state.angular_velocity"])
+    jump = np.abs(np.diff(walk["state.angle"]))
+    assert jump.max() < 1.5e-3 * max(speed.max(), 1.0)
+
+
+def test_a_flat_foot_stands_still_on_the_ground(walked: Callable[[str], Any]) -> None:
+    walk = walked("event_on_off")
+    settled = (walk["walk.contact"] == ground.FLAT) & (np.abs(walk["walk.offset"]) < 1e-6)
+    foot = walk["walk.now.shank"] - walk["state.angle"] + 0.5 * math.pi
+    assert settled.sum() > 500
+    np.testing.assert_allclose(foot[settled], walk.run.walk.timing.ground_angle, atol=1e-5)
+
+
+def test_on_the_toes_the_ankle_follows_the_measured_gait(walked: Callable[[str], Any]) -> None:
+    walk = walked("off")
+    settled = (walk["walk.contact"] == ground.TOE) & (np.abs(walk["walk.offset"]) < 1e-5)
+    assert settled.sum() > 300
+    np.testing.assert_allclose(walk["state.angle"][settled], walk["walk.now.ankle"][settled], atol=2e-5)
+
+
+def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[str], Any]) -> None:
+    from dataclasses import replace
+
+    from scipy.integrate import solve_ivp
+
+    from ppafo.engine.lanes import run_batch
+    from ppafo.engine.run import batch_of
+    from ppafo.engine.scheme.walking import leg_torque
+    from ppafo.model.contact import SWING
+    from ppafo.simulation.sampled import state_row_numbers
+
+    run = plan_walk(walk_plan("off"))
+    walk = run.walk
+    assert walk is not None
+    # No gas, no friction, no stops: what is left is the leg.
+    plant = run.plant._replace(
+        torque_constant=0.0, static_torque=0.0, dynamic_torque=0.0, angle_min=-9.0, angle_max=9.0
+    )
+    timing = walk.timing._replace(start=walk.timing.toe_off)
+    begin = gait_at(walk.gait, timing, walk.leg.body_mass, walk.leg.gravity, 0.0)
+    initial = run.initial._replace(angle=begin.ankle, angular_velocity=begin.ankle_rate)
+    swinging = replace(walk, timing=timing, initial=walk.initial._replace(contact=SWING, now=begin))
+    swing = replace(run, plant=plant, initial=initial, walk=swinging, step_count=300)
+    rows = state_row_numbers(swing)
+    angle = run_batch(batch_of(swing)).record[:, rows["state.angle"], 0]
+
+    def slopes(time: float, y: np.ndarray) -> list[float]:
+        now = gait_at(walk.gait, timing, walk.leg.body_mass, walk.leg.gravity, time)
+        torque = leg_torque(walk.leg, walk.share, SWING, now, y[0])
+        return [y[1], (torque - plant.viscous_damping * y[1]) / plant.inertia]
+
+    times = np.arange(angle.size) * swing.step
+    judge = solve_ivp(slopes, (0.0, times[-1]), [initial.angle, initial.angular_velocity], t_eval=times, rtol=1e-9)
+    assert np.ptp(judge.y[0]) > 0.1
+    assert np.abs(judge.y[0] - angle).max() < 2e-4
+
+
+def test_a_drop_foot_hangs_without_the_device_and_is_lifted_with_it(walked: Callable[[str], Any]) -> None:
+    late_swing = {}
+    for name in CONTROLLERS:
+        walk = walked(name)
+        phase = walk["walk.now.phase"]
+        chosen = (phase > 0.85) & (phase < 0.97) & (walk.time > 2.0)
+        late_swing[name] = math.degrees(float(np.mean(walk["state.angle"][chosen])))
+    assert late_swing["off"] > 105.0
+    assert late_swing["event_on_off"] < 100.0
+    assert late_swing["event_proportional"] < 100.0
+    assert walked("off")["walk.toe_landings"][-1] >= 6
+    assert walked("event_on_off")["walk.toe_landings"][-1] == 0
+
+
+def test_the_device_gives_work_in_push_off_and_uses_gas(walked: Callable[[str], Any]) -> None:
+    assert walked("off")["walk.push_off_work"][-1] < 0.0
+    assert walked("off")["state.supplied_mass"][-1] == 0.0
+    for name in ("event_on_off", "event_proportional"):
+        assert walked(name)["walk.push_off_work"][-1] > 0.5
+        assert walked(name)["state.supplied_mass"][-1] > 1e-3
+
+
+def test_metrics_at_one_kilohertz_are_within_two_per_cent(walk_plan: Callable[[str], Any]) -> None:
+    from dataclasses import replace
+
+    from ppafo.engine.lanes import run_batch
+    from ppafo.engine.run import batch_of
+    from ppafo.simulation.sampled import state_row_numbers
+
+    for name in ("event_on_off", "event_proportional"):
+        found = []
+        for step in (1.0e-3, 5.0e-5):
+            run = plan_walk(replace(walk_plan(name), step=step))
+            rows = state_row_numbers(run)
+            states = run_batch(batch_of(run)).states[:, 0]
+            names = ("walk.slap_rates", "walk.push_off_work", "state.supplied_mass")
+            found.append([states[rows[item]] for item in names])
+        np.testing.assert_allclose(found[0], found[1], rtol=0.02)
+
+
+FAULTS = {
+    "lost": Fault(3.3, 0.0, 0.0),
+    "stuck high": Fault(3.3, 0.0, 900.0),
+    "out of range": Fault(3.3, 0.0, 9000.0),
+    "frozen while loaded": Fault(2.0 * STRIDE + 0.35, 1.0, 0.0),
+}
+LONGEST = 3.5 * STRIDE
+"""Time [s] within which every fault of a force sensor vents both chambers; a lost heel takes three strides to show."""
+
+
+@pytest.mark.parametrize("name", ["event_on_off", "event_proportional"])
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("sensor", ["heel", "toe"])
+def test_a_faulty_force_sensor_vents_both_chambers(
+    walked_with_fault: Callable[..., Any], name: str, sensor: str, fault: str
+) -> None:
+    walk = walked_with_fault(name, sensor, FAULTS[fault])
+    command = walk["result.command"]
+    after = walk.time > FAULTS[fault].time + LONGEST
+    assert (command[after] == VENT).all()
+    assert (command[walk.time < 2.0] != VENT).any(), "the device worked before"
+
+
+@pytest.mark.parametrize("name", ["event_on_off", "event_proportional"])
+@pytest.mark.parametrize(
+    "fault", [Fault(3.3, 0.0, 0.0), Fault(3.3, 0.0, 9.0), Fault(3.3, 1.0, 0.0)], ids=["zero", "nine", "frozen"]
+)
+def test_a_faulty_angle_sensor_vents_both_chambers(
+    walked_with_fault: Callable[..., Any], name: str, fault: Fault
+) -> None:
+    walk = walked_with_fault(name, "angle", fault)
+    after = walk.time > fault.time + STRIDE
+    assert (walk["result.command"][after] == VENT).all()
+
+
+@pytest.mark.parametrize("name", ["event_on_off", "event_proportional"])
+def test_a_device_without_fault_is_not_vented_for_good(walked_with_fault: Callable[..., Any], name: str) -> None:
+    walk = walked_with_fault(name, "heel", Fault(1.0e9, 0.0, 0.0))
+    assert walk["controller_state.safety.vented"][-1] == 0.0
