@@ -11,12 +11,12 @@ import numpy as np
 from ppafo.engine.lanes import Batch, BatchResult, run_batch
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, whole_and_rest
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.paths import with_numbers
 from ppafo.identification.trajectory.preparation import Floats, Prepared
 from ppafo.identification.trajectory.problem import Range
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.plant import plant_parameters
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.plan import exact_orifice, initial_state
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import FreeMotion

@@ -12,7 +12,7 @@ from ppafo.identification.trajectory.information import (
     inflation,
     loss_weights,
 )
-from ppafo.identification.trajectory.paths import broken_order, with_numbers
+from ppafo.identification.trajectory.paths import broken_order
 from ppafo.identification.trajectory.preparation import Floats, Measured, Prepared, prepare
 from ppafo.identification.trajectory.problem import Experiment, Range, TrajectoryProblem, ranges_of
 from ppafo.identification.trajectory.residuals import Residuals, coordinate_bounds, prior_coordinates
@@ -22,6 +22,7 @@ from ppafo.identification.trajectory.verdicts import Evidence, estimate_of
 from ppafo.parameters.device import Device
 from ppafo.signals.channels import CHANNELS
 from ppafo.signals.recording import Channel, Recording, RecordingKind
+from ppafo.simulation.numbers import with_numbers
 
 _MUCH = 1.5
 _TOGETHER = 0.2

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ppafo.engine.run import Run
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.paths import with_numbers
 from ppafo.identification.trajectory.problem import Experiment
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import FreeMotion, Scenario
 

@@ -6,13 +6,14 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.trajectory.information import cost_of, covariance, directions_for
-from ppafo.identification.trajectory.paths import full_path, with_numbers
+from ppafo.identification.trajectory.paths import full_path
 from ppafo.identification.trajectory.preparation import Floats, Prepared
 from ppafo.identification.trajectory.problem import Range
 from ppafo.identification.trajectory.residuals import Residuals, coordinate_bounds
 from ppafo.identification.trajectory.result import TrajectoryFit
 from ppafo.identification.trajectory.search import descend, is_at_bound
 from ppafo.identification.trajectory.verdicts import interval_factor
+from ppafo.simulation.numbers import with_numbers
 
 POINTS_PER_SIDE = 4
 REACH = 2.6
