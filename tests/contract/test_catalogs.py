@@ -1,17 +1,22 @@
 """Every entry of every catalogue keeps the contract of its kind."""
 
 import dataclasses
+import itertools
 import math
+import random
 
 import pytest
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.engine.lane_meters import TRACED
 from ppafo.engine.rows import numbers, rebuild
+from ppafo.metrics import METRICS, MetricKind
 from ppafo.model.plant import Openings
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveKind, ValveModel
+from ppafo.signals.channels import CHANNELS
 
 CATALOGS = [*CONTROLLERS.items(), *PROFILES.items(), *VALVES.items()]
 
@@ -103,3 +108,35 @@ def test_valve_states_survive_the_way_through_rows(name: str, model: ValveModel,
 def test_kinds_are_frozen() -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         VALVES["solenoid"].name = "other"  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("kind", VALVES.values(), ids=lambda kind: kind.name)
+def test_a_valve_chooses_its_model_by_which_settings_are_zero_and_by_nothing_else(kind: ValveKind) -> None:
+    draw = random.Random(kind.name)
+    for _ in range(200):
+        zeros = {item.name for item in kind.quantities if item.minimum == 0.0 and draw.random() < 0.5}
+        drawn = [
+            {item.name: 0.0 if item.name in zeros else draw.uniform(1e-6, item.maximum) for item in kind.quantities}
+            for _ in range(2)
+        ]
+        first, second = (kind.choose(settings) for settings in drawn)
+        assert first is second
+        assert [first.command_delay(settings) > 0.0 for settings in drawn] == [second.command_delay(drawn[1]) > 0.0] * 2
+
+
+@pytest.mark.parametrize("kind", PROFILES.values(), ids=lambda kind: kind.name)
+def test_a_profile_that_says_so_is_monotone(kind: ProfileKind) -> None:
+    draw = random.Random(kind.name)
+    turned = False
+    for _ in range(100):
+        drawn = [draw.uniform(max(item.minimum, -3.0), min(item.maximum, 3.0)) for item in kind.quantities]
+        values = [kind.value(kind.parameters(*drawn), 0.01 * step)[0] for step in range(700)]
+        changes = [later - earlier for earlier, later in itertools.pairwise(values)]
+        turned = turned or (min(changes) < -1e-12 and max(changes) > 1e-12)
+    assert turned != kind.is_monotone
+
+
+@pytest.mark.parametrize("kind", METRICS.values(), ids=lambda kind: kind.name)
+def test_metrics_need_channels_that_there_are(kind: MetricKind) -> None:
+    assert set(kind.channels) <= set(CHANNELS)
+    assert set(kind.traced) <= set(TRACED)

@@ -32,7 +32,8 @@ class ProfileKind:
 
     ``parameters`` is a NamedTuple class whose fields are the quantities in order; ``value(parameters, time)`` returns
     value, rate and second derivative at a time [s]; ``bounds(parameters)`` the lowest and highest value of all time.
-    A quantity with unit ``""`` takes the unit of what is prescribed.
+    A quantity with unit ``""`` takes the unit of what is prescribed. A profile that ``is_monotone`` only rises, only
+    falls or rests, so that both ends of a stretch of time have its extremes.
     """
 
     name: str
@@ -41,6 +42,7 @@ class ProfileKind:
     parameters: type
     value: Callable[..., Any]
     bounds: Callable[..., tuple[float, float]]
+    is_monotone: bool = False
 
 
 class PythonController(Protocol):

@@ -6,7 +6,7 @@ through the same instructions and no lane sees another.
 
 import os
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -31,13 +31,19 @@ VECTOR = 8
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Whole numbers that all runs of a batch share; delays are in steps, ``record_every`` 0 records nothing."""
+    """Whole numbers that all runs of a batch share; delays are in steps, ``record_every`` 0 records nothing.
+
+    ``measure_every`` is the number of steps between two samples of the meters; every ``trace_every`` steps, a multiple
+    of it, the traced channels are kept, 0 for never. Both are for programs that are metered, which record nothing.
+    """
 
     step_count: int
     steps_per_sample: int
     record_every: int
     signal_delay: int
     command_delay: int
+    measure_every: int = 1
+    trace_every: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +58,10 @@ class Batch:
 
 @dataclass(frozen=True, slots=True)
 class BatchResult:
-    """Final states (rows, runs) and records (records, rows, runs), the first at time 0 and the last at the end."""
+    """Final states (rows, runs) and records (records, rows, runs), the first at time 0 and the last at the end.
+
+    The records of a metered program are its traces, with a row for each traced channel.
+    """
 
     states: Floats
     record: Floats
@@ -66,30 +75,40 @@ def load_program(program: Program) -> ModuleType:
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
     """Run a batch on ``threads`` threads (all cores by default)."""
+    results: dict[int, BatchResult] = {}
+
+    def keep(runs: slice, result: BatchResult) -> None:
+        results[runs.start] = result
+
+    run_blocks(batch, keep, threads)
+    return joined([results[start] for start in sorted(results)])
+
+
+def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads: int | None = None) -> None:
+    """Run a batch block by block, and give each result away at once: ``take(runs, result)``, from several threads."""
     module = load_program(batch.program)
     runs = batch.states.shape[1]
     starts = range(0, runs, LANES)
     workers = min(len(starts), threads or os.cpu_count() or 1)
 
     waiting = iter(starts)
-    results: dict[int, BatchResult] = {}
     stop = threading.Event()
 
     def work() -> None:
         for start in waiting:
             if not stop.is_set():
-                results[start] = _run_block(module, batch, slice(start, min(start + LANES, runs)), stop)
+                block = slice(start, min(start + LANES, runs))
+                take(block, _run_block(module, batch, block, stop))
 
     if workers == 1:
         work()
-    else:
-        with ThreadPoolExecutor(workers) as pool:
-            try:
-                for done in [pool.submit(work) for _ in range(workers)]:
-                    done.result()
-            finally:
-                stop.set()
-    return joined([results[start] for start in starts])
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            for done in [pool.submit(work) for _ in range(workers)]:
+                done.result()
+        finally:
+            stop.set()
 
 
 def joined(results: Sequence[BatchResult]) -> BatchResult:
@@ -102,7 +121,8 @@ def joined(results: Sequence[BatchResult]) -> BatchResult:
 
 def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Event) -> BatchResult:
     """One block from beginning to end, in calls short enough for an interrupt to be seen between them."""
-    block = LaneBlock(module, batch.clock, batch.parameters[:, runs], batch.states[:, runs])
+    traced = len(batch.program.traced)
+    block = LaneBlock(module, batch.clock, batch.parameters[:, runs], batch.states[:, runs], traced)
     steps = batch.clock.step_count
     for done in range(0, steps, STEPS_PER_CALL):
         if stop.is_set():
@@ -114,7 +134,7 @@ def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Ev
 class LaneBlock:
     """Up to 32 runs in progress; ``states`` (rows, 32) may be read and written between two calls of ``advance``."""
 
-    def __init__(self, module: ModuleType, clock: Clock, parameters: Floats, states: Floats) -> None:
+    def __init__(self, module: ModuleType, clock: Clock, parameters: Floats, states: Floats, traced: int = 0) -> None:
         self._module = module
         self._clock = clock
         self._width = states.shape[1]
@@ -123,6 +143,8 @@ class LaneBlock:
         self.states = _filled(states)
         records = clock.step_count // clock.record_every + 1 if clock.record_every else 0
         self._record = np.empty((records, states.shape[0], self._width))
+        traces = clock.step_count // clock.trace_every + 1 if clock.trace_every else 0
+        self._trace = np.empty((traces, traced, self.states.shape[1]))
         self._signals = np.zeros((3, clock.signal_delay + 2, self.states.shape[1]))
         self._commands = np.zeros((clock.command_delay + 2, self.states.shape[1]))
 
@@ -135,10 +157,14 @@ class LaneBlock:
             self._signals,
             self._commands,
             self._record,
+            self._trace,
             self._next_step,
             step_count,
+            clock.step_count,
             clock.steps_per_sample,
             clock.record_every,
+            clock.measure_every,
+            clock.trace_every,
             clock.signal_delay,
             clock.command_delay,
         )
@@ -158,7 +184,8 @@ class LaneBlock:
         clock = self._clock
         if clock.record_every and self._next_step % clock.record_every == 0:
             self._record[self._next_step // clock.record_every] = self.states[:, : self._width]
-        return BatchResult(self.states[:, : self._width].copy(), self._record)
+        record = self._trace[:, :, : self._width] if clock.trace_every else self._record
+        return BatchResult(self.states[:, : self._width].copy(), record)
 
 
 def _filled(columns: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple, get_type_hints
 
+from ppafo.control.controllers import constant as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import constant
 from ppafo.engine.scheme.motion import FreeStep, LedStep
@@ -15,6 +16,7 @@ from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
+from ppafo.signals.meter import Course, MeterKind
 
 
 class LaneTiming(NamedTuple):
@@ -46,7 +48,8 @@ class Program:
     ``late_commands`` True adds a dead time before the valve; a step is then done in two parts, before and after the
     instant at which a command arrives, each with valve parameters of its own length. ``is_thermal`` True gives the
     gas an energy balance instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose
-    foot is free or where the ground and a gait lead it (``angle`` is None then).
+    foot is free or where the ground and a gait lead it (``angle`` is None then). ``meters`` are updated at every
+    sample that a recording would have, ``traced`` names channels that are kept at some of them.
     """
 
     valve: ValveModel
@@ -57,6 +60,8 @@ class Program:
     late_commands: bool
     is_thermal: bool = False
     walks: bool = False
+    meters: tuple[MeterKind, ...] = ()
+    traced: tuple[str, ...] = ()
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
@@ -83,7 +88,29 @@ class Program:
             "valve_state": self.valve.state,
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
             **({"walk": WalkState, "gait_seen": GaitSeen} if self.walks else {}),
+            "course": Course if self.follows_reference else NoParameters,
+            **{group: kind.state for group, kind in self.meter_groups.items()},
         }
+
+    @property
+    def meter_groups(self) -> dict[str, MeterKind]:
+        """Meters by the name of their group of state rows."""
+        return {f"{kind.name}_meter": kind for kind in self.meters}
+
+    @property
+    def is_metered(self) -> bool:
+        """True where there is something to do at a sample beside control."""
+        return bool(self.meters or self.traced)
+
+    @property
+    def has_reference(self) -> bool:
+        """True where the controller follows a reference; a constant command follows none."""
+        return self.controller is not constant_controller.KIND
+
+    @property
+    def follows_reference(self) -> bool:
+        """True where a meter needs to know the course of the reference."""
+        return any(kind.needs_course for kind in self.meters)
 
     @property
     def is_held(self) -> bool:

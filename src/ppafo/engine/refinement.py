@@ -5,13 +5,15 @@ the first time and 1/10 of a radian of the second keeps the error of the scheme 
 of the pressure range (docs/decisions/0002).
 """
 
-import math
+import numpy as np
 
+from ppafo.model.columns import larger, root, smaller, whole
 from ppafo.model.plant import PlantParameters, chamber_volumes
 
 STEPS_PER_FILLING = 70.0
 RADIANS_PER_STEP = 0.1
 MOST_DIVISIONS = 1000
+UNCOUNTABLE = 1.0e15
 
 
 def filling_time(plant: PlantParameters, volume: float) -> float:
@@ -21,9 +23,10 @@ def filling_time(plant: PlantParameters, volume: float) -> float:
 
 def gas_spring_frequency(plant: PlantParameters, volume: float) -> float:
     """Angular frequency [rad/s] of the vane on the gas of one chamber at the highest pressure."""
-    pressure = max(plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure)
+    supplied = larger(plant.supply_pressure, plant.dorsiflexion_pressure)
+    pressure = larger(supplied, plant.atmospheric_pressure)
     stiffness = plant.torque_constant * pressure * plant.volume_per_angle / volume
-    return math.sqrt(stiffness / plant.inertia)
+    return root(stiffness / plant.inertia)  # type: ignore[no-any-return]
 
 
 def divisions(
@@ -32,11 +35,11 @@ def divisions(
     """Number of parts [-] into which a step [s] is divided for a vane that stays between two angles [rad].
 
     ``stiffness`` [-] is how much stiffer than at constant temperature the gas is: 1, or the heat capacity ratio, by
-    which adiabatic chambers also fill faster.
+    which adiabatic chambers also fill faster. Any of the numbers may be an array (runs,), and the result is one then.
     """
-    volume = min(chamber_volumes(plant, lowest_angle)[0], chamber_volumes(plant, highest_angle)[1])
+    volume = smaller(chamber_volumes(plant, lowest_angle)[0], chamber_volumes(plant, highest_angle)[1])
     parts = step * STEPS_PER_FILLING * stiffness / filling_time(plant, volume)
     if is_free:
-        spring = gas_spring_frequency(plant, volume) * math.sqrt(stiffness)
-        parts = max(parts, step * spring / RADIANS_PER_STEP)
-    return max(1, math.ceil(parts - 1e-9))
+        spring = gas_spring_frequency(plant, volume) * root(stiffness)
+        parts = larger(parts, step * spring / RADIANS_PER_STEP)
+    return whole(np.clip(np.ceil(parts - 1e-9), 1.0, UNCOUNTABLE))  # type: ignore[no-any-return]

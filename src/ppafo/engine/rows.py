@@ -1,6 +1,6 @@
 """How NamedTuples of floats lie in the rows of a lane block: one row for each number, nested ones flattened."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -37,17 +37,36 @@ def row_expression(row: type, path: str, cells: dict[str, str], name_of: Callabl
     return f"{name_of(row)}({', '.join(inner)})"
 
 
-def numbers(row: Any) -> list[float]:
-    """All numbers of a NamedTuple, in the order of ``leaf_paths``."""
-    flat: list[float] = []
+def leaves(row: Any) -> list[Any]:
+    """All numbers of a NamedTuple, floats or arrays (runs,), in the order of ``leaf_paths``."""
+    flat: list[Any] = []
     for value in row:
-        flat += numbers(value) if isinstance(value, tuple) else [float(value)]
+        flat += leaves(value) if isinstance(value, tuple) else [value]
     return flat
+
+
+def numbers(row: Any) -> list[float]:
+    """All numbers of a NamedTuple of floats, in the order of ``leaf_paths``."""
+    return [float(value) for value in leaves(row)]
+
+
+def table(groups: Sequence[Any], runs: int) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
+    """Rows (numbers, runs) of some NamedTuples whose numbers are floats, the same for all runs, or arrays (runs,)."""
+    flat = [value for group in groups for value in leaves(group)]
+    rows = np.empty((len(flat), runs))
+    for row, value in zip(rows, flat, strict=True):
+        row[:] = value
+    return rows
 
 
 def rebuild(row: type, values: "np.ndarray[Any, Any] | list[float]") -> Any:
     """The NamedTuple whose numbers are ``values``; the inverse of ``numbers``."""
-    return _rebuild(row, iter([float(value) for value in values]))
+    return rebuilt(row, [float(value) for value in values])
+
+
+def rebuilt(row: type, values: Iterable[Any]) -> Any:
+    """The NamedTuple whose numbers, floats or arrays, are ``values``; the inverse of ``leaves``."""
+    return _rebuild(row, iter(values))
 
 
 def _rebuild(row: type, values: Any) -> Any:

@@ -5,17 +5,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Batch, BatchResult, Clock, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
-from ppafo.engine.rows import numbers
+from ppafo.engine.rows import table
 from ppafo.engine.scheme.walking import DeviceShare, WalkState
+from ppafo.model.columns import larger, whole
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.sensors import SensorParameters
+
+Members = NDArray[np.intp]
 
 NEVER_FAILED = 1.0e300
 WHOLE = 1.0e-9
@@ -39,7 +43,8 @@ class Run:
 
     ``step`` divides ``period`` (of the controller). ``valve``, ``controller``, ``reference`` and ``path`` are the
     parameters of the program's pieces, () where it has none; ``early_valve`` are those of the valve for the part of a
-    step before a late command arrives, and ``valve`` those for the part after it. Delays are in seconds.
+    step before a late command arrives, and ``valve`` those for the part after it. Delays are in seconds. Where one
+    ``Run`` stands for an ensemble, any number in it, whole ones too, may be an array (runs,).
     """
 
     program: Program
@@ -69,27 +74,46 @@ class Run:
 
 
 def whole_and_rest(delay: float, step: float) -> tuple[int, float]:
-    """Whole steps in a delay [s] and the rest as a share of a step."""
+    """Whole steps in a delay [s] and the rest as a share of a step; either may be an array (runs,)."""
     steps = delay / step
-    whole = int(np.floor(steps + WHOLE))
-    return whole, max(0.0, steps - whole)
+    complete = whole(np.floor(steps + WHOLE))
+    return complete, larger(0.0, steps - complete)
 
 
 def batch_of(run: Run) -> Batch:
     """The run as a batch of one, for the lanes."""
+    return batches_of(run, 1)[0][1]
+
+
+def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
+    """Batches of ``runs`` runs of one program, those of one clock together, each with the places of its runs.
+
+    Any number in ``run`` may be an array (runs,), one for each run.
+    """
     program = run.program
     command_steps, command_lag = whole_and_rest(run.command_delay, run.step)
     signal_steps, signal_lag = whole_and_rest(run.signal_delay, run.step)
-    clock = Clock(run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     timing = LaneTiming(run.step, run.period, command_lag, signal_lag)
     plant, valve = [run.plant, run.thermal], [run.valve, run.early_valve]
     walk, walk_states = _walk_groups(run.walk)
-    parameters = [timing, *plant, *valve, run.controller, run.reference, run.path, run.sensors, *walk]
+    rest = [run.controller, run.reference, run.path, run.sensors, *walk]
+    parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
     masses = ThermalState(run.initial.mass_1, run.initial.mass_2) if program.is_thermal else NoParameters()
-    states = [LaneResult(0.0, NEVER_FAILED), run.initial, masses, program.valve.initial(), controller_state]
-    return Batch(program, clock, _column(parameters), _column([*states, *walk_states]))
+    result = LaneResult(0.0, NEVER_FAILED)
+    states = table([result, run.initial, masses, program.valve.initial(), controller_state, *walk_states], runs)
+    counts = np.empty((runs, 5), dtype=np.int64)
+    wholes = (run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
+    for column, count in enumerate(wholes):
+        counts[:, column] = count
+    if (counts == counts[0]).all():
+        return [(np.arange(runs), Batch(program, Clock(*counts[0].tolist()), parameters, states))]
+    clocks, group = np.unique(counts, axis=0, return_inverse=True)
+    return [
+        (members, Batch(program, Clock(*clock.tolist()), parameters[:, members], states[:, members]))
+        for clock, members in zip(clocks, _members(group.reshape(-1), len(clocks)), strict=True)
+    ]
 
 
 def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:
@@ -98,6 +122,12 @@ def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:
         return [], []
     parameters = [walk.leg, walk.share, walk.gait, walk.timing, walk.sensors]
     return parameters, [walk.initial, GaitSeen(0.0, 0.0, 0.0)]
+
+
+def _members(group: Members, groups: int) -> list[Members]:
+    """Places of the runs of each group, in order."""
+    order = np.argsort(group, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(group, minlength=groups))[:-1])
 
 
 def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchResult]:
@@ -115,7 +145,3 @@ def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchR
             one = slice(column, column + 1)
             results[index] = BatchResult(joint.states[:, one], joint.record[:, :, one])
     return [results[index] for index in range(len(runs))]
-
-
-def _column(groups: list[Any]) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
-    return np.array([number for group in groups for number in numbers(group)])[:, None]

@@ -1,9 +1,12 @@
 """Gas and work: what a task costs, and what it gives."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ppafo.metrics.metric import MetricKind
+from ppafo.metrics.metric import Floats, MetricKind, Readings
 from ppafo.signals import Recording
+from ppafo.signals.meter import Course, MeterKind, Sample
 
 
 def _gain(recording: Recording, name: str) -> float:
@@ -51,14 +54,137 @@ def work_per_gas(recording: Recording) -> float | None:
     return mechanical_work(recording) / gas if gas > 0.0 else None
 
 
+def gas_per_work(recording: Recording) -> float | None:
+    """Gas taken from the supply per mechanical work [kg/J]; None where the actuator gave no work."""
+    work = mechanical_work(recording)
+    return gas_supplied(recording) / work if work > 0.0 else None
+
+
+class LargestPressure(NamedTuple):
+    """Largest pressure in either chamber [Pa absolute]."""
+
+    pressure: float
+
+
+def start_largest_pressure(course: Course, sample: Sample) -> LargestPressure:
+    """The larger pressure of the first sample."""
+    return LargestPressure(max(sample.pressure_1, sample.pressure_2))
+
+
+def update_largest_pressure(state: LargestPressure, course: Course, sample: Sample) -> LargestPressure:
+    """The larger one of that and both pressures of the next sample."""
+    return LargestPressure(max(state.pressure, sample.pressure_1, sample.pressure_2))
+
+
+LARGEST_PRESSURE = MeterKind("largest_pressure", LargestPressure, start_largest_pressure, update_largest_pressure)
+
+
+class Work(NamedTuple):
+    """Torque [N m] and angle [rad] of the last sample, work so far [J]."""
+
+    torque: float
+    angle: float
+    work: float
+
+
+def start_work(course: Course, sample: Sample) -> Work:
+    """No work at the first sample."""
+    return Work(sample.torque, sample.angle, 0.0)
+
+
+def update_work(state: Work, course: Course, sample: Sample) -> Work:
+    """One interval more, by the trapezoidal rule over the angle."""
+    piece = 0.5 * (state.torque + sample.torque) * (sample.angle - state.angle)
+    return Work(sample.torque, sample.angle, state.work + piece)
+
+
+WORK = MeterKind("work", Work, start_work, update_work, of_motion=True)
+
+
+def read_gas_imbalance(readings: Readings) -> Floats:
+    """``gas_imbalance`` [kg]."""
+    stored = readings.gains["mass_1"] + readings.gains["mass_2"]
+    return readings.gains["supplied_mass"] - readings.gains["vented_mass"] - stored
+
+
+def read_largest_pressure(readings: Readings) -> Floats:
+    """``largest_pressure`` [Pa absolute]."""
+    pressure: Floats = readings.meters[LARGEST_PRESSURE.name].pressure
+    return pressure
+
+
+def read_mechanical_work(readings: Readings) -> Floats:
+    """``mechanical_work`` [J]."""
+    work: Floats = readings.meters[WORK.name].work
+    return work
+
+
+def read_work_per_gas(readings: Readings) -> Floats:
+    """``work_per_gas`` [J/kg]."""
+    return _ratio(read_mechanical_work(readings), readings.gains["supplied_mass"])
+
+
+def read_gas_per_work(readings: Readings) -> Floats:
+    """``gas_per_work`` [kg/J]."""
+    return _ratio(readings.gains["supplied_mass"], read_mechanical_work(readings))
+
+
+def _ratio(above: Floats, below: Floats) -> Floats:
+    """One over the other; nan where the other is not above 0."""
+    return above / np.where(below > 0.0, below, np.nan)
+
+
 _BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
+_MOTION = ("torque", "angle")
+_EFFORT = ("torque", "angle", "supplied_mass")
+_PRESSURES = ("pressure_1", "pressure_2")
 
 METRICS = (
-    MetricKind("gas_supplied", "kg", "gas taken from the supply", ("supplied_mass",), gas_supplied),
-    MetricKind("gas_vented", "kg", "gas let out to the atmosphere", ("vented_mass",), gas_vented),
-    MetricKind("gas_leaked", "kg", "gas leaked past the vane, either way", ("leaked_mass",), gas_leaked),
-    MetricKind("gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance),
-    MetricKind("largest_pressure", "Pa", "largest absolute pressure", ("pressure_1", "pressure_2"), largest_pressure),
-    MetricKind("mechanical_work", "J", "work of the actuator on the vane", ("torque", "angle"), mechanical_work),
-    MetricKind("work_per_gas", "J/kg", "work per supplied gas", ("torque", "angle", "supplied_mass"), work_per_gas),
+    MetricKind(
+        "gas_supplied",
+        "kg",
+        "gas taken from the supply",
+        ("supplied_mass",),
+        gas_supplied,
+        lambda readings: readings.gains["supplied_mass"],
+    ),
+    MetricKind(
+        "gas_vented",
+        "kg",
+        "gas let out to the atmosphere",
+        ("vented_mass",),
+        gas_vented,
+        lambda readings: readings.gains["vented_mass"],
+    ),
+    MetricKind(
+        "gas_leaked",
+        "kg",
+        "gas leaked past the vane, either way",
+        ("leaked_mass",),
+        gas_leaked,
+        lambda readings: readings.gains["leaked_mass"],
+    ),
+    MetricKind(
+        "gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance, read_gas_imbalance
+    ),
+    MetricKind(
+        "largest_pressure",
+        "Pa",
+        "largest absolute pressure",
+        _PRESSURES,
+        largest_pressure,
+        read_largest_pressure,
+        (LARGEST_PRESSURE,),
+    ),
+    MetricKind(
+        "mechanical_work",
+        "J",
+        "work of the actuator on the vane",
+        _MOTION,
+        mechanical_work,
+        read_mechanical_work,
+        (WORK,),
+    ),
+    MetricKind("work_per_gas", "J/kg", "work per supplied gas", _EFFORT, work_per_gas, read_work_per_gas, (WORK,)),
+    MetricKind("gas_per_work", "kg/J", "supplied gas per work", _EFFORT, gas_per_work, read_gas_per_work, (WORK,)),
 )

@@ -1,9 +1,16 @@
 """What a metric declares of itself, and what it gives."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.signals import Recording
+from ppafo.signals.meter import Course, MeterKind
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,11 +23,29 @@ class Metric:
 
 
 @dataclass(frozen=True, slots=True)
+class Readings:
+    """What is left of runs that were metered and not recorded; every number is an array (runs,).
+
+    ``meters`` has the last state of each meter by its name; ``course`` that of the reference, None without one;
+    ``interval`` is the time between two samples [s] and ``samples`` their number; ``gains`` has the last less the first
+    value of channels; ``traces`` has channels sample by sample (samples, runs).
+    """
+
+    meters: Mapping[str, Any]
+    course: Course | None
+    interval: Floats
+    samples: int
+    gains: Mapping[str, Floats]
+    traces: Mapping[str, Floats]
+
+
+@dataclass(frozen=True, slots=True)
 class MetricKind:
     """A metric in the catalogue: the channels it needs, and a pure function that gives the value.
 
     ``compute(recording)`` returns None where the recording has the channels but not what the metric is about, for
-    example no hold for the error on the hold.
+    example no hold for the error on the hold. ``read(readings)`` returns the same for many runs (runs,), nan in place
+    of None, from the meters in ``meters`` and the traces of the channels in ``traced``.
     """
 
     name: str
@@ -28,3 +53,6 @@ class MetricKind:
     summary: str
     channels: tuple[str, ...]
     compute: Callable[[Recording], float | None]
+    read: Callable[[Readings], Floats]
+    meters: tuple[MeterKind, ...] = ()
+    traced: tuple[str, ...] = ()

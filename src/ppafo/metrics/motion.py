@@ -1,9 +1,12 @@
 """How the vane moves."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ppafo.metrics.metric import MetricKind
+from ppafo.metrics.metric import Floats, MetricKind, Readings
 from ppafo.signals import Recording
+from ppafo.signals.meter import Course, MeterKind, Sample
 
 TRAVEL_SHARE = 0.01
 """A move has begun when this share of its travel is done, and has arrived when this share is left."""
@@ -41,9 +44,114 @@ def arrival_time(recording: Recording) -> float | None:
     return _time_of_share(recording, 1.0 - TRAVEL_SHARE)
 
 
+class AngleRange(NamedTuple):
+    """Smallest and largest angle [rad]."""
+
+    smallest: float
+    largest: float
+
+
+def start_angle_range(course: Course, sample: Sample) -> AngleRange:
+    """The angle of the first sample, twice."""
+    return AngleRange(sample.angle, sample.angle)
+
+
+def update_angle_range(state: AngleRange, course: Course, sample: Sample) -> AngleRange:
+    """The range with the next sample in it."""
+    return AngleRange(min(state.smallest, sample.angle), max(state.largest, sample.angle))
+
+
+ANGLE_RANGE = MeterKind("angle_range", AngleRange, start_angle_range, update_angle_range, of_motion=True)
+
+
+class LargestSpeed(NamedTuple):
+    """Largest absolute angular velocity [rad/s]."""
+
+    speed: float
+
+
+def start_largest_speed(course: Course, sample: Sample) -> LargestSpeed:
+    """The speed of the first sample."""
+    return LargestSpeed(abs(sample.angular_velocity))
+
+
+def update_largest_speed(state: LargestSpeed, course: Course, sample: Sample) -> LargestSpeed:
+    """The larger one of that and the speed of the next sample."""
+    return LargestSpeed(max(state.speed, abs(sample.angular_velocity)))
+
+
+LARGEST_SPEED = MeterKind("largest_speed", LargestSpeed, start_largest_speed, update_largest_speed, of_motion=True)
+
+
+def read_angle_range(readings: Readings) -> Floats:
+    """``angle_range`` [rad]."""
+    state = readings.meters[ANGLE_RANGE.name]
+    return np.asarray(state.largest - state.smallest)
+
+
+def read_largest_speed(readings: Readings) -> Floats:
+    """``largest_speed`` [rad/s]."""
+    speed: Floats = readings.meters[LARGEST_SPEED.name].speed
+    return speed
+
+
+def _read_time_of_share(readings: Readings, share: float) -> Floats:
+    """As ``_time_of_share``, of traces (samples, runs): the last angle must be known before the first can be judged."""
+    travelled = readings.traces["angle"] - readings.traces["angle"][0]
+    moves = np.abs(travelled[-1]) >= _STANDSTILL
+    done = travelled / np.where(moves, travelled[-1], np.nan)
+    after = np.argmax(done >= share, axis=0)
+    runs = np.arange(after.size)
+    before, reached = done[after - 1, runs], done[after, runs]
+    part = (share - before) / (reached - before)
+    return np.asarray((after - 1 + part) * readings.interval)
+
+
+def read_departure_time(readings: Readings) -> Floats:
+    """``departure_time`` [s]."""
+    return _read_time_of_share(readings, TRAVEL_SHARE)
+
+
+def read_arrival_time(readings: Readings) -> Floats:
+    """``arrival_time`` [s]."""
+    return _read_time_of_share(readings, 1.0 - TRAVEL_SHARE)
+
+
 METRICS = (
-    MetricKind("angle_range", "rad", "largest angle less smallest angle", ("angle",), angle_range),
-    MetricKind("largest_speed", "rad/s", "largest angular velocity, either way", ("angular_velocity",), largest_speed),
-    MetricKind("departure_time", "s", "time at which 1 % of the move is done", ("angle",), departure_time),
-    MetricKind("arrival_time", "s", "time at which 99 % of the move is done", ("angle",), arrival_time),
+    MetricKind(
+        "angle_range",
+        "rad",
+        "largest angle less smallest angle",
+        ("angle",),
+        angle_range,
+        read_angle_range,
+        (ANGLE_RANGE,),
+    ),
+    MetricKind(
+        "largest_speed",
+        "rad/s",
+        "largest angular velocity, either way",
+        ("angular_velocity",),
+        largest_speed,
+        read_largest_speed,
+        (LARGEST_SPEED,),
+    ),
+    MetricKind(
+        "departure_time",
+        "s",
+        "time at which 1 % of the move is done",
+        ("angle",),
+        departure_time,
+        read_departure_time,
+        traced=("angle",),
+    ),
+    MetricKind(
+        "arrival_time",
+        "s",
+        "time at which 99 % of the move is done",
+        ("angle",),
+        arrival_time,
+        read_arrival_time,
+        traced=("angle",),
+    ),
 )

@@ -2,15 +2,15 @@
 
 import numpy as np
 
+from ppafo.metrics.metric import Floats, Readings
 from ppafo.signals import Recording
-
-_SAME_LEVEL = 1.0e-9
+from ppafo.signals.meter import SAME_LEVEL
 
 
 def hold_start(recording: Recording) -> float | None:
     """Return the time [s] from which on the reference stays at its final level; None where it never rests there."""
     reference = recording["reference"]
-    tolerance = _SAME_LEVEL * float(np.max(np.abs(reference)))
+    tolerance = SAME_LEVEL * float(np.max(np.abs(reference)))
     away = np.flatnonzero(np.abs(reference - reference[-1]) > tolerance)
     first = int(away[-1]) + 1 if away.size else 0
     return float(recording.time[first]) if len(recording) - first >= 2 else None
@@ -28,3 +28,13 @@ def hold(recording: Recording) -> Recording | None:
     """Return the recording from where the reference stays at its final level; None where it never does."""
     start = hold_start(recording)
     return None if start is None else recording.between(start, float(recording.time[-1]))
+
+
+def spans(readings: Readings) -> tuple[Floats, Floats]:
+    """Samples before the hold and intervals on it, of runs that were metered; nan where there is no such part."""
+    if readings.course is None:
+        raise ValueError("no meter that needs the reference was asked for")
+    start = np.asarray(readings.course.hold_start)
+    length = readings.samples - 1 - start
+    has_hold = length >= 1.0
+    return np.where(has_hold & (start > 0.0), start, np.nan), np.where(has_hold, length, np.nan)

@@ -1,11 +1,13 @@
 """How restless a task is: switchings of the valve and oscillations of the torque."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ppafo.metrics.metric import MetricKind
-from ppafo.metrics.phases import hold, ramp
+from ppafo.metrics.metric import Floats, MetricKind, Readings
+from ppafo.metrics.phases import hold, ramp, spans
 from ppafo.signals import Recording
-from ppafo.signals.recording import Floats
+from ppafo.signals.meter import Course, MeterKind, Sample, starts_hold
 
 OSCILLATION_THRESHOLD = 0.05
 """Smallest swing that counts as an oscillation, as a share of the largest absolute reference."""
@@ -56,10 +58,134 @@ def oscillations_hold(recording: Recording) -> float | None:
     return _oscillations(recording, hold(recording))
 
 
+class Switchings(NamedTuple):
+    """Last command that was not 0, and changes of sign so far."""
+
+    command: float
+    changes: float
+
+
+def start_switchings(course: Course, sample: Sample) -> Switchings:
+    """No change at the first sample."""
+    return Switchings(sample.command, 0.0)
+
+
+def update_switchings(state: Switchings, course: Course, sample: Sample) -> Switchings:
+    """One more where the command has the other sign."""
+    was, now = state.command, sample.command
+    differs = (was > 0.0 and now < 0.0) or (was < 0.0 and now > 0.0)
+    return Switchings(now if now != 0.0 else was, state.changes + (1.0 if differs else 0.0))
+
+
+SWITCHINGS = MeterKind("switchings", Switchings, start_switchings, update_switchings)
+
+
+class Swing(NamedTuple):
+    """State of ``reversals``, in three numbers.
+
+    ``play`` follows the signal with a slack of one swing, between it and one swing below it: it moves only where the
+    signal has gone on, or has turned back by more. ``turns`` is above 0 while the signal rises and below 0 while it
+    falls; its size is 1 more than the number of reversals. It begins at UNDECIDED, from which a first way up leads to a
+    size between 1 and 2, which is no reversal yet; a first way down leads to -1. ``highest`` is the highest value.
+    """
+
+    play: float
+    turns: float
+    highest: float
+
+
+UNDECIDED = -0.5
+
+
+def swung(state: Swing, value: float, swing: float) -> Swing:
+    """The state after one value more."""
+    play = min(max(state.play, value - swing), value)
+    turns_back = (play - state.play) * state.turns < 0.0
+    turned = -state.turns + (1.0 if state.turns < 0.0 else -1.0)
+    falls_first = state.turns == UNDECIDED and value < state.highest - swing
+    turns = turned if turns_back else state.turns
+    return Swing(play, -1.0 if falls_first else turns, max(state.highest, value))
+
+
+def count_of(turns: Floats) -> Floats:
+    """Number of reversals from ``Swing.turns`` (runs,)."""
+    return np.maximum(np.floor(np.abs(turns) - 1.0), 0.0)
+
+
+class Oscillations(NamedTuple):
+    """The swing on the ramp, then on the hold; its ``turns`` on the ramp once there is a hold."""
+
+    swing: Swing
+    turns_on_ramp: float
+
+
+def start_oscillations(course: Course, sample: Sample) -> Oscillations:
+    """No reversal at the first sample."""
+    return Oscillations(Swing(sample.torque, UNDECIDED, sample.torque), UNDECIDED)
+
+
+def update_oscillations(state: Oscillations, course: Course, sample: Sample) -> Oscillations:
+    """One sample more; the first one of the hold is the last one of the ramp too."""
+    torque = sample.torque
+    swing = swung(state.swing, torque, OSCILLATION_THRESHOLD * course.largest)
+    anew = starts_hold(course, sample)
+    begun = Swing(torque if anew else swing.play, UNDECIDED if anew else swing.turns, torque if anew else swing.highest)
+    return Oscillations(begun, swing.turns if anew else state.turns_on_ramp)
+
+
+OSCILLATIONS = MeterKind("oscillations", Oscillations, start_oscillations, update_oscillations, True)
+
+
+def read_switchings(readings: Readings) -> Floats:
+    """``switchings``."""
+    changes: Floats = readings.meters[SWITCHINGS.name].changes
+    return changes
+
+
+def read_oscillations_ramp(readings: Readings) -> Floats:
+    """``oscillations_ramp``."""
+    return _where_swinging(readings, spans(readings)[0], count_of(readings.meters[OSCILLATIONS.name].turns_on_ramp))
+
+
+def read_oscillations_hold(readings: Readings) -> Floats:
+    """``oscillations_hold``."""
+    return _where_swinging(readings, spans(readings)[1], count_of(readings.meters[OSCILLATIONS.name].swing.turns))
+
+
+def _where_swinging(readings: Readings, span: Floats, count: Floats) -> Floats:
+    """The count; nan without that part of the task or without a reference to measure against."""
+    largest = 0.0 if readings.course is None else readings.course.largest
+    return np.where(np.isfinite(span) & (np.asarray(largest) != 0.0), count, np.nan)
+
+
 _REVERSALS = "torque reversals of more than 5 % of the largest reference"
 
 METRICS = (
-    MetricKind("switchings", "-", "changes of sign of the command", ("command",), switchings),
-    MetricKind("oscillations_ramp", "-", f"{_REVERSALS}, on the ramp", _NEEDED, oscillations_ramp),
-    MetricKind("oscillations_hold", "-", f"{_REVERSALS}, on the hold", _NEEDED, oscillations_hold),
+    MetricKind(
+        "switchings",
+        "-",
+        "changes of sign of the command",
+        ("command",),
+        switchings,
+        read_switchings,
+        (SWITCHINGS,),
+    ),
+    MetricKind(
+        "oscillations_ramp",
+        "-",
+        f"{_REVERSALS}, on the ramp",
+        _NEEDED,
+        oscillations_ramp,
+        read_oscillations_ramp,
+        (OSCILLATIONS,),
+    ),
+    MetricKind(
+        "oscillations_hold",
+        "-",
+        f"{_REVERSALS}, on the hold",
+        _NEEDED,
+        oscillations_hold,
+        read_oscillations_hold,
+        (OSCILLATIONS,),
+    ),
 )

@@ -1,10 +1,13 @@
 """How well the torque follows its reference."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ppafo.metrics.metric import MetricKind
-from ppafo.metrics.phases import hold, ramp
+from ppafo.metrics.metric import Floats, MetricKind, Readings
+from ppafo.metrics.phases import hold, ramp, spans
 from ppafo.signals import Recording
+from ppafo.signals.meter import Course, MeterKind, Sample, ends_before_hold
 
 _NEEDED = ("torque", "reference")
 
@@ -32,9 +35,90 @@ def peak_error(recording: Recording) -> float:
     return float(np.max(np.abs(recording["reference"] - recording["torque"])))
 
 
+class SquaredError(NamedTuple):
+    """Squared error at the last sample [N^2 m^2]; trapezoidal sums of it before the hold and on it, one a sample."""
+
+    last: float
+    before_hold: float
+    on_hold: float
+
+
+def start_squared_error(course: Course, sample: Sample) -> SquaredError:
+    """The squared error of the first sample."""
+    error = sample.reference - sample.torque
+    return SquaredError(error * error, 0.0, 0.0)
+
+
+def update_squared_error(state: SquaredError, course: Course, sample: Sample) -> SquaredError:
+    """One interval more."""
+    error = sample.reference - sample.torque
+    square = error * error
+    piece = 0.5 * (state.last + square)
+    is_before = ends_before_hold(course, sample)
+    return SquaredError(
+        square,
+        state.before_hold + (piece if is_before else 0.0),
+        state.on_hold + (0.0 if is_before else piece),
+    )
+
+
+SQUARED_ERROR = MeterKind("squared_error", SquaredError, start_squared_error, update_squared_error, True)
+
+
+class PeakError(NamedTuple):
+    """Largest absolute error [N m]."""
+
+    error: float
+
+
+def start_peak_error(course: Course, sample: Sample) -> PeakError:
+    """The error of the first sample."""
+    return PeakError(abs(sample.reference - sample.torque))
+
+
+def update_peak_error(state: PeakError, course: Course, sample: Sample) -> PeakError:
+    """The larger one of that and the error of the next sample."""
+    return PeakError(max(state.error, abs(sample.reference - sample.torque)))
+
+
+PEAK_ERROR = MeterKind("peak_error", PeakError, start_peak_error, update_peak_error)
+
+
+def read_rms_error(readings: Readings) -> Floats:
+    """``rms_error`` [N m]."""
+    squares = readings.meters[SQUARED_ERROR.name]
+    return np.asarray(np.sqrt((squares.before_hold + squares.on_hold) / (readings.samples - 1)))
+
+
+def read_rms_error_ramp(readings: Readings) -> Floats:
+    """``rms_error_ramp`` [N m]."""
+    start, _ = spans(readings)
+    return np.asarray(np.sqrt(readings.meters[SQUARED_ERROR.name].before_hold / start))
+
+
+def read_rms_error_hold(readings: Readings) -> Floats:
+    """``rms_error_hold`` [N m]."""
+    _, length = spans(readings)
+    return np.asarray(np.sqrt(readings.meters[SQUARED_ERROR.name].on_hold / length))
+
+
+def read_peak_error(readings: Readings) -> Floats:
+    """``peak_error`` [N m]."""
+    error: Floats = readings.meters[PEAK_ERROR.name].error
+    return error
+
+
+_RMS = "root-mean-square torque error"
+
 METRICS = (
-    MetricKind("rms_error", "N m", "root-mean-square torque error", _NEEDED, rms_error),
-    MetricKind("rms_error_ramp", "N m", "root-mean-square torque error on the ramp", _NEEDED, rms_error_ramp),
-    MetricKind("rms_error_hold", "N m", "root-mean-square torque error on the hold", _NEEDED, rms_error_hold),
-    MetricKind("peak_error", "N m", "largest torque error, either sign", _NEEDED, peak_error),
+    MetricKind("rms_error", "N m", _RMS, _NEEDED, rms_error, read_rms_error, (SQUARED_ERROR,)),
+    MetricKind(
+        "rms_error_ramp", "N m", f"{_RMS} on the ramp", _NEEDED, rms_error_ramp, read_rms_error_ramp, (SQUARED_ERROR,)
+    ),
+    MetricKind(
+        "rms_error_hold", "N m", f"{_RMS} on the hold", _NEEDED, rms_error_hold, read_rms_error_hold, (SQUARED_ERROR,)
+    ),
+    MetricKind(
+        "peak_error", "N m", "largest torque error, either sign", _NEEDED, peak_error, read_peak_error, (PEAK_ERROR,)
+    ),
 )

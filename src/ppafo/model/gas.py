@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from ppafo.model.columns import over_runs, root
+
 
 @dataclass(frozen=True, slots=True)
 class Species:
@@ -34,14 +36,21 @@ def specific_gas_constant(universal_gas_constant: float, molar_mass: float) -> f
 
 def critical_pressure_ratio(heat_capacity_ratio: float) -> float:
     """Downstream over upstream pressure [-] at and below which flow is choked; the inverse of the paper's 1.832."""
-    k = heat_capacity_ratio
+    return over_runs(_critical_ratio, heat_capacity_ratio)  # type: ignore[no-any-return]
+
+
+def _critical_ratio(k: float) -> float:
     return float((2.0 / (k + 1.0)) ** (k / (k - 1.0)))
 
 
 def choked_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
     """C1 [s/m] of equation (6), with the exponent (k + 1)/(k - 1); ``gas_constant`` is the specific one."""
-    k = heat_capacity_ratio
-    return math.sqrt(k / (gas_constant * temperature) * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
+    power = over_runs(_choked_power, heat_capacity_ratio)
+    return root(heat_capacity_ratio / (gas_constant * temperature) * power)  # type: ignore[no-any-return]
+
+
+def _choked_power(k: float) -> float:
+    return float((2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
 
 
 def subsonic_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:

@@ -1,11 +1,13 @@
 """Flow curves fitted to the exact flow functions, and conductances, for both forms of an orifice."""
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from ppafo.constants import STANDARD_REFERENCE_DENSITY_AIR, STANDARD_REFERENCE_TEMPERATURE
+from ppafo.model.columns import over_runs, root
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
 from ppafo.model.orifice import FlowCurve, isentropic_flow_function, iso6358_flow_function
 
@@ -13,21 +15,37 @@ DEGREE = 6
 FIT_POINTS = 400
 
 
-@lru_cache(maxsize=256)
 def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
     """Fitted curve of equations (6), (7) for a gas; within 3e-7 of the exact function below ``linear_ratio``."""
-    critical = critical_pressure_ratio(heat_capacity_ratio)
-    gaps = _gaps(critical)
-    exact = [isentropic_flow_function(1.0 - gap, heat_capacity_ratio) for gap in gaps]
-    return _fitted(critical, linear_ratio, gaps, np.array(exact))
+    coefficients = over_runs(_isentropic_coefficients, heat_capacity_ratio)
+    return _curve(critical_pressure_ratio(heat_capacity_ratio), linear_ratio, coefficients)
 
 
-@lru_cache(maxsize=256)
 def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve of ISO 6358 for a critical ratio; within 1e-5 of the exact function below ``linear_ratio``."""
-    gaps = _gaps(critical_ratio)
-    exact = [iso6358_flow_function(1.0 - gap, critical_ratio) for gap in gaps]
-    return _fitted(critical_ratio, linear_ratio, gaps, np.array(exact))
+    """Fitted curve of ISO 6358 for a critical ratio b; within 1e-5 of the exact function below ``linear_ratio``.
+
+    The exact function depends on (1 - r) / (1 - b) alone, so one fit, scaled, serves every b.
+    """
+    scale = 1.0 / (1.0 - critical_ratio)
+    factor = root(scale)
+    coefficients = []
+    for value in _iso6358_coefficients():
+        coefficients.append(value * factor)
+        factor = factor * scale
+    return _curve(critical_ratio, linear_ratio, coefficients)
+
+
+@lru_cache(maxsize=4096)
+def _isentropic_coefficients(heat_capacity_ratio: float) -> tuple[float, ...]:
+    gaps = _gaps(critical_pressure_ratio(heat_capacity_ratio))
+    return _fitted(gaps, np.array([isentropic_flow_function(1.0 - gap, heat_capacity_ratio) for gap in gaps]))
+
+
+@lru_cache(maxsize=1)
+def _iso6358_coefficients() -> tuple[float, ...]:
+    """Coefficients for a critical ratio of 0."""
+    gaps = _gaps(0.0)
+    return _fitted(gaps, np.array([iso6358_flow_function(1.0 - gap, 0.0) for gap in gaps]))
 
 
 def area_conductance(
@@ -43,10 +61,9 @@ def sonic_conductance_mass(sonic_conductance: float, gas_constant: float, temper
     ISO 6358 gives C rho_0 sqrt(T_0 / T) for air; another gas passes sqrt(R_air / R) times as much.
     """
     air_constant = 1.0e5 / (STANDARD_REFERENCE_DENSITY_AIR * STANDARD_REFERENCE_TEMPERATURE)
-    same_gas = (
-        sonic_conductance * STANDARD_REFERENCE_DENSITY_AIR * math.sqrt(STANDARD_REFERENCE_TEMPERATURE / temperature)
-    )
-    return same_gas * math.sqrt(air_constant / gas_constant)
+    warmth = root(STANDARD_REFERENCE_TEMPERATURE / temperature)
+    same_gas = sonic_conductance * STANDARD_REFERENCE_DENSITY_AIR * warmth
+    return same_gas * root(air_constant / gas_constant)  # type: ignore[no-any-return]
 
 
 def _gaps(critical_ratio: float) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
@@ -56,15 +73,14 @@ def _gaps(critical_ratio: float) -> "np.ndarray[tuple[int], np.dtype[np.float64]
 
 
 def _fitted(
-    critical_ratio: float,
-    linear_ratio: float,
-    gaps: "np.ndarray[tuple[int], np.dtype[np.float64]]",
-    exact: "np.ndarray[tuple[int], np.dtype[np.float64]]",
-) -> FlowCurve:
-    """Relative least squares of a polynomial times a root."""
+    gaps: "np.ndarray[tuple[int], np.dtype[np.float64]]", exact: "np.ndarray[tuple[int], np.dtype[np.float64]]"
+) -> tuple[float, ...]:
+    """Coefficients of a polynomial times a root, by relative least squares."""
     target = exact / np.sqrt(gaps)
     powers = np.vander(gaps, DEGREE + 1, increasing=True)
     coefficients = np.linalg.lstsq(powers / target[:, None], np.ones_like(target), rcond=None)[0]
-    return FlowCurve(
-        critical_ratio, linear_ratio, 1.0 / (1.0 - linear_ratio), *(float(value) for value in coefficients)
-    )
+    return tuple(coefficients.tolist())
+
+
+def _curve(critical_ratio: float, linear_ratio: float, coefficients: Sequence[float]) -> FlowCurve:
+    return FlowCurve(critical_ratio, linear_ratio, 1.0 / (1.0 - linear_ratio), *coefficients)

@@ -140,10 +140,11 @@ def _check_complete(parameter_set: ParameterSet, valve: str) -> None:
         raise ParameterError(f"{parameter_set.file}: a device needs {', '.join(missing)}: missing here; {remedy}")
 
 
-def _check_consistent(parameter_set: ParameterSet, device: Device) -> None:
+def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
+    """Rules between two numbers: path, relation, path of the other, and whether it holds (in columns, for each run)."""
     actuator, friction, supply = device.actuator, device.friction, device.supply
     atmosphere = supply.atmospheric_pressure
-    rules = (
+    return (
         ("actuator.angle_min", "below", "actuator.angle_max", actuator.angle_min < actuator.angle_max),
         (
             "friction.dynamic_torque",
@@ -154,7 +155,10 @@ def _check_consistent(parameter_set: ParameterSet, device: Device) -> None:
         ("supply.pressure", "above", ATMOSPHERE_PATH, supply.pressure > atmosphere),
         ("supply.dorsiflexion_pressure", "at least", ATMOSPHERE_PATH, supply.dorsiflexion_pressure >= atmosphere),
     )
-    for path, relation, other, holds in rules:
+
+
+def _check_consistent(parameter_set: ParameterSet, device: Device) -> None:
+    for path, relation, other, holds in consistency(device):
         if not holds:
             given, limit = shown(parameter_set.numbers[path]), shown(parameter_set.numbers[other])
             raise ParameterError(f"{parameter_set.file}: {path} = {given} must be {relation} {other} = {limit}")

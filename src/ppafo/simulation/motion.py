@@ -11,7 +11,7 @@ from ppafo.simulation.reading import Reading, written
 from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice
 
 MOST_CHECKED_TIMES = 20_000
-_TOLERANCE = 1.0e-9
+TOLERANCE = 1.0e-9
 _ANGLE_PATH = "motion.angle"
 
 
@@ -20,11 +20,13 @@ def read_motion(reading: Reading, device: Device, duration: float, step: float) 
     kind = kind_at(reading.document, "motion")
     if kind == "led":
         profile = read_profile(reading, "motion.profile", ANGLE_LEVEL)
-        _check_profile(reading, device, profile, duration, step)
+        problem = profile_problem(device.name, _stops(device), profile, duration, step)
+        if problem:
+            raise ScenarioError(f"{reading.file}: {problem}")
         return LedMotion(profile)
     angle = reading.number(_ANGLE_PATH, ANGLE)
     if not _is_between_stops(device, angle):
-        raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_stops(device)}")
+        raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_told(_stops(device))}")
     if kind == "held":
         return LedMotion(ProfileChoice("constant", {"level": angle}))
     return FreeMotion(**reading.section("motion", FREE))
@@ -36,13 +38,17 @@ def read_profile(reading: Reading, section: str, prescribed: Quantity) -> Profil
     return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))
 
 
-def _check_profile(reading: Reading, device: Device, profile: ProfileChoice, duration: float, step: float) -> None:
+def profile_problem(
+    device: str, stops: tuple[float, float], profile: ProfileChoice, duration: float, step: float
+) -> str:
+    """Return where a profile leaves the stops [rad] of a device, named by ``device``; an empty text if nowhere."""
     for time, angle in _angles(profile, duration, step):
-        if not _is_between_stops(device, angle):
-            raise ScenarioError(
-                f"{reading.file}: [motion.profile] leaves the stops of {device.name}, {_stops(device)}: it is at "
-                f"{written(angle, 'rad')} at {time:.6g} s"
+        if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
+            return (
+                f"[motion.profile] leaves the stops of {device}, {_told(stops)}: it is at {written(angle, 'rad')} at "
+                f"{time:.6g} s"
             )
+    return ""
 
 
 def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tuple[float, float]]:
@@ -60,8 +66,12 @@ def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tu
 
 
 def _is_between_stops(device: Device, angle: float) -> bool:
-    return device.actuator.angle_min - _TOLERANCE <= angle <= device.actuator.angle_max + _TOLERANCE
+    return device.actuator.angle_min - TOLERANCE <= angle <= device.actuator.angle_max + TOLERANCE
 
 
-def _stops(device: Device) -> str:
-    return f"{written(device.actuator.angle_min, 'rad')} to {written(device.actuator.angle_max, 'rad')}"
+def _stops(device: Device) -> tuple[float, float]:
+    return device.actuator.angle_min, device.actuator.angle_max
+
+
+def _told(stops: tuple[float, float]) -> str:
+    return f"{written(stops[0], 'rad')} to {written(stops[1], 'rad')}"

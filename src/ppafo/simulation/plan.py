@@ -1,6 +1,7 @@
 """From a scenario to a run: step sizes, rows of parameters, initial gas."""
 
-import math
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from ppafo.engine.refinement import MOST_DIVISIONS, divisions
 from ppafo.engine.run import Run, whole_and_rest
 from ppafo.errors import ScenarioError
 from ppafo.model.chambers import chamber_mass
+from ppafo.model.columns import at, first, larger, over_runs, smaller, whole
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_volumes
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.thermal import wall_exchange
 from ppafo.model.valves.catalog import VALVES
+from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, ProfileChoice, Scenario
@@ -23,13 +26,29 @@ from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, ProfileChoi
 MOST_STEPS = 1.0e9
 WHOLE = 1.0e-9
 
+Problem = tuple[Any, Callable[[int], str]]
+"""What may be wrong with a run: a truth value, or an array of them (runs,), and the line about one of the runs."""
+
 
 def plan_run(scenario: Scenario) -> Run:
     """The run of a scenario; with a Python controller it records every step, because that controller needs the past."""
+    run, problems = plan_runs(scenario)
+    for is_bad, line in problems:
+        if is_bad:
+            raise ScenarioError(f"{scenario.name}: {line(0)}")
+    return run
+
+
+def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
+    """The run of a scenario, and what may be wrong with it; any number in both may be an array (runs,).
+
+    All runs of an ensemble must ask for one program: of a valve's and the sensors' settings, each is 0 for all or none.
+    """
     device, motion, control = scenario.device, scenario.motion, scenario.control
     plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
-    valve = VALVES[device.valve.kind].choose(device.valve.settings)
-    delay = valve.command_delay(device.valve.settings)
+    settings = device.valve.settings
+    valve = VALVES[device.valve.kind].choose({name: first(value) for name, value in settings.items()})
+    delay = valve.command_delay(settings)
     in_lanes = control.kind != PYTHON_CONTROLLER
     controller = CONTROLLERS[control.kind] if in_lanes else None
     program = Program(
@@ -38,28 +57,22 @@ def plan_run(scenario: Scenario) -> Run:
         controller=controller,
         angle=None if isinstance(motion, FreeMotion) else PROFILES[motion.profile.kind],
         ideal_sensors=has_ideal_sensors(scenario),
-        late_commands=delay > 0.0,
+        late_commands=first(delay) > 0.0,
         is_thermal=scenario.thermal is not None,
     )
-    steps_per_sample, step = divided_step(scenario, plant)
+    steps_per_sample, step, undivided = divided_step(scenario, plant)
     lag = whole_and_rest(delay, step)[1] * step
-    settings = device.valve.settings
-    record_every = max(1, round(scenario.output_interval / step)) if in_lanes else 1
-    step_count = math.ceil(scenario.duration / (step * record_every) - WHOLE) * record_every
-    if step_count > MOST_STEPS:
-        raise ScenarioError(
-            f"{scenario.name}: run.duration = {scenario.duration:.6g} s takes {step_count:.3g} steps of {step:.3g} s, "
-            f"at most {MOST_STEPS:.0e} are allowed: shorten the run, or look at what makes a chamber so fast"
-        )
-    return Run(
+    record_every = larger(1, whole(np.rint(scenario.output_interval / step))) if in_lanes else 1
+    step_count = whole(np.ceil(scenario.duration / (step * record_every) - WHOLE)) * record_every
+    run = Run(
         program=program,
         plant=plant,
         thermal=thermal_parameters(scenario),
         valve_orifice=exact_orifice(device.valve.orifice, device),
         leak_orifice=exact_orifice(device.actuator.leak, device),
         initial=initial_state(scenario, plant),
-        valve=valve.prepare(settings, step - lag),
-        early_valve=valve.prepare(settings, lag) if program.late_commands else (),
+        valve=prepared_valve(valve, settings, step - lag),
+        early_valve=prepared_valve(valve, settings, lag) if program.late_commands else (),
         controller=() if controller is None else controller.parameters(**control.settings),
         reference=profile_parameters(scenario.reference),
         path=() if isinstance(motion, FreeMotion) else profile_parameters(motion.profile),
@@ -71,6 +84,27 @@ def plan_run(scenario: Scenario) -> Run:
         signal_delay=scenario.sensors.delay,
         command_delay=delay,
     )
+    return run, (undivided, _too_many_steps(scenario, step, step_count))
+
+
+def prepared_valve(valve: ValveModel, settings: Mapping[str, float], step: float) -> Any:
+    """Parameters of a valve for steps of ``step`` [s]; settings and step may be arrays (runs,)."""
+
+    def prepare(*values: float) -> Any:
+        return valve.prepare(dict(zip(settings, values[:-1], strict=True)), values[-1])
+
+    return over_runs(prepare, *settings.values(), step)
+
+
+def _too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
+    def line(run: int) -> str:
+        duration, length, count = (at(number, run) for number in (scenario.duration, step, step_count))
+        return (
+            f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MOST_STEPS:.0e} are "
+            f"allowed: shorten the run, or look at what makes a chamber so fast"
+        )
+
+    return step_count > MOST_STEPS, line
 
 
 def thermal_parameters(scenario: Scenario) -> ThermalParameters | NoParameters:
@@ -86,10 +120,7 @@ def thermal_parameters(scenario: Scenario) -> ThermalParameters | NoParameters:
 
 def has_ideal_sensors(scenario: Scenario) -> bool:
     """True where the controller sees the present without noise or rounding."""
-    sensors = scenario.sensors
-    return not any(
-        (sensors.delay, sensors.angle_noise, sensors.pressure_noise, sensors.angle_quantum, sensors.pressure_quantum)
-    )
+    return not any(first(flaw) for flaw in scenario.sensors.flaws)
 
 
 def sensor_parameters(scenario: Scenario) -> SensorParameters:
@@ -100,7 +131,7 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
         sensors.pressure_noise,
         sensors.angle_quantum,
         sensors.pressure_quantum,
-        float(sensors.seed),
+        sensors.seed,
     )
 
 
@@ -117,30 +148,43 @@ def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtyp
     return np.array([kind.value(parameters, float(time)) for time in times]).T
 
 
-def divided_step(scenario: Scenario, plant: PlantParameters) -> tuple[int, float]:
-    """Steps in a sample period and their length [s]: a whole number, fine enough for the fastest chamber."""
+def divided_step(scenario: Scenario, plant: PlantParameters) -> tuple[int, float, Problem]:
+    """Steps in a sample period and their length [s]: a whole number, fine enough for the fastest chamber.
+
+    The last is what is wrong where the step would have to be divided too often.
+    """
     period = scenario.control.period
-    coarse = max(1, math.ceil(period / scenario.time_step - WHOLE))
+    coarse = larger(1, whole(np.ceil(period / scenario.time_step - WHOLE)))
     lowest, highest = angle_range(scenario, plant)
     is_free = isinstance(scenario.motion, FreeMotion)
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
     parts = divisions(plant, period / coarse, lowest, highest, is_free, stiffness)
-    if parts > MOST_DIVISIONS:
-        raise ScenarioError(
-            f"{scenario.name}: run.step = {scenario.time_step:.3g} s would have to be divided into {parts} parts "
-            f"(at most {MOST_DIVISIONS}), because a chamber fills that fast: look at the dead volumes and the valve's "
-            f"area, or give run.step = {MOST_DIVISIONS * period / (coarse * parts):.1g} s or less"
+
+    def line(run: int) -> str:
+        step, count = at(scenario.time_step, run), int(at(parts, run))
+        finest = MOST_DIVISIONS * at(period, run) / (at(coarse, run) * count)
+        return (
+            f"run.step = {step:.3g} s would have to be divided into {count} parts (at most {MOST_DIVISIONS}), because "
+            f"a chamber fills that fast: look at the dead volumes and the valve's area, or give run.step = "
+            f"{finest:.1g} s or less"
         )
-    return coarse * parts, period / (coarse * parts)
+
+    return coarse * parts, period / (coarse * parts), (parts > MOST_DIVISIONS, line)
 
 
 def angle_range(scenario: Scenario, plant: PlantParameters) -> tuple[float, float]:
     """Smallest and largest angle [rad] that the vane can reach in this scenario."""
     if isinstance(scenario.motion, FreeMotion):
         return plant.angle_min, plant.angle_max
-    profile = scenario.motion.profile
-    lowest, highest = PROFILES[profile.kind].bounds(profile_parameters(profile))
-    return max(lowest, plant.angle_min), min(highest, plant.angle_max)
+    lowest, highest = profile_bounds(scenario.motion.profile)
+    return larger(lowest, plant.angle_min), smaller(highest, plant.angle_max)
+
+
+def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
+    """Lowest and highest value of a profile."""
+    kind = PROFILES[choice.kind]
+    lowest, highest = over_runs(lambda *values: kind.bounds(kind.parameters(*values)), *profile_parameters(choice))
+    return lowest, highest
 
 
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
@@ -149,8 +193,8 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     if isinstance(motion, FreeMotion):
         angle, rate = motion.angle, motion.angular_velocity
     else:
-        kind = PROFILES[motion.profile.kind]
-        angle, rate, _ = kind.value(profile_parameters(motion.profile), 0.0)
+        kind, parameters = PROFILES[motion.profile.kind], profile_parameters(motion.profile)
+        angle, rate, _ = over_runs(lambda *values: kind.value(kind.parameters(*values), 0.0), *parameters)
     volume_1, volume_2 = chamber_volumes(plant, angle)
     mass_1 = chamber_mass(scenario.initial_pressure_1, volume_1, plant.gas_product)
     mass_2 = chamber_mass(scenario.initial_pressure_2, volume_2, plant.gas_product)

@@ -43,7 +43,7 @@ class Reading:
             return self._default(path, quantity)
         result = self._in_si(path, value, quantity, atmosphere)
         if not is_within(result, quantity):
-            raise self.refusal(path, f"{quantity.summary or quantity.name} must be {_limits(quantity, atmosphere)}")
+            raise self.refusal(path, f"{quantity.summary or quantity.name} must be {limits(quantity, atmosphere)}")
         return result
 
     def section(self, section: str, quantities: tuple[Quantity, ...]) -> dict[str, float]:
@@ -85,7 +85,8 @@ def _form(quantity: Quantity, number: float) -> str:
     return f"a text with its unit, for example '{format_quantity(number, unit)}'"
 
 
-def _limits(quantity: Quantity, atmosphere: float) -> str:
+def limits(quantity: Quantity, atmosphere: float) -> str:
+    """Return what a value may be, as text: ``at least 0 deg and at most 180 deg``."""
     unit = WRITTEN_UNITS.get(quantity.unit, quantity.unit) if quantity.unit != "Pa_a" else "Pa_a"
     lower, upper = (
         f"{from_si(limit, unit, quantity.unit, atmosphere):.6g} {unit}".rstrip() if math.isfinite(limit) else ""

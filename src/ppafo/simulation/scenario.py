@@ -84,6 +84,11 @@ class Sensors:
     pressure_quantum: float = 0.0
     seed: int = 1
 
+    @property
+    def flaws(self) -> tuple[float, ...]:
+        """What makes these sensors worse than ideal ones, each 0 where it does not."""
+        return self.delay, self.angle_noise, self.pressure_noise, self.angle_quantum, self.pressure_quantum
+
 
 @dataclass(frozen=True, slots=True)
 class Control:

@@ -8,11 +8,12 @@ import pytest
 from ppafo.cli import bench as command
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.reference.solver import solve_reference
+from ppafo.metrics import gas, switching, tracking
 from ppafo.studies import bench
 from ppafo.studies.bench import single_run, start_up
 from ppafo.studies.bench.children import run_python
-from ppafo.studies.bench.ensemble import Findings, _scaling_line, _variants
-from ppafo.studies.bench.ensemble_worker import JaxEnsemble, Order, largest_difference
+from ppafo.studies.bench.ensemble import Findings, _metrics_line, _scaling_line, _variants
+from ppafo.studies.bench.ensemble_worker import JaxEnsemble, Order, largest_difference, metrics_of
 from ppafo.studies.bench.jax_model import state_of, task_of
 from ppafo.studies.bench.jax_program import Variant
 from ppafo.studies.bench.machine import Machine, describe_machine
@@ -142,6 +143,24 @@ def test_scaling_is_the_best_of_one_thread_over_the_best_of_two():
     findings.add({"seconds": {"lanes 1": [4.0, 2.0], "lanes 2": [1.25, 3.0]}, "difference": None}, "")
     assert _scaling_line(findings).value == pytest.approx(1.6)
     assert _scaling_line(findings).met is False
+
+
+def test_speed_with_metrics_is_the_time_without_over_the_time_with():
+    findings = Findings()
+    findings.add({"seconds": {"lanes 2": [1.0, 0.9], "lanes with metrics 2": [1.0, 1.5]}, "difference": None}, "")
+    line = _metrics_line("id", "two threads", findings, 2)
+    assert line.value == pytest.approx(0.9)
+    assert line.spread == pytest.approx((0.6, 1.0))
+    assert line.met is True
+
+
+def test_the_metrics_that_are_timed_are_those_of_the_single_runs():
+    timed = metrics_of(ensemble(3, 0.5), 1)()
+    names = {kind.name for kind in (*tracking.METRICS, *gas.METRICS, *switching.METRICS)}
+    assert set(timed) == names
+    assert all(values.shape == (3,) for values in timed.values())
+    assert np.isfinite(timed["rms_error"]).all()
+    assert np.unique(timed["gas_supplied"]).size == 3
 
 
 def test_the_best_of_jax_is_taken_over_all_flags_and_the_worst_difference():

@@ -29,4 +29,5 @@ KIND = ProfileKind(
     parameters=ConstantProfile,
     value=value,
     bounds=bounds,
+    is_monotone=True,
 )

@@ -41,4 +41,5 @@ KIND = ProfileKind(
     parameters=RampHold,
     value=value,
     bounds=bounds,
+    is_monotone=True,
 )

@@ -1,14 +1,13 @@
-"""Numbers of a scenario and its device by dotted path: read, declared and replaced, in SI units."""
+"""Numbers of a scenario and its device that can be fitted, by dotted path: declared and read, in SI units."""
 
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass, replace
-from typing import Any
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, SECTIONS, SONIC_FORM
 from ppafo.parameters.device import Device, Orifice
+from ppafo.simulation import numbers
 from ppafo.simulation.declaration import FREE, INITIAL
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
@@ -20,7 +19,6 @@ TIME_OFFSET = "recording.time_offset"
 RECORDING = (
     Quantity("time_offset", "s", "time by which the samples are later than the run, a late trigger", 0.0, -1.0, 1.0),
 )
-_INITIAL = {"initial.pressure_1": "initial_pressure_1", "initial.pressure_2": "initial_pressure_2"}
 
 
 def full_path(path: str, scenario: Scenario) -> str:
@@ -55,49 +53,16 @@ def declaration_of(path: str, scenario: Scenario) -> Quantity:
 def number_at(scenario: Scenario, path: str) -> float:
     """Return the number at a path in SI units; the time offset of a recording is 0 before it is fitted."""
     declaration_of(path, scenario)
-    if path == TIME_OFFSET:
-        return 0.0
-    parts = _place(full_path(path, scenario), scenario)
-    node: Any = scenario
-    for part in parts:
-        node = node[part] if isinstance(node, Mapping) else getattr(node, part)
-    return float(node)
+    return 0.0 if path == TIME_OFFSET else numbers.number_at(scenario, path)
 
 
-def with_numbers(scenario: Scenario, numbers: Mapping[str, float]) -> Scenario:
+def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
     """Return the scenario with numbers replaced, by paths of ``declared_numbers``; a time offset is none of it."""
-    for path, number in numbers.items():
-        if path != TIME_OFFSET:
-            scenario = _replaced(scenario, _place(path, scenario), number)
-    return scenario
+    return numbers.with_numbers(scenario, {path: number for path, number in changed.items() if path != TIME_OFFSET})
 
 
 def _orifice_form(orifice: object) -> tuple[Quantity, ...]:
     return AREA_FORM if isinstance(orifice, Orifice) else SONIC_FORM
-
-
-def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
-    """Return the attributes (or keys) that lead from the scenario to a number."""
-    if path in _INITIAL:
-        return (_INITIAL[path],)
-    parts = path.split(".")
-    if parts[0] == "motion":
-        return tuple(parts)
-    if parts[0] == "valves":
-        is_orifice = parts[-1] in _names(scenario.device.valve.orifice)
-        return ("device", "valve", "orifice" if is_orifice else "settings", parts[-1])
-    return ("device", *parts)
-
-
-def _names(node: object) -> frozenset[str]:
-    return frozenset(item.name for item in fields(node)) if is_dataclass(node) else frozenset()
-
-
-def _replaced(node: Any, parts: tuple[str, ...], number: float) -> Any:
-    if isinstance(node, Mapping):
-        return {**node, parts[0]: number}
-    inner = number if len(parts) == 1 else _replaced(getattr(node, parts[0]), parts[1:], number)
-    return replace(node, **{parts[0]: inner})
 
 
 def broken_order(device: Device) -> str:

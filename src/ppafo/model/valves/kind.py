@@ -46,7 +46,8 @@ class ValveModel:
 class ValveKind:
     """A valve as the catalogue knows it: name, what it is, its parameters beside the orifice's own, and its models.
 
-    ``choose(settings)`` returns the simplest model that is exact for the settings.
+    ``choose(settings)`` returns the simplest model that is exact for the settings. It may look only at which of them
+    are 0: runs of an ensemble with zeros in the same settings share one model.
     """
 
     name: str

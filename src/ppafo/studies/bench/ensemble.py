@@ -19,6 +19,7 @@ WORKER = ("-m", "ppafo.studies.bench.ensemble_worker")
 ONE_THREAD_TARGET = Target(80_000.0, at_least=True)
 JAX_TARGET = Target(4.0, at_least=True)
 TWO_CORES_TARGET = Target(1.8, at_least=True)
+METRICS_TARGET = Target(0.8, at_least=True)
 AGREEMENT_TARGET = Target(1e-9, at_least=False)
 
 DEFAULT_FLAGS = "default flags"
@@ -61,6 +62,7 @@ def measure_ensemble(runs: int, duration: float, repetitions: int, say: Callable
     cores = usable_cores()
     one = _ask(runs, duration, repetitions, cores[-1:], (1,), say)
     lines = [_speed_line("ensemble_one_thread", "one thread", runs * duration, one.timings["lanes 1"], _one_thread())]
+    lines += [_metrics_line("ensemble_metrics_one_thread", "one thread", one, 1)]
     lines += [_jax_line("ensemble_jax_one_core", "JAX on one core", one, "lanes 1")]
     if len(cores) == 1:
         return [*lines, _alone("ensemble_two_cores"), _agreement(one)]
@@ -69,6 +71,7 @@ def measure_ensemble(runs: int, duration: float, repetitions: int, say: Callable
     most = f"lanes {len(cores)}"
     lines += [
         _speed_line("ensemble_all_cores", f"{len(cores)} threads", runs * duration, every.timings[most], None),
+        _metrics_line("ensemble_metrics_two_threads", "two threads", every, 2),
         _scaling_line(every),
         _jax_line("ensemble_jax_all_cores", f"JAX on {len(cores)} cores", every, most),
     ]
@@ -121,6 +124,15 @@ def _one_thread() -> Target | None:
 def _speed_line(line_id: str, where: str, simulated: float, timing: Timing, target: Target | None) -> Line:
     spread = (simulated / timing.worst, simulated / timing.best)
     return Line(line_id, GROUP, f"ppafo, {where}", simulated / timing.best, "x real time", target, spread)
+
+
+def _metrics_line(line_id: str, where: str, findings: Findings, threads: int) -> Line:
+    """Speed with metrics worked out in the lanes, over the speed of the lanes alone."""
+    bare, metered = findings.timings[f"lanes {threads}"], findings.timings[f"lanes with metrics {threads}"]
+    spread = (bare.best / metered.worst, bare.worst / metered.best)
+    note = "every metric of tracking, gas and switching, none of them from a record"
+    what = f"speed with metrics over speed without, {where}"
+    return Line(line_id, GROUP, what, bare.best / metered.best, "times", METRICS_TARGET, spread, note)
 
 
 def _scaling_line(findings: Findings) -> Line:

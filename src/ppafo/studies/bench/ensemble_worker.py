@@ -7,7 +7,8 @@ starts its threads then, so each choice of flags and cores needs a process of it
 import json
 import os
 import sys
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from typing import Any
@@ -15,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.lanes import Batch, Floats, run_batch
+from ppafo.metrics import gas, switching, tracking
+from ppafo.simulation.ensemble.running import Outcome, Request
 from ppafo.studies.bench.jax_model import State, state_of, task_of
 from ppafo.studies.bench.jax_program import Variant, compile_model, differing_parameters
 from ppafo.studies.bench.task import ensemble
@@ -99,6 +102,7 @@ def work(order: Order) -> dict[str, Any]:
     batch = ensemble(order.runs, order.duration)
     lanes = run_batch(batch).states
     contenders = {f"lanes {threads}": Contender(partial(run_batch, batch, threads)) for threads in order.threads}
+    contenders |= {f"lanes with metrics {threads}": Contender(metrics_of(batch, threads)) for threads in order.threads}
     difference = None
     if order.variants and find_spec("jax") is not None:
         models = {variant.name: JaxEnsemble(batch, variant) for variant in order.variants}
@@ -106,6 +110,22 @@ def work(order: Order) -> dict[str, Any]:
         contenders |= _finalists(models)
     timings = time_in_turn(contenders, order.repetitions)
     return {"seconds": {name: timing.seconds for name, timing in timings.items()}, "difference": difference}
+
+
+def metrics_of(batch: Batch, threads: int) -> Callable[[], dict[str, Floats]]:
+    """A function that runs the batch with every metric of tracking, gas and switching, sampled at every step."""
+    kinds = {kind.name: kind for kind in (*tracking.METRICS, *gas.METRICS, *switching.METRICS)}
+    request = Request(kinds, (), 0.0, np.empty(0))
+    sampled = replace(batch, clock=replace(batch.clock, record_every=1))
+    runs = batch.states.shape[1]
+
+    def run() -> dict[str, Floats]:
+        outcome = Outcome(runs, request)
+        outcome.run(sampled, np.arange(runs), threads)
+        return outcome.metrics
+
+    run()
+    return run
 
 
 def _finalists(models: dict[str, JaxEnsemble]) -> dict[str, Contender]:

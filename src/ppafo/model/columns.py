@@ -1,0 +1,83 @@
+"""Functions of floats applied to columns: one value for each run of an ensemble.
+
+Plain arithmetic works on floats and on arrays (runs,) alike, bit for bit. What branches or takes a power or an
+exponential does not; here such a function is called as it is, once for each combination of values that occurs.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def over_runs(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Result of a function of floats; where an argument is an array (runs,), every number of it is one too.
+
+    The function returns a float or a tuple, nested ones and NamedTuples among them, of the same shape for all runs.
+    """
+    varied = [argument for argument in arguments if isinstance(argument, np.ndarray)]
+    if not varied:
+        return function(*arguments)
+    distinct, places = _distinct(varied)
+    return _gathered([function(*_filled(arguments, values)) for values in distinct], places)
+
+
+def root(number: Any) -> Any:
+    """Square root of a number or of each in a column."""
+    return np.sqrt(number) if isinstance(number, np.ndarray) else math.sqrt(number)
+
+
+def larger(first: Any, second: Any) -> Any:
+    """The larger of two numbers; where one is a column, run by run."""
+    return np.maximum(first, second) if _has_column(first, second) else max(first, second)
+
+
+def smaller(first: Any, second: Any) -> Any:
+    """The smaller of two numbers; where one is a column, run by run."""
+    return np.minimum(first, second) if _has_column(first, second) else min(first, second)
+
+
+def whole(number: Any) -> Any:
+    """A whole number as an int; an array of them as one of integers."""
+    return number.astype(np.int64) if isinstance(number, np.ndarray) else int(number)
+
+
+def at(number: Any, run: int) -> float:
+    """The number of one run."""
+    return float(number[run]) if isinstance(number, np.ndarray) else float(number)
+
+
+def first(number: Any) -> float:
+    """The number of the first run."""
+    return at(number, 0)
+
+
+def _has_column(*numbers: Any) -> bool:
+    return any(isinstance(number, np.ndarray) for number in numbers)
+
+
+def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence[float]], NDArray[np.intp]]:
+    """The combinations of values that occur, and which of them each run has."""
+    if len(columns) == 1:
+        values, places = np.unique(columns[0], return_inverse=True)
+        return values[:, None].tolist(), places
+    # Combinations are sorted only where there is a hope that some occur again.
+    if all(np.unique(column).size > column.size // 2 for column in columns):
+        return np.stack(columns, axis=1).tolist(), np.arange(columns[0].size)
+    rows, places = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
+    return rows.tolist(), places.reshape(-1)
+
+
+def _filled(arguments: Sequence[Any], values: Sequence[float]) -> list[Any]:
+    given = iter(values)
+    return [next(given) if isinstance(argument, np.ndarray) else argument for argument in arguments]
+
+
+def _gathered(results: Sequence[Any], places: NDArray[np.intp]) -> Any:
+    first = results[0]
+    if not isinstance(first, tuple):
+        return np.array(results, dtype=np.float64)[places]
+    parts = [_gathered([result[index] for result in results], places) for index in range(len(first))]
+    return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)

@@ -1,0 +1,77 @@
+"""A recording seen sample by sample, for what is worked out without keeping it.
+
+A meter is a state of a few floats that goes through the samples of a run once. Its functions are pure and scalar, so
+that the engine can compile them into its lanes.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+
+class Sample(NamedTuple):
+    """One sample of a recording: its number from 0, and channels in SI units; a run without reference has 0 there."""
+
+    number: float
+    angle: float
+    angular_velocity: float
+    pressure_1: float
+    pressure_2: float
+    torque: float
+    command: float
+    reference: float
+
+
+class Course(NamedTuple):
+    """What is known of the whole reference [N m], and where it rests.
+
+    Its last value and its largest absolute value over all samples; ``tolerance`` is the difference from the last value
+    up to which it counts as resting; ``hold_start`` is the number of the sample after the last one that did not rest.
+    """
+
+    last: float
+    largest: float
+    tolerance: float
+    hold_start: float
+
+
+SAME_LEVEL = 1.0e-9
+"""Share of the largest reference up to which two values of it are the same level."""
+
+
+def is_away(reference: float, last: float, tolerance: float) -> bool:
+    """True where a reference [N m] does not rest at its last value."""
+    return abs(reference - last) > tolerance
+
+
+def followed(course: Course, sample: Sample) -> Course:
+    """The course with one sample more, of a monotone reference: away from its last value first, then at rest."""
+    away = is_away(sample.reference, course.last, course.tolerance)
+    return Course(course.last, course.largest, course.tolerance, sample.number + 1.0 if away else course.hold_start)
+
+
+def ends_before_hold(course: Course, sample: Sample) -> bool:
+    """True where the reference did not rest yet at the sample before this one."""
+    return course.hold_start >= sample.number
+
+
+def starts_hold(course: Course, sample: Sample) -> bool:
+    """True at the first sample of the hold."""
+    return course.hold_start == sample.number
+
+
+@dataclass(frozen=True, slots=True)
+class MeterKind:
+    """Something worked out from samples: ``state`` is a NamedTuple class of floats, so are its nested ones.
+
+    ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one; what
+    ``course`` says of the hold is right up to this sample. A meter without ``needs_course`` must not look at it; one
+    that is ``of_motion`` stays as it started while the vane stands still.
+    """
+
+    name: str
+    state: type
+    start: Callable[[Course, Sample], Any]
+    update: Callable[[Any, Course, Sample], Any]
+    needs_course: bool = False
+    of_motion: bool = False

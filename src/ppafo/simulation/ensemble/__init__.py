@@ -1,0 +1,111 @@
+"""Many variants of one scenario, with metrics worked out inside the lanes and no trajectory stored."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.lane_meters import TRACED
+from ppafo.engine.lanes import Floats
+from ppafo.errors import ScenarioError, nearest_name
+from ppafo.metrics.catalog import METRICS
+from ppafo.metrics.metric import MetricKind
+from ppafo.simulation.ensemble.columns import checked_columns
+from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
+from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, samples_of
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import OPEN_LOOP, REMEDY
+
+COMPLETED, DIVERGED, REFUSED = 0, 1, 2
+"""How a run of an ensemble ended; refused is a combination of values that no run can have."""
+
+
+@dataclass(frozen=True, slots=True)
+class EnsembleResult:
+    """What came of the runs of an ensemble, in the order of the columns.
+
+    ``status`` (runs,) is COMPLETED, DIVERGED or REFUSED; ``failure_time`` (runs,) [s] is nan where a run did not
+    diverge; ``reasons`` has one line for each run, by its index, that diverged or was refused. ``metrics`` maps a name
+    to values (runs,) in SI units, nan where a run failed or has no such metric. ``times`` (times,) [s] and ``traces``,
+    channel to values (times, runs), are there for the channels that were asked for; nan where a run failed.
+    """
+
+    status: NDArray[np.int8]
+    failure_time: Floats
+    reasons: dict[int, str]
+    metrics: dict[str, Floats]
+    times: Floats
+    traces: dict[str, Floats]
+
+
+def run_ensemble(
+    base: Scenario,
+    columns: Mapping[str, Floats],
+    meters: Sequence[str],
+    bands: Sequence[str] = (),
+    every: float = 0.0,
+    threads: int | None = None,
+) -> EnsembleResult:
+    """Run ``base`` once for each row of values; each run gives exactly what it gives alone.
+
+    ``columns`` maps dotted paths, as in overrides (``supply.pressure``, ``valve.area``, ``reference.level``), to values
+    in SI units, shape (runs,), pressures absolute. ``meters`` names metrics of ``ppafo.metrics``; ``bands`` names
+    channels whose traces are kept every ``every`` [s] (the output interval unless given) to the end of the longest run.
+    ScenarioError for unknown paths, metrics and channels, or for columns of different lengths; a run whose values are
+    out of range is REFUSED and the others go on. Memory grows with the number of runs: give chunks of some ten
+    thousand.
+
+    A pressure at the start that the scenario gives as a word follows the column of the pressure that it names. All
+    other pressures of ``base`` are absolute, whatever ``supply.atmospheric_pressure`` is.
+    """
+    metrics = {name: _metric(base, name) for name in meters}
+    for name in bands:
+        _check_channel(base, name)
+    interval = every or base.output_interval
+    if not interval > 0.0:
+        raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
+    checked = checked_columns(base, columns)
+    plan = plan_ensemble(checked)
+    request = Request(metrics, tuple(dict.fromkeys(bands)), interval, _times(plan, interval if bands else 0.0))
+    outcome = Outcome(checked.runs, request)
+    for members, batch in plan.batches:
+        outcome.run(batch, members, threads)
+    return _result(plan, outcome)
+
+
+def _result(plan: EnsemblePlan, outcome: Outcome) -> EnsembleResult:
+    status = np.where(outcome.is_completed, COMPLETED, DIVERGED).astype(np.int8)
+    status[list(plan.reasons)] = REFUSED
+    reasons = dict(plan.reasons)
+    for run in np.flatnonzero(status == DIVERGED).tolist():
+        reasons[run] = f"diverged at t = {outcome.failure_time[run]:.6g} s; {REMEDY}"
+    times = outcome.request.times
+    return EnsembleResult(
+        status, outcome.failure_time, dict(sorted(reasons.items())), outcome.metrics, times, outcome.traces
+    )
+
+
+def _times(plan: EnsemblePlan, every: float) -> Floats:
+    """Times of the traces [s], to the end of the longest run; none where nothing is traced."""
+    if every == 0.0 or not plan.batches:
+        return np.empty(0)
+    longest = max(float((intervals(batch) * (samples_of(batch) - 1)).max()) for _, batch in plan.batches)
+    return np.arange(int(longest / every * (1.0 + 1.0e-9)) + 1, dtype=np.float64) * every
+
+
+def _metric(base: Scenario, name: str) -> MetricKind:
+    if name not in METRICS:
+        raise ScenarioError(f"{base.name}: there is no metric '{name}'{_hint(name, METRICS)}")
+    return METRICS[name]
+
+
+def _check_channel(base: Scenario, name: str) -> None:
+    if name not in TRACED:
+        raise ScenarioError(f"{base.name}: the channel '{name}' cannot be traced{_hint(name, TRACED)}")
+    if name == REFERENCE and base.control.kind == OPEN_LOOP:
+        raise ScenarioError(f"{base.name}: a constant command follows no reference, so there is none to trace")
+
+
+def _hint(name: str, known: Mapping[str, object]) -> str:
+    return nearest_name(name, known) or f"; known are {', '.join(known)}"

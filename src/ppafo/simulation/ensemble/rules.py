@@ -1,0 +1,88 @@
+"""What the numbers of a run must not be together: the rules of a single scenario, over columns."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.lanes import Floats
+from ppafo.model.columns import at
+from ppafo.parameters.building import consistency
+from ppafo.simulation.clock import MOST_STEPS_OF_DELAY
+from ppafo.simulation.motion import TOLERANCE, profile_problem
+from ppafo.simulation.numbers import HELD_ANGLE
+from ppafo.simulation.plan import Problem, profile_bounds
+from ppafo.simulation.reading import written
+from ppafo.simulation.scenario import FreeMotion, ProfileChoice, Scenario
+
+Rule = Callable[[Scenario], tuple[Problem, ...]]
+"""What may be wrong with a scenario that stands for many runs."""
+
+
+def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
+    """Two numbers of a device that contradict each other."""
+
+    def problem(path: str, relation: str, other: str, holds: Any) -> Problem:
+        first, second = _number(scenario, path), _number(scenario, other)
+        return np.logical_not(
+            holds
+        ), lambda run: f"{path} = {at(first, run):.9g} must be {relation} {other} = {at(second, run):.9g} (SI units)"
+
+    return tuple(problem(*rule) for rule in consistency(scenario.device))
+
+
+def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
+    """A vane that begins, is held or is led beyond the stops."""
+    actuator, motion = scenario.device.actuator, scenario.motion
+    profile = ProfileChoice("constant", {"level": motion.angle}) if isinstance(motion, FreeMotion) else motion.profile
+    lowest, highest = profile_bounds(profile)
+    lower, upper = actuator.angle_min - TOLERANCE, actuator.angle_max + TOLERANCE
+    outside = np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
+    if profile.kind == "constant":
+        level = profile.settings["level"]
+
+        def angle_line(run: int) -> str:
+            stops = f"{written(at(actuator.angle_min, run), 'rad')} to {written(at(actuator.angle_max, run), 'rad')}"
+            return f"{HELD_ANGLE} = {written(at(level, run), 'rad')}: must be between the stops, {stops}"
+
+        return ((outside, angle_line),)
+    # The bounds hold for all time; a run that may leave them is looked at in time.
+    found = {int(run): _led_beyond(scenario, profile, int(run)) for run in np.flatnonzero(outside)}
+    for run, problem in found.items():
+        outside[run] = bool(problem)
+    return ((outside, lambda run: found[run]),)
+
+
+def _led_beyond(scenario: Scenario, profile: ProfileChoice, run: int) -> str:
+    actuator = scenario.device.actuator
+    settings = {name: at(value, run) for name, value in profile.settings.items()}
+    stops = (at(actuator.angle_min, run), at(actuator.angle_max, run))
+    one = ProfileChoice(profile.kind, settings)
+    return profile_problem(scenario.device.name, stops, one, at(scenario.duration, run), at(scenario.time_step, run))
+
+
+def _too_late(scenario: Scenario) -> tuple[Problem, ...]:
+    """Sensors that are slower than the run, or than can be remembered."""
+    delay, step = scenario.sensors.delay, scenario.time_step
+
+    def long_line(run: int) -> str:
+        most = written(MOST_STEPS_OF_DELAY * at(step, run), "s")
+        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {most}, {MOST_STEPS_OF_DELAY:.0e} steps"
+
+    return (
+        (
+            delay > scenario.duration,
+            lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
+        ),
+        (delay / step > MOST_STEPS_OF_DELAY, long_line),
+    )
+
+
+def _number(scenario: Scenario, path: str) -> Floats | float:
+    node: Any = scenario.device
+    for part in path.split("."):
+        node = getattr(node, part)
+    return node  # type: ignore[no-any-return]
+
+
+RULES: tuple[Rule, ...] = (_inconsistent, _beyond_the_stops, _too_late)

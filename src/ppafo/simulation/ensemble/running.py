@@ -1,0 +1,155 @@
+"""Runs the batches of an ensemble and reads their meters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
+from ppafo.engine.metering import group_of, metered, meters_of
+from ppafo.engine.program import Program
+from ppafo.engine.run import NEVER_FAILED, Members
+from ppafo.errors import ScenarioError
+from ppafo.metrics.metric import MetricKind, Readings
+
+GAINED = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2")
+"""Channels whose gain follows from the first and the last state."""
+REFERENCE = "reference"
+_SAME = 1.0e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is wanted of every run: metrics by name, channels to trace and the times at which to keep them [s]."""
+
+    metrics: Mapping[str, MetricKind]
+    bands: tuple[str, ...]
+    every: float
+    times: Floats
+
+
+@final
+class Outcome:
+    """What came of all runs so far: arrays that batches write their columns into, nan where nothing was written."""
+
+    def __init__(self, runs: int, request: Request) -> None:
+        self.request = request
+        self.failure_time = np.full(runs, np.nan)
+        self.is_completed = np.zeros(runs, dtype=bool)
+        self.metrics = {name: np.full(runs, np.nan) for name in request.metrics}
+        self.traces = {name: np.full((request.times.size, runs), np.nan) for name in request.bands}
+
+    def run(self, plain: Batch, members: Members, threads: int | None) -> None:
+        """Run a batch whose runs have these places in the ensemble."""
+        asked = _asked(plain, self.request)
+        batch = asked.batch
+        states = np.empty_like(batch.states)
+        looked_back = {name: np.full(members.size, np.nan) for name, kind in asked.metrics.items() if kind.traced}
+
+        def take(runs: slice, result: BatchResult) -> None:
+            states[:, runs] = result.states
+            for name, values in looked_back.items():
+                values[runs] = _read(asked, name, asked.readings(result.states, runs, result.record))
+            for name in self.request.bands:
+                trace = result.record[:: asked.band_stride, batch.program.traced.index(name)]
+                self.traces[name][: len(trace), members[runs]] = trace
+
+        run_blocks(batch, take, threads)
+        self._judge(asked, members, states, plain.states.shape[0])
+        readings = asked.readings(states, slice(None), None)
+        for name in asked.metrics:
+            values = looked_back[name] if name in looked_back else _read(asked, name, readings)
+            self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
+
+    def _judge(self, asked: "_Asked", members: Members, states: Floats, physical: int) -> None:
+        """Which runs were completed, as in a single run: possible all the time, and finite at the end."""
+        failed = group_of("result", asked.batch.program.state_rows(), states).failure_time
+        completed = (failed >= NEVER_FAILED) & np.isfinite(states[:physical]).all(axis=0)
+        self.is_completed[members] = completed
+        end = asked.interval * (asked.samples - 1)
+        time = np.where(failed < NEVER_FAILED, failed, end)
+        self.failure_time[members] = np.where(completed, np.nan, time)
+        lost = members[~completed]
+        for trace in self.traces.values():
+            trace[:, lost] = np.nan
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What is asked of one batch: the batch with its meters, the metrics it can have, the interval of its samples."""
+
+    batch: Batch
+    metrics: Mapping[str, MetricKind]
+    interval: Floats
+    samples: int
+    band_stride: int
+
+    def readings(self, states: Floats, runs: slice, record: Floats | None) -> Readings:
+        """The readings of some runs from their last states and, if there are, their traces."""
+        program = self.batch.program
+        groups = program.state_rows()
+        first, last = (_totals(program, rows) for rows in (self.batch.states[:, runs], states))
+        traces = {} if record is None else {name: record[:, row] for row, name in enumerate(program.traced)}
+        return Readings(
+            meters=meters_of(program, states),
+            course=group_of("course", groups, states) if program.follows_reference else None,
+            interval=self.interval[runs],
+            samples=self.samples,
+            gains={name: last[name] - first[name] for name in GAINED},
+            traces=traces,
+        )
+
+
+def _totals(program: Program, states: Floats) -> dict[str, Floats]:
+    """Gas in the chambers and totals of each run; gas with an energy balance keeps its true masses elsewhere."""
+    groups = program.state_rows()
+    state = group_of("state", groups, states)
+    totals = {name: getattr(state, name) for name in GAINED}
+    if program.is_thermal:
+        masses = group_of("masses", groups, states)
+        totals |= {"mass_1": masses.mass_1, "mass_2": masses.mass_2}
+    return totals
+
+
+def _asked(plain: Batch, request: Request) -> _Asked:
+    program = plain.program
+    there = {
+        name: kind for name, kind in request.metrics.items() if program.has_reference or REFERENCE not in kind.channels
+    }
+    meters = dict.fromkeys(meter for kind in there.values() for meter in kind.meters)
+    looked_back = dict.fromkeys(channel for kind in there.values() for channel in kind.traced)
+    interval = intervals(plain)
+    stride = _stride(interval, request) if request.bands else 1
+    traced = dict.fromkeys((*looked_back, *request.bands))
+    trace_every = 0 if not traced else 1 if looked_back else stride
+    batch = metered(plain, tuple(meters), tuple(traced), trace_every)
+    return _Asked(batch, there, interval, samples_of(plain), stride if looked_back else 1)
+
+
+def intervals(batch: Batch) -> Floats:
+    """Time between two samples [s] of each run of a batch that is not metered yet."""
+    timing = group_of("timing", batch.program.parameter_rows(), batch.parameters)
+    return np.asarray(timing.step * batch.clock.record_every)
+
+
+def samples_of(batch: Batch) -> int:
+    """Number of samples of each run of a batch that is not metered yet, the first and the last among them."""
+    return batch.clock.step_count // batch.clock.record_every + 1
+
+
+def _stride(interval: Floats, request: Request) -> int:
+    """Samples between two that are kept."""
+    stride = max(1, round(request.every / float(interval[0])))
+    if np.abs(stride * interval - request.every).max() > _SAME * request.every:
+        raise ScenarioError(
+            f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "
+            f"{interval.max():.6g} s; give run.output_interval a value that does"
+        )
+    return stride
+
+
+def _read(asked: _Asked, name: str, readings: Readings) -> Floats:
+    """The values of a metric; runs that failed may have any."""
+    with np.errstate(all="ignore"):
+        return np.asarray(asked.metrics[name].read(readings))

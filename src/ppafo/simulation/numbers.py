@@ -1,0 +1,123 @@
+"""Numbers of a scenario and its device by dotted path: declared and replaced, in SI units.
+
+A number may be an array (runs,), one value for each run of an ensemble; the scenario then stands for all of them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+from ppafo.control.controllers import constant
+from ppafo.model.declaration import Quantity
+from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SECTIONS, SONIC_FORM
+from ppafo.parameters.device import Orifice, SonicOrifice
+from ppafo.simulation import declaration
+from ppafo.simulation.scenario import FreeMotion, LedMotion, Scenario
+
+HELD_ANGLE = "motion.angle"
+TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "controller.period")
+"""Paths that decide the clock of a run."""
+
+_CHOSEN_VALVE = "valve."
+_DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
+_OF_SENSORS = {"angle_resolution": "angle_quantum", "pressure_resolution": "pressure_quantum"}
+_OF_WALLS = {"wall_area_per_volume": "area_per_volume"}
+_INITIAL = {"initial.pressure_1": "initial_pressure_1", "initial.pressure_2": "initial_pressure_2"}
+_ORIFICES = {"actuator.leak": ("device", "actuator", "leak"), "valve": ("device", "valve", "orifice")}
+
+
+def chosen_path(path: str, scenario: Scenario) -> str:
+    """Return the path with ``valve.`` in place of ``valves.NAME.`` where that is the valve of the scenario."""
+    own = f"valves.{scenario.device.valve_name}."
+    return _CHOSEN_VALVE + path.removeprefix(own) if path.startswith(own) else path
+
+
+def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
+    """Return the declaration of every number of a scenario and its device, by path; both forms of an orifice."""
+    found = {f"{section}.{item.name}": item for section in _DEVICE_SECTIONS for item in SECTIONS[section]}
+    found |= {f"actuator.leak.{item.name}": item for item in ORIFICE}
+    found |= {f"valve.{item.name}": item for item in (*ORIFICE, *VALVES[scenario.device.valve.kind].quantities)}
+    return found | declaration.quantities(_kinds(scenario)) | _angle_of_held_vane(scenario)
+
+
+def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
+    """Return the scenario with numbers replaced, by the paths of ``declared_numbers`` that are not in ``TIMES``.
+
+    An orifice given in the other form takes that form; both numbers of it must be there.
+    """
+    chosen = {chosen_path(path, scenario): number for path, number in numbers.items()}
+    for section, place in _ORIFICES.items():
+        form = other_form(scenario, section)
+        if any(f"{section}.{name}" in chosen for name in form):
+            new = {name: chosen.pop(f"{section}.{name}") for name in form}
+            kind = SonicOrifice if "sonic_conductance" in form else Orifice
+            scenario = _replaced(scenario, place, kind(**new))
+    for path, number in chosen.items():
+        scenario = _replaced(scenario, _place(path, scenario), number)
+    return scenario
+
+
+def number_at(scenario: Scenario, path: str) -> float:
+    """Return the number at a path of ``declared_numbers`` that is not in ``TIMES``, in SI units."""
+    node: Any = scenario
+    for part in _place(chosen_path(path, scenario), scenario):
+        node = node[part] if isinstance(node, Mapping) else getattr(node, part)
+    return float(node)
+
+
+def other_form(scenario: Scenario, section: str) -> tuple[str, ...]:
+    """Return the names of the form in which an orifice (``valve`` or ``actuator.leak``) is not given."""
+    device = scenario.device
+    orifice = device.valve.orifice if section == "valve" else device.actuator.leak
+    return tuple(item.name for item in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
+
+
+def _kinds(scenario: Scenario) -> dict[str, Any]:
+    """Return a document that names the kinds of the scenario and nothing else; a constant command has no reference."""
+    motion: dict[str, Any] = {"kind": "free"}
+    if isinstance(scenario.motion, LedMotion):
+        motion = {"kind": "led", "profile": {"kind": scenario.motion.profile.kind}}
+    controller = {"kind": scenario.control.kind}
+    gas = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
+    if scenario.control.kind == constant.KIND.name:
+        return {"motion": motion, "controller": controller, **gas}
+    return {"motion": motion, "controller": controller, "reference": {"kind": scenario.reference.kind}, **gas}
+
+
+def _angle_of_held_vane(scenario: Scenario) -> dict[str, Quantity]:
+    motion = scenario.motion
+    is_held = isinstance(motion, LedMotion) and motion.profile.kind == "constant"
+    return {HELD_ANGLE: declaration.ANGLE} if is_held else {}
+
+
+def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
+    """Return the attributes (or keys) that lead from the scenario to a number."""
+    section, _, name = path.rpartition(".")
+    if path in _INITIAL:
+        return (_INITIAL[path],)
+    if path == HELD_ANGLE and not isinstance(scenario.motion, FreeMotion):
+        return ("motion", "profile", "settings", "level")
+    if section == "valve":
+        is_orifice = name in _names(scenario.device.valve.orifice)
+        return ("device", "valve", "orifice" if is_orifice else "settings", name)
+    return {
+        "motion": ("motion", name),
+        "motion.profile": ("motion", "profile", "settings", name),
+        "controller": ("control", "settings", name),
+        "reference": ("reference", "settings", name),
+        "sensors": ("sensors", _OF_SENSORS.get(name, name)),
+        "gas_model": ("thermal", _OF_WALLS.get(name, name)),
+    }.get(section, ("device", *path.split(".")))
+
+
+def _names(node: object) -> frozenset[str]:
+    return frozenset(item.name for item in fields(node)) if is_dataclass(node) else frozenset()
+
+
+def _replaced(node: Any, parts: tuple[str, ...], number: Any) -> Any:
+    inside = parts[1:]
+    if isinstance(node, Mapping):
+        return {**node, parts[0]: _replaced(node[parts[0]], inside, number) if inside else number}
+    inner = _replaced(getattr(node, parts[0]), inside, number) if inside else number
+    return replace(node, **{parts[0]: inner})

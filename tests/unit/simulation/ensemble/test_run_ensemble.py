@@ -1,0 +1,232 @@
+"""Meters and traces of an ensemble against the recordings of the same runs, one by one."""
+
+import dataclasses
+import re
+from types import ModuleType
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ppafo.errors import ScenarioError
+from ppafo.metrics import METRICS
+from ppafo.simulation.ensemble import COMPLETED, DIVERGED, REFUSED, EnsembleResult, run_ensemble
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.numbers import TIMES, declared_numbers, with_numbers
+from ppafo.simulation.result import Result
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate
+
+Floats = NDArray[np.float64]
+
+TASK = "torque-task-proportional"
+COUNTS = ("switchings", "oscillations_ramp", "oscillations_hold")
+RUNS = 8
+METERS = tuple(METRICS)
+BANDS = ("torque", "supplied_mass", "angle", "pressure_2")
+"""The same meters and traces all over: each choice of them is another program to compile."""
+
+CASES: tuple[tuple[str, tuple[str, ...]], ...] = (
+    (TASK, ("run.duration=0.6 s", "reference.ramp_start=0.05 s", "reference.ramp_time=0.3 s", "valve.area=3e-5 m^2")),
+    (TASK, ("run.duration=0.6 s", "run.output_interval=3 ms", "run.step=1 ms", "reference.ramp_time=0.2 s")),
+    ("torque-task-solenoid", ("run.duration=1.2 s", "reference.ramp_time=0.4 s")),
+    ("torque-task-solenoid", ("run.duration=0.6 s", "valve.opening_delay=3 ms", "valve.switching_interval=4 ms")),
+    ("torque-task-slow-valve", ("run.duration=1 s", "reference.ramp_time=0.3 s")),
+    ("torque-task-moving-ankle", ("run.duration=1.9 s",)),
+    ("torque-task-anti-windup", ("run.duration=4 s",)),
+    (TASK, ("run.duration=0.5 s", "reference.kind=sine", "reference.amplitude=2 N m", "reference.frequency=9 Hz")),
+    (TASK, ("run.duration=0.4 s", "reference.kind=constant", "reference.level=2 N m")),
+    ("step-response", ()),
+    ("step-response", ("controller.kind=pid", "reference.kind=ramp_hold", "reference.level=2 N m", "run.duration=1 s")),
+)
+"""Scenarios of every kind of valve, motion, controller and reference, held or not."""
+
+
+def quiet_columns(draws: ModuleType, base: Scenario, generator: np.random.Generator) -> dict[str, Floats]:
+    """Columns of numbers that keep program and clock: fewer programs to compile."""
+    declared = declared_numbers(base)
+    fixed = {*TIMES, "motion.angle", "motion.profile.level", "supply.atmospheric_pressure"}
+    return {
+        path: draws.column(base, path, quantity, generator, RUNS)
+        for path, quantity in declared.items()
+        if path not in fixed and path not in draws.CHOICES and path.rpartition(".")[0] not in ("sensors", "actuator")
+    }
+
+
+def alone(base: str, overrides: tuple[str, ...], columns: dict[str, Floats], run: int) -> Result:
+    declared = declared_numbers(load_scenario(base, overrides))
+    texts = [f"{path}={float(values[run])!r} {declared[path].unit}".strip() for path, values in columns.items()]
+    return simulate(base, [*overrides, *texts])
+
+
+def assert_same_metrics(result: EnsembleResult, run: int, single: Result) -> None:
+    for name, values in result.metrics.items():
+        if name not in single.metrics:
+            assert np.isnan(values[run]), name
+        elif name in COUNTS:
+            assert values[run] == single.metrics[name].value, name
+        else:
+            scale = 1e-4 if name == "gas_imbalance" else 0.0
+            assert values[run] == pytest.approx(single.metrics[name].value, rel=1e-11, abs=1e-12 * scale), name
+
+
+@pytest.mark.parametrize(("name", "overrides"), CASES)
+def test_meters_give_the_metrics_of_the_recording(draws: ModuleType, name: str, overrides: tuple[str, ...]) -> None:
+    base = load_scenario(name, overrides)
+    columns = quiet_columns(draws, base, np.random.default_rng([*name.encode(), len(overrides)]))
+    result = run_ensemble(base, columns, METERS)
+    assert set(result.metrics) == set(METRICS)
+    for run in range(RUNS):
+        single = alone(name, overrides, columns, run)
+        assert single.status.is_completed
+        assert result.status[run] == COMPLETED
+        assert_same_metrics(result, run, single)
+
+
+SINE = ("reference.kind=sine", "reference.level=1 N m", "reference.frequency=1 Hz")
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        (*SINE, "reference.amplitude=0 N m", "run.duration=0.3 s"),
+        (*SINE, "reference.amplitude=2 N m", "reference.phase=-0.0005", "run.duration=0.251 s"),
+    ],
+    ids=["at rest all the time", "at rest for the last two samples, on both sides of the crest"],
+)
+def test_a_reference_that_turns_is_looked_at_ahead_for_its_hold(overrides: tuple[str, ...]) -> None:
+    base = load_scenario(TASK, overrides)
+    columns = {"valve.area": np.array([1e-5, 2e-5])}
+    result = run_ensemble(base, columns, METERS)
+    assert np.isfinite(result.metrics["rms_error_hold"]).all()
+    for run in range(2):
+        assert_same_metrics(result, run, alone(TASK, overrides, columns, run))
+
+
+def test_every_metric_of_the_catalogue_was_seen_in_some_case(draws: ModuleType) -> None:
+    seen: set[str] = set()
+    for name, overrides in CASES:
+        columns = {"friction.viscous_damping": np.array([0.02])}
+        result = run_ensemble(load_scenario(name, overrides), columns, METERS)
+        seen |= {metric for metric, values in result.metrics.items() if np.isfinite(values).all()}
+    assert seen == set(METRICS)
+
+
+def test_traces_are_the_channels_of_the_recording_at_the_times_asked_for() -> None:
+    base = load_scenario("step-response", ("run.duration=0.3 s",))
+    areas = np.array([1e-5, 2e-5])
+    result = run_ensemble(base, {"valve.area": areas}, METERS, BANDS, 0.02)
+    assert result.times == pytest.approx(0.02 * np.arange(16))
+    for run, area in enumerate(areas):
+        recording = simulate("step-response", ("run.duration=0.3 s", f"valve.area={area} m^2")).recording
+        for channel, trace in result.traces.items():
+            assert trace[:, run] == pytest.approx(recording[channel][::20], rel=1e-12, abs=1e-15)
+
+
+def test_shorter_runs_have_no_trace_after_their_end() -> None:
+    base = load_scenario("step-response", ("run.duration=0.2 s",))
+    result = run_ensemble(base, {"run.duration": np.array([0.1, 0.2])}, METERS, BANDS, 0.05)
+    assert np.isnan(result.traces["torque"][:, 0]).tolist() == [False, False, False, True, True]
+    assert np.isfinite(result.traces["torque"][:, 1]).all()
+
+
+def test_a_run_is_the_same_in_any_order_on_any_number_of_threads_and_in_any_chunk() -> None:
+    base = load_scenario(TASK, ("run.duration=0.2 s", "reference.ramp_start=0 s", "reference.ramp_time=0.1 s"))
+    areas = np.linspace(1e-5, 3e-5, 100)
+    whole = run_ensemble(base, {"valve.area": areas}, METERS, threads=1)
+    parts = [run_ensemble(base, {"valve.area": part}, METERS, threads=2) for part in (areas[:37], areas[37:])]
+    backwards = run_ensemble(base, {"valve.area": areas[::-1]}, METERS, threads=3)
+    for name, values in whole.metrics.items():
+        assert np.array_equal(values, np.concatenate([part.metrics[name] for part in parts]), equal_nan=True)
+        assert np.array_equal(values, backwards.metrics[name][::-1], equal_nan=True)
+    assert np.unique(whole.metrics["rms_error_hold"]).size == 100
+
+
+def test_a_scenario_that_was_changed_in_python_runs_as_it_is() -> None:
+    base = dataclasses.replace(load_scenario(TASK), duration=0.1005, initial_pressure_1=2e5)
+    result = run_ensemble(base, {"valve.area": np.array([base.device.valve.orifice.area])}, METERS)  # type: ignore[union-attr]
+    assert result.metrics["rms_error"][0] == pytest.approx(simulate(base).metrics["rms_error"].value, rel=1e-12)
+
+
+def test_a_pressure_at_the_start_given_as_a_word_follows_the_pressure_that_it_names() -> None:
+    base = load_scenario("step-response", ("run.duration=0.1 s",))
+    columns = {"supply.dorsiflexion_pressure": np.array([3e5, 4e5])}
+    result = run_ensemble(base, columns, METERS, BANDS, 0.1)
+    assert result.traces["pressure_2"][0] == pytest.approx([3e5, 4e5], rel=1e-12)
+
+
+def test_runs_that_cannot_be_are_refused_with_a_line_and_the_others_go_on() -> None:
+    base = load_scenario(TASK, ("run.duration=0.1 s",))
+    columns = {
+        "supply.pressure": np.array([4e5, -1.0, 1e5, np.nan, 4e5, 4e5, 4e5]),
+        "motion.angle": np.array([1.3, 1.3, 1.3, 1.3, 9.0, 1.3, 1.3]),
+        "run.duration": np.array([0.1, 0.1, 0.1, 0.1, 0.1, 0.1003, 0.1]),
+        "actuator.dead_volume_1": np.array([1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-12]),
+        "actuator.dead_volume_2": np.array([1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-12]),
+    }
+    columns["motion.angle"][6] = base.device.actuator.angle_min
+    result = run_ensemble(base, columns, METERS)
+    assert result.status.tolist() == [COMPLETED, *[REFUSED] * 6]
+    assert np.isfinite(result.metrics["rms_error"]).tolist() == [True, *[False] * 6]
+    parts = ("regulated pressure", "above supply.atmospheric", "not a finite", "stops", "run.", "divided")
+    for run, part in enumerate(parts, 1):
+        assert part in result.reasons[run]
+        assert "\n" not in result.reasons[run]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "part"),
+    [
+        ("valve.area", -1.0, "must be at least"),
+        ("run.duration", 1e300, "length of the run"),
+        ("motion.angle", 0.0, "between the stops"),
+        ("friction.static_torque", 0.0, "at most friction.static_torque"),
+        ("sensors.delay", 9.0, "longer than run.duration"),
+        ("sensors.seed", np.inf, "not a finite number"),
+        ("sensors.seed", 0.5, "a whole number"),
+        ("run.duration", 1e6, "too many|at most|steps"),
+    ],
+)
+def test_an_ensemble_of_which_no_run_can_be_is_a_result_all_the_same(path: str, value: float, part: str) -> None:
+    result = run_ensemble(load_scenario(TASK), {path: np.full(3, value)}, METERS, BANDS)
+    assert result.status.tolist() == [REFUSED] * 3
+    assert result.times.size == 0
+    assert all(re.search(part, result.reasons[run]) for run in range(3))
+
+
+def test_a_run_that_diverges_says_when_and_has_neither_metrics_nor_traces() -> None:
+    impossible = dataclasses.replace(load_scenario("step-response"), initial_pressure_1=-2.0e5)
+    result = run_ensemble(impossible, {"valve.area": np.array([1e-5, 2e-5])}, METERS, BANDS, 0.01)
+    assert result.status.tolist() == [DIVERGED, DIVERGED]
+    assert np.isnan(np.array(list(result.metrics.values()))).all()
+    assert np.isnan(result.traces["torque"]).all()
+    for run, area in enumerate((1e-5, 2e-5)):
+        single = simulate(with_numbers(impossible, {"valve.area": area}))
+        assert result.failure_time[run] == single.status.time
+        assert "diverged at t =" in result.reasons[run]
+        assert "smaller run.step" in result.reasons[run]
+
+
+@pytest.mark.parametrize(
+    ("columns", "meters", "bands", "message"),
+    [
+        ({"valve.arae": [1e-5]}, [], (), r"no number 'valve\.arae'.*did you mean 'valve\.area'"),
+        ({"controller.kind": [1.0]}, [], (), "is a text and cannot vary"),
+        ({"gas.species": [1.0]}, [], (), "is a text and cannot vary"),
+        ({}, [], (), "columns of one length"),
+        ({"valve.area": []}, [], (), "columns of one length"),
+        ({"valve.area": [1e-5], "supply.pressure": [4e5, 5e5]}, [], (), "columns of one length"),
+        ({"valve.area": [1e-5], "valves.proportional.area": [1e-5]}, [], (), "are the same value"),
+        ({"valve.sonic_conductance": [1e-8]}, [], (), "a column for both"),
+        ({"controller.rate": [1e3], "controller.period": [1e-3]}, [], (), "not both"),
+        ({"valve.area": [1e-5]}, ["rms_eror"], (), "no metric 'rms_eror', did you mean 'rms_error'"),
+        ({"valve.area": [1e-5]}, [], ("external_torque",), "cannot be traced"),
+    ],
+)
+def test_what_no_single_run_is_to_blame_for_is_one_clear_error(
+    columns: dict[str, list[float]], meters: list[str], bands: tuple[str, ...], message: str
+) -> None:
+    arrays = {path: np.array(values) for path, values in columns.items()}
+    with pytest.raises(ScenarioError, match=message) as caught:
+        run_ensemble(load_scenario(TASK), arrays, meters, bands)
+    assert "\n" not in str(caught.value)
