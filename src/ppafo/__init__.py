@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         PpafoError,
         ScenarioError,
         SimulationError,
+        StudyError,
         UnitError,
     )
     from ppafo.metrics import Metric, evaluate
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import simulate, simulate_many
     from ppafo.storage import read_recording, read_result
+    from ppafo.studies.sweep.loading import list_studies, load_study
+    from ppafo.studies.sweep.results import StudyResults, load_study_results
+    from ppafo.studies.sweep.run import run_study
 
 __version__ = "0.1.0"
 
@@ -51,17 +55,23 @@ __all__ = [
     "ScenarioError",
     "SimulationError",
     "Status",
+    "StudyError",
+    "StudyResults",
     "UnitError",
     "apply_overrides",
     "audit",
     "evaluate",
     "list_scenarios",
     "list_sets",
+    "list_studies",
     "load_device",
     "load_parameter_set",
     "load_scenario",
+    "load_study",
+    "load_study_results",
     "read_recording",
     "read_result",
+    "run_study",
     "scenario_from_dict",
     "simulate",
     "simulate_many",
@@ -75,6 +85,7 @@ _HOMES = {
         "PpafoError",
         "ScenarioError",
         "SimulationError",
+        "StudyError",
         "UnitError",
     ),
     "ppafo.metrics": ("Metric", "evaluate"),
@@ -88,6 +99,9 @@ _HOMES = {
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("simulate", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
+    "ppafo.studies.sweep.loading": ("list_studies", "load_study"),
+    "ppafo.studies.sweep.results": ("StudyResults", "load_study_results"),
+    "ppafo.studies.sweep.run": ("run_study",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

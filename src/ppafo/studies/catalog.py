@@ -3,4 +3,5 @@
 STUDIES: dict[str, str] = {
     "bench": "how fast are the lanes and the command line beside other solvers on this machine?",
     "reproduction": "which of the paper's claims hold when its experiments are run again?",
+    "sweep": "what comes of many runs of a study file, and how do the metrics hang on what varies?",
 }
