@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         PpafoError,
         ScenarioError,
         SimulationError,
+        StudyError,
         UnitError,
     )
     from ppafo.gait import Gait, list_gaits, load_gait
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import simulate, simulate_many
     from ppafo.storage import read_recording, read_result
+    from ppafo.studies.sweep.loading import list_studies, load_study
+    from ppafo.studies.sweep.results import StudyResults, load_study_results
+    from ppafo.studies.sweep.run import run_study
 
 __version__ = "0.1.0"
 
@@ -53,6 +57,8 @@ __all__ = [
     "ScenarioError",
     "SimulationError",
     "Status",
+    "StudyError",
+    "StudyResults",
     "UnitError",
     "apply_overrides",
     "audit",
@@ -60,12 +66,16 @@ __all__ = [
     "list_gaits",
     "list_scenarios",
     "list_sets",
+    "list_studies",
     "load_device",
     "load_gait",
     "load_parameter_set",
     "load_scenario",
+    "load_study",
+    "load_study_results",
     "read_recording",
     "read_result",
+    "run_study",
     "scenario_from_dict",
     "simulate",
     "simulate_many",
@@ -79,6 +89,7 @@ _HOMES = {
         "PpafoError",
         "ScenarioError",
         "SimulationError",
+        "StudyError",
         "UnitError",
     ),
     "ppafo.gait": ("Gait", "list_gaits", "load_gait"),
@@ -93,6 +104,9 @@ _HOMES = {
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("simulate", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
+    "ppafo.studies.sweep.loading": ("list_studies", "load_study"),
+    "ppafo.studies.sweep.results": ("StudyResults", "load_study_results"),
+    "ppafo.studies.sweep.run": ("run_study",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -3,6 +3,7 @@
 COMMANDS: dict[str, str] = {
     "reproduce": "run the paper's experiments and report against its claims",
     "simulate": "run a scenario and write its recording, metrics and figure",
+    "sweep": "run a study: many runs, a row for each, resumable",
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": "bench recordings in, parameter set with uncertainty out",

@@ -9,6 +9,7 @@ from ppafo.errors import DataError, nearest_name
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.schema",
     "scenario": "ppafo.simulation.schema",
+    "study": "ppafo.studies.sweep.declaration",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.column_map",
     "rig": "ppafo.rig.schema",

@@ -80,7 +80,7 @@ def _hardware(reading: Reading, given: Given, overrides: tuple[str, ...]) -> Har
     section = reading.document["device"]
     valve = section.get("valve")
     try:
-        parameter_set = given.parameter_set or load_parameter_set(_set_name(section["set"], given.folder))
+        parameter_set = given.parameter_set or load_parameter_set(set_name(section["set"], given.folder))
         name = chosen_valve(parameter_set, valve)
         parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
     except ParameterError as error:
@@ -88,7 +88,7 @@ def _hardware(reading: Reading, given: Given, overrides: tuple[str, ...]) -> Har
     return Hardware(apply_device_overrides(parameter_set, overrides, valve), name)
 
 
-def _set_name(name: str, folder: Path) -> str:
+def set_name(name: str, folder: Path) -> str:
     """Return the name of a set of the package, or the path of a set file, which may be relative to the scenario."""
     is_path = Path(name).suffix == ".toml" or "/" in name
     return str(folder / name) if is_path and name not in list_sets() else name

@@ -9,6 +9,9 @@ from pathlib import Path
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.errors import DataError, reason
 
+LEFT_ASIDE = ".writing-"
+"""Part of the name of a file that is being written; one that is still there was left by a process that was killed."""
+
 
 def read_bytes(path: str | Path, most: int | None = None) -> bytes:
     """Return the content of a regular file that is there and is not empty, refused above ``most`` bytes."""

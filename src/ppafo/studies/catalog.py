@@ -4,4 +4,5 @@ STUDIES: dict[str, str] = {
     "bench": "how fast are the lanes and the command line beside other solvers on this machine?",
     "endurance": "how long does one bottle of gas last, how cold does it get, and why does it end?",
     "reproduction": "which of the paper's claims hold when its experiments are run again?",
+    "sweep": "what comes of many runs of a study file, and how do the metrics hang on what varies?",
 }

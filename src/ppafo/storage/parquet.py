@@ -1,0 +1,103 @@
+"""Tables as Parquet files: columns with unit and meaning, the same table giving the same bytes, damage found."""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.errors import DataError, one_line
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_LEVEL = 1
+_FLOATING = ("double", "float")
+
+
+@dataclass(frozen=True, slots=True)
+class TableColumn:
+    """Values of a column, a NumPy or Arrow array, with unit and meaning."""
+
+    values: Any
+    unit: str
+    summary: str
+
+
+def table_of(columns: Mapping[str, TableColumn], described: Mapping[str, str]) -> "pa.Table":
+    """Return a table whose columns say their unit and meaning; ``described`` is what the table says of itself."""
+    import pyarrow as pa
+
+    arrays = [
+        pa.array(item.values) if isinstance(item.values, np.ndarray) else item.values for item in columns.values()
+    ]
+    fields = [
+        pa.field(name, array.type, metadata={"unit": column.unit, "summary": column.summary})
+        for (name, column), array in zip(columns.items(), arrays, strict=True)
+    ]
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=dict(described)))
+
+
+def parquet_bytes(table: "pa.Table") -> bytes:
+    """Return the content of a Parquet file; the same table gives the same bytes with the same release of pyarrow.
+
+    Floats are split by bytes and compressed, which makes them a tenth to a third smaller; pages carry checksums.
+    """
+    import pyarrow.parquet as pq
+
+    floats = [field.name for field in table.schema if str(field.type) in _FLOATING]
+    texts = [field.name for field in table.schema if str(field.type).startswith("dictionary")]
+    buffer = io.BytesIO()
+    pq.write_table(
+        table,
+        buffer,
+        compression="zstd",
+        compression_level=_LEVEL,
+        use_dictionary=texts,
+        use_byte_stream_split=floats,
+        write_page_checksum=True,
+    )
+    return buffer.getvalue()
+
+
+def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | None = None) -> "pa.Table":
+    """Return a table, or some of its columns; DataError where the file is damaged, checksums included."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with file, pq.ParquetFile(file, page_checksum_verification=True) as opened:
+            return opened.read(columns=None if columns is None else list(columns))
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:120]}") from error
+
+
+def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:
+    """Return the columns as arrays; texts become objects."""
+    return {name: table.column(name).to_numpy() for name in table.column_names}
+
+
+def coded_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":
+    """Return a column of texts from their numbers in a list."""
+    import pyarrow as pa
+
+    return pa.DictionaryArray.from_arrays(pa.array(codes, type=pa.int8()), pa.array(list(texts), type=pa.string()))
+
+
+def texts_of_some(texts: Mapping[int, str], length: int) -> "pa.Array":
+    """Return a column of texts that only some rows have, by their number."""
+    import pyarrow as pa
+
+    column: list[str | None] = [None] * length
+    for number, text in texts.items():
+        column[number] = text
+    return pa.array(column, type=pa.string())
+
+
+def lists_of(values: "np.ndarray[Any, Any]") -> "pa.ListArray":
+    """Return a column whose rows are the rows of a matrix, as lists."""
+    import pyarrow as pa
+
+    offsets = np.arange(values.shape[0] + 1, dtype=np.int32) * values.shape[1]
+    return pa.ListArray.from_arrays(pa.array(offsets), pa.array(np.ascontiguousarray(values).reshape(-1)))

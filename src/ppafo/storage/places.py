@@ -1,0 +1,148 @@
+"""Folders of files that may be on another machine: on a disk, or at any address that fsspec knows (s3://, gs://).
+
+A file is there whole or not at all: on a disk it is written aside and renamed, and the object stores put it whole.
+"""
+
+import contextlib
+import io
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from ppafo.errors import DataError, reason
+from ppafo.storage.files import LEFT_ASIDE, write_file
+
+_ADDRESS_MARK = "://"
+
+
+class Place(Protocol):
+    """A folder; names are relative to it, with ``/`` between folders."""
+
+    @property
+    def address(self) -> str:
+        """What messages call it, and from which another process can open it."""
+        ...
+
+    def names(self) -> frozenset[str]:
+        """Return the names of all files in it and in its folders, none where it does not exist."""
+        ...
+
+    def open(self, name: str) -> io.BufferedIOBase:
+        """Return a file for reading; OSError where there is none."""
+        ...
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file, replacing an earlier one; DataError where that is not possible."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Remove a file if it is there."""
+        ...
+
+    def free_bytes(self) -> int | None:
+        """Return how much can still be written, None where nobody knows."""
+        ...
+
+    def tidy(self) -> None:
+        """Remove what a killed process has left half written beside its place."""
+        ...
+
+
+def place_at(address: str | Path) -> Place:
+    """Return the folder at a path or an address such as ``s3://bucket/study``."""
+    text = str(address)
+    return _remote(text) if _ADDRESS_MARK in text else DiskFolder(Path(text).absolute())
+
+
+@dataclass(frozen=True, slots=True)
+class DiskFolder:
+    """A folder on a disk of this machine, or on one that several machines share."""
+
+    folder: Path
+
+    @property
+    def address(self) -> str:
+        """The absolute path."""
+        return str(self.folder)
+
+    def names(self) -> frozenset[str]:
+        """Return the names of all files, those left aside by a killed process not among them."""
+        if self.folder.exists() and not self.folder.is_dir():
+            raise DataError(f"{self.folder}: is a file; the results need a folder")
+        files = (path for path in self.folder.rglob("*") if not path.is_dir() and LEFT_ASIDE not in path.name)
+        return frozenset(path.relative_to(self.folder).as_posix() for path in files)
+
+    def open(self, name: str) -> io.BufferedIOBase:
+        """Return a file for reading."""
+        return (self.folder / name).open("rb")
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file aside, then rename it."""
+        write_file(self.folder / name, content)
+
+    def remove(self, name: str) -> None:
+        """Remove a file if it is there."""
+        (self.folder / name).unlink(missing_ok=True)
+
+    def free_bytes(self) -> int | None:
+        """Return the free space of the disk."""
+        there = next(place for place in (self.folder, *self.folder.parents) if place.exists())
+        return shutil.disk_usage(there).free
+
+    def tidy(self) -> None:
+        """Remove files that were being written when a process was killed."""
+        for path in self.folder.rglob(f"*{LEFT_ASIDE}*"):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+@dataclass(frozen=True, slots=True)
+class RemoteFolder:
+    """A folder of a file system of fsspec."""
+
+    address: str
+    system: Any
+    root: str
+
+    def names(self) -> frozenset[str]:
+        """Return the names of all files."""
+        if not self.system.exists(self.root):
+            return frozenset()
+        return frozenset(str(path)[len(self.root) :].lstrip("/") for path in self.system.find(self.root))
+
+    def open(self, name: str) -> io.BufferedIOBase:
+        """Return the whole of a file for reading."""
+        return io.BytesIO(self.system.cat_file(f"{self.root}/{name}"))
+
+    def write(self, name: str, content: bytes) -> None:
+        """Put a file whole."""
+        try:
+            self.system.makedirs(f"{self.root}/{name}".rpartition("/")[0], exist_ok=True)
+            self.system.pipe_file(f"{self.root}/{name}", content)
+        except (OSError, ValueError) as error:
+            raise DataError(f"{self.address}/{name}: cannot be written: {reason(error)}") from error
+
+    def remove(self, name: str) -> None:
+        """Remove a file if it is there."""
+        with contextlib.suppress(FileNotFoundError):
+            self.system.rm_file(f"{self.root}/{name}")
+
+    def free_bytes(self) -> int | None:
+        """Return None: an object store does not say."""
+        return None
+
+    def tidy(self) -> None:
+        """Do nothing: nothing is left aside."""
+
+
+def _remote(address: str) -> RemoteFolder:
+    try:
+        from fsspec.core import url_to_fs
+    except ModuleNotFoundError as error:
+        raise DataError(f"{address}: an address needs the extra 'cluster': pip install 'ppafo[cluster]'") from error
+    try:
+        system, root = url_to_fs(address)
+    except (ValueError, ImportError, OSError) as error:
+        raise DataError(f"{address}: cannot be opened: {' '.join(str(error).split())}") from error
+    return RemoteFolder(address.rstrip("/"), system, str(root).rstrip("/"))

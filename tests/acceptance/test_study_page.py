@@ -1,0 +1,57 @@
+"""What the page on studies shows is run as it stands there, with fewer draws."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pandas
+import pytest
+
+from ppafo.studies.sweep.declaration import VARIED
+from ppafo.studies.sweep.loading import load_study
+from ppafo.studies.sweep.run import run_study
+
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "study.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    """The code blocks of the page in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+
+
+def test_the_study_of_the_page_has_the_runs_that_the_page_says() -> None:
+    study = load_study(tomllib.loads(blocks("toml")[0]))
+    assert f"= {study.runs:,} runs" in PAGE
+
+
+def test_the_table_of_the_page_has_every_kind_with_its_keys() -> None:
+    table = PAGE.partition("| kind | keys |")[2].partition("\n\n")[0]
+    for model in VARIED:
+        kind = model.model_fields["kind"].annotation.__args__[0]  # type: ignore[union-attr]
+        row = next(line for line in table.splitlines() if f"`{kind}`" in line)
+        if kind != "truncated_normal":
+            named = set(re.findall(r"`(\w+)`", row.split("|")[2]))
+            assert named == set(model.model_fields) - {"path", "kind", "only"}
+
+
+def test_the_python_of_the_page_reads_what_the_study_wrote(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    document = tomllib.loads(blocks("toml")[0])
+    run_study(document, "out/my-study", overrides=["run.duration=0.2 s"], runs=8)
+    names: dict[str, object] = {}
+    for text in blocks("python"):
+        exec(text, names)
+    frame = names["frame"]
+    assert isinstance(frame, pandas.DataFrame)
+    assert len(frame) == 32
+    assert set(frame["configuration"]) == {"proportional", "solenoid"}
+    assert (tmp_path / "study.png").stat().st_size > 10_000
+
+
+def test_the_tree_of_the_page_is_what_a_study_writes(tmp_path: Path) -> None:
+    document = tomllib.loads(blocks("toml")[0])
+    document["outputs"]["trajectories"] = ["torque"]
+    run_study(document, tmp_path / "out", overrides=["run.duration=0.1 s"], runs=2)
+    written = {path.relative_to(tmp_path / "out").parts[0] for path in (tmp_path / "out").rglob("*")}
+    tree = PAGE.partition("## What comes out")[2].partition("The columns say")[0]
+    assert {name for name in written if name not in tree} == set()

@@ -1,0 +1,62 @@
+"""Tables as Parquet: columns with units, the same bytes for the same table, damage found."""
+
+import io
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.storage.parquet import (
+    TableColumn,
+    as_numpy,
+    coded_texts,
+    lists_of,
+    parquet_bytes,
+    read_parquet,
+    table_of,
+    texts_of_some,
+)
+
+
+def content() -> bytes:
+    """A file with a column of every sort."""
+    random = np.random.default_rng(1)
+    columns = {
+        "run": TableColumn(np.arange(500), "-", "number"),
+        "torque": TableColumn(random.normal(size=500), "N m", "a torque"),
+        "status": TableColumn(coded_texts(np.arange(500) % 2, ("good", "bad")), "-", "how it ended"),
+        "reason": TableColumn(texts_of_some({3: "why"}, 500), "-", "why"),
+        "trace": TableColumn(lists_of(random.normal(size=(500, 4)).astype(np.float32)), "N m", "over time"),
+    }
+    return parquet_bytes(table_of(columns, {"study": "mine"}))
+
+
+def test_the_same_table_gives_the_same_bytes() -> None:
+    assert content() == content()
+
+
+def test_columns_come_back_with_their_units() -> None:
+    table = read_parquet(io.BytesIO(content()), "file")
+    columns = as_numpy(table)
+    np.testing.assert_array_equal(columns["torque"], np.random.default_rng(1).normal(size=500))
+    assert columns["status"][:3].tolist() == ["good", "bad", "good"]
+    assert columns["reason"][2:4].tolist() == [None, "why"]
+    assert np.stack(columns["trace"]).shape == (500, 4)
+    assert table.schema.field("torque").metadata == {b"unit": b"N m", b"summary": b"a torque"}
+    assert table.schema.metadata[b"study"] == b"mine"
+    assert read_parquet(io.BytesIO(content()), "file", ["run"]).column_names == ["run"]
+
+
+@pytest.mark.parametrize("damage", [lambda c: c[:-9], lambda c: c[:200], lambda c: c[:0], lambda c: b"PAR1" + c[9:]])
+def test_a_file_that_is_not_whole_is_refused(damage: object) -> None:
+    with pytest.raises(DataError, match="file: is not a whole Parquet file"):
+        read_parquet(io.BytesIO(damage(content())), "file")  # type: ignore[operator]
+
+
+def test_a_changed_bit_in_the_data_is_found_by_the_checksum_of_its_page() -> None:
+    whole = content()
+    column = pyarrow.parquet.ParquetFile(io.BytesIO(whole)).metadata.row_group(0).column(1)
+    place = column.data_page_offset + column.total_compressed_size // 2
+    with pytest.raises(DataError, match="not a whole Parquet file"):
+        read_parquet(io.BytesIO(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :]), "file")

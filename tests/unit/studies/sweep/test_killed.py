@@ -1,0 +1,96 @@
+"""``ppafo sweep`` killed at any moment and started again ends with the bytes of a run that was left in peace."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+STUDY = """
+schema_version = 1
+name = "killed"
+runs_of_chunk = 256
+
+[[configurations]]
+name = "proportional"
+scenario = "torque-task-proportional"
+
+[[configurations]]
+name = "solenoid"
+scenario = "torque-task-solenoid"
+
+[sample]
+method = "latin_hypercube"
+runs = 4096
+seed = 5
+
+[[vary]]
+path = "supply.pressure"
+kind = "normal"
+mean = "50 psi_g"
+standard_deviation = "2 psi_d"
+
+[[vary]]
+path = "actuator.dead_volume_1"
+kind = "log_normal"
+median = "2 cm^3"
+factor = 1.3
+
+[outputs]
+metrics = ["rms_error", "gas_supplied"]
+trajectories = ["torque"]
+bands = ["torque"]
+every = "50 ms"
+"""
+CHUNKS = 32
+LONGEST = 240.0
+
+
+def started(study: Path, out: Path) -> "subprocess.Popen[bytes]":
+    """A process that runs the study."""
+    words = [sys.executable, "-c", "from ppafo.cli.main import main; raise SystemExit(main())"]
+    return subprocess.Popen(
+        [*words, "sweep", str(study), "--out", str(out)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+
+def finished_chunks(out: Path) -> int:
+    """Number of chunks that count as finished."""
+    return len(list((out / "finished").glob("chunk-*.json")))
+
+
+def killed_after(study: Path, out: Path, chunks: int, delay: float) -> int:
+    """Start the study, kill it some time [s] after so many chunks are there; returns how many are there then."""
+    process = started(study, out)
+    end = time.monotonic() + LONGEST
+    while finished_chunks(out) < chunks and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.002)
+    time.sleep(delay)
+    process.send_signal(signal.SIGKILL)
+    process.wait(LONGEST)
+    return finished_chunks(out)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file of a folder of results, without the log."""
+    files = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+    return {name: path.read_bytes() for name, path in files.items() if name != "log.jsonl"}
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="this system cannot kill a process so")
+def test_a_study_killed_again_and_again_ends_with_the_same_bytes(tmp_path: Path) -> None:
+    study = tmp_path / "killed.toml"
+    study.write_text(STUDY, encoding="utf-8")
+    in_peace, killed = tmp_path / "in-peace", tmp_path / "killed"
+    assert started(study, in_peace).wait(LONGEST) == 0
+    draw = random.Random(os.environ.get("PPAFO_TEST_SEED", "1"))
+    there = [killed_after(study, killed, chunks, draw.uniform(0.0, 0.05)) for chunks in (0, 1, 6, 13, 21, 31)]
+    assert sum(0 < count < CHUNKS for count in there) >= 3
+    assert there == sorted(there)
+    assert started(study, killed).wait(LONGEST) == 0
+    assert finished_chunks(killed) == CHUNKS
+    assert contents(killed) == contents(in_peace)
