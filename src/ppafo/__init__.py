@@ -32,16 +32,22 @@ if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import simulate, simulate_many
     from ppafo.storage import read_recording, read_result
+    from ppafo.studies.comparison import Comparison, compare
+    from ppafo.studies.monte_carlo import MonteCarlo, monte_carlo
+    from ppafo.studies.sensitivity import Sensitivity, sensitivity
+    from ppafo.studies.tuning import Tuning, list_tunings, load_tuning, tune
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Channel",
+    "Comparison",
     "DataError",
     "Device",
     "IdentificationError",
     "Measurement",
     "Metric",
+    "MonteCarlo",
     "ParameterError",
     "ParameterSet",
     "PpafoError",
@@ -49,22 +55,30 @@ __all__ = [
     "Result",
     "Scenario",
     "ScenarioError",
+    "Sensitivity",
     "SimulationError",
     "Status",
+    "Tuning",
     "UnitError",
     "apply_overrides",
     "audit",
+    "compare",
     "evaluate",
     "list_scenarios",
     "list_sets",
+    "list_tunings",
     "load_device",
     "load_parameter_set",
     "load_scenario",
+    "load_tuning",
+    "monte_carlo",
     "read_recording",
     "read_result",
     "scenario_from_dict",
+    "sensitivity",
     "simulate",
     "simulate_many",
+    "tune",
 ]
 
 _HOMES = {
@@ -88,6 +102,10 @@ _HOMES = {
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("simulate", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
+    "ppafo.studies.comparison": ("Comparison", "compare"),
+    "ppafo.studies.monte_carlo": ("MonteCarlo", "monte_carlo"),
+    "ppafo.studies.sensitivity": ("Sensitivity", "sensitivity"),
+    "ppafo.studies.tuning": ("Tuning", "list_tunings", "load_tuning", "tune"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -3,6 +3,10 @@
 COMMANDS: dict[str, str] = {
     "reproduce": "run the paper's experiments and report against its claims",
     "simulate": "run a scenario and write its recording, metrics and figure",
+    "compare": "hold configurations against each other, over an uncertain device too",
+    "sensitivity": "say which uncertain value matters: Morris or Sobol indices",
+    "montecarlo": "draw until a statistic is known well enough",
+    "tune": "search gains for a goal under constraints, robust where asked",
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": "bench recordings in, parameter set with uncertainty out",

@@ -9,6 +9,7 @@ from ppafo.errors import DataError, nearest_name
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.schema",
     "scenario": "ppafo.simulation.schema",
+    "tuning": "ppafo.studies.tuning.declaration",
     "identification": "ppafo.identification.problem",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
