@@ -37,17 +37,23 @@ if TYPE_CHECKING:
     from ppafo.studies.sweep.loading import list_studies, load_study
     from ppafo.studies.sweep.results import StudyResults, load_study_results
     from ppafo.studies.sweep.run import run_study
+    from ppafo.studies.comparison import Comparison, compare
+    from ppafo.studies.monte_carlo import MonteCarlo, monte_carlo
+    from ppafo.studies.sensitivity import Sensitivity, sensitivity
+    from ppafo.studies.tuning import Tuning, list_tunings, load_tuning, tune
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Channel",
+    "Comparison",
     "DataError",
     "Device",
     "Gait",
     "IdentificationError",
     "Measurement",
     "Metric",
+    "MonteCarlo",
     "ParameterError",
     "ParameterSet",
     "PpafoError",
@@ -55,30 +61,38 @@ __all__ = [
     "Result",
     "Scenario",
     "ScenarioError",
+    "Sensitivity",
     "SimulationError",
     "Status",
     "StudyError",
     "StudyResults",
+    "Tuning",
     "UnitError",
     "apply_overrides",
     "audit",
+    "compare",
     "evaluate",
     "list_gaits",
     "list_scenarios",
     "list_sets",
     "list_studies",
+    "list_tunings",
     "load_device",
     "load_gait",
     "load_parameter_set",
     "load_scenario",
     "load_study",
     "load_study_results",
+    "load_tuning",
+    "monte_carlo",
     "read_recording",
     "read_result",
     "run_study",
     "scenario_from_dict",
+    "sensitivity",
     "simulate",
     "simulate_many",
+    "tune",
 ]
 
 _HOMES = {
@@ -107,6 +121,10 @@ _HOMES = {
     "ppafo.studies.sweep.loading": ("list_studies", "load_study"),
     "ppafo.studies.sweep.results": ("StudyResults", "load_study_results"),
     "ppafo.studies.sweep.run": ("run_study",),
+    "ppafo.studies.comparison": ("Comparison", "compare"),
+    "ppafo.studies.monte_carlo": ("MonteCarlo", "monte_carlo"),
+    "ppafo.studies.sensitivity": ("Sensitivity", "sensitivity"),
+    "ppafo.studies.tuning": ("Tuning", "list_tunings", "load_tuning", "tune"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -10,6 +10,7 @@ FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.schema",
     "scenario": "ppafo.simulation.schema",
     "study": "ppafo.studies.sweep.declaration",
+    "tuning": "ppafo.studies.tuning.declaration",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.column_map",
     "rig": "ppafo.rig.schema",

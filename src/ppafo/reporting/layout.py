@@ -44,3 +44,24 @@ def figure_of_panels(
     for axes in figure.axes:
         axes.yaxis.set_label_coords(-margins.label / panel_width, 0.5)
     return figure, grid
+
+
+def figure_of_free_panels(
+    size: tuple[float, float], margins: Margins, rows: int, columns: int, widths: Sequence[float] | None = None
+) -> "tuple[Figure, list[list[Axes]]]":
+    """Return a figure of this width and height [inches] and its panels by row, each with axes of its own."""
+    from matplotlib.figure import Figure
+
+    width, height = size
+    panel_width = (width - margins.left - margins.right - (columns - 1) * margins.column_gap) / columns
+    panel_height = (height - margins.top - margins.bottom - (rows - 1) * margins.row_gap) / rows
+    figure = Figure(figsize=size)
+    figure.subplots_adjust(
+        left=margins.left / width,
+        bottom=margins.bottom / height,
+        right=1.0 - margins.right / width,
+        top=1.0 - margins.top / height,
+        wspace=margins.column_gap / panel_width,
+        hspace=margins.row_gap / panel_height,
+    )
+    return figure, figure.subplots(rows, columns, squeeze=False, width_ratios=widths).tolist()

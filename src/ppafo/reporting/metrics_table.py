@@ -6,7 +6,13 @@ from dataclasses import replace
 from ppafo.metrics import Metric
 from ppafo.units import from_si
 
-_SHOWN_IN = {"kg": ("kg", "g"), "rad": ("rad", "deg"), "rad/s": ("rad/s", "deg/s"), "Pa": ("Pa_a", "psi_a")}
+_SHOWN_IN = {
+    "kg": ("kg", "g"),
+    "kg/J": ("kg/J", "g/J"),
+    "rad": ("rad", "deg"),
+    "rad/s": ("rad/s", "deg/s"),
+    "Pa": ("Pa_a", "psi_a"),
+}
 _PLAIN_NUMBER = "-"
 
 

@@ -5,4 +5,9 @@ STUDIES: dict[str, str] = {
     "endurance": "how long does one bottle of gas last, how cold does it get, and why does it end?",
     "reproduction": "which of the paper's claims hold when its experiments are run again?",
     "sweep": "what comes of many runs of a study file, and how do the metrics hang on what varies?",
+    "comparison": "which configuration is better, by how much, and how surely?",
+    "monte_carlo": "how sure is a number, and how many runs does it take?",
+    "reproduction": "which of the paper's claims hold when its experiments are run again?",
+    "sensitivity": "which uncertain value matters?",
+    "tuning": "which gains are best, also for a device that is not known exactly?",
 }

@@ -1,0 +1,60 @@
+"""``ppafo sensitivity STUDY``: which uncertain value matters, by Morris or Sobol."""
+
+import argparse
+
+from ppafo.cli.output import EXIT_GOOD, check_output, print_result, write_files
+from ppafo.cli.quick_imports import load_compiler, load_drawing
+from ppafo.cli.study_options import add_study_options, confidence, most_failed, progress, seed, threads
+from ppafo.cli.whole_numbers import whole_number
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("study", metavar="STUDY", help="a study with distributions: a name, or a .toml file")
+    parser.add_argument(
+        "--method", metavar="sobol|morris", default="sobol", help="sobol (default), or morris to screen"
+    )
+    parser.add_argument(
+        "--metric", dest="metrics", metavar="NAME", action="append", default=[], help="those of the study unless given"
+    )
+    parser.add_argument("--samples", metavar="N", help="base points (1024 unless given) or trajectories (128)")
+    parser.add_argument("--configuration", metavar="NAME", help="of the study, where it has several")
+    parser.add_argument("--independent", action="store_true", help="leave the correlations of the study out")
+    add_study_options(parser)
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Run the design, print and write the indices."""
+    load_compiler()
+    from ppafo.reporting.sensitivity_report import (
+        FILES,
+        REPORT,
+        sensitivity_document,
+        sensitivity_files,
+        sensitivity_text,
+    )
+    from ppafo.studies.sensitivity import sensitivity
+
+    check_output(parsed.out, FILES)
+    with progress() as line:
+        found = sensitivity(
+            parsed.study,
+            parsed.method,
+            parsed.metrics,
+            whole_number(parsed.samples, "--samples"),
+            parsed.configuration,
+            parsed.overrides,
+            parsed.independent,
+            seed(parsed),
+            confidence(parsed),
+            most_failed(parsed, 0.02),
+            threads(parsed),
+            line,
+        )
+    lines = sensitivity_text(found)
+    if parsed.out is not None:
+        load_drawing()
+        write_files(parsed.out, sensitivity_files(found))
+        lines += ["", f"report: {parsed.out / REPORT}"]
+    print_result("\n".join(lines), sensitivity_document(found), parsed.json)
+    return EXIT_GOOD

@@ -1,0 +1,188 @@
+"""Configurations side by side: each as it is, and all of them over the same uncertain values."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ppafo.metrics import Metric
+from ppafo.simulation.result import Status
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate_many
+from ppafo.studies.comparison.compared import COMPARED, compared_metrics
+from ppafo.studies.comparison.configurations import (
+    Configurations,
+    Placed,
+    checked_baseline,
+    chosen_configurations,
+    with_overrides,
+)
+from ppafo.studies.comparison.paired import Paired, best_shares, paired
+from ppafo.studies.sweep.sampling.distributions import Floats
+from ppafo.studies.sweep.study import Study
+from ppafo.studies.uncertainty.draws import Uncertainty, study_of, uncertainty_of
+from ppafo.studies.uncertainty.intervals import Interval
+from ppafo.studies.uncertainty.outcomes import (
+    Outcomes,
+    Tally,
+    Watch,
+    check_confidence,
+    check_draws,
+    check_failures,
+    check_share,
+    scenario_model,
+)
+
+AS_WRITTEN = "as written"
+"""What the task of a configuration is called where no other is asked for."""
+DEFAULT_DRAWS = 4096
+FEWEST_DRAWS = 32
+
+Source = Study | str | Path | Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A configuration on a task: its metrics by name, how the run ended, and its runs over the draws, if any."""
+
+    task: str
+    configuration: str
+    scenario: Scenario
+    metrics: Mapping[str, Metric]
+    status: Status
+    outcomes: Outcomes | None
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All cases, task by task in the order of the configurations, one of which is the ``baseline``.
+
+    ``draws`` is 0 without uncertainty; ``varied`` are the uncertain paths; ``confidence`` is that of the intervals.
+    """
+
+    metrics: tuple[str, ...]
+    configurations: tuple[str, ...]
+    baseline: str
+    tasks: Mapping[str, tuple[str, ...]]
+    cases: tuple[Case, ...]
+    draws: int
+    seed: int
+    varied: tuple[str, ...]
+    confidence: float
+
+    def of_task(self, task: str) -> tuple[Case, ...]:
+        """Return the cases of a task."""
+        return tuple(case for case in self.cases if case.task == task)
+
+    def pairs(self, task: str, configuration: str) -> list[Paired]:
+        """Return the statistics of a configuration against the baseline on a task; none without uncertainty."""
+        baseline, other = self._drawn(task, self.baseline), self._drawn(task, configuration)
+        if baseline is None or other is None:
+            return []
+        found = [
+            paired(name, baseline.metrics[name], other.metrics[name], COMPARED[name], self.confidence)
+            for name in self.metrics
+        ]
+        return [item for item in found if item is not None]
+
+    def best(self, task: str, metric: str) -> dict[str, Interval]:
+        """Return the probability of each configuration to be the best in a metric on a task."""
+        drawn = [self._drawn(task, name) for name in self.configurations]
+        values: list[Floats] = [item.metrics[metric] for item in drawn if item is not None]
+        if len(values) < len(drawn) or not COMPARED[metric]:
+            return {}
+        return dict(zip(self.configurations, best_shares(values, COMPARED[metric], self.confidence), strict=False))
+
+    def _drawn(self, task: str, configuration: str) -> Outcomes | None:
+        return next(case.outcomes for case in self.of_task(task) if case.configuration == configuration)
+
+
+def compare(
+    configurations: Configurations | None = None,
+    uncertainty: Source | None = None,
+    tasks: Mapping[str, Sequence[str]] | None = None,
+    overrides: Sequence[str] = (),
+    baseline: str | None = None,
+    draws: int = DEFAULT_DRAWS,
+    seed: int | None = None,
+    confidence: float = 0.95,
+    most_failed: float = 0.01,
+    threads: int | None = None,
+    watch: Watch | None = None,
+) -> Comparison:
+    """Compare configurations on tasks, and over the distributions of a study with common random numbers.
+
+    ``configurations`` are scenarios by name (or a list of names, files or Scenario objects); those of the study unless
+    given. ``uncertainty`` is a study file, name or Study, whose distributions hold in all of them. ``tasks`` has
+    overrides by name, such as ``{"slow": ["reference.ramp_time=2 s"]}``; ``overrides`` change every configuration.
+    ``baseline`` is the configuration that all others are held against, the first unless given. Draws are independent
+    whatever the study's sampling method. StudyError for bad input and where more than the share ``most_failed`` of a
+    configuration's runs fails; fewer are left out in pairs.
+    """
+    check_draws(draws, FEWEST_DRAWS)
+    check_confidence(confidence)
+    study = study_of(uncertainty) if uncertainty is not None else None
+    chosen = chosen_configurations(configurations, study, overrides)
+    names = tuple(item.name for item in chosen)
+    held_against = checked_baseline(baseline, names)
+    wanted = {name: tuple(texts) for name, texts in (tasks or {AS_WRITTEN: ()}).items()}
+    placed = [
+        Placed(task, item.name, with_overrides(item.scenario, texts))
+        for task, texts in wanted.items()
+        for item in chosen
+    ]
+    metrics = compared_metrics([place.scenario for place in placed])
+    drawing = _drawing(study, draws, seed, check_share(most_failed, "most_failed"))
+    outcomes = _outcomes(placed, metrics, drawing, threads, watch) if drawing is not None else [None] * len(placed)
+    results = simulate_many([place.scenario for place in placed], threads)
+    return Comparison(
+        metrics=metrics,
+        configurations=names,
+        baseline=held_against,
+        tasks=wanted,
+        cases=tuple(
+            Case(place.task, place.configuration, place.scenario, result.metrics, result.status, runs)
+            for place, result, runs in zip(placed, results, outcomes, strict=True)
+        ),
+        draws=drawing.draws if drawing is not None else 0,
+        seed=drawing.seed if drawing is not None else 0,
+        varied=drawing.uncertainty.paths if drawing is not None else (),
+        confidence=confidence,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Drawing:
+    """What is drawn: distributions, which of them hold where, how many draws, their seed, the share that may fail."""
+
+    study: Study
+    uncertainty: Uncertainty
+    draws: int
+    seed: int
+    most_failed: float
+
+
+def _drawing(study: Study | None, draws: int, seed: int | None, most_failed: float) -> _Drawing | None:
+    """Return what is drawn; None without a study, or where nothing in it varies."""
+    if study is None or not study.paths:
+        return None
+    return _Drawing(study, uncertainty_of(study), draws, study.sample.seed if seed is None else seed, most_failed)
+
+
+def _outcomes(
+    placed: Sequence[Placed], metrics: Sequence[str], drawing: _Drawing, threads: int | None, watch: Watch | None
+) -> list[Outcomes]:
+    """Return the runs of every case, all over the same draws."""
+    columns = drawing.uncertainty.random_columns(0, drawing.draws, drawing.seed)
+    tally = Tally(drawing.draws * len(placed), watch)
+    found = []
+    for place in placed:
+        name = place.configuration
+        own = {path: column for path, column in columns.items() if drawing.study.varies(path, name)}
+        unchanged = {"supply.pressure": np.full(drawing.draws, place.scenario.device.supply.pressure)}
+        outcomes = scenario_model(place.scenario, metrics, threads, tally.add)(own or unchanged)
+        check_failures(outcomes, drawing.most_failed, f"configuration '{name}', task '{place.task}'")
+        found.append(outcomes)
+    return found

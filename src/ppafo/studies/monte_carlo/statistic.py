@@ -1,0 +1,101 @@
+"""What is estimated of a metric: its mean, a quantile, or the probability that it is above or below a value."""
+
+import re
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ppafo.errors import StudyError
+from ppafo.metrics import METRICS
+from ppafo.studies.sweep.sampling.distributions import Floats
+from ppafo.studies.uncertainty.intervals import Interval, mean_interval, quantile_interval, share_interval
+from ppafo.studies.uncertainty.metric_values import level_of
+
+GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
+
+_QUANTILE = re.compile(r"quantile\s+(\d*\.?\d+)")
+_PROBABILITY = re.compile(r"probability\s+(above|below)\s+(\S.*)")
+
+
+class Statistic(Protocol):
+    """A number about a distribution; ``unit`` is the SI unit of its interval."""
+
+    @property
+    def told(self) -> str:
+        """The statistic in words that ``parse_statistic`` reads."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the statistic, '-' for a plain number."""
+        ...
+
+    def estimate(self, values: Floats, confidence: float) -> Interval:
+        """Return estimate and interval from independent values (draws,) of the metric [SI]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Mean:
+    """The mean of a metric; its interval rests on the central limit theorem."""
+
+    unit: str
+    told: str = "mean"
+
+    def estimate(self, values: Floats, confidence: float) -> Interval:
+        """Return estimate and interval [SI]."""
+        return mean_interval(values, confidence)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantile:
+    """The value of a metric below which a share of the runs lies."""
+
+    unit: str
+    share: float
+
+    @property
+    def told(self) -> str:
+        """The statistic in words."""
+        return f"quantile {self.share:g}"
+
+    def estimate(self, values: Floats, confidence: float) -> Interval:
+        """Return estimate and interval [SI]."""
+        return quantile_interval(values, self.share, confidence)
+
+
+@dataclass(frozen=True, slots=True)
+class Probability:
+    """The probability that a metric is above (or else below) a value [SI]; ``text`` is the value as it was written."""
+
+    threshold: float
+    is_above: bool
+    text: str
+    unit: str = "-"
+
+    @property
+    def told(self) -> str:
+        """The statistic in words."""
+        return f"probability {'above' if self.is_above else 'below'} {self.text}"
+
+    def estimate(self, values: Floats, confidence: float) -> Interval:
+        """Return estimate and interval, from 0 to 1."""
+        hits = values > self.threshold if self.is_above else values < self.threshold
+        return share_interval(int(np.count_nonzero(hits)), values.size, confidence)
+
+
+def parse_statistic(text: str, metric: str) -> Statistic:
+    """Return the statistic of a metric that a text names; StudyError where it names none."""
+    words, unit = text.strip(), METRICS[metric].unit
+    if words == "mean":
+        return Mean(unit)
+    quantile = _QUANTILE.fullmatch(words)
+    if quantile is not None and 0.0 < float(quantile[1]) < 1.0:
+        return Quantile(unit, float(quantile[1]))
+    probability = _PROBABILITY.fullmatch(words)
+    if probability is not None:
+        return Probability(
+            level_of(probability[2], metric, f"statistic '{text}'"), probability[1] == "above", probability[2]
+        )
+    raise StudyError(f"statistic '{text}' is not known; it is {GRAMMAR}, with a share above 0 and below 1")

@@ -1,0 +1,77 @@
+"""Monte Carlo over the distributions of a study file."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ppafo.errors import StudyError, UnitError
+from ppafo.metrics import METRICS
+from ppafo.studies.monte_carlo.estimate import MonteCarlo, StoppingRule, draw_until
+from ppafo.studies.monte_carlo.statistic import Statistic, parse_statistic
+from ppafo.studies.sweep.study import Study
+from ppafo.studies.uncertainty.draws import chosen_configuration, study_of, uncertainty_in
+from ppafo.studies.uncertainty.metric_values import difference_of
+from ppafo.studies.uncertainty.outcomes import Tally, Watch, check_metrics, scenario_model
+from ppafo.units import parse_quantity
+
+DEFAULT_WIDTH = "1 %"
+
+
+def monte_carlo(
+    study: Study | str | Path | Mapping[str, Any],
+    metric: str,
+    statistic: str = "mean",
+    width: str = DEFAULT_WIDTH,
+    configuration: str | None = None,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    first: int = 256,
+    most: int = 2**20,
+    confidence: float = 0.95,
+    most_failed: float = 0.01,
+    threads: int | None = None,
+    watch: Watch | None = None,
+) -> MonteCarlo:
+    """Estimate a statistic of a metric over the distributions of a study until its interval is ``width`` wide.
+
+    ``statistic`` is ``mean``, ``quantile 0.95`` or ``probability above 3 N m``; ``width`` a share of its value
+    (``1 %``) or a difference with its unit (``0.01 N m``; for a probability a number, ``0.01``). Draws are independent
+    whatever the study's sampling method, because the intervals need it; ``seed`` is that of the study unless given.
+    StudyError for bad input and where more than the share ``most_failed`` of the runs fails.
+    """
+    chosen = study_of(study, overrides)
+    base = chosen_configuration(chosen, configuration)
+    uncertainty = uncertainty_in(chosen, base)
+    check_metrics([metric], base.scenario)
+    what = parse_statistic(statistic, metric)
+    rule = stopping_rule(what, metric, width, StoppingRule(1.0, False, first, most, confidence, most_failed))
+    tally = Tally(rule.first, watch)
+    model = scenario_model(base.scenario, [metric], threads, tally.add)
+    return draw_until(model, uncertainty, metric, what, rule, chosen.sample.seed if seed is None else seed)
+
+
+def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingRule) -> StoppingRule:
+    """Return the rule with the width that a text says, else like another one."""
+    text = width.strip()
+    is_relative = text.endswith("%")
+    if statistic.unit == "-" and METRICS[metric].unit != "-":
+        number = _plain(text)
+    else:
+        number = parse_share(text) if is_relative else difference_of(text, metric, f"width = '{width}'")
+    return replace(like, width=number, is_relative=is_relative)
+
+
+def parse_share(text: str) -> float:
+    """Return a share from a text in percent, such as '1 %'."""
+    try:
+        return parse_quantity(text, "")
+    except UnitError as error:
+        raise StudyError(f"width = '{text}': {error}") from error
+
+
+def _plain(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise StudyError(f"width = '{text}': that of a probability is a plain number, such as 0.01") from error

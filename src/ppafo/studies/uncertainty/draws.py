@@ -1,0 +1,100 @@
+"""Draws from the distributions of a study, as columns of values for an ensemble."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ppafo.errors import StudyError, nearest_name
+from ppafo.studies.sweep.loading import load_study
+from ppafo.studies.sweep.sampling.correlation import correlated
+from ppafo.studies.sweep.sampling.distributions import Floats
+from ppafo.studies.sweep.sampling.uniforms import uniform_numbers
+from ppafo.studies.sweep.study import Configuration, Drawn, Sample, Study
+
+MOST_DRAWS = 2**26
+
+Columns = dict[str, Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """Distributions of some paths, and the Cholesky factor of the correlation of their normal scores (None: none)."""
+
+    drawn: tuple[Drawn, ...]
+    scores: tuple[tuple[float, ...], ...] | None = None
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The uncertain paths."""
+        return tuple(item.path for item in self.drawn)
+
+    def columns(self, uniform: Floats) -> Columns:
+        """Return values [SI] (draws,) by path for uniform numbers in (0, 1), shape (draws, paths)."""
+        shares = uniform if self.scores is None else correlated(uniform, self.scores)
+        return {item.path: item.distribution.values(shares[:, row]) for row, item in enumerate(self.drawn)}
+
+    def random_columns(self, first: int, count: int, seed: int) -> Columns:
+        """Return independent draws number ``first`` to ``first + count - 1`` of the stream that ``seed`` names."""
+        sample = Sample("random", first + count, seed)
+        return self.columns(uniform_numbers(sample, len(self.drawn), first, count))
+
+
+def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Study:
+    """Return a study: as it is, or by name, file or data, with overrides in every configuration."""
+    if not isinstance(study, Study):
+        return load_study(study, overrides)
+    if overrides:
+        raise StudyError("a Study cannot be overridden any more; give its name or file, or load it with the overrides")
+    return study
+
+
+def uncertainty_of(study: Study) -> Uncertainty:
+    """Return the distributions of a study; StudyError where it has none, or has a grid, which has no probability."""
+    if study.axes:
+        raise StudyError(
+            f"study '{study.name}': '{study.axes[0].path}' is varied over a grid or list, which has no probability; "
+            "give it a distribution, or leave it out"
+        )
+    if not study.drawn:
+        raise StudyError(f"study '{study.name}': nothing in it has a distribution; give it a [[vary]] of kind 'normal'")
+    return Uncertainty(study.drawn, study.scores)
+
+
+def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
+    """Return the distributions that hold in one configuration; StudyError where none does."""
+    whole = uncertainty_of(study)
+    kept = [row for row, item in enumerate(whole.drawn) if study.varies(item.path, configuration.name)]
+    if not kept:
+        raise StudyError(
+            f"study '{study.name}': nothing has a distribution in the configuration '{configuration.name}'"
+        )
+    if len(kept) == len(whole.drawn):
+        return whole
+    return Uncertainty(tuple(whole.drawn[row] for row in kept), _factor_of_some(whole.scores, kept))
+
+
+def chosen_configuration(study: Study, name: str | None) -> Configuration:
+    """Return a configuration by its name; without a name the only one. StudyError where that leaves a choice."""
+    names = [item.name for item in study.configurations]
+    if name is None:
+        if len(names) > 1:
+            raise StudyError(f"study '{study.name}' has several configurations; choose one: {', '.join(names)}")
+        return study.configurations[0]
+    if name not in names:
+        hint = nearest_name(name, names)
+        raise StudyError(f"study '{study.name}' has no configuration '{name}'{hint}; known are {', '.join(names)}")
+    return study.configurations[names.index(name)]
+
+
+def _factor_of_some(
+    factor: tuple[tuple[float, ...], ...] | None, kept: Sequence[int]
+) -> tuple[tuple[float, ...], ...] | None:
+    """Return the Cholesky factor of the correlation among some of the paths."""
+    if factor is None:
+        return None
+    lower = np.asarray(factor)
+    correlation = (lower @ lower.T)[np.ix_(kept, kept)]
+    return tuple(tuple(float(number) for number in row) for row in np.linalg.cholesky(correlation))

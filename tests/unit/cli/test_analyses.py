@@ -1,0 +1,163 @@
+"""``ppafo compare``, ``sensitivity``, ``montecarlo`` and ``tune``: text, JSON, files, and what is refused."""
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.studies.uncertainty import outcomes
+
+STUDY = "torque-task-uncertainty"
+SHORT = ["--set", "run.duration=0.3 s"]
+TUNING = """
+schema_version = 1
+name = "trial"
+scenario = "torque-task-proportional"
+overrides = ["reference.level=4 N m", "run.duration=0.3 s"]
+search = [{ path = "controller.proportional_gain", minimum = "0.05 1/(N m)", maximum = "0.5 1/(N m)" }]
+objective = [{ metric = "rms_error" }]
+effort = { starts = 1, generations = 2, candidates_per_gain = 5 }
+"""
+
+
+@pytest.fixture
+def tuning(tmp_path: Path) -> Path:
+    """A small tuning file."""
+    path = tmp_path / "trial.toml"
+    path.write_text(TUNING)
+    return path
+
+
+def commands(tuning: Path) -> dict[str, list[str]]:
+    """A quick run of each command."""
+    return {
+        "compare": ["compare", "--study", STUDY, "--baseline", "solenoid", "--draws", "64", *SHORT],
+        "montecarlo": [
+            *("montecarlo", STUDY, "--metric", "rms_error", "--configuration", "proportional"),
+            *("--width", "20 %", "--first", "64", "--most", "512", *SHORT),
+        ],
+        "sensitivity": [
+            *("sensitivity", STUDY, "--method", "morris", "--samples", "8", "--metric", "gas_supplied"),
+            *("--configuration", "proportional", "--independent", *SHORT),
+        ],
+        "tune": ["tune", str(tuning)],
+    }
+
+
+@pytest.mark.parametrize("command", ["compare", "montecarlo", "sensitivity", "tune"])
+def test_each_command_prints_and_leaves_a_report_with_its_figures(
+    command: str, tuning: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main([*commands(tuning)[command], "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert f"report: {out / 'report.html'}" in printed
+    page = (out / "report.html").read_text()
+    assert "data:image/svg+xml" in page
+    assert "nothing on this page was measured" in page
+    assert {path.suffix for path in out.iterdir()} == {".png", ".svg", ".json", ".txt", ".html"}
+    text = next(path for path in out.iterdir() if path.suffix == ".txt" and path.name != "overrides.txt").read_text()
+    assert text.splitlines()[0] == printed.splitlines()[0]
+
+
+@pytest.mark.parametrize("command", ["compare", "montecarlo", "sensitivity", "tune"])
+def test_each_command_prints_one_json_document_the_same_every_time(
+    command: str, tuning: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    printed = []
+    for _ in range(2):
+        assert main([*commands(tuning)[command], "--json"]) == 0
+        printed.append(capsys.readouterr().out)
+    assert json.loads(printed[0])
+    assert printed[0] == printed[1]
+
+
+def test_a_comparison_says_the_change_and_how_probable_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["compare", "--study", STUDY, "--baseline", "solenoid", "--draws", "64", "--json"]
+    assert main([*words, "--task", "slow:reference.ramp_time=2 s, run.duration=2.5 s", *SHORT]) == 0
+    document = json.loads(capsys.readouterr().out)
+    task = document["tasks"][0]
+    assert (task["task"], task["overrides"]) == ("slow", ["reference.ramp_time=2 s", "run.duration=2.5 s"])
+    assert task["pareto_front"] == ["proportional"]
+    gas = next(item for item in task["pairs"]["proportional"] if item["metric"] == "gas_supplied")
+    assert gas["change_high"] < 0.0
+    assert gas["better"]["low"] > 0.9
+
+
+def test_the_lines_of_a_tuning_can_be_pasted(tuning: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tune", str(tuning), "--out", str(tmp_path / "out")]) == 0
+    pasted = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("ppafo simulate"))
+    assert main([*shlex.split(pasted)[1:], "--json", "--out", str(tmp_path / "run")]) == 0
+    result = json.loads(capsys.readouterr().out)
+    stored = json.loads((tmp_path / "out" / "tuning.json").read_text())
+    assert result["metrics"]["rms_error"]["value"] == pytest.approx(stored["after"]["values"]["rms_error"], rel=1e-9)
+
+
+def test_an_interval_that_stays_too_wide_is_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["montecarlo", STUDY, "--metric", "rms_error", "--configuration", "proportional", *SHORT]
+    assert main([*words, "--width", "0.001 %", "--first", "32", "--most", "64"]) == 1
+    assert "not narrow enough after all 64 draws that were allowed" in capsys.readouterr().out
+
+
+def test_tunings_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tune", "--list"]) == 0
+    assert capsys.readouterr().out.startswith("pid-gains ")
+
+
+def test_an_interruption_leaves_nothing(
+    tuning: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_words: object, **_more: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(outcomes, "run_ensemble", interrupted)
+    for words in commands(tuning).values():
+        assert main([*words, "--out", str(tmp_path / "out")]) == 130
+        assert not (tmp_path / "out").exists()
+    assert "interrupted; nothing was written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["compare"], "nothing to compare"),
+        (["compare", "torque-task-solenoid", "torque-task-proportionel"], "did you mean 'torque-task-proportional'"),
+        (["compare", "--study", STUDY, "--draws", "many"], "--draws many: must be a whole number"),
+        (["compare", "--study", STUDY, "--threads", "0"], "--threads 0: must be 1 or more"),
+        (["compare", "--study", STUDY, "--task", "slow"], "--task slow: is not of the form NAME:PATH=VALUE"),
+        (["compare", "--study", STUDY, "--confidence", "200%"], "--confidence 200%: must be a number from 0 to 1"),
+        (["compare", "--study", STUDY, "--task", "slow:reference.ramp=2 s"], "reference.ramp"),
+        (["montecarlo", STUDY], "--metric"),
+        (["montecarlo", STUDY, "--metric", "rms_eror", "--configuration", "solenoid"], "did you mean 'rms_error'"),
+        (["montecarlo", STUDY, "--metric", "rms_error"], "choose one: proportional, solenoid"),
+        (["montecarlo", "pressure-and-area", "--metric", "rms_error"], "varied over a grid or list"),
+        (["sensitivity", STUDY, "--method", "moris"], "there is no method 'moris', did you mean 'morris'"),
+        (["sensitivity", STUDY, "--configuration", "solenoid"], "--independent"),
+        (["tune"], "no tuning was given"),
+        (["tune", "pid-gain"], "there is no tuning 'pid-gain', did you mean 'pid-gains'"),
+        (["tune", "pid-gains", "--seed", "-1"], "--seed"),
+    ],
+)
+def test_mistakes_are_one_line_and_exit_code_2(
+    words: list[str], text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert text in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("command", ["compare", "montecarlo", "sensitivity", "tune"])
+def test_an_output_that_cannot_be_written_is_refused_before_anything_runs(
+    command: str, tuning: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out").write_text("a file")
+    assert main([*commands(tuning)[command], "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "--out" in said
+    assert "runs" not in said

@@ -1,0 +1,66 @@
+"""Paired statistics against numbers worked out by hand and by theory."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ppafo.studies.comparison.paired import best_shares, paired, pareto_front
+
+
+def test_pairs_are_counted_and_incomplete_ones_left_out() -> None:
+    first = np.array([1.0, 2.0, 4.0, np.nan, 5.0])
+    second = np.array([0.5, 2.0, 6.0, 1.0, np.nan])
+    item = paired("rms_error", first, second, -1, 0.95)
+    assert item is not None
+    assert item.pairs == 3
+    assert item.difference.value == pytest.approx((-0.5 + 0.0 + 2.0) / 3)
+    assert item.change == pytest.approx(0.0)
+    assert item.better is not None
+    assert (item.better.value, item.equal) == pytest.approx((1 / 3, 1 / 3))
+
+
+def test_more_is_better_where_the_metric_says_so() -> None:
+    first, second = np.ones(10), np.array([2.0] * 7 + [0.5] * 3)
+    less, more, neither = (paired("x", first, second, better, 0.95) for better in (-1, 1, 0))
+    assert less is not None
+    assert less.better is not None
+    assert less.better.value == pytest.approx(0.3)
+    assert more is not None
+    assert more.better is not None
+    assert more.better.value == pytest.approx(0.7)
+    assert neither is not None
+    assert neither.better is None
+
+
+def test_common_draws_see_a_difference_that_separate_draws_do_not() -> None:
+    random = np.random.default_rng(3)
+    device = random.normal(0.0, 1.0, 400)
+    first, second = 10.0 + device, 9.95 + device + random.normal(0.0, 0.05, 400)
+    together = paired("x", first, second, -1, 0.95)
+    apart = paired("x", first, random.permutation(second), -1, 0.95)
+    assert together is not None
+    assert apart is not None
+    assert together.difference.high < 0.0
+    assert together.difference.width < 0.1 * apart.difference.width
+
+
+def test_a_baseline_of_zero_has_no_relative_change() -> None:
+    item = paired("switchings", np.zeros(5), np.ones(5), -1, 0.95)
+    assert item is not None
+    assert math.isnan(item.change)
+    assert item.difference.value == 1.0
+
+
+def test_no_pair_gives_nothing() -> None:
+    assert paired("x", np.array([np.nan]), np.array([1.0]), -1, 0.95) is None
+
+
+def test_the_best_of_several_is_counted_with_ties_for_all() -> None:
+    values = [np.array([1.0, 3.0, 2.0, np.nan]), np.array([2.0, 1.0, 2.0, 0.0]), np.array([3.0, 4.0, 5.0, 1.0])]
+    assert [share.value for share in best_shares(values, -1, 0.95)] == pytest.approx([2 / 3, 2 / 3, 0.0])
+
+
+def test_the_front_has_what_nothing_beats_in_all_goals() -> None:
+    points = np.array([[1.0, 5.0], [2.0, 2.0], [3.0, 1.0], [3.0, 2.0], [2.0, 2.0], [np.nan, 0.0]])
+    assert pareto_front(points).tolist() == [True, True, True, False, True, False]
