@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         PpafoError,
         ScenarioError,
         SimulationError,
+        StudyError,
         UnitError,
     )
     from ppafo.metrics import Metric, evaluate
@@ -26,42 +27,55 @@ if TYPE_CHECKING:
     from ppafo.parameters import ParameterSet, apply_overrides, list_sets, load_device, load_parameter_set
     from ppafo.parameters.audit import audit
     from ppafo.parameters.device import Device
+    from ppafo.parameters.parts import Catalogue, Part, load_catalogue
     from ppafo.signals import Channel, Recording
     from ppafo.simulation.loading import list_scenarios, load_scenario, scenario_from_dict
     from ppafo.simulation.result import Result, Status
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import simulate, simulate_many
     from ppafo.storage import read_recording, read_result
+    from ppafo.studies.design import Design, load_design, run_design
+    from ppafo.studies.sizing import Sizing, load_sizing, run_sizing
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Catalogue",
     "Channel",
     "DataError",
+    "Design",
     "Device",
     "IdentificationError",
     "Measurement",
     "Metric",
     "ParameterError",
     "ParameterSet",
+    "Part",
     "PpafoError",
     "Recording",
     "Result",
     "Scenario",
     "ScenarioError",
     "SimulationError",
+    "Sizing",
     "Status",
+    "StudyError",
     "UnitError",
     "apply_overrides",
     "audit",
     "evaluate",
     "list_scenarios",
     "list_sets",
+    "load_catalogue",
+    "load_design",
     "load_device",
     "load_parameter_set",
     "load_scenario",
+    "load_sizing",
     "read_recording",
     "read_result",
+    "run_design",
+    "run_sizing",
     "scenario_from_dict",
     "simulate",
     "simulate_many",
@@ -75,6 +89,7 @@ _HOMES = {
         "PpafoError",
         "ScenarioError",
         "SimulationError",
+        "StudyError",
         "UnitError",
     ),
     "ppafo.metrics": ("Metric", "evaluate"),
@@ -82,12 +97,15 @@ _HOMES = {
     "ppafo.parameters": ("ParameterSet", "apply_overrides", "list_sets", "load_device", "load_parameter_set"),
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
+    "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
     "ppafo.signals": ("Channel", "Recording"),
     "ppafo.simulation.loading": ("list_scenarios", "load_scenario", "scenario_from_dict"),
     "ppafo.simulation.result": ("Result", "Status"),
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("simulate", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
+    "ppafo.studies.design": ("Design", "load_design", "run_design"),
+    "ppafo.studies.sizing": ("Sizing", "load_sizing", "run_sizing"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -28,6 +28,10 @@ class SimulationError(PpafoError):
     """A run could not be carried out, for example because no model could be compiled."""
 
 
+class StudyError(PpafoError):
+    """A study file asks for something that is not possible, or its results belong to another study."""
+
+
 class IdentificationError(PpafoError):
     """A recording does not allow the estimate that was asked for."""
 

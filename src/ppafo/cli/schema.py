@@ -9,6 +9,9 @@ from ppafo.errors import DataError, nearest_name
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.schema",
     "scenario": "ppafo.simulation.schema",
+    "parts": "ppafo.parameters.parts.schema",
+    "design": "ppafo.studies.design.document",
+    "size": "ppafo.studies.sizing.document",
     "identification": "ppafo.identification.problem",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
