@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ppafo.parameters import ParameterSet, apply_overrides, list_sets, load_device, load_parameter_set
     from ppafo.parameters.audit import audit
     from ppafo.parameters.device import Device
+    from ppafo.parameters.parts import Catalogue, Part, load_catalogue
     from ppafo.signals import Channel, Recording
     from ppafo.simulation.loading import list_scenarios, load_scenario, scenario_from_dict
     from ppafo.simulation.result import Result, Status
@@ -41,13 +42,17 @@ if TYPE_CHECKING:
     from ppafo.studies.monte_carlo import MonteCarlo, monte_carlo
     from ppafo.studies.sensitivity import Sensitivity, sensitivity
     from ppafo.studies.tuning import Tuning, list_tunings, load_tuning, tune
+    from ppafo.studies.design import Design, load_design, run_design
+    from ppafo.studies.sizing import Sizing, load_sizing, run_sizing
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Catalogue",
     "Channel",
     "Comparison",
     "DataError",
+    "Design",
     "Device",
     "Gait",
     "IdentificationError",
@@ -56,6 +61,7 @@ __all__ = [
     "MonteCarlo",
     "ParameterError",
     "ParameterSet",
+    "Part",
     "PpafoError",
     "Recording",
     "Result",
@@ -63,6 +69,7 @@ __all__ = [
     "ScenarioError",
     "Sensitivity",
     "SimulationError",
+    "Sizing",
     "Status",
     "StudyError",
     "StudyResults",
@@ -77,6 +84,8 @@ __all__ = [
     "list_sets",
     "list_studies",
     "list_tunings",
+    "load_catalogue",
+    "load_design",
     "load_device",
     "load_gait",
     "load_parameter_set",
@@ -88,6 +97,11 @@ __all__ = [
     "read_recording",
     "read_result",
     "run_study",
+    "load_sizing",
+    "read_recording",
+    "read_result",
+    "run_design",
+    "run_sizing",
     "scenario_from_dict",
     "sensitivity",
     "simulate",
@@ -112,6 +126,7 @@ _HOMES = {
     "ppafo.parameters": ("ParameterSet", "apply_overrides", "list_sets", "load_device", "load_parameter_set"),
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
+    "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
     "ppafo.signals": ("Channel", "Recording"),
     "ppafo.simulation.loading": ("list_scenarios", "load_scenario", "scenario_from_dict"),
     "ppafo.simulation.result": ("Result", "Status"),
@@ -125,6 +140,8 @@ _HOMES = {
     "ppafo.studies.monte_carlo": ("MonteCarlo", "monte_carlo"),
     "ppafo.studies.sensitivity": ("Sensitivity", "sensitivity"),
     "ppafo.studies.tuning": ("Tuning", "list_tunings", "load_tuning", "tune"),
+    "ppafo.studies.design": ("Design", "load_design", "run_design"),
+    "ppafo.studies.sizing": ("Sizing", "load_sizing", "run_sizing"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

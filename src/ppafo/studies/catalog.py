@@ -10,4 +10,7 @@ STUDIES: dict[str, str] = {
     "reproduction": "which of the paper's claims hold when its experiments are run again?",
     "sensitivity": "which uncertain value matters?",
     "tuning": "which gains are best, also for a device that is not known exactly?",
+    "design": "which parts and settings does no other design beat in error, gas and mass?",
+    "reproduction": "which of the paper's claims hold when its experiments are run again?",
+    "sizing": "which valve, supply pressure and bottle are just enough for a torque profile and hours of use?",
 }

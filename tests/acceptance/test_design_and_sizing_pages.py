@@ -1,0 +1,57 @@
+"""What the pages on designing and sizing show is run as it stands there."""
+
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.cli.main import main
+
+PAGES = Path(__file__).parents[2] / "docs" / "how-to"
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """The code blocks of a page in one language."""
+    text = (PAGES / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+def test_the_sizing_of_the_page_prints_what_the_page_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(blocks("size-a-device.md", "sh")[0])[1:]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    shown = blocks("size-a-device.md", "text")[0].splitlines()
+    assert len(shown) > 6
+    assert [line for line in shown if line and line not in printed] == []
+    assert (tmp_path / "out" / "size" / "suggested.csv").exists()
+
+
+def test_the_file_and_the_python_of_the_page_on_sizing_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my-profile.toml").write_text(blocks("size-a-device.md", "toml")[0])
+    names: dict[str, Any] = {}
+    exec(blocks("size-a-device.md", "python")[0], names)
+    assert capsys.readouterr().out.startswith("enfield-ls-v05s pipeline-jacpac-9oz ")
+
+
+def test_the_file_and_the_python_of_the_page_on_designs_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = blocks("choose-a-design.md", "toml")[0].replace("screening = 1024", "screening = 128\ngenerations = 1")
+    (tmp_path / "my-device.toml").write_text(text)
+    names: dict[str, Any] = {}
+    exec(blocks("choose-a-design.md", "python")[0], names)
+    assert capsys.readouterr().out.strip().endswith("smc-crb2bw40-90d 2")
+
+
+def test_the_commands_about_parts_run(capsys: pytest.CaptureFixture[str]) -> None:
+    commands = blocks("choose-a-design.md", "sh")[1].splitlines()
+    assert [main(shlex.split(command)[1:]) for command in commands] == [0, 0]
+    assert "festo-mpye-5-m5-010-b" in capsys.readouterr().out

@@ -1,0 +1,172 @@
+"""``ppafo design``, ``ppafo size`` and ``ppafo parts``, from files to files."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.parameters.parts import load_catalogue
+
+DESIGN = """
+schema_version = 1
+name = "tiny"
+
+[[task]]
+name = "ramp"
+scenarios = { proportional = "torque-task-proportional" }
+overrides = ["run.duration=0.3 s", "reference.ramp_time=0.2 s", "reference.level=4 N m"]
+
+[parts]
+valves = ["enfield-ls-v05s"]
+actuators = ["smc-crb2bw40-90d"]
+regulators = ["festo-lrma-qs-4"]
+
+[variables."supply.pressure"]
+lowest = "30 psi_g"
+highest = "90 psi_g"
+
+[search]
+screening = 32
+population = 16
+generations = 1
+"""
+SIZING = """
+schema_version = 1
+name = "tiny"
+scenario = "torque-task-proportional"
+simulated = 1
+gain_factors = [1.0]
+
+[profile]
+time = ["0 s", "0.3 s", "0.6 s", "1 s"]
+torque = ["0 N m", "3 N m", "3 N m", "0 N m"]
+
+[use]
+repetitions = 50
+
+[limits]
+rms_error = "0.6 N m"
+
+[parts]
+valves = ["enfield-ls-v05s"]
+bottles = ["pipeline-jacpac-9oz"]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "design.toml").write_text(DESIGN)
+    (tmp_path / "sizing.toml").write_text(SIZING)
+    return tmp_path
+
+
+def test_a_design_is_printed_and_written_with_its_doubts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = folder / "out"
+    assert main(["design", str(folder / "design.toml"), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "* suggested: it has the smallest sum of error, gas and mass" in printed
+    assert "enfield-ls-v05s  mass (assumed)" in printed
+    names = ["design.json", "front.csv", "front.png", "front.svg", "report.html"]
+    assert sorted(path.name for path in out.iterdir()) == names
+    document = json.loads((out / "design.json").read_text())
+    assert 0 <= document["suggested"] < len(document["front"])
+    assert {item["part"] for item in document["doubtful"]} == {"enfield-ls-v05s", "festo-lrma-qs-4"}
+    lines = (out / "front.csv").read_text().splitlines()
+    assert lines[0] == "valve,actuator,error [N m],gas [kg],mass [kg],supply.pressure [Pa_a]"
+    assert len(lines) == 1 + len(document["front"])
+    report = (out / "report.html").read_text()
+    assert "Look up before buying" in report
+    assert "mass 300\N{NO-BREAK SPACE}g is assumed" in report
+    assert "<script" not in report
+
+
+def test_the_json_of_a_design_is_the_same_for_the_same_seed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    fronts = []
+    for seed in ("5", "5", "6"):
+        assert main(["design", str(folder / "design.toml"), "--seed", seed, "--json"]) == 0
+        fronts.append(json.loads(capsys.readouterr().out)["front"])
+    assert fronts[0] == fronts[1] != fronts[2]
+
+
+def test_a_sizing_is_printed_and_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = folder / "out"
+    assert main(["size", str(folder / "sizing.toml"), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "(typed, not measured)" in printed
+    assert "* suggested: enfield-ls-v05s at " in printed
+    names = ["report.html", "sizing.json", "sizing.png", "sizing.svg", "suggested.csv"]
+    assert sorted(path.name for path in out.iterdir()) == names
+    document = json.loads((out / "sizing.json").read_text())
+    assert document["suggested"] == "enfield-ls-v05s"
+    assert document["valves"][0]["bottle"] == "pipeline-jacpac-9oz"
+    assert (out / "suggested.csv").read_text().startswith("# simulated")
+
+
+def test_a_sizing_without_a_suggestion_ends_with_1_and_says_why(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "hard.toml").write_text(SIZING.replace("0.6 N m", "0.001 N m"))
+    assert main(["size", str(folder / "hard.toml"), "--out", str(folder / "out")]) == 1
+    assert "no suggestion: no valve keeps the error limit" in capsys.readouterr().out
+    assert "no valve keeps the error limit" in (folder / "out" / "report.html").read_text()
+
+
+@pytest.mark.parametrize("command", ["design", "size"])
+def test_an_interrupted_study_writes_nothing_and_ends_with_130(
+    command: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    module = "ppafo.studies.design.evaluation" if command == "design" else "ppafo.studies.sizing.trials"
+    monkeypatch.setattr(f"{module}.run_ensemble", interrupted)
+    file = folder / ("design.toml" if command == "design" else "sizing.toml")
+    assert main([command, str(file), "--out", str(folder / "out")]) == 130
+    assert not (folder / "out").exists()
+    assert "interrupted; nothing was written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["design"], "no design was given: name one (torque-task) or give a .toml file"),
+        (["design", "torque-tusk"], "there is no design 'torque-tusk', did you mean 'torque-task'?"),
+        (["design", "torque-task", "--seed", "-1"], "--seed -1: must be a whole number from 0"),
+        (["size"], "no sizing was given: name one (push-off)"),
+        (["size", "pushoff"], "there is no sizing 'pushoff', did you mean 'push-off'?"),
+        (["parts", "enfield"], "there is no part 'enfield'"),
+        (["parts", "--catalogue", "mine.toml"], "mine.toml: cannot be read"),
+    ],
+)
+def test_bad_input_is_one_line_and_2(
+    words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "--out", "out"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert message in said
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("command", "name"), [("design", "torque-task"), ("size", "push-off")])
+def test_files_of_the_package_are_listed(command: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--list"]) == 0
+    assert capsys.readouterr().out.startswith(name)
+
+
+def test_parts_are_listed_with_what_is_doubtful_and_what_is_not_known(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["parts"]) == 0
+    printed = capsys.readouterr().out
+    assert all(part.name in printed for part in load_catalogue().parts)
+    assert main(["parts", "enfield-ls-v05s"]) == 0
+    printed = capsys.readouterr().out
+    assert "31.6 mm^2  published" in printed
+    assert "not known: largest_pressure, nominal_flow, spool_frequency" in printed
+
+
+@pytest.mark.parametrize("name", ["parts", "design", "size"])
+def test_the_layouts_of_the_files_are_published(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema", name]) == 0
+    assert json.loads(capsys.readouterr().out)["$schema"].startswith("https://json-schema.org")
