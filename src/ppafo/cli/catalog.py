@@ -2,6 +2,7 @@
 
 COMMANDS: dict[str, str] = {
     "reproduce": "run the paper's experiments and report against its claims",
+    "unreported": "what the paper's results imply about the settings that it does not print",
     "simulate": "run a scenario and write its recording, metrics and figure",
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
