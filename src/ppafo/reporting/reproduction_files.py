@@ -11,6 +11,7 @@ from ppafo.reporting.reproduction_report import holding_torque, reproduction_rep
 from ppafo.reporting.step_response_figure import step_response_figure
 from ppafo.reporting.style import rendered
 from ppafo.reporting.torque_task_figure import torque_task_figure
+from ppafo.reporting.unreported_figure import unreported_figure
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.owned_folder import FolderKind, check_owned_folder, read_json, write_owned_folder
 from ppafo.studies.reproduction import Reproduction
@@ -23,19 +24,23 @@ CLAIMS = "claims.json"
 IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
+UNSAID_FIGURE = "unreported-settings"
 _FORMATS = ("png", "svg")
 
 FILES = (
     *(f"{name}.csv" for name in EXPERIMENTS),
     *(
         f"{figure}.{file_format}"
-        for figure in (IDENTIFICATION_FIGURE, STEP_FIGURE, TORQUE_FIGURE)
+        for figure in (IDENTIFICATION_FIGURE, STEP_FIGURE, TORQUE_FIGURE, UNSAID_FIGURE)
         for file_format in _FORMATS
     ),
     CLAIMS,
     REPORT,
 )
-"""Names of all files, in the order of writing; the report comes last. Without the virtual rig there is no figure 3."""
+"""Names of all files, in the order of writing; the report comes last.
+
+Without the virtual rig there is no figure 3, with changed values no figure of what the paper leaves unsaid.
+"""
 
 
 def check_reproduction_folder(folder: Path) -> None:
@@ -51,15 +56,17 @@ def write_reproduction(folder: Path, contents: Mapping[str, bytes]) -> None:
 def reproduction_files(reproduction: Reproduction) -> dict[str, bytes]:
     """Return the contents of ``FILES``: recordings as CSV, the figures as PNG and SVG, claims and report."""
     step, torque = _step_figure(reproduction), _torque_figure(reproduction)
-    identification = _identification_figure(reproduction)
+    identification, unsaid = _identification_figure(reproduction), _unsaid_figure(reproduction)
+    figures = (step["svg"], torque["svg"], identification.get("svg"), unsaid.get("svg"))
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
     return {
         **{f"{run.scenario.name}.csv": marked_csv_bytes(run.recording) for run in runs},
         **{f"{IDENTIFICATION_FIGURE}.{file_format}": content for file_format, content in identification.items()},
         **{f"{STEP_FIGURE}.{file_format}": content for file_format, content in step.items()},
         **{f"{TORQUE_FIGURE}.{file_format}": content for file_format, content in torque.items()},
+        **{f"{UNSAID_FIGURE}.{file_format}": content for file_format, content in unsaid.items()},
         CLAIMS: f"{json_text(claims_document(reproduction))}\n".encode(),
-        REPORT: reproduction_report(reproduction, step["svg"], torque["svg"], identification.get("svg")).encode(),
+        REPORT: reproduction_report(reproduction, *figures).encode(),
     }
 
 
@@ -78,6 +85,12 @@ def _identification_figure(reproduction: Reproduction) -> dict[str, bytes]:
     if isinstance(evidence, NoEvidence):
         return {}
     return rendered(synthetic_figure_3(evidence.bench.torque, evidence.bench.decay), _FORMATS)
+
+
+def _unsaid_figure(reproduction: Reproduction) -> dict[str, bytes]:
+    """Return the figure of what the paper leaves unsaid by format; nothing where values were changed."""
+    family = reproduction.family
+    return {} if family is None else rendered(unreported_figure(family), _FORMATS)
 
 
 def _step_figure(reproduction: Reproduction) -> dict[str, bytes]:

@@ -12,11 +12,13 @@ from ppafo.reporting.metrics_table import in_shown_unit
 from ppafo.reporting.page import inline_figure, rendered_page
 from ppafo.reporting.synthetic_section import synthetic_values
 from ppafo.reporting.typesetting import printed_quantity, quantity, sentence
+from ppafo.reporting.unreported_table import conclusion_rows, setting_rows
 from ppafo.simulation.result import Result
 from ppafo.studies.reproduction import Claim, Reproduction
 from ppafo.studies.reproduction.assumed import AssumedValue
 from ppafo.studies.reproduction.claim import VERDICTS, verdict_counts
 from ppafo.studies.reproduction.study import PROPORTIONAL, SOLENOID, STEP
+from ppafo.studies.unreported_settings.study import conclusions
 
 TEMPLATE = "reproduction.html.jinja"
 
@@ -38,13 +40,18 @@ _TASK_METRICS = (
 
 
 def reproduction_report(
-    reproduction: Reproduction, step_figure: bytes, torque_figure: bytes, identification_figure: bytes | None = None
+    reproduction: Reproduction,
+    step_figure: bytes,
+    torque_figure: bytes,
+    identification_figure: bytes | None = None,
+    unsaid_figure: bytes | None = None,
 ) -> str:
     """Return the report as HTML; figures are the contents of SVG files and become part of the page."""
     values = {
         **_summary(reproduction),
         **_findings(reproduction),
         **synthetic_values(reproduction, identification_figure),
+        "unsaid": _unsaid(reproduction, unsaid_figure),
         "step_figure": inline_figure(step_figure),
         "torque_figure": inline_figure(torque_figure),
         "task_rows": _task_rows(reproduction.solenoid.metrics, reproduction.proportional.metrics),
@@ -61,6 +68,20 @@ def holding_torque(result: Result) -> float:
     """Largest torque that a result's supply can hold [N m]; equation (2) with atmosphere in the other chamber."""
     device = result.scenario.device
     return device.actuator.torque_constant * (device.supply.pressure - device.supply.atmospheric_pressure)
+
+
+def _unsaid(reproduction: Reproduction, figure: bytes | None) -> dict[str, Any] | None:
+    """Return what the report says of the settings that the paper does not print; None where they were not studied."""
+    family = reproduction.family
+    if family is None or figure is None:
+        return None
+    return {
+        "figure": inline_figure(figure),
+        "drawn": family.drawn,
+        "effective": f"{family.effective:.0f}",
+        "settings": setting_rows(family),
+        "conclusions": conclusion_rows(conclusions(family)),
+    }
 
 
 def _summary(reproduction: Reproduction) -> dict[str, Any]:

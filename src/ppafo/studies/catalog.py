@@ -13,4 +13,5 @@ STUDIES: dict[str, str] = {
     "design": "which parts and settings does no other design beat in error, gas and mass?",
     "reproduction": "which of the paper's claims hold when its experiments are run again?",
     "sizing": "which valve, supply pressure and bottle are just enough for a torque profile and hours of use?",
+    "unreported_settings": "which settings of its torque task does the paper imply, and how firm is its conclusion?",
 }

@@ -22,6 +22,10 @@ from ppafo.studies.reproduction.printed import load_printed
 from ppafo.studies.reproduction.step_response import Levels, StepEvents, step_events, step_observations
 from ppafo.studies.reproduction.synthetic import NoEvidence, SyntheticEvidence, synthetic_evidence
 from ppafo.studies.reproduction.torque_task import torque_task_claims, torque_task_observations
+from ppafo.studies.unreported_settings import Family, infer_settings
+
+FAMILY_DRAWS = 16_384
+"""Completions of the torque task in the report; ``ppafo unreported`` takes more."""
 
 STEP = "step-response"
 SOLENOID = "torque-task-solenoid"
@@ -54,7 +58,10 @@ ORDER = (
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """What came of it: claims in the order of the paper, what the text tells, runs, assumptions and audit findings."""
+    """What came of it: claims in the order of the paper, what the text tells, runs, assumptions and audit findings.
+
+    ``family`` is what the paper's results imply about the settings it does not print; None where values were changed.
+    """
 
     claims: tuple[Claim, ...]
     step_observations: tuple[Observation, ...]
@@ -70,6 +77,7 @@ class Reproduction:
     completed_set: str
     completed_findings: tuple[Finding, ...]
     overrides: tuple[str, ...]
+    family: Family | None
 
     @property
     def missed(self) -> tuple[Claim, ...]:
@@ -118,7 +126,14 @@ def reproduce(overrides: Sequence[str] = (), tell: Callable[[str], None] = _sile
         completed_set=completed.name,
         completed_findings=tuple(audit(completed)),
         overrides=tuple(overrides),
+        family=None if overrides else _family(tell),
     )
+
+
+def _family(tell: Callable[[str], None]) -> Family:
+    """Return the completions of the torque task that agree with the paper, of few draws."""
+    tell(f"drawing {FAMILY_DRAWS} completions of the torque task")
+    return infer_settings(FAMILY_DRAWS)
 
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:

@@ -1,0 +1,51 @@
+"""``ppafo unreported``: what the paper's results imply about the settings that it does not print."""
+
+import argparse
+from pathlib import Path
+
+from ppafo.cli.output import (
+    EXIT_CHECK_FAILED,
+    EXIT_GOOD,
+    add_output_arguments,
+    check_output,
+    print_result,
+    tell,
+    write_files,
+)
+from ppafo.cli.quick_imports import load_compiler, load_drawing
+
+_FIGURE, _DOCUMENT = "unreported-settings", "unreported.json"
+_FORMATS = ("png", "svg")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument(
+        "--draws", type=int, default=262_144, metavar="N", help="completions of the torque task to run; default 262144"
+    )
+    parser.add_argument("--seed", type=int, default=2011, metavar="N", help="seed of the draws; default 2011")
+    add_output_arguments(parser)
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Print what is implied; 1 where no completion agrees with the paper."""
+    load_compiler()
+    from ppafo.documents.json_text import json_text
+    from ppafo.reporting.unreported_table import unreported_document, unreported_table
+    from ppafo.studies.unreported_settings import infer_settings
+
+    check_output(parsed.out, (_DOCUMENT, *(f"{_FIGURE}.{ending}" for ending in _FORMATS)))
+    family = infer_settings(parsed.draws, parsed.seed, tell)
+    document = unreported_document(family)
+    lines = unreported_table(family)
+    if parsed.out is not None:
+        load_drawing()
+        from ppafo.reporting.style import rendered
+        from ppafo.reporting.unreported_figure import unreported_figure
+
+        figures = rendered(unreported_figure(family), _FORMATS)
+        contents = {f"{_FIGURE}.{ending}": content for ending, content in figures.items()}
+        write_files(Path(parsed.out), {**contents, _DOCUMENT: f"{json_text(document)}\n".encode()})
+        lines += ["", f"figure: {parsed.out / f'{_FIGURE}.png'}"]
+    print_result("\n".join(lines), document, parsed.json)
+    return EXIT_GOOD if family.effective > 0.0 else EXIT_CHECK_FAILED
