@@ -35,15 +35,15 @@ if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import simulate, simulate_many
     from ppafo.storage import read_recording, read_result
+    from ppafo.studies.comparison import Comparison, compare
+    from ppafo.studies.design import Design, load_design, run_design
+    from ppafo.studies.monte_carlo import MonteCarlo, monte_carlo
+    from ppafo.studies.sensitivity import Sensitivity, sensitivity
+    from ppafo.studies.sizing import Sizing, load_sizing, run_sizing
     from ppafo.studies.sweep.loading import list_studies, load_study
     from ppafo.studies.sweep.results import StudyResults, load_study_results
     from ppafo.studies.sweep.run import run_study
-    from ppafo.studies.comparison import Comparison, compare
-    from ppafo.studies.monte_carlo import MonteCarlo, monte_carlo
-    from ppafo.studies.sensitivity import Sensitivity, sensitivity
     from ppafo.studies.tuning import Tuning, list_tunings, load_tuning, tune
-    from ppafo.studies.design import Design, load_design, run_design
-    from ppafo.studies.sizing import Sizing, load_sizing, run_sizing
 
 __version__ = "0.1.0"
 
@@ -90,18 +90,16 @@ __all__ = [
     "load_gait",
     "load_parameter_set",
     "load_scenario",
+    "load_sizing",
     "load_study",
     "load_study_results",
     "load_tuning",
     "monte_carlo",
     "read_recording",
     "read_result",
-    "run_study",
-    "load_sizing",
-    "read_recording",
-    "read_result",
     "run_design",
     "run_sizing",
+    "run_study",
     "scenario_from_dict",
     "sensitivity",
     "simulate",

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from ppafo.simulation.ensemble import run_ensemble
 
 from ppafo.control.profiles.tabulated import KIND, KNOTS, NEVER, Tabulated, bounds, used_knots, value
+from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from ppafo.simulation.numbers import with_numbers
 
 from ppafo.errors import PpafoError
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
 from ppafo.studies.design import Design, load_design, run_design
 from ppafo.studies.design.candidates import Candidates
