@@ -2,8 +2,8 @@
 
 COMMANDS: dict[str, str] = {
     "reproduce": "run the paper's experiments and report against its claims",
-    "unreported": "what the paper's results imply about the settings that it does not print",
     "simulate": "run a scenario and write its recording, metrics and figure",
+    "unreported": "what the paper's results imply about the settings that it does not print",
     "sweep": "run a study: many runs, a row for each, resumable",
     "compare": "hold configurations against each other, over an uncertain device too",
     "sensitivity": "say which uncertain value matters: Morris or Sobol indices",
