@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import simulate, simulate_many
     from ppafo.storage import read_recording, read_result
+    from ppafo.walking import compare_walks, list_walks, load_walk, walk, walk_population
 
 __version__ = "0.1.0"
 
@@ -56,19 +57,24 @@ __all__ = [
     "UnitError",
     "apply_overrides",
     "audit",
+    "compare_walks",
     "evaluate",
     "list_gaits",
     "list_scenarios",
     "list_sets",
+    "list_walks",
     "load_device",
     "load_gait",
     "load_parameter_set",
     "load_scenario",
+    "load_walk",
     "read_recording",
     "read_result",
     "scenario_from_dict",
     "simulate",
     "simulate_many",
+    "walk",
+    "walk_population",
 ]
 
 _HOMES = {
@@ -93,6 +99,7 @@ _HOMES = {
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("simulate", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
+    "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk", "walk_population"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -3,6 +3,7 @@
 COMMANDS: dict[str, str] = {
     "reproduce": "run the paper's experiments and report against its claims",
     "simulate": "run a scenario and write its recording, metrics and figure",
+    "walk": "walk with the device, without it, and as the healthy gait would have it",
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": "bench recordings in, parameter set with uncertainty out",

@@ -9,6 +9,7 @@ from ppafo.errors import DataError, nearest_name
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.schema",
     "scenario": "ppafo.simulation.schema",
+    "walk": "ppafo.walking.schema",
     "identification": "ppafo.identification.problem",
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",

@@ -87,6 +87,7 @@ def _form(quantity: Quantity, number: float) -> str:
 
 def _limits(quantity: Quantity, atmosphere: float) -> str:
     unit = WRITTEN_UNITS.get(quantity.unit, quantity.unit) if quantity.unit != "Pa_a" else "Pa_a"
+    unit = "" if unit in PLAIN else unit
     lower, upper = (
         f"{from_si(limit, unit, quantity.unit, atmosphere):.6g} {unit}".rstrip() if math.isfinite(limit) else ""
         for limit in (quantity.minimum, quantity.maximum)
