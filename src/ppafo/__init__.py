@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from ppafo.studies.sweep.results import StudyResults, load_study_results
     from ppafo.studies.sweep.run import run_study
     from ppafo.studies.tuning import Tuning, list_tunings, load_tuning, tune
+    from ppafo.walking import compare_walks, list_walks, load_walk, walk, walk_population
 
 __version__ = "0.1.0"
 
@@ -78,12 +79,14 @@ __all__ = [
     "apply_overrides",
     "audit",
     "compare",
+    "compare_walks",
     "evaluate",
     "list_gaits",
     "list_scenarios",
     "list_sets",
     "list_studies",
     "list_tunings",
+    "list_walks",
     "load_catalogue",
     "load_design",
     "load_device",
@@ -94,6 +97,7 @@ __all__ = [
     "load_study",
     "load_study_results",
     "load_tuning",
+    "load_walk",
     "monte_carlo",
     "read_recording",
     "read_result",
@@ -105,6 +109,8 @@ __all__ = [
     "simulate",
     "simulate_many",
     "tune",
+    "walk",
+    "walk_population",
 ]
 
 _HOMES = {
@@ -140,6 +146,7 @@ _HOMES = {
     "ppafo.studies.tuning": ("Tuning", "list_tunings", "load_tuning", "tune"),
     "ppafo.studies.design": ("Design", "load_design", "run_design"),
     "ppafo.studies.sizing": ("Sizing", "load_sizing", "run_sizing"),
+    "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk", "walk_population"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

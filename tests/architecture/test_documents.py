@@ -22,8 +22,7 @@ from ppafo.signals.channels import CHANNELS
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "ppafo"
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
-PAPER_EQUATIONS = (*range(1, 11), 13, 14)
-LEG_EQUATIONS = (11, 12)
+PAPER_EQUATIONS = tuple(range(1, 15))
 
 GROUPS_OF_NUMBERS = (plant.PlantParameters, plant.PlantState, plant.Openings, sensors.Measurement)
 DEVICE_PARTS = [part for _, part in inspect.getmembers(device, dataclasses.is_dataclass)]
@@ -121,11 +120,6 @@ def test_every_equation_of_the_paper_has_a_section_with_functions() -> None:
     sections = sections_of_equations()
     assert tuple(sections) == PAPER_EQUATIONS
     assert [number for number, names in sections.items() if not names] == []
-
-
-def test_the_equations_of_the_leg_are_said_to_come() -> None:
-    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-    assert all(f"({number})" in text.partition("## ")[0] for number in LEG_EQUATIONS)
 
 
 def test_every_dotted_name_on_the_page_of_equations_is_a_function() -> None:

@@ -9,6 +9,7 @@ COMMANDS: dict[str, str] = {
     "sensitivity": "say which uncertain value matters: Morris or Sobol indices",
     "montecarlo": "draw until a statistic is known well enough",
     "tune": "search gains for a goal under constraints, robust where asked",
+    "walk": "walk with the device, without it, and as the healthy gait would have it",
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": "bench recordings in, parameter set with uncertainty out",

@@ -14,6 +14,7 @@ FORMATS: dict[str, str] = {
     "parts": "ppafo.parameters.parts.schema",
     "design": "ppafo.studies.design.document",
     "size": "ppafo.studies.sizing.document",
+    "walk": "ppafo.walking.schema",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.column_map",
     "rig": "ppafo.rig.schema",

@@ -43,7 +43,7 @@ def is_free(contact: float) -> bool:
 
 
 def foot_angle(shank: float, ankle: float) -> float:
-    """Angle [rad] of the foot over the horizontal, above 0 with the toes up."""
+    """Angle [rad] of the foot over the horizontal, above 0 with the toes up, from equation (12)'s angles."""
     return shank - ankle + QUARTER_TURN
 
 

@@ -60,7 +60,7 @@ def link_product(leg: LegParameters) -> float:
 
 
 def mass_matrix(leg: LegParameters, cosine_theta: float) -> MassMatrix:
-    """The inertia matrix M [kg m^2] at an ankle angle, of which the cosine is given. Equation (11)."""
+    """The inertia matrix M [kg m^2] at an ankle angle, of which the cosine is given. Equations (11), (12)."""
     foot = foot_inertia_about_ankle(leg)
     product = link_product(leg) * cosine_theta
     shank = leg.shank_inertia + leg.shank_mass * leg.shank_mass_centre * leg.shank_mass_centre
@@ -71,7 +71,7 @@ def mass_matrix(leg: LegParameters, cosine_theta: float) -> MassMatrix:
 def centrifugal_torques(
     leg: LegParameters, sine_theta: float, shank_rate: float, angular_velocity: float
 ) -> LegTorques:
-    """The centrifugal and Coriolis torques C q' [N m]; rates of the shank and of the ankle [rad/s]. Equation (11)."""
+    """The centrifugal and Coriolis torques C q' [N m]; rates of shank and ankle [rad/s]. Equations (11), (12)."""
     product = link_product(leg) * sine_theta
     knee = product * angular_velocity * (2.0 * shank_rate - angular_velocity)
     return LegTorques(knee, -product * shank_rate * shank_rate)
@@ -86,7 +86,7 @@ def gravity_torques(
     knee_forward: float,
     knee_up: float,
 ) -> LegTorques:
-    """The vector G [N m], with the acceleration of the knee forward and up [m/s^2] as a part of gravity. Equation (11).
+    """The vector G [N m], with the acceleration of the knee forward and up [m/s^2] in it. Equations (11), (12).
 
     phi is the shank angle and alpha that of the foot over the horizontal.
     """

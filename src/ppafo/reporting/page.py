@@ -28,3 +28,8 @@ def rendered_page(template: str, values: Mapping[str, Any]) -> str:
 def inline_figure(svg: bytes) -> str:
     """Return the content of an SVG file as the address of an image that is part of the page."""
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"
+
+
+def inline_animation(gif: bytes) -> str:
+    """Return the content of a GIF file as the address of an image that is part of the page."""
+    return f"data:image/gif;base64,{base64.b64encode(gif).decode('ascii')}"

@@ -23,11 +23,31 @@ CHANNELS: dict[str, ChannelKind] = {
     "pressure_2": ChannelKind("Pa", "absolute pressure in chamber 2"),
     "torque": ChannelKind("N m", "actuator torque, positive in plantarflexion"),
     "reference": ChannelKind("N m", "torque that the controller was asked for"),
-    "command": ChannelKind(PLAIN_NUMBER, "command to the valve, from -1 to 1", is_held=True),
+    "command": ChannelKind(PLAIN_NUMBER, "command to the valve, from -1 to 1; 2 vents both chambers", is_held=True),
     "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start"),
     "vented_mass": ChannelKind("kg", "gas let out to the atmosphere since the start"),
     "leaked_mass": ChannelKind("kg", "gas leaked past the vane, either way, since the start"),
     "external_torque": ChannelKind("N m", "torque on the wearer, T_ex of equation (1)"),
+    "shank_angle": ChannelKind("rad", "shank from the vertical, above 0 while the ankle is in front of the knee"),
+    "healthy_angle": ChannelKind(
+        "rad", "ankle angle of the gait that the wearer would walk, growing in plantarflexion"
+    ),
+    "device_power": ChannelKind("W", "power that the device gives to the wearer, T_ex times the angular velocity"),
+    "knee_torque": ChannelKind(
+        "N m", "T_1 of equation (11), what moves shank and foot without the ground; for the swing"
+    ),
+    "contact": ChannelKind(PLAIN_NUMBER, "foot and ground: 0 free, 1 on the heel, 2 flat, 3 on the toes", is_held=True),
+    "controller_phase": ChannelKind(
+        PLAIN_NUMBER, "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off", is_held=True
+    ),
+    "safe_state": ChannelKind(
+        PLAIN_NUMBER, "1 once the controller no longer trusts its sensors and has vented for good", is_held=True
+    ),
+    "heel_force": ChannelKind("N", "force under the heel as its sensor follows it"),
+    "toe_force": ChannelKind("N", "force under the toes as its sensor follows it"),
+    "toe_height": ChannelKind(
+        "m", "toes over the ground, against the healthy gait with a flat foot at the same instant"
+    ),
     "mass_1": ChannelKind("kg", "gas in chamber 1"),
     "mass_2": ChannelKind("kg", "gas in chamber 2"),
     "temperature_1": ChannelKind("K", "temperature of the gas in chamber 1, of a gas with an energy balance"),

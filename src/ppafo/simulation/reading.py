@@ -88,6 +88,7 @@ def _form(quantity: Quantity, number: float) -> str:
 def limits(quantity: Quantity, atmosphere: float) -> str:
     """Return what a value may be, as text: ``at least 0 deg and at most 180 deg``."""
     unit = WRITTEN_UNITS.get(quantity.unit, quantity.unit) if quantity.unit != "Pa_a" else "Pa_a"
+    unit = "" if unit in PLAIN else unit
     lower, upper = (
         f"{from_si(limit, unit, quantity.unit, atmosphere):.6g} {unit}".rstrip() if math.isfinite(limit) else ""
         for limit in (quantity.minimum, quantity.maximum)

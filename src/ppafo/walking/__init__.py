@@ -1,7 +1,19 @@
 """The device on a leg that walks: wearer, gait, sensors and event-based control put together, and what came of it."""
 
+from ppafo.walking.comparison import Comparison, compare_walks
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.loading import list_configurations, load_configuration
+from ppafo.walking.loading import list_walks, load_walk
+from ppafo.walking.population import Population, walk_population
 from ppafo.walking.walk import WalkResult, walk
 
-__all__ = ["Configuration", "WalkResult", "list_configurations", "load_configuration", "walk"]
+__all__ = [
+    "Comparison",
+    "Configuration",
+    "Population",
+    "WalkResult",
+    "compare_walks",
+    "list_walks",
+    "load_walk",
+    "walk",
+    "walk_population",
+]

@@ -22,6 +22,7 @@ from ppafo.simulation.declaration import PERIOD, RATE, kind_at, value_at
 from ppafo.simulation.overriding import device_paths, is_of_device, split_override
 from ppafo.simulation.reading import Reading
 from ppafo.walking.configuration import NEVER, Configuration
+from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
     FAULT_TIME,
     FAULTY,
@@ -41,14 +42,12 @@ _TEXTS = ("gait", "controller.kind", *(f"faults.{sensor}.kind" for sensor in FAU
 DEFAULT_PERIOD = 1.0e-3
 
 
-def list_configurations() -> tuple[str, ...]:
+def list_walks() -> tuple[str, ...]:
     """Return the names of the walk configurations that come with the package."""
     return _FILE.names()
 
 
-def load_configuration(
-    name_or_path: str | Path, overrides: Iterable[str] = (), gait: str | Path | None = None
-) -> Configuration:
+def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str | Path | None = None) -> Configuration:
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` replaces the
@@ -65,7 +64,7 @@ def load_configuration(
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
     kind = WALKING_CONTROLLERS[kind_at(document, "controller")]
-    return Configuration(
+    configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
         device=_device(document, [text for text in given if is_of_device(split_override(text)[0])], file),
@@ -81,6 +80,8 @@ def load_configuration(
         file=str(name_or_path),
         overrides=given,
     )
+    check_walk(configuration, reading)
+    return configuration
 
 
 def _changed(document: dict[str, Any], overrides: tuple[str, ...], file: str) -> dict[str, Any]:
@@ -106,6 +107,7 @@ def _set(document: dict[str, Any], path: str, text: str) -> None:
         kept = {item.name for item in (RATE, PERIOD, *controller_settings(text))}
         for key in set(table) - kept:
             del table[key]
+    table.pop({"controller.rate": "period", "controller.period": "rate"}.get(path, ""), None)
     table[name] = int(text) if path == "sensors.seed" and text.isdecimal() else text
 
 

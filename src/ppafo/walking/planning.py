@@ -1,7 +1,7 @@
 """From a wearer, a gait, a device and a controller to a run of the engine."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from ppafo.engine.rows import rebuild
 from ppafo.engine.run import Run, Walk
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState
 from ppafo.gait import Gait
+from ppafo.gait.gait import Curve
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.contact import HEEL
 from ppafo.model.fourier import Series
@@ -38,6 +39,9 @@ FLAT_FROM, FLAT_TO = 0.15, 0.35
 
 HEEL_RISE = math.radians(3.0)
 """The heel has left the ground when the foot is steeper than flat by this."""
+
+USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
+"""Shares of the stance at which the heel rises where the angles do not show it, and at the latest."""
 
 CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
 """Shares of the swing between which the toes must clear the ground."""
@@ -175,19 +179,25 @@ def _series(gait: Gait, name: str) -> Series:
     return Series(curve.mean, *[number for pair in pairs for number in pair])
 
 
+def followed(curve: Curve) -> Curve:
+    """The curve with the harmonics that the engine follows."""
+    return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
+
+
 def gait_timing(gait: Gait) -> GaitTiming:
     """Events of the gait, the heel's rise and the flat foot's angle from its own angles."""
     phases = np.linspace(0.0, 1.0, 1001)
-    foot = gait.shank_angle.sampled(phases) - gait.ankle_angle.sampled(phases) + 0.5 * math.pi
+    shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
+    foot = shank.sampled(phases) - ankle.sampled(phases) + 0.5 * math.pi
     flat = (phases >= FLAT_FROM) & (phases <= FLAT_TO)
     ground_angle = float(np.median(foot[flat]))
     steep = np.flatnonzero((phases > FLAT_TO) & (foot < ground_angle - HEEL_RISE))
-    heel_off = float(phases[steep[0]]) if steep.size else 0.6 * gait.stance_share
+    heel_off = float(phases[steep[0]]) if steep.size else USUAL_HEEL_RISE * gait.stance_share
     swing = 1.0 - gait.stance_share
     return GaitTiming(
         frequency=1.0 / gait.stride_time,
         start=0.0,
-        heel_off=min(heel_off, 0.95 * gait.stance_share),
+        heel_off=min(heel_off, LATEST_HEEL_RISE * gait.stance_share),
         toe_off=gait.stance_share,
         clearance_from=gait.stance_share + CLEARANCE_FROM * swing,
         clearance_to=gait.stance_share + CLEARANCE_TO * swing,

@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ppafo.signals import CHANNELS, Recording
 
 Floats = NDArray[np.float64]
 
@@ -55,10 +56,23 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
     return {name: np.diff(totals[item.total][starts]) for name, item in PER_STRIDE.items()}
 
 
-def averaged(time: Floats, values: Floats, unit: str, starts: NDArray[np.intp]) -> Curves:
-    """Mean and deviation over strides of a channel, each stride brought to the same phases."""
-    strides = [
-        np.interp(time[first] + PHASES * (time[last] - time[first]), time, values) for first, last in pairwise(starts)
-    ]
-    together = np.array(strides)
-    return Curves(together.mean(axis=0), together.std(axis=0), unit)
+def averaged(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Curves]:
+    """Mean and deviation over strides of every channel, each stride brought to the same phases; none without strides.
+
+    Channels that hold their value between samples, such as the command, have no mean.
+    """
+    if starts.size < 2:
+        return {}
+    times = times_of_phases(recording.time, starts)
+    names = [name for name in recording.names if not (name in CHANNELS and CHANNELS[name].is_held)]
+    return {name: _curves(np.interp(times, recording.time, recording[name]), recording.unit(name)) for name in names}
+
+
+def times_of_phases(time: Floats, starts: NDArray[np.intp]) -> Floats:
+    """Times [s] of ``PHASES`` in each stride, shape (strides, phases)."""
+    first, last = time[starts[:-1]], time[starts[1:]]
+    return np.asarray(first[:, None] + PHASES * (last - first)[:, None])
+
+
+def _curves(strides: Floats, unit: str) -> Curves:
+    return Curves(strides.mean(axis=0), strides.std(axis=0), unit)

@@ -1,38 +1,51 @@
 """Runs a walk and gathers what came of it, stride by stride and on average."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ppafo.engine.lanes import Floats, run_batch
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, LaneBlock, load_program
+from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError
 from ppafo.metrics import Metric
-from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix
-from ppafo.model.plant import chamber_pressures
-from ppafo.signals import Channel, Recording
+from ppafo.signals import Recording
 from ppafo.simulation.result import Status
 from ppafo.simulation.sampled import state_row_numbers
+from ppafo.storage.opensim import write_opensim
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import WalkPlan, plan_walk
+from ppafo.walking.recorded import recorded
 from ppafo.walking.strides import PER_STRIDE, SETTLING, Curves, averaged, per_stride, stride_starts
 
-SHORTEST_STRIDES = 4
-LONGEST_MINUTES = 600.0
-FINE_RECORD = 1.0e-3
-COARSE_RECORD = 5.0e-3
-FINE_UP_TO = 61.0
-"""Length of a walk [s] up to which every millisecond is recorded; longer ones keep every fifth."""
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHORTEST_STRIDES = 5
+LONGEST_MINUTES = 60.0
+RECORD_INTERVALS = ((61.0, 1.0e-3), (601.0, 5.0e-3), (60.0 * LONGEST_MINUTES, 2.0e-2))
+"""Up to which length of a walk [s] the record has which interval [s]: an hour of milliseconds would not fit."""
 
 REMEDY = "the step may be too long, or a value far from any real one: try a smaller run.step, and look at the wearer"
 
 
-@dataclass(frozen=True, slots=True)
+Progress = Callable[[float, float], None]
+
+
+def silent(done: float, total: float) -> None:  # both are there for those who listen
+    """Progress that nobody listens to."""
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class WalkResult:
     """A finished walk: recording, numbers of each stride (strides,), curves over the stride, and numbers of the whole.
 
-    ``averages`` and ``metrics`` leave out the first strides, in which the controller learns.
+    ``averages`` and ``metrics`` leave out the first strides, in which the controller learns. ``starts`` are the samples
+    of the recording right after each heel strike.
     """
 
     configuration: Configuration
@@ -41,10 +54,59 @@ class WalkResult:
     averages: Mapping[str, Curves]
     metrics: Mapping[str, Metric]
     status: Status
+    starts: NDArray[np.intp]
+
+    def __repr__(self) -> str:
+        """Return name, status, duration and one line a metric, in SI units."""
+        width = max((len(name) for name in self.metrics), default=0)
+        lines = [f"  {name:<{width}}  {item.value:.4g} {item.unit}" for name, item in self.metrics.items()]
+        head = f"Walk '{self.configuration.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
+        return "\n".join([head, *lines])
+
+    def plot(self) -> "Figure":
+        """Return a figure of the mean stride with the healthy gait beside it; ``.savefig(...)`` writes it."""
+        from ppafo.reporting.walk_figure import walk_figure
+
+        return walk_figure({self.configuration.name: self})
+
+    def save_opensim(self, path: str | Path) -> Path:
+        """Write the recording as a ``.sto`` file that OpenSim reads; returns the path."""
+        return write_opensim(path, self.recording)
 
 
-def walk(configuration: Configuration, minutes: float) -> WalkResult:
-    """Walk for some minutes; a walk that diverges is a result with that status. ScenarioError for bad input."""
+def walk(
+    configuration: Configuration | str | Path,
+    minutes: float,
+    overrides: Iterable[str] = (),
+    gait: str | Path | None = None,
+    progress: Progress = silent,
+) -> WalkResult:
+    """Walk for some minutes: a configuration, the name of a shipped one, or a file; overrides as on the command line.
+
+    A walk that diverges is a result with that status, up to the time of failure. ScenarioError or ParameterError for
+    bad input. ``progress`` is told after every part of the walk how many of how many minutes are done.
+    """
+    given = isinstance(configuration, Configuration)
+    chosen = configuration if isinstance(configuration, Configuration) else load_walk(configuration, overrides, gait)
+    if given and (gait is not None or tuple(overrides)):
+        raise ScenarioError("overrides and a gait belong to a name or a file: give them to load_walk")
+    run = plan_walk(plan_of(chosen, checked_seconds(chosen, minutes)))
+    outcome = _stepped(batch_of(run), run.step, progress)
+    rows = state_row_numbers(run)
+    record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
+    status = _status(float(outcome.states[rows["result.failure_time"], 0]), outcome.states)
+    time = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
+    if status.time is not None:
+        kept = time < status.time
+        kept[0] = True
+        time, record = time[kept], {name: values[kept] for name, values in record.items()}
+    recording = recorded(chosen, run, time, record)
+    starts = stride_starts(record["walk.strides"])
+    return _gathered(chosen, recording, record, starts, status)
+
+
+def checked_seconds(configuration: Configuration, minutes: float) -> float:
+    """Length of a walk [s], refused where it is too short for whole strides or too long."""
     seconds = 60.0 * minutes
     shortest = SHORTEST_STRIDES * configuration.gait.stride_time
     if not shortest <= seconds <= 60.0 * LONGEST_MINUTES:
@@ -52,18 +114,17 @@ def walk(configuration: Configuration, minutes: float) -> WalkResult:
             f"a walk of {minutes:.6g} min: must be {shortest / 60.0:.2g} min ({SHORTEST_STRIDES} strides) or more and "
             f"at most {LONGEST_MINUTES:g} min"
         )
-    run = plan_walk(plan_of(configuration, seconds))
-    outcome = run_batch(batch_of(run))
-    rows = state_row_numbers(run)
-    record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
-    status = _status(float(outcome.states[rows["result.failure_time"], 0]), outcome.states)
-    time = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
-    if status.time is not None:
-        kept = time < status.time
-        time, record = time[kept], {name: values[kept] for name, values in record.items()}
-    recording = _recording(configuration, run, time, record)
-    starts = stride_starts(record["walk.strides"])
-    return _gathered(configuration, recording, record, starts, status)
+    return seconds
+
+
+def _stepped(batch: Batch, step: float, progress: Progress) -> BatchResult:
+    """Run in parts short enough for an interrupt to be seen and for progress to be told."""
+    block = LaneBlock(load_program(batch.program), batch.clock, batch.parameters, batch.states)
+    count = batch.clock.step_count
+    for done in range(0, count, STEPS_PER_CALL):
+        block.advance(min(STEPS_PER_CALL, count - done))
+        progress(min(done + STEPS_PER_CALL, count) * step / 60.0, count * step / 60.0)
+    return block.result()
 
 
 def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
@@ -80,7 +141,7 @@ def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
         duration=seconds,
         period=configuration.period,
         step=configuration.step,
-        record_interval=FINE_RECORD if seconds <= FINE_UP_TO else COARSE_RECORD,
+        record_interval=next(interval for longest, interval in RECORD_INTERVALS if seconds <= longest),
     )
 
 
@@ -88,65 +149,29 @@ def _gathered(
     configuration: Configuration,
     recording: Recording,
     record: Mapping[str, Floats],
-    starts: "np.ndarray[tuple[int], np.dtype[np.intp]]",
+    starts: NDArray[np.intp],
     status: Status,
 ) -> WalkResult:
     strides = per_stride(record, starts)
     settled = starts[SETTLING:]
-    averages: dict[str, Curves] = {}
-    if settled.size >= 2:
-        averages = {
-            name: averaged(recording.time, recording[name], recording.unit(name), settled) for name in recording.names
-        }
-    metrics = _metrics(configuration, strides, averages)
-    return WalkResult(configuration, recording, strides, averages, metrics, status)
+    averages = averaged(recording, settled)
+    metrics = _metrics(configuration, strides, averages) | _safety(recording)
+    return WalkResult(configuration, recording, strides, averages, metrics, status, starts)
+
+
+def _safety(recording: Recording) -> dict[str, Metric]:
+    """When the controller stopped trusting its sensors; nothing where it never did."""
+    if "safe_state" not in recording or not recording["safe_state"].any():
+        return {}
+    time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
+    return {"safe_state_time": Metric(time, "s", "when the controller vented both chambers for good")}
 
 
 def _status(failed: float, states: Floats) -> Status:
     if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
         return Status("completed", None, "completed")
-    return Status("diverged", failed, f"diverged at t = {failed:.6g} s; {REMEDY}")
-
-
-def _recording(configuration: Configuration, run: Run, time: Floats, record: Mapping[str, Floats]) -> Recording:
-    angle, rate = record["state.angle"], record["state.angular_velocity"]
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])  # type: ignore[arg-type]
-    external = record["walk.external_torque"]
-    channels = {
-        "angle": (angle, "rad"),
-        "angular_velocity": (rate, "rad/s"),
-        "shank_angle": (record["walk.now.shank"], "rad"),
-        "healthy_angle": (record["walk.now.ankle"], "rad"),
-        "pressure_1": (pressure_1, "Pa"),
-        "pressure_2": (pressure_2, "Pa"),
-        "torque": (run.plant.torque_constant * np.subtract(pressure_1, pressure_2), "N m"),
-        "external_torque": (external, "N m"),
-        "device_power": (external * rate, "W"),
-        "knee_torque": (_knee_torque(run, time, record), "N m"),
-        "command": (record["result.command"], "-"),
-        "contact": (record["walk.contact"], "-"),
-        "heel_force": (record["walk.heel_force"], "N"),
-        "toe_force": (record["walk.toe_force"], "N"),
-        "supplied_mass": (record["state.supplied_mass"], "kg"),
-        "vented_mass": (record["state.vented_mass"], "kg"),
-    }
-    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
-    return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
-
-
-def _knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
-    """T_1 of equation (11) [N m]: what moves shank and foot as prescribed, without the ground; for the swing."""
-    assert run.walk is not None, "a walk has a leg"
-    leg = run.walk.leg
-    theta, phi = record["state.angle"], record["walk.now.shank"]
-    alpha = phi - theta + 0.5 * np.pi
-    ankle_acceleration = np.gradient(record["state.angular_velocity"], time)
-    matrix = mass_matrix(leg, np.cos(theta))  # type: ignore[arg-type]
-    turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])  # type: ignore[arg-type]
-    forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
-    weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)  # type: ignore[arg-type]
-    inertial = matrix.shank * record["walk.now.shank_acceleration"] + matrix.coupling * ankle_acceleration
-    return np.asarray(inertial + turning.knee + weight.knee)
+    time = failed if failed < NEVER_FAILED else 0.0
+    return Status("diverged", time, f"diverged at t = {time:.6g} s; {REMEDY}")
 
 
 def _metrics(

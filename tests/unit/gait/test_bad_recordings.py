@@ -59,7 +59,7 @@ CASES: dict[str, tuple[Change, str]] = {
     ),
     "unit of something else": (
         changed(SHANK, lambda x: x, "shank_angle [m]"),
-        "column 'shank_angle' [m]: unit 'm' does",
+        "column 'shank_angle [m]': unit 'm' does not fit: an angle is needed",
     ),
     "misspelt column": (
         changed(SHANK, lambda x: x, "shank_angel [rad]"),

@@ -129,7 +129,7 @@ def external_torque(
     acceleration: float,
     angle_is_free: bool,
 ) -> float:
-    """T_ex [N m]: what the free foot needs, or what equation (1) leaves of the actuator where the ground leads."""
+    """T_ex [N m]: what a free foot needs, equation (11), or what equation (1) leaves of the actuator on the ground."""
     speed = state.angular_velocity
     passive_damping = leg.ankle_damping * speed
     needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - torque

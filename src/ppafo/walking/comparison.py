@@ -1,0 +1,77 @@
+"""The same wearer with the device, with the device switched off, and as the healthy gait would have it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ppafo.control.walking import off
+from ppafo.metrics import Metric
+from ppafo.signals.recording import Floats
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.planning import gait_timing
+from ppafo.walking.posture import ankle_path
+from ppafo.walking.strides import PHASES
+from ppafo.walking.walk import Progress, WalkResult, healthy_positive_work, silent, walk
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """A walk with the device, the same with both chambers vented, and numbers of the healthy gait by name."""
+
+    with_device: WalkResult
+    without_device: WalkResult
+    healthy: Mapping[str, Metric]
+
+    @property
+    def is_completed(self) -> bool:
+        """True where both walks reached their end."""
+        return self.with_device.status.is_completed and self.without_device.status.is_completed
+
+
+def compare_walks(configuration: Configuration, minutes: float, progress: Progress = silent) -> Comparison:
+    """Walk some minutes with the device and as long with it switched off; ScenarioError for bad input."""
+    return Comparison(
+        walk(configuration, minutes, progress=progress),
+        walk(switched_off(configuration), minutes, progress=progress),
+        healthy_metrics(configuration),
+    )
+
+
+def switched_off(configuration: Configuration) -> Configuration:
+    """The same wearer and device with both chambers vented."""
+    return replace(configuration, name=f"{configuration.name}-off", controller=off.KIND, settings={})
+
+
+def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:
+    """What the numbers of a walk would be with a healthy ankle; without the moment there is no work."""
+    gait = configuration.gait
+    found = {
+        "slap_rate": Metric(_landing_rate(configuration), "rad/s", "rate of the measured foot as it comes down"),
+        "toe_clearance": Metric(0.0, "m", "the healthy gait is the measure"),
+        "toe_landing": Metric(0.0, "-", "the heel comes first"),
+        "angle_difference": Metric(0.0, "rad", "the healthy gait is the measure"),
+    }
+    if gait.ankle_moment is not None:
+        work = healthy_positive_work(configuration)
+        found["push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
+    return found
+
+
+def healthy_toe_height(configuration: Configuration) -> Floats:
+    """Toes of the healthy gait over the ground [m] at ``PHASES``."""
+    gait = configuration.gait
+    path = ankle_path(gait, gait_timing(gait), configuration.wearer)
+    return path.toe_height(PHASES % 1.0, gait.shank_angle.sampled(PHASES), gait.ankle_angle.sampled(PHASES))
+
+
+def _landing_rate(configuration: Configuration) -> float:
+    """Fastest fall of the measured toes between heel strike and foot flat [rad/s], below 0."""
+    gait = configuration.gait
+    rates = [
+        gait.shank_angle.rate(phase, gait.stride_time) - gait.ankle_angle.rate(phase, gait.stride_time)
+        for phase in np.linspace(0.0, 0.15, 151).tolist()
+    ]
+    return float(min(rates))

@@ -1,0 +1,103 @@
+"""Settings of a walk that contradict each other: refused before anything runs, in one line that names both."""
+
+from collections.abc import Iterator, Mapping
+
+from ppafo.errors import ScenarioError
+from ppafo.simulation.reading import Reading, written
+from ppafo.walking.configuration import Configuration
+
+_NEWTON, _RADIAN, _SECOND, _METRE = "N", "rad", "s", "m"
+
+
+def check_walk(configuration: Configuration, reading: Reading) -> None:
+    """Raise ScenarioError with the first contradiction; ``reading`` tells how a value was given."""
+    for path, reason in _contradictions(configuration):
+        raise reading.refusal(path, reason) if _is_given(reading, path) else _of_default(reading, path, reason)
+
+
+def _is_given(reading: Reading, path: str) -> bool:
+    section, _, name = path.partition(".")
+    table = reading.document.get(section)
+    return isinstance(table, Mapping) and name in table
+
+
+def _of_default(reading: Reading, path: str, reason: str) -> ScenarioError:
+    return ScenarioError(f"{reading.file}: {path}, which is not given and has its default: {reason}")
+
+
+def _contradictions(configuration: Configuration) -> Iterator[tuple[str, str]]:
+    yield from _segments(configuration)
+    if "load_threshold" in configuration.settings:
+        yield from _thresholds(configuration)
+        yield from _times(configuration)
+        yield from _angles(configuration)
+        yield from _gait(configuration)
+    if "peak_time" in configuration.settings:
+        yield from _profile(configuration.settings)
+
+
+def _segments(configuration: Configuration) -> Iterator[tuple[str, str]]:
+    wearer = configuration.wearer
+    if wearer.shank_mass_centre > wearer.shank_length:
+        length = written(wearer.shank_length, _METRE)
+        yield "wearer.shank_mass_centre", f"lies beyond the ankle: wearer.shank_length is {length}"
+    if wearer.foot_mass_centre > wearer.toe_lever:
+        lever = written(wearer.toe_lever, _METRE)
+        yield "wearer.foot_mass_centre", f"lies beyond the toes: wearer.toe_lever is {lever}"
+
+
+def _thresholds(configuration: Configuration) -> Iterator[tuple[str, str]]:
+    settings = configuration.settings
+    load, unload = settings["load_threshold"], settings["unload_threshold"]
+    if unload >= load:
+        yield (
+            "controller.unload_threshold",
+            f"must be below controller.load_threshold, which is {written(load, _NEWTON)}",
+        )
+    if settings["largest_force"] <= load:
+        yield "controller.largest_force", f"must be above controller.load_threshold, which is {written(load, _NEWTON)}"
+
+
+def _times(configuration: Configuration) -> Iterator[tuple[str, str]]:
+    settings, stride = configuration.settings, configuration.gait.stride_time
+    if not 0.5 * stride < settings["first_stride_time"] < 2.0 * stride:
+        shown = written(round(stride, 4), _SECOND)
+        yield "controller.first_stride_time", f"must be between half and twice the stride of the gait, which is {shown}"
+    if settings["frozen_time"] <= 2.0 * configuration.period:
+        shown = written(configuration.period, _SECOND)
+        yield "controller.frozen_time", f"must be longer than two samples of the controller, one is {shown}"
+
+
+def _angles(configuration: Configuration) -> Iterator[tuple[str, str]]:
+    settings, actuator = configuration.settings, configuration.device.actuator
+    low, high = settings["lowest_angle"], settings["highest_angle"]
+    if low >= high:
+        yield "controller.lowest_angle", f"must be below controller.highest_angle, which is {written(high, _RADIAN)}"
+    low, high = max(low, actuator.angle_min), min(high, actuator.angle_max)
+    if not low < settings["swing_angle"] < high:
+        reach = f"{written(low, _RADIAN)} to {written(high, _RADIAN)}"
+        yield "controller.swing_angle", f"lies outside of what sensor and device reach, {reach}"
+
+
+def _gait(configuration: Configuration) -> Iterator[tuple[str, str]]:
+    gait = configuration.gait
+    if gait.vertical_force is None:
+        reason = (
+            f"needs force sensors, and gait '{gait.name}' has no vertical_force; import it with the ground reaction, "
+            "or take controller.kind=off"
+        )
+        yield "controller.kind", reason
+
+
+def _profile(settings: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    peak, rise, fall = settings["peak_time"], settings["rise_time"], settings["fall_time"]
+    if rise > peak:
+        yield "controller.rise_time", f"the torque would rise before the heel strike: controller.peak_time is {peak:g}"
+    if peak + fall > 1.0:
+        yield "controller.peak_time", f"with controller.fall_time {fall:g} the torque would end after the stride"
+    if peak < settings["push_off_start"]:
+        start = settings["push_off_start"]
+        yield (
+            "controller.peak_time",
+            f"the peak would be over before the push-off: controller.push_off_start is {start:g}",
+        )

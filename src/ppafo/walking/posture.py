@@ -1,0 +1,102 @@
+"""Where shank and foot are in the sagittal plane: the leg that the gait prescribes, with any ankle angle.
+
+A gait file has angles only. The ankle's path follows from them: in stance the healthy foot rolls over heel and toes
+without sliding, in the swing the ankle goes over to the next foothold with the healthy toes above the ground.
+The same path carries the foot with and without the device; toes that come out below the ground would drag.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.gait import Gait
+from ppafo.model.gait import GaitTiming
+from ppafo.signals.recording import Floats
+from ppafo.walking.planning import followed
+from ppafo.walking.wearer import Wearer
+
+ANKLE_HEIGHT_SHARE = 0.039 / 0.246
+"""Height of the ankle over the sole as a share of the shank's length: both as shares of the stature in figure 4.1 of
+Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
+
+MID_SWING_CLEARANCE = 0.015
+"""Healthy toes over the ground in mid-swing [m]; 1 to 2 cm (Winter 1992, Phys Ther 72:45)."""
+
+DEFAULT_SPEED = 1.3
+"""Walking speed [m/s] where the gait has none; only for the length of the strides in pictures."""
+
+_GRID = np.linspace(0.0, 1.0, 1001)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posture:
+    """Joints in the plane [m], each (samples, 2), x forward and y up from the ground."""
+
+    knee: Floats
+    ankle: Floats
+    heel: Floats
+    toe: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnklePath:
+    """Path of the ankle [m] over the phases of one stride, and what it takes to place shank and foot on it."""
+
+    forward: Floats
+    up: Floats
+    stride_length: float
+    ground_angle: float
+    shank_length: float
+    heel_lever: float
+    toe_lever: float
+    height: float
+
+    def posture(self, turns: Floats, shank: Floats, ankle: Floats) -> Posture:
+        """Joints at a running phase [strides], for shank and ankle angles [rad]."""
+        phase = turns % 1.0
+        x = np.interp(phase, _GRID, self.forward) + self.stride_length * np.floor(turns)
+        joint = np.stack([x, np.interp(phase, _GRID, self.up)], axis=1)
+        knee = joint + self.shank_length * np.stack([-np.sin(shank), np.cos(shank)], axis=1)
+        tilt = shank - ankle + 0.5 * np.pi - self.ground_angle
+        return Posture(
+            knee, joint, joint + self._sole(tilt, -self.heel_lever), joint + self._sole(tilt, self.toe_lever)
+        )
+
+    def toe_height(self, phase: Floats, shank: Floats, ankle: Floats) -> Floats:
+        """Toes over the ground [m] at phases from 0 to 1; below 0 they would drag."""
+        tilt = shank - ankle + 0.5 * np.pi - self.ground_angle
+        up = self.toe_lever * np.sin(tilt) - self.height * np.cos(tilt)
+        return np.asarray(np.interp(phase % 1.0, _GRID, self.up) + up)
+
+    def _sole(self, tilt: Floats, lever: float) -> Floats:
+        along, up = np.cos(tilt), np.sin(tilt)
+        return np.stack([lever * along + self.height * up, lever * up - self.height * along], axis=1)
+
+
+def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
+    """The path of the ankle in a gait for the segments of a wearer."""
+    height = ANKLE_HEIGHT_SHARE * wearer.shank_length
+    shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
+    foot = shank.sampled(_GRID) - ankle.sampled(_GRID) + 0.5 * np.pi - timing.ground_angle
+    toes_down = height * np.cos(foot) - wearer.toe_lever * np.sin(foot)
+    heel_down = height * np.cos(foot) + wearer.heel_lever * np.sin(foot)
+    swing = np.clip((_GRID - timing.toe_off) / (1.0 - timing.toe_off), 0.0, 1.0)
+    up = np.maximum(toes_down, heel_down) + MID_SWING_CLEARANCE * np.sin(np.pi * swing) ** 2
+    length = (gait.walking_speed or DEFAULT_SPEED) * gait.stride_time
+    forward = _forward(foot, wearer, height, timing.toe_off, length)
+    levers = wearer.heel_lever, wearer.toe_lever
+    return AnklePath(forward, up, length, timing.ground_angle, wearer.shank_length, *levers, height)
+
+
+def _forward(foot: Floats, wearer: Wearer, height: float, toe_off: float, length: float) -> Floats:
+    """Rolling over heel and toes in stance; in the swing a smooth way to the next foothold with equal speeds."""
+    on_heel = wearer.heel_lever * (np.cos(foot) - 1.0) - height * np.sin(foot)
+    on_toes = wearer.toe_lever * (1.0 - np.cos(foot)) - height * np.sin(foot)
+    rolled = np.where(foot > 0.0, on_heel, on_toes)
+    last = int(np.searchsorted(_GRID, toe_off)) - 1
+    speed = (rolled[last] - rolled[last - 10]) / (_GRID[last] - _GRID[last - 10])
+    way, span = rolled[0] + length - rolled[last], 1.0 - _GRID[last]
+    share = np.clip((_GRID - _GRID[last]) / span, 0.0, 1.0)
+    start = speed * span
+    cubic = start * share + (3.0 * way - 2.0 * start) * share**2 + (start - 2.0 * way) * share**3
+    return np.asarray(np.where(np.arange(_GRID.size) <= last, rolled, rolled[last] + cubic))

@@ -1,0 +1,55 @@
+"""What the page on walking shows is run as it stands there."""
+
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.walking import load_walk
+
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+
+
+def test_the_commands_and_the_python_of_the_page_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    commands = [line for block in blocks("sh") for line in block.splitlines()]
+    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 6
+    listed = {
+        name for cell in re.findall(r"^\| (`.*?`) \|", PAGE, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)
+    }
+    assert {name for name in listed if not (tmp_path / "out" / "walk" / name).is_file()} == set()
+    capsys.readouterr()
+    names: dict[str, Any] = {}
+    exec(blocks("python")[0], names)
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0].startswith("completed 0.")
+    assert printed[2] == "100 wearers, (100,)"
+    assert (tmp_path / "out" / "walk.sto").stat().st_size > 10_000
+
+
+def test_the_table_of_the_page_is_what_the_command_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shown = [line.split() for line in PAGE.partition("    ppafo walk")[2].splitlines()[2:10]]
+    assert main(["walk", "--config", "solenoid", "--minutes", "0.2"]) == 0
+    assert [line.split() for line in capsys.readouterr().out.splitlines()[2:10]] == shown
+    assert len(shown) == 8
+
+
+def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:
+    path = tmp_path / "stiff-ankle.toml"
+    path.write_text(blocks("toml")[0])
+    configuration = load_walk(path)
+    assert configuration.settings["push_off_start"] == pytest.approx(0.42)
+    assert configuration.gait_sensors.heel_fault.time == pytest.approx(3.0)
+    assert not configuration.has_ideal_sensors

@@ -1,0 +1,239 @@
+"""``ppafo walk``: what it prints, what it writes, and what it refuses."""
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.storage import read_csv, read_netcdf
+from ppafo.walking import loading
+
+SHORT = ["--minutes", "0.1"]
+FILES = [
+    "gait-phases.png",
+    "gait-phases.svg",
+    "legs.gif",
+    "legs.png",
+    "legs.svg",
+    "mean-stride-off.csv",
+    "mean-stride.csv",
+    "mean-stride.png",
+    "mean-stride.svg",
+    "recording-off.nc",
+    "recording.csv",
+    "recording.nc",
+    "report.html",
+    "strides-off.csv",
+    "strides.csv",
+    "walk.json",
+]
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of one walk, which the tests below only read."""
+    folder = tmp_path_factory.mktemp("walks") / "solenoid"
+    assert main(["walk", *SHORT, "--out", str(folder)]) == 0
+    return folder
+
+
+def test_a_walk_prints_its_table_and_where_the_files_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["walk", "--config", "proportional", *SHORT, "--out", str(tmp_path / "walk")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "proportional: completed, 4 strides of falisse2019-subject1"
+    assert lines[2].split() == ["with", "without", "healthy"]
+    work = next(line for line in lines if line.startswith("Work on the wearer in push-off (J)")).split()
+    assert float(work[-3]) > 0.5
+    assert float(work[-2]) < 0.0
+    assert float(work[-1]) == pytest.approx(22.49)
+    assert str(tmp_path / "walk") in lines[-1]
+
+
+def test_a_walk_writes_its_folder_whole(walked: Path) -> None:
+    assert names(walked) == FILES
+    assert names(walked.parent) == ["solenoid"]
+    document = json.loads((walked / "walk.json").read_text())
+    assert document["files"] == FILES
+    assert document["status"]["kind"] == document["status_off"]["kind"] == "completed"
+    assert document["configuration"]["controller"] == "event_on_off"
+    assert document["metrics"]["gas"]["unit"] == "kg"
+
+
+def test_tables_and_recordings_say_the_same_and_that_they_are_simulated(walked: Path) -> None:
+    stored = read_netcdf(walked / "recording.nc")
+    written = read_csv(walked / "recording.csv")
+    assert stored.kind == written.kind == "simulated"
+    np.testing.assert_array_equal(stored["angle"], written["angle"])
+    strides = (walked / "strides.csv").read_text().splitlines()
+    assert strides[0].startswith("# simulated")
+    assert strides[1].startswith("stride [-],start [s],gas [kg],push_off_work [J]")
+    gas = [float(line.split(",")[2]) for line in strides[2:]]
+    document = json.loads((walked / "walk.json").read_text())
+    assert np.mean(gas[2:]) == pytest.approx(document["metrics"]["gas"]["value"])
+    mean = (walked / "mean-stride.csv").read_text().splitlines()
+    assert len(mean) == 2 + 101
+    assert "angle [rad],angle_deviation [rad]" in mean[1]
+
+
+def test_the_report_holds_figures_and_numbers(walked: Path) -> None:
+    page = (walked / "report.html").read_text()
+    assert page.count("data:image/svg+xml;base64,") == 3
+    assert "Gas per stride (g)" in page
+    assert "legs.gif" in page
+    assert "<script" not in page
+
+
+def test_the_animation_is_small_and_moves(walked: Path) -> None:
+    from PIL import Image
+
+    content = (walked / "legs.gif").read_bytes()
+    assert len(content) < 3_000_000
+    with Image.open(io.BytesIO(content)) as picture:
+        assert picture.n_frames >= 30  # type: ignore[attr-defined]
+        first = np.asarray(picture.convert("RGB")).copy()
+        picture.seek(20)
+        assert (np.asarray(picture.convert("RGB")) != first).any()
+
+
+def test_an_earlier_walk_is_replaced_and_other_folders_are_not(
+    walked: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("kept")
+    assert main(["walk", *SHORT, "--out", str(tmp_path / "mine")]) == 2
+    assert "is not empty and not a ppafo walk (it has no walk.json)" in capsys.readouterr().err
+    assert names(tmp_path / "mine") == ["notes.txt"]
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    (copy / "walk.json").write_bytes((walked / "walk.json").read_bytes())
+    assert main(["walk", "--config", "off", *SHORT, "--out", str(copy)]) == 0
+    assert json.loads((copy / "walk.json").read_text())["configuration"]["name"] == "off"
+
+
+def test_json_is_the_only_thing_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["walk", *SHORT, "--json", "--out", str(tmp_path / "walk")]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["metrics"]["push_off_work"]["value"] > 0.5
+    assert document["folder"] == str(tmp_path / "walk")
+
+
+def test_the_list_names_every_walk(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["walk", "--list"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["off", "proportional", "solenoid"]
+    assert main(["walk", "--list", "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["walks"]) == 3
+
+
+def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema", "walk"]) == 0
+    assert "wearer" in json.loads(capsys.readouterr().out)["properties"]
+
+
+MISTAKES = {
+    "--config solenoit": "there is no walk 'solenoit', did you mean 'solenoid'?",
+    "--gait nobody": "there is no gait 'nobody'",
+    "--minutes 0.01": "must be 0.087 min (5 strides) or more",
+    "--minutes nan": "a walk of nan min: must be",
+    "--minutes -1": "a walk of -1 min: must be",
+    "--minutes soon": "--minutes 'soon': a number of minutes, or a time such as '90 s'",
+    "--set controller.unload_threshold=80N": "must be below controller.load_threshold, which is 60 N",
+    "--set controller.swing_angel=90deg": "did you mean 'controller.swing_angle'?",
+    "--wearers many": "--wearers 'many' is not a whole number",
+    "--wearers 0": "0 wearers cannot walk; choose 1 to 1000000",
+    "--wearers 3 --seed x": "--seed 'x' is not a whole number",
+    "--wearer 3 --configs x": "there is no option '--configs'",
+}
+
+
+@pytest.mark.parametrize("words", MISTAKES)
+def test_bad_input_is_one_line_and_writes_nothing(
+    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["walk", *words.split(), "--out", str(tmp_path / "walk")]) == 2
+    shown = capsys.readouterr().err
+    assert MISTAKES[words] in shown
+    assert len(shown.splitlines()) == 1
+    assert names(tmp_path) == []
+
+
+def test_a_failing_sensor_is_told_with_the_time_of_the_safe_state(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    faulty = ["faults.toe.kind=stuck", "faults.toe.time=3.3 s", "faults.toe.reading=9 kN"]
+    words = [word for text in faulty for word in ("--set", text)]
+    assert main(["walk", "--minutes", "0.15", *words, "--out", str(tmp_path / "walk")]) == 0
+    told = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("safe state"))
+    assert 3.3 <= float(told.split()[-2]) < 3.4
+    assert (
+        "Safe state: when the controller vented both chambers for good" in (tmp_path / "walk/report.html").read_text()
+    )
+    document = json.loads((tmp_path / "walk" / "walk.json").read_text())
+    assert 3.3 <= document["metrics"]["safe_state_time"]["value"] < 3.4
+    assert "safe_state_time" not in document["metrics_off"]
+
+
+def test_a_minute_may_be_given_as_a_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["walk", "--minutes", "6 s", "--json", "--out", str(tmp_path / "walk")]) == 0
+    assert json.loads(capsys.readouterr().out)["minutes"] == pytest.approx(0.1, abs=1e-3)
+
+
+@pytest.fixture
+def bursting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Walks with a supply far from any real one."""
+    load = loading.load_walk
+
+    def changed(*given: Any) -> Any:
+        configuration = load(*given)
+        supply = replace(configuration.device.supply, pressure=1.0e18)
+        return replace(configuration, device=replace(configuration.device, supply=supply))
+
+    monkeypatch.setattr(loading, "load_walk", changed)
+
+
+@pytest.mark.usefixtures("bursting")
+def test_a_walk_that_diverges_is_a_status_and_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["walk", *SHORT, "--out", str(tmp_path / "walk")]) == 1
+    captured = capsys.readouterr()
+    assert captured.out.startswith("solenoid: diverged")
+    assert captured.err.startswith("ppafo: solenoid: diverged at t = ")
+    assert "try a smaller run.step" in captured.err
+    document = json.loads((tmp_path / "walk" / "walk.json").read_text())
+    assert document["status"]["kind"] == "diverged"
+    assert "diverged at t" in (tmp_path / "walk" / "report.html").read_text()
+    assert "legs.gif" not in names(tmp_path / "walk")
+
+
+@pytest.mark.usefixtures("bursting")
+def test_wearers_that_diverge_are_told_with_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["walk", *SHORT, "--wearers", "4", "--out", str(tmp_path / "walk")]) == 1
+    assert "4 of 4 wearers diverged and are left out" in capsys.readouterr().err
+    assert names(tmp_path / "walk") == ["wearers.csv", "wearers.json"]
+
+
+def test_many_wearers_are_written_with_quantiles_and_histograms(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "wearers"
+    assert main(["walk", *SHORT, "--wearers", "50", "--seed", "4", "--out", str(folder)]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("solenoid: 50 wearers, 0.1 min each\n")
+    assert names(folder) == ["wearers.csv", "wearers.json", "wearers.png", "wearers.svg"]
+    document = json.loads((folder / "wearers.json").read_text())
+    quantiles = document["outcomes"]["gas"]["quantiles"]
+    rows = (folder / "wearers.csv").read_text().splitlines()
+    column = rows[1].split(",").index("gas [kg]")
+    gas = [float(row.split(",")[column]) for row in rows[2:]]
+    assert len(gas) == document["wearers"] == 50
+    assert quantiles["0.5"] == pytest.approx(np.median(gas))
+    assert quantiles["0.05"] < quantiles["0.5"] < quantiles["0.95"]
+    assert main(["walk", *SHORT, "--wearers", "50", "--seed", "4", "--json", "--out", str(folder)]) == 0
+    assert json.loads(capsys.readouterr().out)["outcomes"]["gas"]["quantiles"] == quantiles

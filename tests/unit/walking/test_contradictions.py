@@ -1,0 +1,104 @@
+"""Mistakes in a walk file or an override: one line that names what, and what is allowed."""
+
+import tomllib
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from ppafo.errors import DataError, ParameterError, ScenarioError
+from ppafo.gait import load_gait
+from ppafo.gait.document import gait_toml
+from ppafo.walking import Configuration, list_walks, load_walk, walk, walk_population
+from ppafo.walking.schema import json_schema
+
+MISTAKES = {
+    "controller.unload_threshold=80 N": "must be below controller.load_threshold, which is 60 N",
+    "controller.largest_force=100 N; controller.load_threshold=200 N": "must be above controller.load_threshold",
+    "controller.first_stride_time=5 s": "between half and twice the stride of the gait, which is 1.0384 s",
+    "controller.frozen_time=10 ms; controller.rate=100 Hz": "longer than two samples of the controller, one is 0.01 s",
+    "controller.lowest_angle=100 deg; controller.highest_angle=90 deg": "must be below controller.highest_angle",
+    "controller.swing_angle=135 deg": "lies outside of what sensor and device reach, 20 deg to 130 deg",
+    "wearer.shank_mass_centre=0.5 m": "lies beyond the ankle: wearer.shank_length is 0.46 m",
+    "wearer.toe_lever=0.08 m": "wearer.foot_mass_centre, which is not given and has its default",
+    "controller.unload_treshold=20 N": "has no value 'controller.unload_treshold', did you mean 'controller.unload_th",
+    "controller.load_threshold=60": "a number without a unit does not fit: a unit like 'N' is needed",
+    "controller.load_threshold=60 kg": "unit 'kg' does not fit: a unit like 'N' is needed",
+    "wearer.body_mass=5 kg": "must be at least 10 kg and at most 300 kg",
+    "controller.kind=event_of": "'event_of' is not known",
+    "faults.heel.time=3 s": "'faults.heel.kind' is missing",
+}
+PROFILE = {
+    "controller.peak_time=0.9; controller.fall_time=0.2": "the torque would end after the stride",
+    "controller.peak_time=0.95": "must be at least 0.1 and at most 0.9$",
+    "controller.rise_time=0.6": "the torque would rise before the heel strike: controller.peak_time is 0.53",
+    "controller.peak_time=0.3": "the peak would be over before the push-off: controller.push_off_start is 0.4",
+}
+
+
+@pytest.mark.parametrize("overrides", MISTAKES)
+def test_a_mistake_is_named_in_one_line(overrides: str) -> None:
+    with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[overrides]) as caught:
+        load_walk("solenoid", overrides.split("; "))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("overrides", PROFILE)
+def test_a_torque_profile_that_contradicts_itself_is_refused(overrides: str) -> None:
+    with pytest.raises(ScenarioError, match=PROFILE[overrides]):
+        load_walk("proportional", overrides.split("; "))
+
+
+def test_shipped_walks_load_and_contradict_nothing() -> None:
+    assert list_walks() == ("off", "proportional", "solenoid")
+    assert [load_walk(name).name for name in list_walks()] == list(list_walks())
+
+
+def test_the_published_schema_accepts_the_shipped_walks_and_no_unknown_key() -> None:
+    schema = json_schema()
+    for name in list_walks():
+        text = (resources.files("ppafo.walking") / "configurations" / f"{name}.toml").read_text(encoding="utf-8")
+        document = tomllib.loads(text)
+        jsonschema.validate(document, schema)
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({**document, "wearers": {}}, schema)
+
+
+def test_a_period_given_takes_the_place_of_the_rate_of_the_file() -> None:
+    assert load_walk("solenoid", ["controller.period=2 ms"]).period == pytest.approx(2.0e-3)
+
+
+def test_unknown_names_have_a_hint() -> None:
+    with pytest.raises(ScenarioError, match="did you mean 'solenoid'"):
+        load_walk("solenoit")
+    with pytest.raises(DataError, match="no gait 'falisse'"):
+        load_walk("solenoid", gait="falisse")
+
+
+def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> None:
+    bare = replace(load_gait(), name="bare", vertical_force=None, ankle_moment=None, centre_of_pressure=None)
+    path = tmp_path / "bare.toml"
+    path.write_text(gait_toml(bare))
+    with pytest.raises(ScenarioError, match="gait 'bare' has no vertical_force; import it with the ground reaction"):
+        load_walk("solenoid", gait=path)
+    assert load_walk("off", gait=path).gait.name == "bare"
+
+
+@pytest.mark.parametrize("minutes", [0.05, -1.0, 61.0, float("nan"), float("inf")])
+def test_a_walk_too_short_or_too_long_is_refused(minutes: float) -> None:
+    with pytest.raises(ScenarioError, match=r"must be 0\.087 min \(5 strides\) or more and at most 60 min"):
+        walk("solenoid", minutes)
+
+
+def test_overrides_beside_a_configuration_are_refused() -> None:
+    configuration: Configuration = load_walk("off")
+    with pytest.raises(ScenarioError, match="give them to load_walk"):
+        walk(configuration, 0.1, ["wearer.body_mass=80 kg"])
+
+
+@pytest.mark.parametrize("count", [0, -3, 1_000_001])
+def test_a_number_of_wearers_that_cannot_walk_is_refused(count: int) -> None:
+    with pytest.raises(ScenarioError, match="choose 1 to 1000000"):
+        walk_population(load_walk("off"), 0.1, count)

@@ -1,0 +1,137 @@
+"""Many wearers in one batch: the first is the wearer of the configuration, the others differ as is stated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.run import batch_of
+from ppafo.gait import load_gait
+from ppafo.gait.gait import Curve
+from ppafo.simulation.sampled import state_row_numbers
+from ppafo.walking import load_walk, walk_population
+from ppafo.walking.anthropometry import (
+    MASS_VARIATION,
+    STATURE_VARIATION,
+    Build,
+    bounded_normal,
+    drawn_builds,
+    scaled_segments,
+)
+from ppafo.walking.planning import gait_timing, plan_walk
+from ppafo.walking.population import START_VARIATION, THRESHOLD_VARIATION
+from ppafo.walking.varied_gait import SERIES, Series, varied_gaits
+from ppafo.walking.walk import plan_of
+from ppafo.walking.wearer import paper_subject
+
+MINUTES = 0.15
+
+
+@pytest.mark.parametrize("name", ["solenoid", "proportional", "off"])
+def test_the_first_wearer_is_that_of_the_configuration(name: str) -> None:
+    configuration = load_walk(name)
+    people = walk_population(configuration, MINUTES, 9, seed=3)
+    run = plan_walk(plan_of(configuration, 60.0 * MINUTES))
+    rows = state_row_numbers(run)
+    alone = run_batch(batch_of(run)).states[:, 0]
+    strides = run.step * run.step_count / configuration.gait.stride_time
+    assert people.outcomes["gas"][0] * strides == pytest.approx(alone[rows["state.supplied_mass"]], rel=1e-9)
+    assert people.outcomes["push_off_work"][0] * strides == pytest.approx(alone[rows["walk.push_off_work"]], rel=1e-9)
+    slaps = alone[rows["walk.slap_rates"]] / alone[rows["walk.landings"]]
+    assert people.outcomes["slap_rate"][0] == pytest.approx(slaps, rel=1e-9)
+
+
+def varied(curve: Curve | None, series: Series, index: int) -> Curve:
+    assert curve is not None
+    cosines, sines = (tuple(values[index].tolist()) for values in (series.cosines, series.sines))
+    return replace(curve, mean=float(series.mean[index]), cosines=cosines, sines=sines)
+
+
+def test_any_wearer_walks_as_it_would_alone() -> None:
+    configuration, index, count = load_walk("solenoid"), 3, 5
+    people = walk_population(configuration, MINUTES, count, seed=3)
+    generator = np.random.default_rng(3)
+    build = drawn_builds(count, generator)
+    gaits = varied_gaits(configuration.gait, count, generator)
+    scale = 1.0 + THRESHOLD_VARIATION * bounded_normal(generator, (count,))[index]
+    start = START_VARIATION * bounded_normal(generator, (count,))[index]
+    settings = dict(configuration.settings)
+    settings |= {name: settings[name] * scale for name in ("load_threshold", "unload_threshold")}
+    settings["push_off_start"] += start
+    segments = scaled_segments(configuration.wearer, build)
+    gait = replace(
+        configuration.gait,
+        stride_time=float(gaits.stride_time[index]),
+        stance_share=float(gaits.timing["toe_off"][index]),
+        **{name: varied(configuration.gait.curve(name), gaits.series[field], index) for field, name in SERIES.items()},
+    )
+    timing = gait_timing(gait)
+    for name, values in gaits.timing.items():
+        assert float(values[index]) == pytest.approx(getattr(timing, name), rel=1e-9), name
+    wearer = replace(configuration.wearer, **{name: float(values[index]) for name, values in segments.items()})
+    alone = replace(configuration, wearer=wearer, gait=gait, settings=settings)
+    run = plan_walk(plan_of(alone, 60.0 * MINUTES))
+    rows, states = state_row_numbers(run), run_batch(batch_of(run)).states[:, 0]
+    strides = run.step * run.step_count / gait.stride_time
+    for name, row in (("gas", "state.supplied_mass"), ("push_off_work", "walk.push_off_work")):
+        assert people.outcomes[name][index] * strides == pytest.approx(states[rows[row]], rel=1e-5), name
+    slap = states[rows["walk.slap_rates"]] / states[rows["walk.landings"]]
+    assert people.outcomes["slap_rate"][index] == pytest.approx(slap, rel=1e-5)
+    assert people.traits["body_mass"][index] == wearer.body_mass
+
+
+def test_the_same_seed_gives_the_same_wearers_and_another_one_others() -> None:
+    configuration = load_walk("solenoid")
+    first, again, other = (walk_population(configuration, MINUTES, 40, seed) for seed in (1, 1, 2))
+    for name, values in first.outcomes.items():
+        np.testing.assert_array_equal(values, again.outcomes[name])
+    assert not np.array_equal(first.outcomes["gas"], other.outcomes["gas"])
+    assert first.count == 40
+    assert first.diverged == 0
+    assert np.ptp(first.outcomes["gas"]) > 0.05 * first.outcomes["gas"].mean()
+
+
+def test_builds_vary_as_stated_and_keep_the_shares_of_segments() -> None:
+    build = drawn_builds(20_000, np.random.default_rng(1))
+    assert build.mass.std() == pytest.approx(MASS_VARIATION, rel=0.04)
+    assert build.stature.std() == pytest.approx(STATURE_VARIATION, rel=0.04)
+    assert np.corrcoef(build.mass, build.stature)[0, 1] == pytest.approx(0.5, abs=0.03)
+    wearer = paper_subject()
+    leg = scaled_segments(wearer, Build(np.array([1.0, 2.0]), np.array([1.0, 1.5])))
+    assert leg["shank_length"].tolist() == pytest.approx([0.46, 0.69])
+    assert leg["foot_mass"].tolist() == pytest.approx([1.0, 2.0])
+    assert leg["shank_inertia"].tolist() == pytest.approx([0.1, 0.1 * 2.0 * 2.25])
+
+
+def test_gaits_vary_by_the_deviation_of_each_curve() -> None:
+    gait = load_gait()
+    gaits = varied_gaits(gait, 4000, np.random.default_rng(1))
+    phases = 2.0 * np.pi * np.outer(np.arange(1, 9), np.linspace(0.0, 1.0, 200, endpoint=False))
+    for field, curve in (("shank", gait.shank_angle), ("ankle", gait.ankle_angle)):
+        series = gaits.series[field]
+        values = series.mean[:, None] + series.cosines @ np.cos(phases) + series.sines @ np.sin(phases)
+        spread = float(np.sqrt(np.mean((values - values.mean(axis=0)) ** 2)))
+        assert spread == pytest.approx(curve.deviation, rel=0.06)
+    assert gaits.stride_time.std() == pytest.approx(gait.stride_time_deviation, rel=0.06)
+
+
+def test_wearers_that_diverge_are_counted_and_left_out() -> None:
+    configuration = load_walk("solenoid")
+    supply = replace(configuration.device.supply, pressure=1.0e18)
+    people = walk_population(replace(configuration, device=replace(configuration.device, supply=supply)), MINUTES, 8)
+    assert people.diverged == 8
+    assert people.count == 0
+    assert "8 of 8 wearers diverged and are left out; the step may be too long" in people.message
+
+
+def test_progress_of_many_wearers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ppafo.walking.population.STEPS_AT_ONCE", 1.0)
+    told: list[tuple[float, float]] = []
+    configuration = load_walk("off")
+    grouped = walk_population(configuration, MINUTES, 70, 1, lambda done, total: told.append((done, total)))
+    assert told == [(32.0, 70.0), (64.0, 70.0), (70.0, 70.0)]
+    monkeypatch.undo()
+    np.testing.assert_array_equal(
+        grouped.outcomes["push_off_work"], walk_population(configuration, MINUTES, 70, 1).outcomes["push_off_work"]
+    )

@@ -1,0 +1,118 @@
+"""What a walk gives: strides, mean stride, metrics, comparison with the device switched off, files for OpenSim."""
+
+import re
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.signals import CHANNELS, Channel, Recording
+from ppafo.storage.opensim import read_opensim
+from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk
+from ppafo.walking.strides import PHASES, SETTLING, averaged, stride_starts
+
+MINUTES = 0.15
+
+
+@lru_cache(maxsize=4)
+def compared(name: str) -> Comparison:
+    return compare_walks(load_walk(name), MINUTES)
+
+
+@pytest.mark.parametrize("name", ["solenoid", "proportional"])
+def test_numbers_of_strides_add_up_to_the_recording(name: str) -> None:
+    result = compared(name).with_device
+    strides = result.strides
+    assert {values.size for values in strides.values()} == {int(result.metrics["strides"].value)}
+    supplied = result.recording["supplied_mass"]
+    first, last = result.starts[0], result.starts[-1]
+    assert strides["gas"].sum() == pytest.approx(supplied[last] - supplied[first], rel=1e-12)
+    assert result.metrics["gas"].value == pytest.approx(strides["gas"][SETTLING:].mean())
+    times = np.diff(result.recording.time[result.starts])
+    np.testing.assert_allclose(times, result.configuration.gait.stride_time, atol=1.5e-3)
+
+
+def test_the_mean_stride_is_the_mean_of_strides() -> None:
+    time = np.linspace(0.0, 4.0, 4001)
+    growing = np.floor(time) + np.sin(2.0 * np.pi * time)
+    recording = Recording("strides", time, {"angle": Channel(growing, "rad"), "command": Channel(0.0 * time, "-")})
+    curves = averaged(recording, stride_starts(np.floor(time + 1.0e-9)))
+    assert set(curves) == {"angle"}, "a held channel has no mean"
+    middle = np.abs(PHASES - 0.5) < 0.4
+    np.testing.assert_allclose(curves["angle"].mean[middle], 2.0 + np.sin(2.0 * np.pi * PHASES[middle]), atol=1e-5)
+    np.testing.assert_allclose(curves["angle"].deviation[middle], np.sqrt(2.0 / 3.0), atol=1e-9)
+
+
+def test_two_strikes_are_needed_for_a_stride() -> None:
+    recording = Recording("one", np.arange(3.0), {"angle": Channel(np.zeros(3), "rad")})
+    assert averaged(recording, np.array([1])) == {}
+
+
+def test_channels_of_a_walk_are_known_with_their_units() -> None:
+    recording = compared("solenoid").with_device.recording
+    assert {name: recording.unit(name) for name in recording.names} == {
+        name: CHANNELS[name].unit for name in recording.names
+    }
+    np.testing.assert_allclose(
+        recording["device_power"], recording["external_torque"] * recording["angular_velocity"], rtol=1e-12
+    )
+    assert set(np.unique(recording["controller_phase"])) == {0.0, 1.0, 2.0, 3.0}
+
+
+def test_the_comparison_is_the_same_wearer_with_both_chambers_vented() -> None:
+    pair = compared("solenoid")
+    worn, bare = pair.with_device, pair.without_device
+    assert bare.configuration.wearer == worn.configuration.wearer
+    assert bare.configuration.device == worn.configuration.device
+    assert bare.configuration.controller.name == "off"
+    assert (bare.recording["command"] == 2.0).all()
+    assert bare.metrics["gas"].value == 0.0
+    assert worn.metrics["toe_clearance"].value > bare.metrics["toe_clearance"].value + 0.05
+    assert worn.metrics["angle_difference"].value < 0.5 * bare.metrics["angle_difference"].value
+    assert pair.healthy["push_off_work"].value == pytest.approx(worn.metrics["healthy_positive_work"].value)
+    assert -10.0 < pair.healthy["slap_rate"].value < -1.0
+
+
+def test_the_name_of_a_configuration_is_as_good_as_the_configuration() -> None:
+    by_name = walk("off", MINUTES)
+    np.testing.assert_array_equal(by_name.recording["angle"], walk(load_walk("off"), MINUTES).recording["angle"])
+
+
+def test_progress_is_told_up_to_the_end() -> None:
+    told: list[tuple[float, float]] = []
+    walk("off", 4.0, progress=lambda done, total: told.append((done, total)))
+    assert len(told) >= 2
+    assert told[-1][0] == told[-1][1] == pytest.approx(4.0, abs=1e-3)
+
+
+def diverging() -> WalkResult:
+    configuration = load_walk("solenoid")
+    supply = replace(configuration.device.supply, pressure=1.0e18)
+    return walk(replace(configuration, device=replace(configuration.device, supply=supply)), MINUTES)
+
+
+def test_a_walk_that_diverges_says_when_and_what_to_do() -> None:
+    result = diverging()
+    assert result.status.kind == "diverged"
+    assert re.fullmatch(
+        r"diverged at t = [\d.e-]+ s; the step may be too long.*look at the wearer", result.status.message
+    )
+    assert result.status.time is not None
+    assert result.recording.time[-1] < MINUTES * 60.0
+    assert "diverged" in repr(result)
+    assert result.averages == {}
+
+
+def test_a_walk_is_written_for_opensim(tmp_path: Path) -> None:
+    result = compared("solenoid").with_device
+    table = read_opensim(result.save_opensim(tmp_path / "walk.sto"))
+    np.testing.assert_array_equal(table.columns["angle"], result.recording["angle"])
+    assert table.in_degrees is False
+
+
+def test_a_result_can_be_drawn_and_says_what_it_is() -> None:
+    result = compared("proportional").with_device
+    assert len(result.plot().axes) == 5
+    assert repr(result).startswith("Walk 'proportional', 0.15 min: completed\n  gas ")
