@@ -47,7 +47,7 @@ def shown_claims() -> dict[str, list[str]]:
 @pytest.fixture(scope="module")
 def reproduction() -> Reproduction:
     """One run of the paper's experiments, which the tests below only read."""
-    return reproduce()
+    return reproduce(completions=1000)
 
 
 @pytest.mark.parametrize("block", blocks("python"))

@@ -136,7 +136,7 @@ def test_json_is_the_same_as_the_claims_file(out: Path, capsys: pytest.CaptureFi
 
 def missed_claims(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the solenoid valves take three times the gas."""
-    honest = study.reproduce()
+    honest = study.reproduce(completions=1000)
     claims = tuple(
         dataclasses.replace(claim, value=3.3, verdict="contradicted") if claim.id == "co2_solenoid" else claim
         for claim in honest.claims

@@ -7,7 +7,7 @@ from ppafo.studies.reproduction import Claim, Reproduction, reproduce
 
 @pytest.fixture(scope="module")
 def reproduction() -> Reproduction:
-    return reproduce()
+    return reproduce(completions=1000)
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ LEVELS = Levels(480536.0, 101325.0)
 
 @pytest.fixture(scope="module")
 def reproduction() -> Reproduction:
-    return reproduce()
+    return reproduce(completions=1000)
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ SYNTHETIC = {
 
 @pytest.fixture(scope="module")
 def reproduction() -> Reproduction:
-    return reproduce()
+    return reproduce(completions=1000)
 
 
 def printed_with(**values: float) -> Printed:
@@ -65,7 +65,7 @@ def test_a_claim_as_a_document_is_plain_data_with_all_that_a_reader_needs(reprod
 def test_without_the_rig_what_needs_a_measurement_has_no_value_but_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     bench_study.cache_clear()
     monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
-    bare = reproduce()
+    bare = reproduce(completions=1000)
     open_claims = [claim for claim in bare.claims if claim.verdict == "not_testable"]
     assert {claim.id for claim in open_claims} == SYNTHETIC
     assert all(claim.value is None and claim.note.startswith("Needs") for claim in open_claims)
@@ -256,10 +256,10 @@ def test_a_run_that_diverges_stops_the_reproduction_with_its_name(
 
     monkeypatch.setattr(study, "simulate", diverged)
     with pytest.raises(SimulationError, match="step-response: diverged at t"):
-        reproduce()
+        reproduce(completions=1000)
 
 
 def test_every_experiment_is_told_of_before_it_runs() -> None:
     heard: list[str] = []
-    reproduce(tell=heard.append)
+    reproduce(tell=heard.append, completions=1000)
     assert [name for name in (STEP, SOLENOID, PROPORTIONAL) if not any(name in text for text in heard)] == []

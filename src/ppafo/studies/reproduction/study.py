@@ -24,7 +24,7 @@ from ppafo.studies.reproduction.synthetic import NoEvidence, SyntheticEvidence, 
 from ppafo.studies.reproduction.torque_task import torque_task_claims, torque_task_observations
 from ppafo.studies.unreported_settings import Family, infer_settings
 
-FAMILY_DRAWS = 16_384
+COMPLETIONS = 49_152
 """Completions of the torque task in the report; ``ppafo unreported`` takes more."""
 
 STEP = "step-response"
@@ -89,12 +89,15 @@ def _silent(text: str) -> None:
     """Say nothing."""
 
 
-def reproduce(overrides: Sequence[str] = (), tell: Callable[[str], None] = _silent) -> Reproduction:
+def reproduce(
+    overrides: Sequence[str] = (), tell: Callable[[str], None] = _silent, completions: int = COMPLETIONS
+) -> Reproduction:
     """Run the paper's experiments with the shipped scenarios and judge every claim.
 
     ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
     have it, a path of the device all of them. The virtual rig stands in for the paper's measurements, where it can.
-    ``tell`` hears what is being done. SimulationError where a run diverges.
+    ``tell`` hears what is being done; ``completions`` of the torque task are weighed by what the paper reports, none
+    where values are changed. SimulationError where a run diverges.
     """
     scenarios = _scenarios(overrides)
     runs = {name: _run(scenario, tell) for name, scenario in scenarios.items()}
@@ -126,14 +129,14 @@ def reproduce(overrides: Sequence[str] = (), tell: Callable[[str], None] = _sile
         completed_set=completed.name,
         completed_findings=tuple(audit(completed)),
         overrides=tuple(overrides),
-        family=None if overrides else _family(tell),
+        family=None if overrides else _family(completions, tell),
     )
 
 
-def _family(tell: Callable[[str], None]) -> Family:
-    """Return the completions of the torque task that agree with the paper, of few draws."""
-    tell(f"drawing {FAMILY_DRAWS} completions of the torque task")
-    return infer_settings(FAMILY_DRAWS)
+def _family(completions: int, tell: Callable[[str], None]) -> Family:
+    """Return completions of the torque task with how well they agree with the paper."""
+    tell(f"drawing {completions} completions of the torque task")
+    return infer_settings(completions)
 
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
