@@ -3,6 +3,7 @@
 COMMANDS: dict[str, str] = {
     "reproduce": "run the paper's experiments and report against its claims",
     "simulate": "run a scenario and write its recording, metrics and figure",
+    "league": "rank every controller on a task, with the best that is possible",
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": "bench recordings in, parameter set with uncertainty out",
