@@ -10,6 +10,7 @@ COMMANDS: dict[str, str] = {
     "montecarlo": "draw until a statistic is known well enough",
     "tune": "search gains for a goal under constraints, robust where asked",
     "walk": "walk with the device, without it, and as the healthy gait would have it",
+    "league": "rank every controller on a task, with the best that is possible",
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": "bench recordings in, parameter set with uncertainty out",

@@ -2,6 +2,7 @@
 
 STUDIES: dict[str, str] = {
     "bench": "how fast are the lanes and the command line beside other solvers on this machine?",
+    "league": "how good is each controller on a task, and how far is it from the best that is possible?",
     "reproduction": "which of the paper's claims hold when its experiments are run again?",
     "unreported_settings": "which settings of its torque task does the paper imply, and how firm is its conclusion?",
     "sweep": "what comes of many runs of a study file, and how do the metrics hang on what varies?",

@@ -26,18 +26,24 @@ class PidState(NamedTuple):
     started: float
 
 
+def pid_command(
+    parameters: PidParameters, state: PidState, error: float, ahead: float, period: float
+) -> tuple[float, PidState]:
+    """Command from -1 to 1 of a torque error [N m] on top of a command that is given ahead [-]. Equation (13)."""
+    change = (error - state.error) * state.started
+    slope = state.slope + (change - period * state.slope) / (period + parameters.derivative_filter)
+    integral = state.integral + parameters.integral_gain * error * period
+    wanted = ahead + parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
+    command = max(-1.0, min(1.0, wanted))
+    integral = integral + parameters.anti_windup * period * (command - wanted)
+    return command, PidState(integral, error, slope, 1.0)
+
+
 def update(
     parameters: PidParameters, state: PidState, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, PidState]:
     """Command from -1 to 1 of the torque error; integral by rectangles, slope by backward difference. Equation (13)."""
-    error = reference - measurement.torque
-    change = (error - state.error) * state.started
-    slope = state.slope + (change - period * state.slope) / (period + parameters.derivative_filter)
-    integral = state.integral + parameters.integral_gain * error * period
-    wanted = parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
-    command = max(-1.0, min(1.0, wanted))
-    integral = integral + parameters.anti_windup * period * (command - wanted)
-    return command, PidState(integral, error, slope, 1.0)
+    return pid_command(parameters, state, reference - measurement.torque, 0.0, period)
 
 
 KIND = ControllerKind(

@@ -1,0 +1,90 @@
+"""Model-based torque control: the chamber dynamics inverted, so that the torque error decays at a chosen rate."""
+
+from typing import NamedTuple
+
+from ppafo.control.chamber_model import NOMINAL_QUANTITIES, NominalChambers, opening_for_rate, torque_rates
+from ppafo.control.kind import ControllerKind
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+
+
+class FeedbackLinearisationParameters(NamedTuple):
+    """Decay rate of the error [1/s], filter of the angle's rate [s], and the believed device as ``NominalChambers``."""
+
+    convergence_rate: float
+    rate_filter: float
+    torque_constant: float
+    volume_per_angle: float
+    angle_min: float
+    angle_max: float
+    dead_volume_1: float
+    dead_volume_2: float
+    gas_product: float
+    valve_conductance: float
+    leak_conductance: float
+    critical_ratio: float
+    supply_pressure: float
+    dorsiflexion_pressure: float
+    atmospheric_pressure: float
+
+
+class FeedbackLinearisationState(NamedTuple):
+    """Reference [N m] and angle [rad] one sample ago, filtered angular velocity [rad/s], start mark."""
+
+    reference: float
+    angle: float
+    angular_velocity: float
+    started: float
+
+
+def nominal_chambers(parameters: FeedbackLinearisationParameters) -> NominalChambers:
+    """The believed device among the parameters."""
+    return NominalChambers(
+        parameters.torque_constant,
+        parameters.volume_per_angle,
+        parameters.angle_min,
+        parameters.angle_max,
+        parameters.dead_volume_1,
+        parameters.dead_volume_2,
+        parameters.gas_product,
+        parameters.valve_conductance,
+        parameters.leak_conductance,
+        parameters.critical_ratio,
+        parameters.supply_pressure,
+        parameters.dorsiflexion_pressure,
+        parameters.atmospheric_pressure,
+    )
+
+
+def update(
+    parameters: FeedbackLinearisationParameters,
+    state: FeedbackLinearisationState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+) -> tuple[float, FeedbackLinearisationState]:
+    """Command: the opening for which the believed chambers change the torque by r' + rate (r - torque) [N m/s]."""
+    reference_rate = (reference - state.reference) / period * state.started
+    turned = (measurement.angle - state.angle) * state.started
+    velocity = state.angular_velocity
+    velocity = velocity + (turned - period * velocity) / (period + parameters.rate_filter)
+    rates = torque_rates(
+        nominal_chambers(parameters), measurement.angle, velocity, measurement.pressure_1, measurement.pressure_2
+    )
+    wanted = reference_rate + parameters.convergence_rate * (reference - measurement.torque)
+    return opening_for_rate(rates, wanted), FeedbackLinearisationState(reference, measurement.angle, velocity, 1.0)
+
+
+KIND = ControllerKind(
+    name="feedback_linearisation",
+    summary="Chamber dynamics inverted at the measured pressures and angle: the torque error decays at a chosen rate.",
+    source="Slotine and Li 1991, Applied Nonlinear Control, chapter 6; on pneumatic actuators Richer and Hurmuzlu 2000",
+    quantities=(
+        Quantity("convergence_rate", "1/s", "rate at which the torque error decays", 93.0, 0.0, 1.0e5),
+        Quantity("rate_filter", "s", "time constant of the filter on the angle's rate", 0.0054, 0.0, 10.0),
+        *NOMINAL_QUANTITIES,
+    ),
+    parameters=FeedbackLinearisationParameters,
+    initial=FeedbackLinearisationState(0.0, 0.0, 0.0, 0.0),
+    update=update,
+)

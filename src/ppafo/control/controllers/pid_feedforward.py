@@ -1,0 +1,123 @@
+"""PID control with a feed-forward command from the inverse valve model along the reference."""
+
+from typing import NamedTuple
+
+from ppafo.control.chamber_model import (
+    NOMINAL_QUANTITIES,
+    NominalChambers,
+    TorqueRates,
+    opening_for_rate,
+    torque_rates,
+)
+from ppafo.control.controllers.pid import PidParameters, PidState, pid_command
+from ppafo.control.kind import ControllerKind
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+
+NEARLY_SUPPLY = 0.999
+"""Largest share of the supply pressure that the feed-forward plans for: above it no opening follows a demand."""
+
+
+class PidFeedforwardParameters(NamedTuple):
+    """Those of ``PidParameters``, the weight of the feed-forward [-], the believed device as ``NominalChambers``."""
+
+    proportional_gain: float
+    integral_gain: float
+    derivative_gain: float
+    derivative_filter: float
+    anti_windup: float
+    feedforward: float
+    torque_constant: float
+    volume_per_angle: float
+    angle_min: float
+    angle_max: float
+    dead_volume_1: float
+    dead_volume_2: float
+    gas_product: float
+    valve_conductance: float
+    leak_conductance: float
+    critical_ratio: float
+    supply_pressure: float
+    dorsiflexion_pressure: float
+    atmospheric_pressure: float
+
+
+class PidFeedforwardState(NamedTuple):
+    """The state of the PID, and the reference one sample ago [N m]."""
+
+    feedback: PidState
+    reference: float
+
+
+def pid_of(parameters: PidFeedforwardParameters) -> PidParameters:
+    """The gains of the feedback."""
+    return PidParameters(
+        parameters.proportional_gain,
+        parameters.integral_gain,
+        parameters.derivative_gain,
+        parameters.derivative_filter,
+        parameters.anti_windup,
+    )
+
+
+def nominal_chambers(parameters: PidFeedforwardParameters) -> NominalChambers:
+    """The believed device among the parameters."""
+    return NominalChambers(
+        parameters.torque_constant,
+        parameters.volume_per_angle,
+        parameters.angle_min,
+        parameters.angle_max,
+        parameters.dead_volume_1,
+        parameters.dead_volume_2,
+        parameters.gas_product,
+        parameters.valve_conductance,
+        parameters.leak_conductance,
+        parameters.critical_ratio,
+        parameters.supply_pressure,
+        parameters.dorsiflexion_pressure,
+        parameters.atmospheric_pressure,
+    )
+
+
+def rates_on_reference(nominal: NominalChambers, reference: float, angle: float) -> TorqueRates:
+    """Believed torque rates of a vane at rest whose torque is the reference [N m] with the other chamber vented."""
+    ambient = nominal.atmospheric_pressure
+    above = reference / nominal.torque_constant
+    pressure_1 = min(ambient + max(above, 0.0), NEARLY_SUPPLY * nominal.supply_pressure)
+    pressure_2 = min(ambient + max(-above, 0.0), NEARLY_SUPPLY * nominal.dorsiflexion_pressure)
+    return torque_rates(nominal, angle, 0.0, pressure_1, pressure_2)
+
+
+def update(
+    parameters: PidFeedforwardParameters,
+    state: PidFeedforwardState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+) -> tuple[float, PidFeedforwardState]:
+    """Command: PID of the torque error, equation (13), and the opening that the reference's rate needs."""
+    rate = (reference - state.reference) / period * state.feedback.started
+    rates = rates_on_reference(nominal_chambers(parameters), reference, measurement.angle)
+    ahead = parameters.feedforward * opening_for_rate(rates, rate)
+    error = reference - measurement.torque
+    command, feedback = pid_command(pid_of(parameters), state.feedback, error, ahead, period)
+    return command, PidFeedforwardState(feedback, reference)
+
+
+KIND = ControllerKind(
+    name="pid_feedforward",
+    summary="PID on the torque error, with the opening that a valve model asks for along the reference.",
+    source="the paper, equation (13), with the inverse of equations (2) to (9); Åström and Hägglund 2006, Advanced PID",
+    quantities=(
+        Quantity("proportional_gain", "1/(N m)", "k_p", 1.1, 0.0, 1.0e3),
+        Quantity("integral_gain", "1/(N m s)", "k_i", 3.3, 0.0, 1.0e5),
+        Quantity("derivative_gain", "s/(N m)", "k_d", 0.0061, 0.0, 1.0e3),
+        Quantity("derivative_filter", "s", "time constant of the filter on the slope of the error", 0.0025, 0.0, 10.0),
+        Quantity("anti_windup", "1/s", "rate at which the integral is pulled back, 0 for none", 0.33, 0.0, 1.0e4),
+        Quantity("feedforward", "", "weight of the feed-forward, 0 for none", 1.0, 0.0, 2.0),
+        *NOMINAL_QUANTITIES,
+    ),
+    parameters=PidFeedforwardParameters,
+    initial=PidFeedforwardState(PidState(0.0, 0.0, 0.0, 0.0), 0.0),
+    update=update,
+)

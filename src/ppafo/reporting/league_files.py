@@ -1,0 +1,54 @@
+"""Everything that ``ppafo league`` writes, as file contents by name."""
+
+import ppafo
+from ppafo.documents.json_text import json_text
+from ppafo.reporting.league_figure import league_figure
+from ppafo.reporting.league_table import HEAD, league_document, league_notes, league_rows, league_table
+from ppafo.reporting.page import inline_figure, rendered_page
+from ppafo.reporting.style import rendered
+from ppafo.studies.league import League
+
+FORMATS = ("png", "svg")
+REPORT = "report.html"
+NAMES = ("league.txt", "league.json", *(f"league.{file_format}" for file_format in FORMATS), REPORT)
+TEMPLATE = "league.html.jinja"
+
+
+def league_files(league: League) -> dict[str, bytes]:
+    """Return every file: the table, the numbers, the figure, and the report with all of them."""
+    table = "\n".join(league_table(league))
+    drawn = rendered(league_figure(league), FORMATS)
+    contents = {
+        "league.txt": f"{table}\n".encode(),
+        "league.json": f"{json_text(league_document(league))}\n".encode(),
+    }
+    contents |= {f"league.{file_format}": content for file_format, content in drawn.items()}
+    contents[REPORT] = league_report(league, drawn["svg"]).encode()
+    return contents
+
+
+def league_report(league: League, figure: bytes) -> str:
+    """Return the report as HTML; the figure is the content of an SVG file."""
+    first = league.standings[0]
+    return rendered_page(
+        TEMPLATE,
+        {
+            "scenario": league.scenario,
+            "device": first.result.scenario.device.name,
+            "overrides": list(league.overrides),
+            "head": HEAD,
+            "rows": league_rows(league),
+            "notes": league_notes(league),
+            "figure": inline_figure(figure),
+            "entrants": [
+                {
+                    "name": standing.entrant.name,
+                    "source": standing.entrant.source,
+                    "found": standing.entrant.found,
+                    "command": standing.command,
+                }
+                for standing in league.standings
+            ],
+            "versions": f"ppafo {ppafo.__version__}",
+        },
+    )
