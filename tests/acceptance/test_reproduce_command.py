@@ -6,6 +6,7 @@ import re
 import struct
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -37,8 +38,16 @@ IDS = [
     "co2_proportional",
     "co2_saving",
 ]
-FIGURES = ("figure-3-identification", "figure-7-step-response", "figure-8-torque-task")
+FIGURES = ("figure-3-identification", "figure-7-step-response", "figure-8-torque-task", "unreported-settings")
 RECORDINGS = ("step-response", "torque-task-solenoid", "torque-task-proportional")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_completions() -> Iterator[None]:
+    """As many completions of the torque task as a test needs; the command takes more."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("ppafo.studies.reproduction.study.COMPLETIONS", 1000)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +145,7 @@ def test_json_is_the_same_as_the_claims_file(out: Path, capsys: pytest.CaptureFi
 
 def missed_claims(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the solenoid valves take three times the gas."""
-    honest = study.reproduce(completions=1000)
+    honest = study.reproduce()
     claims = tuple(
         dataclasses.replace(claim, value=3.3, verdict="contradicted") if claim.id == "co2_solenoid" else claim
         for claim in honest.claims

@@ -106,9 +106,9 @@ def test_energy_balance_is_within_the_limits(name: str, coefficient: float) -> N
     assert_within_limits(scenario, f"{name}, {coefficient:g} W/(m^2 K)")
 
 
-@pytest.mark.parametrize("first", [0, 10, 20])
+@pytest.mark.parametrize("first", [0, 4, 8])
 def test_energy_balance_of_random_devices_is_within_the_limits(draws: ModuleType, first: int) -> None:
-    for seed in range(first, first + 10):
+    for seed in range(first, first + 4):
         coefficient = (0.0, 50.0, 2.0e3)[seed % 3]
         assert_within_limits(with_walls(draws.random_scenario(seed), coefficient), f"seed {seed}")
 

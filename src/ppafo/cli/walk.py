@@ -93,13 +93,15 @@ def _progress(done: float, total: float) -> None:
 
 
 def _lines(comparison: "Comparison", folder: Path, files: list[str]) -> list[str]:
-    from ppafo.reporting.walk_table import safety_sentence, walk_table
+    from ppafo.reporting.walk_table import bottle_sentence, safety_sentence, walk_table
+    from ppafo.studies.endurance.of_walk import endurance_of_walk
 
     result = comparison.with_device
     strides = f"{result.metrics['strides'].value:.0f} strides" if "strides" in result.metrics else "no strides"
     head = f"{result.configuration.name}: {result.status.kind}, {strides} of {result.configuration.gait.name}"
     safety = safety_sentence(comparison)
-    remarks = ["", safety] if safety else []
+    bottle = bottle_sentence(endurance_of_walk(result))
+    remarks = [line for remark in (bottle, safety) if remark for line in ("", remark)]
     return [head, "", *walk_table(comparison), *remarks, "", f"written: {folder} ({', '.join(files)})"]
 
 

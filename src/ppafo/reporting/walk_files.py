@@ -16,12 +16,13 @@ from ppafo.reporting.walk_animation import animation
 from ppafo.reporting.walk_figure import comparison_figure
 from ppafo.reporting.walk_frames import frames_figure
 from ppafo.reporting.walk_strip import strip_figure
-from ppafo.reporting.walk_table import COLUMNS, safety_sentence, walk_rows
+from ppafo.reporting.walk_table import COLUMNS, bottle_document, bottle_sentence, safety_sentence, walk_rows
 from ppafo.signals.recording import Floats
 from ppafo.simulation.document import UNITS, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.storage.owned_folder import FolderKind, read_json
+from ppafo.studies.endurance.of_walk import endurance_of_walk
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.strides import PER_STRIDE, PHASES
 from ppafo.walking.walk import WalkResult
@@ -80,6 +81,7 @@ def walk_document(comparison: Comparison) -> dict[str, Any]:
         "status_off": plain(comparison.without_device.status),
         "minutes": float(comparison.with_device.recording.time[-1]) / 60.0,
         "metrics": plain(dict(comparison.with_device.metrics)),
+        "bottle": bottle_document(endurance_of_walk(comparison.with_device)),
         "metrics_off": plain(dict(comparison.without_device.metrics)),
         "healthy": plain(dict(comparison.healthy)),
         "versions": {"ppafo": ppafo.__version__, "python": platform.python_version(), "numpy": np.__version__},
@@ -132,6 +134,7 @@ def walk_report(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
         "is_completed": comparison.is_completed,
         "messages": [walk.status.message for walk in walks if not walk.status.is_completed],
         "safety": safety_sentence(comparison),
+        "bottle": bottle_sentence(endurance_of_walk(comparison.with_device)),
         "columns": COLUMNS,
         "rows": walk_rows(comparison),
         "figures": figures,

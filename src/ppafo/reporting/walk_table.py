@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ppafo.metrics import Metric
+from ppafo.studies.endurance import Endurance
 from ppafo.units import from_si
 from ppafo.walking.comparison import Comparison
 
@@ -60,6 +62,32 @@ def safety_sentence(comparison: Comparison) -> str:
     if "safe_state_time" not in metrics:
         return ""
     return f"safe state: {metrics['safe_state_time'].summary}, at {metrics['safe_state_time'].value:.2f} s"
+
+
+def bottle_sentence(life: Endurance | None) -> str:
+    """Return how long one bottle lasts on the walk; empty where it took no gas."""
+    if life is None:
+        return ""
+    course = life.discharge
+    return (
+        f"one bottle ({life.bottle.name}, {1.0e3 * life.bottle.mass:.0f} g): {course.walking_time / 60.0:.1f} min, "
+        f"{course.steps:.0f} strides of this leg; {course.ending.message}"
+    )
+
+
+def bottle_document(life: Endurance | None) -> dict[str, Any] | None:
+    """Return the same as data, in SI units."""
+    if life is None:
+        return None
+    course = life.discharge
+    return {
+        "bottle": life.bottle.name,
+        "gas_per_stride": life.draw.mass_per_step,
+        "walking_time": course.walking_time,
+        "strides": course.steps,
+        "ending": course.ending.kind,
+        "message": course.ending.message,
+    }
 
 
 def _cell(row: _Row, metrics: Mapping[str, Metric]) -> str:

@@ -81,11 +81,11 @@ def draw_of_recording(recording: Recording, step_time: float | None) -> Draw:
             f"{recording.label}: a step of {step:g} s does not fit into a recording of {recording.duration:g} s"
         )
     mean = gain / recording.duration
-    peak = max(mean, _largest_flow(recording))
+    peak = max(mean, largest_flow(recording))
     return Draw(mean * step, step, peak, f"recording '{recording.label}', {recording.kind}, repeated")
 
 
-def _largest_flow(recording: Recording) -> float:
+def largest_flow(recording: Recording) -> float:
     """Return the largest flow [kg/s], averaged over the window or over a recording that is shorter."""
     window = min(PEAK_WINDOW, recording.duration)
     starts = recording.time[recording.time <= recording.time[-1] - window]

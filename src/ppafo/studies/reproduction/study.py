@@ -90,14 +90,14 @@ def _silent(text: str) -> None:
 
 
 def reproduce(
-    overrides: Sequence[str] = (), tell: Callable[[str], None] = _silent, completions: int = COMPLETIONS
+    overrides: Sequence[str] = (), tell: Callable[[str], None] = _silent, completions: int | None = None
 ) -> Reproduction:
     """Run the paper's experiments with the shipped scenarios and judge every claim.
 
     ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
     have it, a path of the device all of them. The virtual rig stands in for the paper's measurements, where it can.
-    ``tell`` hears what is being done; ``completions`` of the torque task are weighed by what the paper reports, none
-    where values are changed. SimulationError where a run diverges.
+    ``tell`` hears what is being done; ``completions`` of the torque task (COMPLETIONS unless given) are weighed by what
+    the paper reports, none where values are changed. SimulationError where a run diverges.
     """
     scenarios = _scenarios(overrides)
     runs = {name: _run(scenario, tell) for name, scenario in scenarios.items()}
@@ -129,7 +129,7 @@ def reproduce(
         completed_set=completed.name,
         completed_findings=tuple(audit(completed)),
         overrides=tuple(overrides),
-        family=None if overrides else _family(completions, tell),
+        family=None if overrides else _family(completions or COMPLETIONS, tell),
     )
 
 

@@ -8,8 +8,8 @@ from ppafo.identification.trajectory.paths import (
     declared_numbers,
     full_path,
     number_at,
+    with_numbers,
 )
-from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 
 
