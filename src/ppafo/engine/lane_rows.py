@@ -40,13 +40,13 @@ class LaneRows:
         paths = leaf_paths(self.program.state_rows()[group], group)
         return [f"x[{self.state_at[path]}, lane] = {path}" for path in paths]
 
-    def keep(self) -> list[str]:
-        """Lines that keep what the first stage hands on."""
-        groups = self.program.step_rows().items()
-        return [f"{self.cells[path]} = {path}" for name, row in groups for path in leaf_paths(row, name)]
+    def keep(self, *names: str) -> list[str]:
+        """Lines that keep what a phase hands on to the next ones of the step, by group."""
+        groups = self.program.step_rows()
+        return [f"{self.cells[path]} = {path}" for name in names for path in leaf_paths(groups[name], name)]
 
     def load_step(self) -> list[str]:
-        """Lines that load what the first stage handed on."""
+        """Lines that load all that earlier phases of the step handed on."""
         return [self.load(name) for name in self.program.step_rows()]
 
 

@@ -101,7 +101,8 @@ def part(rows: LaneRows, prelude: list[str]) -> list[str]:
 
     Each phase is a loop of its own: loops this short let the processor work on several lanes at once.
     """
-    phases = [[*begin(rows), *rows.keep(), *rows.store("valve_state")], [*feed(rows), *rows.store("state")]]
+    kept = rows.keep("gas", "shown") if rows.program.walks else rows.keep(*rows.program.step_rows())
+    phases = [*lead_walk(rows), [*begin(rows), *kept, *rows.store("valve_state")], [*feed(rows), *rows.store("state")]]
     if rows.program.angle is None:
         phases.append([*rows.load_step(), *end_free(rows), *rows.store("state")])
     phases[-1] += judge(rows)
@@ -119,16 +120,23 @@ def begin(rows: LaneRows) -> list[str]:
     ]
 
 
+def lead_walk(rows: LaneRows) -> list[list[str]]:
+    """Two phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
+    if not rows.program.walks:
+        return []
+    gait = f"{rows.add(gait_at)}(gait, gait_timing, leg.body_mass, leg.gravity, time + length)"
+    foot = f"{rows.add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)"
+    return [
+        [rows.load("gait"), f"next_gait = {gait}", *rows.keep("next_gait")],
+        [rows.load("next_gait"), f"begun = {foot}", *rows.keep("begun")],
+    ]
+
+
 def lead(rows: LaneRows) -> list[str]:
     """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
     program, add = rows.program, rows.add
     if program.walks:
-        return [
-            rows.load("gait"),
-            f"next_gait = {add(gait_at)}(gait, gait_timing, leg.body_mass, leg.gravity, time + length)",
-            f"begun = {add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)",
-            f"next_angle = {add(walking.next_angle)}(plant, walk, begun)",
-        ]
+        return [rows.load("begun"), f"next_angle = {add(walking.next_angle)}(plant, walk, begun)"]
     if program.angle is None:
         return [
             f"begun = {add(motion.begin_free)}(plant, state, 0.0, length)",
@@ -182,7 +190,7 @@ def end_free(rows: LaneRows) -> list[str]:
     if not rows.program.walks:
         return [f"state = {rows.add(motion.end_free)}(plant, state, begun, 0.0, length)"]
     follow = rows.cells["gait_sensors.follow_rate"]
-    given = f"plant, leg, share, gait_timing, {follow}, state, walk, begun, length"
+    given = f"plant, leg, share, gait_timing, {follow}, state, walk, begun, next_gait, length"
     return [f"state, walk = {rows.add(walking.end_walk)}({given})", *rows.store("walk")]
 
 

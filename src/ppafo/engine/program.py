@@ -10,7 +10,7 @@ from ppafo.engine.scheme.motion import FreeStep, LedStep
 from ppafo.engine.scheme.pneumatics import MovingGas, StillGas
 from ppafo.engine.scheme.thermal_gas import ThermalGas
 from ppafo.engine.scheme.walking import DeviceShare, WalkState, WalkStep
-from ppafo.model.gait import GaitSeries, GaitTiming
+from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
@@ -123,4 +123,5 @@ class Program:
         begun = free if self.angle is None else (NoParameters if self.is_held else LedStep)
         isothermal = StillGas if self.is_held else MovingGas
         _, shown, _ = get_type_hints(self.valve.connect).values()
-        return {"begun": begun, "gas": ThermalGas if self.is_thermal else isothermal, "shown": shown}
+        gait = {"next_gait": GaitNow} if self.walks else {}
+        return {**gait, "begun": begun, "gas": ThermalGas if self.is_thermal else isothermal, "shown": shown}

@@ -12,7 +12,7 @@ from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.refinement import filling_time
 from ppafo.engine.rows import rebuild
 from ppafo.engine.run import Run, Walk
-from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState
+from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState, foot_direction
 from ppafo.gait import Gait
 from ppafo.gait.gait import Curve
 from ppafo.model.chambers import chamber_mass
@@ -120,7 +120,9 @@ def plan_walk(plan: WalkPlan) -> Run:
             gait=gait,
             timing=timing,
             sensors=plan.gait_sensors,
-            initial=WalkState(HEEL, 0.0, start, *(0.0,) * 4, NO_CLEARANCE, *(0.0,) * 6),
+            initial=WalkState(
+                HEEL, 0.0, start, foot_direction(start.shank, start.ankle), *(0.0,) * 4, NO_CLEARANCE, *(0.0,) * 6
+            ),
         ),
     )
 

@@ -57,7 +57,7 @@ def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[
 
     from ppafo.engine.lanes import run_batch
     from ppafo.engine.run import batch_of
-    from ppafo.engine.scheme.walking import leg_torque
+    from ppafo.engine.scheme.walking import foot_direction, leg_torque
     from ppafo.model.contact import SWING
     from ppafo.simulation.sampled import state_row_numbers
 
@@ -71,14 +71,15 @@ def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[
     timing = walk.timing._replace(start=walk.timing.toe_off)
     begin = gait_at(walk.gait, timing, walk.leg.body_mass, walk.leg.gravity, 0.0)
     initial = run.initial._replace(angle=begin.ankle, angular_velocity=begin.ankle_rate)
-    swinging = replace(walk, timing=timing, initial=walk.initial._replace(contact=SWING, now=begin))
+    first = walk.initial._replace(contact=SWING, now=begin, foot=foot_direction(begin.shank, begin.ankle))
+    swinging = replace(walk, timing=timing, initial=first)
     swing = replace(run, plant=plant, initial=initial, walk=swinging, step_count=300)
     rows = state_row_numbers(swing)
     angle = run_batch(batch_of(swing)).record[:, rows["state.angle"], 0]
 
     def slopes(time: float, y: np.ndarray) -> list[float]:
         now = gait_at(walk.gait, timing, walk.leg.body_mass, walk.leg.gravity, time)
-        torque = leg_torque(walk.leg, walk.share, SWING, now, y[0])
+        torque = leg_torque(walk.leg, walk.share, SWING, now, y[0], foot_direction(now.shank, y[0]))
         return [y[1], (torque - plant.viscous_damping * y[1]) / plant.inertia]
 
     times = np.arange(angle.size) * swing.step

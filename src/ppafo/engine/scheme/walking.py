@@ -29,8 +29,15 @@ class DeviceShare(NamedTuple):
     gravity_torque: float
 
 
+class Direction(NamedTuple):
+    """Sine and cosine of the angle of the foot over the horizontal."""
+
+    sine: float
+    cosine: float
+
+
 class WalkState(NamedTuple):
-    """Where the foot stands, the gait now, what the wearer gets, and totals since the start.
+    """Where the foot stands, the gait and the foot's direction now, what the wearer gets, and totals since the start.
 
     ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
     ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``slap_rate`` of the foot at the last landing
@@ -42,6 +49,7 @@ class WalkState(NamedTuple):
     contact: float
     offset: float
     now: GaitNow
+    foot: Direction
     external_torque: float
     heel_force: float
     toe_force: float
@@ -56,39 +64,44 @@ class WalkState(NamedTuple):
 
 
 class WalkStep(NamedTuple):
-    """First stage: the free foot, where the ground would lead the ankle, the fading difference, the gait at the end."""
+    """First stage: the free foot, where the ground would lead the ankle, and the fading difference."""
 
     free: FreeStep
     led: ground.Ankle
     offset: float
-    next: GaitNow
 
 
 NO_CLEARANCE = 1.0e3
 
 
-def leg_torque(leg: LegParameters, share: DeviceShare, contact: float, now: GaitNow, angle: float) -> float:
+def foot_direction(shank: float, angle: float) -> Direction:
+    """Direction of the foot at a shank angle and an ankle angle [rad]."""
+    sine, cosine = sine_and_cosine(ground.foot_angle(shank, angle) / TURN)
+    return Direction(sine, cosine)
+
+
+def leg_torque(
+    leg: LegParameters, share: DeviceShare, contact: float, now: GaitNow, angle: float, foot: Direction
+) -> float:
     """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
 
     The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the weight of the foot plate, and
     the ground under the heel.
     """
-    alpha = ground.foot_angle(now.shank, angle)
-    sine_alpha, cosine_alpha = sine_and_cosine(alpha / TURN)
-    # theta is phi - alpha + 90 deg.
-    sine_theta = now.cosine_shank * cosine_alpha + now.sine_shank * sine_alpha
-    cosine_theta = now.cosine_shank * sine_alpha - now.sine_shank * cosine_alpha
+    # theta is phi less the angle of the foot plus 90 deg.
+    sine_theta = now.cosine_shank * foot.cosine + now.sine_shank * foot.sine
+    cosine_theta = now.cosine_shank * foot.sine - now.sine_shank * foot.cosine
     matrix = mass_matrix(leg, cosine_theta)
     turning = centrifugal_torques(leg, sine_theta, now.shank_rate, 0.0)
     weight = gravity_torques(
-        leg, now.sine_shank, now.cosine_shank, sine_alpha, cosine_alpha, now.knee_forward, now.knee_up
+        leg, now.sine_shank, now.cosine_shank, foot.sine, foot.cosine, now.knee_forward, now.knee_up
     )
     # The measured moment is that of muscles and tissue together.
     muscles = now.moment - passive_torque(leg, now.ankle)
     wearer = leg.residual_share * muscles + passive_torque(leg, angle)
     heel = now.force * leg.heel_lever if contact == ground.HEEL else 0.0
     inertial = matrix.coupling * now.shank_acceleration + turning.ankle + weight.ankle
-    return wearer + heel + share.gravity_torque * cosine_alpha - inertial
+    return wearer + heel + share.gravity_torque * foot.cosine - inertial
 
 
 def begin_walk(
@@ -102,7 +115,7 @@ def begin_walk(
     step: float,
 ) -> WalkStep:
     """Where one step [s] leads the foot, by its own dynamics and by the ground."""
-    torque = leg_torque(leg, share, walk.contact, walk.now, state.angle)
+    torque = leg_torque(leg, share, walk.contact, walk.now, state.angle, walk.foot)
     free = begin_free(plant, state, torque, step)
     offset = walk.offset / (1.0 + step / ground.FADING_TIME)
     prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle)
@@ -111,7 +124,7 @@ def begin_walk(
         prescribed.rate - offset / ground.FADING_TIME,
         prescribed.acceleration,
     )
-    return WalkStep(free, led, offset, next_gait)
+    return WalkStep(free, led, offset)
 
 
 def next_angle(plant: PlantParameters, walk: WalkState, begun: WalkStep) -> float:
@@ -125,18 +138,23 @@ def external_torque(
     share: DeviceShare,
     state: PlantState,
     torque: float,
+    weight: float,
     led: ground.Ankle,
     acceleration: float,
     angle_is_free: bool,
 ) -> float:
-    """T_ex [N m]: what a free foot needs, equation (11), or what equation (1) leaves of the actuator on the ground."""
+    """T_ex [N m]: what a free foot needs, equation (11), or what equation (1) leaves of the actuator on the ground.
+
+    ``torque`` [N m] is that of the leg with the foot plate, ``weight`` what of it the foot plate's weight is.
+    """
     speed = state.angular_velocity
     passive_damping = leg.ankle_damping * speed
-    needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - torque
+    needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - weight)
     pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
     actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
-    given = actuator - way * plant.dynamic_torque - share.viscous_damping * speed - share.inertia * led.acceleration
+    moving = way * plant.dynamic_torque + share.viscous_damping * speed + share.inertia * led.acceleration
+    given = actuator + weight - moving
     return needed if angle_is_free else given
 
 
@@ -149,13 +167,15 @@ def end_walk(
     state: PlantState,
     walk: WalkState,
     begun: WalkStep,
+    now: GaitNow,
     step: float,
 ) -> tuple[PlantState, WalkState]:
-    """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin."""
-    now = begun.next
+    """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin; ``now`` is then."""
     free = ground.is_free(walk.contact)
     predicted = bounded(plant, begun.free.free_angle)
-    torque = leg_torque(leg, share, walk.contact, now, predicted)
+    # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
+    foot = foot_direction(now.shank, predicted if free else begun.led.angle)
+    torque = leg_torque(leg, share, walk.contact, now, predicted, foot)
     moved = end_free(plant, state, begun.free, torque, step)
     after = with_motion(
         state,
@@ -163,14 +183,12 @@ def end_walk(
         moved.angular_velocity if free else begun.led.rate,
     )
     acceleration = (after.angular_velocity - state.angular_velocity) / max(step, 1.0e-30)
-    # Without the weight of the foot plate: it belongs to the device.
-    sine_alpha, cosine_alpha = sine_and_cosine(ground.foot_angle(now.shank, after.angle) / TURN)
-    bare = torque - share.gravity_torque * cosine_alpha
-    given = external_torque(plant, leg, share, after, bare, begun.led, acceleration, free)
+    weight = share.gravity_torque * foot.cosine
+    given = external_torque(plant, leg, share, after, torque, weight, begun.led, acceleration, free)
     landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset)
-    height = leg.toe_lever * (sine_alpha - now.sine_healthy_foot)
+    height = leg.toe_lever * (foot.sine - now.sine_healthy_foot)
     turned = after.angle - state.angle
-    return after, counted(timing, walk, after, now, landed, given, height, follow_rate, turned, step)
+    return after, counted(timing, walk, after, now, foot, landed, given, height, follow_rate, turned, step)
 
 
 def counted(
@@ -178,6 +196,7 @@ def counted(
     walk: WalkState,
     state: PlantState,
     now: GaitNow,
+    foot: Direction,
     landed: ground.Landing,
     given: float,
     height: float,
@@ -201,6 +220,7 @@ def counted(
         landed.contact,
         landed.offset,
         now,
+        foot,
         given,
         walk.heel_force + (heel - walk.heel_force) * share,
         walk.toe_force + (toe - walk.toe_force) * share,
