@@ -11,7 +11,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.refinement import filling_time
 from ppafo.engine.rows import rebuild
-from ppafo.engine.run import Run, Walk
+from ppafo.engine.run import Run, Walk, whole_and_rest
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState, foot_direction
 from ppafo.gait import Gait
 from ppafo.gait.gait import Curve
@@ -78,32 +78,23 @@ def plan_walk(plan: WalkPlan) -> Run:
     leg = plan.wearer.leg()
     bare = plant_parameters(plan.device)
     plant = with_leg(bare, leg)
-    gait, timing = gait_series(plan.gait), gait_timing(plan.gait)
-    valve = walking_valve(plan.device.valve)
-    settings = plan.device.valve.settings
-    program = Program(
-        valve=valve,
-        reference=PROFILES["constant"],
-        controller=plan.controller,
-        angle=None,
-        ideal_sensors=plan.has_ideal_sensors,
-        late_commands=False,
-        walks=True,
-    )
+    walk = _walk(plan, leg, bare)
+    valve, settings = walking_valve(plan.device.valve), plan.device.valve.settings
+    delay = valve.command_delay(settings)
     coarse = max(1, math.ceil(plan.period / plan.step - 1.0e-9))
     steps = coarse * _parts(plant, plan.period / coarse)
     step = plan.period / steps
+    lag = whole_and_rest(delay, step)[1] * step
     record_every = max(1, round(plan.record_interval / step))
-    start = gait_at(gait, timing, leg.body_mass, leg.gravity, 0.0)
     return Run(
-        program=program,
+        program=_program(plan, valve, delay > 0.0),
         plant=plant,
         thermal=NoParameters(),
         valve_orifice=exact_orifice(plan.device.valve.orifice, plan.device),
         leak_orifice=exact_orifice(plan.device.actuator.leak, plan.device),
-        initial=vented(plant, start.ankle, start.ankle_rate),
-        valve=valve.prepare(settings, step),
-        early_valve=(),
+        initial=vented(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
+        valve=valve.prepare(settings, step - lag),
+        early_valve=valve.prepare(settings, lag) if delay > 0.0 else (),
         controller=controller_parameters(plan.controller, plan.settings),
         reference=PROFILES["constant"].parameters(0.0),
         path=(),
@@ -113,17 +104,35 @@ def plan_walk(plan: WalkPlan) -> Run:
         steps_per_sample=steps,
         record_every=record_every,
         signal_delay=0.0,
-        command_delay=0.0,
-        walk=Walk(
-            leg=leg,
-            share=DeviceShare(bare.inertia, bare.viscous_damping, bare.gravity_torque),
-            gait=gait,
-            timing=timing,
-            sensors=plan.gait_sensors,
-            initial=WalkState(
-                HEEL, 0.0, start, foot_direction(start.shank, start.ankle), *(0.0,) * 4, NO_CLEARANCE, *(0.0,) * 6
-            ),
-        ),
+        command_delay=delay,
+        walk=walk,
+    )
+
+
+def _program(plan: WalkPlan, valve: ValveModel, late_commands: bool) -> Program:
+    return Program(
+        valve=valve,
+        reference=PROFILES["constant"],
+        controller=plan.controller,
+        angle=None,
+        ideal_sensors=plan.has_ideal_sensors,
+        late_commands=late_commands,
+        walks=True,
+    )
+
+
+def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
+    """The leg of a walk, at its first heel strike; ``bare`` is the device without it."""
+    gait, timing = gait_series(plan.gait), gait_timing(plan.gait)
+    start = gait_at(gait, timing, leg.body_mass, leg.gravity, 0.0)
+    foot = foot_direction(start.shank, start.ankle)
+    return Walk(
+        leg=leg,
+        share=DeviceShare(bare.inertia, bare.viscous_damping, bare.gravity_torque),
+        gait=gait,
+        timing=timing,
+        sensors=plan.gait_sensors,
+        initial=WalkState(HEEL, 0.0, start, foot, *(0.0,) * 4, NO_CLEARANCE, *(0.0,) * 6),
     )
 
 

@@ -167,3 +167,22 @@ def test_a_faulty_angle_sensor_vents_both_chambers(
 def test_a_device_without_fault_is_not_vented_for_good(walked_with_fault: Callable[..., Any], name: str) -> None:
     walk = walked_with_fault(name, "heel", Fault(1.0e9, 0.0, 0.0))
     assert walk["controller_state.safety.vented"][-1] == 0.0
+
+
+def test_a_dead_time_of_the_valve_delays_the_pressure(walk_plan: Callable[[str], Any]) -> None:
+    from dataclasses import replace
+
+    from ppafo.engine.lanes import run_batch
+    from ppafo.engine.run import batch_of
+    from ppafo.simulation.sampled import state_row_numbers
+
+    plan = walk_plan("event_proportional")
+    seen = {}
+    for delay in (0.0, 0.0304):
+        valve = replace(plan.device.valve, settings={**plan.device.valve.settings, "delay": delay})
+        run = plan_walk(replace(plan, device=replace(plan.device, valve=valve), duration=3.0))
+        rows = state_row_numbers(run)
+        record = run_batch(batch_of(run)).record[:, :, 0]
+        loaded = record[:, rows["state.supplied_mass"]] > 1e-6
+        seen[delay] = float(np.flatnonzero(loaded)[0]) * run.step * run.record_every
+    assert 0.028 < seen[0.0304] - seen[0.0] < 0.036
