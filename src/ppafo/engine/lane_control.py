@@ -22,8 +22,18 @@ def control_loop(rows: LaneRows) -> list[str]:
         *rows.store("controller_state"),
         f"{rows.cells['result.command']} = command",
     ]
-    loop = over_lanes(lines)
-    return ["if step_index % steps_per_sample == 0:", *indented(loop)]
+    return ["if step_index % steps_per_sample == 0:", *indented([*places(rows), *over_lanes(lines)])]
+
+
+def places(rows: LaneRows) -> list[str]:
+    """Lines that find the number of the sample and where late signals lie, once for all lanes."""
+    if rows.program.ideal_sensors:
+        return []
+    return [
+        "sample_index = step_index // steps_per_sample",
+        "late = (step_index - signal_delay) % signal_history.shape[1]",
+        "later = (step_index - signal_delay - 1) % signal_history.shape[1]",
+    ]
 
 
 def sense(rows: LaneRows) -> list[str]:
@@ -32,16 +42,12 @@ def sense(rows: LaneRows) -> list[str]:
         measuring = rows.add(measure)
         return [
             rows.load("sensors"),
-            "depth = signal_history.shape[1]",
-            "late = (step_index - signal_delay) % depth",
-            "later = (step_index - signal_delay - 1) % depth",
             *[
                 f"{name} = signal_history[{row}, late, lane] + timing.signal_lag * "
                 f"(signal_history[{row}, later, lane] - signal_history[{row}, late, lane])"
                 for row, name in enumerate(("angle", "pressure_1", "pressure_2"))
             ],
-            f"seen = {measuring}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, "
-            "step_index // steps_per_sample)",
+            f"seen = {measuring}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample_index)",
         ]
     return [
         f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}(plant, state.angle, state.mass_1, state.mass_2)",
@@ -68,7 +74,7 @@ def sense_gait(rows: LaneRows) -> list[str]:
         pressures,
         f"seen = {rows.add(measure_gait)}(sensors, gait_sensors, gait_seen, state.angle, pressure_1, pressure_2, "
         "walk.heel_force, walk.toe_force, plant.torque_constant, step_index * timing.step, "
-        "step_index // steps_per_sample)",
+        "sample_index)",
         f"gait_seen = {rows.add(GaitSeen)}(seen.heel_force, seen.toe_force, seen.angle)",
         *rows.store("gait_seen"),
     ]
@@ -82,16 +88,16 @@ def remember_signals(rows: LaneRows) -> list[str]:
         rows.load("plant"),
         rows.load("state"),
         f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}(plant, state.angle, state.mass_1, state.mass_2)",
-        "signal_history[0, step_index % signal_history.shape[1], lane] = state.angle",
-        "signal_history[1, step_index % signal_history.shape[1], lane] = pressure_1",
-        "signal_history[2, step_index % signal_history.shape[1], lane] = pressure_2",
+        "signal_history[0, place, lane] = state.angle",
+        "signal_history[1, place, lane] = pressure_1",
+        "signal_history[2, place, lane] = pressure_2",
     ]
     before_start = [
         "if step_index == 0:",
         "    for slot in range(1, signal_history.shape[1]):",
         "        signal_history[:, slot, :] = signal_history[:, 0, :]",
     ]
-    return [*over_lanes(lines), *before_start]
+    return ["place = step_index % signal_history.shape[1]", *over_lanes(lines), *before_start]
 
 
 def remember_commands(rows: LaneRows) -> list[str]:
@@ -99,6 +105,6 @@ def remember_commands(rows: LaneRows) -> list[str]:
     if not rows.program.late_commands:
         return []
     lines = [
-        f"command_history[step_index % command_history.shape[0], lane] = {rows.cells['result.command']}",
+        f"command_history[command_place, lane] = {rows.cells['result.command']}",
     ]
-    return over_lanes(lines)
+    return ["command_place = step_index % command_history.shape[0]", *over_lanes(lines)]

@@ -78,15 +78,17 @@ def late_loop(rows: LaneRows) -> list[str]:
         rows.load("early_valve"),
         "valve = early_valve",
         f"length = {rows.length}",
-        "command = command_history[(step_index - command_delay - 1) % command_history.shape[0], lane]",
+        "command = command_history[place_before, lane]",
     ]
     after = [
         *opening(rows),
         "time += timing.command_lag * timing.step",
         "length = timing.step - timing.command_lag * timing.step",
-        "command = command_history[(step_index - command_delay) % command_history.shape[0], lane]",
+        "command = command_history[place_after, lane]",
     ]
     return [
+        "place_before = (step_index - command_delay - 1) % command_history.shape[0]",
+        "place_after = (step_index - command_delay) % command_history.shape[0]",
         "for lane in range(width):",
         f"    {rows.length} = {lag}",
         "for part in range(1):",
