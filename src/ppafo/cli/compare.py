@@ -3,7 +3,7 @@
 import argparse
 
 from ppafo.cli.arguments import UsageError
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, check_output, print_result, write_files
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, check_own_folder, print_result, write_files
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.cli.study_options import add_study_options, confidence, most_failed, progress, seed, threads
 from ppafo.cli.whole_numbers import whole_number
@@ -35,7 +35,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.studies.comparison import compare
     from ppafo.studies.comparison.study import DEFAULT_DRAWS
 
-    check_output(parsed.out, FILES)
+    check_own_folder(parsed.out, FILES)
     draws = whole_number(parsed.draws, "--draws")
     with progress() as line:
         comparison = compare(

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_output, print_result, write_files
+from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_own_folder, print_result, write_files
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.errors import StudyError
 
@@ -28,7 +28,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.reporting.design_table import design_document, design_table
     from ppafo.studies.design import load_design, run_design
 
-    check_output(parsed.out, FILE_NAMES)
+    check_own_folder(parsed.out, FILE_NAMES)
     read_design_file(parsed.design)
     load_compiler()
     problem = load_design(parsed.design, _seed(parsed.seed))

@@ -6,7 +6,7 @@ from ppafo.cli.output import (
     EXIT_GOOD,
     add_output_arguments,
     add_override_argument,
-    check_output,
+    check_own_folder,
     print_result,
     tell,
     write_files,
@@ -44,7 +44,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.reporting.league_table import league_document, league_table
     from ppafo.studies.league import league
 
-    check_output(parsed.out, NAMES)
+    check_own_folder(parsed.out, NAMES)
     played = league(parsed.scenario, parsed.overrides, parsed.draws, say=tell)
     lines = league_table(played)
     if parsed.out is not None:

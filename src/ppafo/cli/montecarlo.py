@@ -2,7 +2,7 @@
 
 import argparse
 
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, check_output, print_result, write_files
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, check_own_folder, print_result, write_files
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.cli.study_options import add_study_options, confidence, most_failed, progress, seed, threads
 from ppafo.cli.whole_numbers import whole_number
@@ -19,7 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="mean (default), 'quantile 0.95', 'probability above 1.2 N m', 'probability below 0.5 g'",
     )
     parser.add_argument(
-        "--width", metavar="WIDTH", default="1 %", help="of the interval: '1 %%' of the value (default), or '0.01 N m'"
+        "--width",
+        metavar="WIDTH",
+        help="of the interval: '1 %%' of the value (default), or '0.01 N m'; of a probability 0.02 unless given",
     )
     parser.add_argument("--configuration", metavar="NAME", help="of the study, where it has several")
     parser.add_argument("--first", metavar="N", default="256", help="draws before the first look; 256 unless given")
@@ -39,7 +41,7 @@ def run(parsed: argparse.Namespace) -> int:
     )
     from ppafo.studies.monte_carlo import monte_carlo
 
-    check_output(parsed.out, FILES)
+    check_own_folder(parsed.out, FILES)
     with progress() as line:
         estimate = monte_carlo(
             parsed.study,

@@ -49,6 +49,16 @@ def check_output(folder: Path | None, names: Iterable[str] = ()) -> None:
             raise DataError(f"--out {error}") from error
 
 
+def check_own_folder(folder: Path | None, names: Iterable[str]) -> None:
+    """Refuse, before anything runs, a folder that holds anything but files of these names, which would be replaced."""
+    wanted = frozenset(names)
+    if folder is not None and folder.is_dir():
+        foreign = sorted(entry.name for entry in folder.iterdir() if entry.name not in wanted)
+        if foreign:
+            raise DataError(f"--out {folder}: holds '{foreign[0]}', which is not ours; choose another folder")
+    check_output(folder, wanted)
+
+
 def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.Namespace) -> None:
     """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where asked, and print one of them."""
     if parsed.out is not None:

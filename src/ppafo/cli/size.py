@@ -6,7 +6,7 @@ from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
     EXIT_GOOD,
     add_output_arguments,
-    check_output,
+    check_own_folder,
     print_result,
     tell,
     write_files,
@@ -33,7 +33,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.reporting.sizing_files import FILE_NAMES, sizing_files
     from ppafo.reporting.sizing_table import sizing_document, sizing_table
 
-    check_output(parsed.out, FILE_NAMES)
+    check_own_folder(parsed.out, FILE_NAMES)
     read_sizing_file(parsed.sizing)
     load_compiler()
     from ppafo.studies.sizing import run_sizing

@@ -9,7 +9,7 @@ from ppafo.cli.output import (
     EXIT_GOOD,
     add_output_arguments,
     add_override_argument,
-    check_output,
+    check_own_folder,
     print_result,
     write_files,
 )
@@ -42,7 +42,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.studies.tuning import tune
 
     problem = _problem(parsed)
-    check_output(parsed.out, FILES)
+    check_own_folder(parsed.out, FILES)
     with progress() as line:
         tuning = tune(problem, (), threads(parsed), line)
     lines = tuning_text(tuning)

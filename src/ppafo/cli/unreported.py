@@ -7,12 +7,13 @@ from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
     EXIT_GOOD,
     add_output_arguments,
-    check_output,
+    check_own_folder,
     print_result,
     tell,
     write_files,
 )
 from ppafo.cli.quick_imports import load_compiler, load_drawing
+from ppafo.cli.whole_numbers import whole_number
 
 _FIGURE, _DOCUMENT = "unreported-settings", "unreported.json"
 _FORMATS = ("png", "svg")
@@ -21,9 +22,9 @@ _FORMATS = ("png", "svg")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument(
-        "--draws", type=int, default=262_144, metavar="N", help="completions of the torque task to run; default 262144"
+        "--draws", default="262144", metavar="N", help="completions of the torque task to run; default 262144"
     )
-    parser.add_argument("--seed", type=int, default=2011, metavar="N", help="seed of the draws; default 2011")
+    parser.add_argument("--seed", default="2011", metavar="N", help="seed of the draws; default 2011")
     add_output_arguments(parser)
 
 
@@ -34,8 +35,10 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.reporting.unreported_table import unreported_document, unreported_table
     from ppafo.studies.unreported_settings import infer_settings
 
-    check_output(parsed.out, (_DOCUMENT, *(f"{_FIGURE}.{ending}" for ending in _FORMATS)))
-    family = infer_settings(parsed.draws, parsed.seed, tell)
+    draws = whole_number(parsed.draws, "--draws") or 0
+    seed = whole_number(parsed.seed, "--seed") or 0
+    check_own_folder(parsed.out, (_DOCUMENT, *(f"{_FIGURE}.{ending}" for ending in _FORMATS)))
+    family = infer_settings(draws, seed, tell)
     document = unreported_document(family)
     lines = unreported_table(family)
     if parsed.out is not None:

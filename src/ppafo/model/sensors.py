@@ -36,14 +36,14 @@ def mixed(value: int) -> int:
     return value ^ (value >> 16)
 
 
-def next_word(word: int) -> int:
-    """The word after this one, 32 bits."""
-    return mixed((word + 0x1E3779B9) & MASK)
+def next_word(value: int) -> int:
+    """The 32-bit word after this one."""
+    return mixed((value + 0x1E3779B9) & MASK)
 
 
-def halves(word: int) -> int:
+def halves(value: int) -> int:
     """Both 16-bit halves of a 32-bit word, added."""
-    return (word & 0xFFFF) + (word >> 16)
+    return (value & 0xFFFF) + (value >> 16)
 
 
 def standard_noise(seed: int, sample: int, channel: int) -> float:

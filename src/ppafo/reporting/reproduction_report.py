@@ -79,6 +79,7 @@ def _unsaid(reproduction: Reproduction, figure: bytes | None) -> dict[str, Any] 
         "figure": inline_figure(figure),
         "drawn": family.drawn,
         "effective": f"{family.effective:.0f}",
+        "few": not family.is_enough,
         "settings": setting_rows(family),
         "conclusions": conclusion_rows(conclusions(family)),
     }

@@ -37,7 +37,8 @@ def unreported_figure(family: Family) -> "Figure":
         figure.text(
             0.01,
             0.985,
-            "What the paper left unsaid: grey is what was allowed, blue what its reported results leave (simulated)",
+            "What the paper left unsaid: grey is what was allowed, blue what its results leave "
+            f"(simulated; as much as {family.effective:.0f} completions of equal weight)",
             va="top",
             fontsize=11,
         )

@@ -6,6 +6,7 @@ from typing import Any
 
 from ppafo.studies.unreported_settings.evidence import REPORTED, TOLD
 from ppafo.studies.unreported_settings.study import (
+    ENOUGH,
     Conclusion,
     Family,
     Implied,
@@ -13,9 +14,6 @@ from ppafo.studies.unreported_settings.study import (
     implied,
     strongest_links,
 )
-
-FEW = 100.0
-"""Fewer effective completions than this make the intervals rough; the table says so."""
 
 
 def setting_rows(family: Family) -> list[tuple[str, str, str, str]]:
@@ -62,15 +60,18 @@ def unreported_table(family: Family) -> list[str]:
     lines = [*_columns(rows), ""]
     head = ("conclusion", "of all completions", "of those that agree", "by the other results alone")
     lines += [*_columns([head, *conclusion_rows(conclusions(family))]), ""]
+    lines += [_count(family)]
+    if not family.is_enough:
+        return [*lines, f"fewer than {ENOUGH:g} of equal weight are too few for a verdict: give more --draws"]
     links = "; ".join(f"{one} with {other} {value:+.2f}" for one, other, value in strongest_links(family))
-    lines += [f"tied together (correlation of ranks): {links}"]
-    lines += [
+    return [*lines, f"tied together (correlation of ranks): {links}"]
+
+
+def _count(family: Family) -> str:
+    return (
         f"{family.density.size} completions with both valves of {family.drawn} drawn, seed {family.seed}; "
         f"those that agree say as much as {family.effective:.0f} of equal weight"
-    ]
-    if family.effective < FEW:
-        lines += [f"fewer than {FEW:g} of equal weight: the intervals are rough, give more --draws"]
-    return lines
+    )
 
 
 def _columns(rows: Sequence[Sequence[str]]) -> list[str]:

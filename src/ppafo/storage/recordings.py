@@ -10,14 +10,20 @@ from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.netcdf import read_netcdf
 from ppafo.storage.result_folder import CSV_FILE, RUN_FILE, read_document, read_result
 
+WALK_RECORDING = "recording.nc"
+"""What the folder of a walk has in place of a result."""
+
 
 def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
-    """Return the recording in a ``.nc`` or ``.csv`` file or in a result folder.
+    """Return the recording in a ``.nc`` or ``.csv`` file, or in a result folder or that of a walk.
 
     Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute].
     """
     place = Path(path)
     if place.is_dir():
+        recording = place / WALK_RECORDING
+        if recording.is_file() and not (place / RUN_FILE).exists():
+            return read_netcdf(recording)
         return read_result(place).recording
     if place.suffix == ".nc":
         return read_netcdf(place)

@@ -88,7 +88,8 @@ def followed_phase(
     known = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
     aged = PhaseState(state.phase, heel, toe, state.in_phase + period, since, known, state.strikes)
     phase = next_phase(rules, aged, heel.loaded, toe.loaded)
-    strikes = state.phase == SWING and phase == LANDING
+    # A foot that comes down on its toes, or with a lost heel sensor, begins a stride too.
+    strikes = state.phase == SWING and phase != SWING
     plausible = state.strikes > 0.5 and since > 0.5 * known and since < 2.0 * known
     learnt = known + rules.stride_weight * (since - known) if plausible else known
     return PhaseState(

@@ -122,7 +122,7 @@ def begin_walk(
     led = ground.Ankle(
         bounded(plant, prescribed.angle + offset),
         prescribed.rate - offset / ground.FADING_TIME,
-        prescribed.acceleration,
+        prescribed.acceleration + offset / (ground.FADING_TIME * ground.FADING_TIME),
     )
     return WalkStep(free, led, offset)
 

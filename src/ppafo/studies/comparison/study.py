@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.errors import StudyError
 from ppafo.metrics import Metric
+from ppafo.simulation.numbers import number_at
 from ppafo.simulation.result import Status
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
@@ -153,6 +155,10 @@ def compare(
     )
 
 
+_SAME = 1.0e-9
+"""Values that differ by less than this share are one."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Drawing:
     """What is drawn: distributions, which of them hold where, how many draws, their seed, the share that may fail."""
@@ -171,10 +177,32 @@ def _drawing(study: Study | None, draws: int, seed: int | None, most_failed: flo
     return _Drawing(study, uncertainty_of(study), draws, study.sample.seed if seed is None else seed, most_failed)
 
 
+def _check_set_or_drawn(placed: Sequence[Placed], study: Study) -> None:
+    """Refuse cases that differ in a value that the study draws for all of them: the difference would not count."""
+    shared = [path for path in study.paths if not path.startswith("valve.")]
+    for path in shared:
+        places = [place for place in placed if study.varies(path, place.configuration)]
+        values = [value for place in places if (value := _value_at(path, place.scenario)) is not None]
+        lowest, highest = min(values, default=0.0), max(values, default=0.0)
+        if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
+            raise StudyError(
+                f"the study draws '{path}' for every configuration, so values that differ ({lowest:.6g} and "
+                f"{highest:.6g} in SI units) would not count; take a study that does not draw it"
+            )
+
+
+def _value_at(path: str, scenario: Scenario) -> float | None:
+    try:
+        return number_at(scenario, path)
+    except (AttributeError, KeyError, TypeError):
+        return None
+
+
 def _outcomes(
     placed: Sequence[Placed], metrics: Sequence[str], drawing: _Drawing, threads: int | None, watch: Watch | None
 ) -> list[Outcomes]:
     """Return the runs of every case, all over the same draws."""
+    _check_set_or_drawn(placed, drawing.study)
     columns = drawing.uncertainty.random_columns(0, drawing.draws, drawing.seed)
     tally = Tally(drawing.draws * len(placed), watch)
     found = []

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.errors import StudyError, UnitError
-from ppafo.metrics import METRICS
 from ppafo.studies.monte_carlo.estimate import MonteCarlo, StoppingRule, draw_until
-from ppafo.studies.monte_carlo.statistic import Statistic, parse_statistic
+from ppafo.studies.monte_carlo.statistic import Probability, Statistic, parse_statistic
 from ppafo.studies.sweep.study import Study
 from ppafo.studies.uncertainty.draws import chosen_configuration, study_of, uncertainty_in
 from ppafo.studies.uncertainty.metric_values import difference_of
@@ -16,13 +15,14 @@ from ppafo.studies.uncertainty.outcomes import Tally, Watch, check_metrics, scen
 from ppafo.units import parse_quantity
 
 DEFAULT_WIDTH = "1 %"
+PROBABILITY_WIDTH = "0.02"
 
 
 def monte_carlo(
     study: Study | str | Path | Mapping[str, Any],
     metric: str,
     statistic: str = "mean",
-    width: str = DEFAULT_WIDTH,
+    width: str | None = None,
     configuration: str | None = None,
     overrides: Sequence[str] = (),
     seed: int | None = None,
@@ -36,8 +36,8 @@ def monte_carlo(
     """Estimate a statistic of a metric over the distributions of a study until its interval is ``width`` wide.
 
     ``statistic`` is ``mean``, ``quantile 0.95`` or ``probability above 3 N m``; ``width`` a share of its value
-    (``1 %``) or a difference with its unit (``0.01 N m``; for a probability a number, ``0.01``). Draws are independent
-    whatever the study's sampling method, because the intervals need it; ``seed`` is that of the study unless given.
+    (``1 %`` unless given) or a difference with its unit (``0.01 N m``; for a probability a number, 0.02). Draws are
+    independent whatever the study's sampling method, because the intervals need it; ``seed`` is the study's by default.
     StudyError for bad input and where more than the share ``most_failed`` of the runs fails.
     """
     chosen = study_of(study, overrides)
@@ -45,7 +45,8 @@ def monte_carlo(
     uncertainty = uncertainty_in(chosen, base)
     check_metrics([metric], base.scenario)
     what = parse_statistic(statistic, metric)
-    rule = stopping_rule(what, metric, width, StoppingRule(1.0, False, first, most, confidence, most_failed))
+    asked = width or (PROBABILITY_WIDTH if isinstance(what, Probability) else DEFAULT_WIDTH)
+    rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first, most, confidence, most_failed))
     tally = Tally(rule.first, watch)
     model = scenario_model(base.scenario, [metric], threads, tally.add)
     return draw_until(model, uncertainty, metric, what, rule, chosen.sample.seed if seed is None else seed)
@@ -55,7 +56,7 @@ def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingR
     """Return the rule with the width that a text says, else like another one."""
     text = width.strip()
     is_relative = text.endswith("%")
-    if statistic.unit == "-" and METRICS[metric].unit != "-":
+    if isinstance(statistic, Probability):
         number = _plain(text)
     else:
         number = parse_share(text) if is_relative else difference_of(text, metric, f"width = '{width}'")

@@ -85,6 +85,7 @@ def _built(document: dict[str, Any], source: _Source) -> Study:
     parsed = _parsed(document, source.file)
     configurations = _configurations(parsed, source)
     _check_asks_for_something(parsed, source)
+    _check_set_or_varied(parsed, source)
     places = {item.path: _place(item, configurations, source) for item in parsed.vary}
     varied = [_varied(item, places[item.path], configurations, source) for item in parsed.vary]
     drawn = tuple(item for item in varied if isinstance(item, Drawn))
@@ -103,6 +104,18 @@ def _built(document: dict[str, Any], source: _Source) -> Study:
         document=document,
         text=source.text,
     )
+
+
+def _check_set_or_varied(parsed: declared.StudyFile, source: _Source) -> None:
+    """Refuse a value that is set in a configuration in which it also varies: it would not count."""
+    for each in parsed.configurations:
+        given = {text.partition("=")[0].strip() for text in each.overrides}
+        for item in parsed.vary:
+            if item.path in given and item.kind != "stated" and (not item.only or each.name in item.only):
+                raise source.refusal(
+                    f"configuration '{each.name}': '{item.path}' is set and also varies, so the value set would not "
+                    "count; leave one out, or give the [[vary]] 'only' with the other configurations"
+                )
 
 
 def _configurations(parsed: declared.StudyFile, source: _Source) -> tuple[Configuration, ...]:

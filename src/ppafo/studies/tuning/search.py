@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ppafo.studies.sweep.sampling.distributions import Floats
+from ppafo.studies.tuning.judging import FAILED, INFEASIBLE
 from ppafo.studies.tuning.problem import Effort
 
 Costs = Callable[[Floats], Floats]
@@ -54,6 +56,13 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
         course.append(min([float(np.min(found)), *course[-1:]]))
         return found
 
+    is_settled = False
+
+    def stop(intermediate_result: Any) -> bool:
+        nonlocal is_settled
+        is_settled = have_come_together(intermediate_result.population_energies)
+        return is_settled
+
     is_within = all(0.0 <= share <= 1.0 for share in before)
     result = differential_evolution(
         generation,
@@ -62,13 +71,22 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
         init="latinhypercube",
         popsize=effort.candidates_per_gain,
         maxiter=effort.generations,
-        tol=_TOLERANCE,
+        tol=0.0,
+        callback=stop,
         polish=False,
         updating="deferred",
         vectorized=True,
         rng=random,
     )
-    return Start(tuple(map(float, result.x)), float(result.fun), tried, tuple(course), bool(result.success))
+    return Start(tuple(map(float, result.x)), float(result.fun), tried, tuple(course), is_settled)
+
+
+def have_come_together(costs: Floats) -> bool:
+    """Tell whether candidates cost the same; where all break a constraint, by how much they break it."""
+    if np.max(costs) >= FAILED or np.min(costs) < INFEASIBLE <= np.max(costs):
+        return False
+    beyond = costs - INFEASIBLE if np.min(costs) >= INFEASIBLE else costs
+    return float(np.std(beyond)) <= _TOLERANCE * abs(float(np.mean(beyond)))
 
 
 def agreement(starts: Sequence[Start]) -> float:
@@ -77,5 +95,6 @@ def agreement(starts: Sequence[Start]) -> float:
     As good is a cost within a hundredth; large where very different gains do as well, which the goal then leaves open.
     """
     best = starts[0]
-    as_good = [item for item in starts if item.cost <= best.cost + 0.01 * abs(best.cost)]
+    beyond = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
+    as_good = [item for item in starts if item.cost <= best.cost + 0.01 * abs(beyond)]
     return max(float(np.max(np.abs(np.subtract(item.shares, best.shares)))) for item in as_good)

@@ -1,7 +1,8 @@
 """Draws completions of the torque task, runs each with both valves, and weighs them by what the paper reports."""
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +35,13 @@ from ppafo.studies.unreported_settings.settings import (
 Floats = NDArray[np.float64]
 
 CHUNK = 32_768
-ROUNDS = 4
+ROUNDS = 12
 FEWEST, MOST = 1_000, 20_000_000
 DEFAULT_DRAWS = 262_144
 DEFAULT_SEED = 2011
 
+ENOUGH = 100.0
+TOO_FEW = "too few to say"
 IMPLIED, NARROWED = 0.5, 0.8
 """A setting is implied (narrowed) where what is left of its range is below this share of what was allowed."""
 
@@ -68,6 +71,11 @@ class Family:
         raw = agreement(self.metrics, left_out) / self.density
         total = raw.sum()
         return np.asarray(raw / total if total > 0.0 else raw)
+
+    @property
+    def is_enough(self) -> bool:
+        """True where enough completions agree for a verdict on a setting."""
+        return self.effective >= ENOUGH
 
     @property
     def effective(self) -> float:
@@ -180,15 +188,15 @@ def _density(points: Floats, proposals: list[Proposal | None], sizes: list[int])
 
 
 def implied(family: Family) -> list[Implied]:
-    """What the results imply for each setting, in their order."""
-    return [_of_setting(setting, family.draws[setting.name], family.weights) for setting in SETTINGS]
+    """What the results imply for each setting, in their order; no verdict where too few completions agree."""
+    found = [_of_setting(setting, family.draws[setting.name], family.weights) for setting in SETTINGS]
+    return found if family.is_enough else [replace(item, verdict=TOO_FEW) for item in found]
 
 
 def _of_setting(setting: Setting, values: Floats, weight: Floats) -> Implied:
     if setting.choices:
         shares = tuple(float(weight[values == choice].sum()) for choice in setting.choices)
-        likely = [share for share in shares if share > 0.05]
-        left = len(likely) / len(shares)
+        left = spread_of(shares)
         return Implied(setting, np.nan, np.nan, np.nan, left, shares, _verdict(left))
     low, median, high = weighted_quantiles(values, weight, (0.05, 0.5, 0.95))
     scale = np.log if setting.is_logarithmic else np.asarray
@@ -196,7 +204,17 @@ def _of_setting(setting: Setting, values: Floats, weight: Floats) -> Implied:
     return Implied(setting, median, low, high, left, (), _verdict(left))
 
 
+def spread_of(shares: Sequence[float]) -> float:
+    """How far weights spread over choices, 0 for one alone to 1 for all alike, by their perplexity; nan for none."""
+    if not sum(shares) > 0.0:
+        return float("nan")
+    entropy = -sum(share * math.log(share) for share in shares if share > 0.0)
+    return (math.exp(entropy) - 1.0) / (len(shares) - 1)
+
+
 def _verdict(left: float) -> str:
+    if math.isnan(left):
+        return "nothing agrees"
     if left < IMPLIED:
         return "implied"
     return "narrowed" if left < NARROWED else "left open"
