@@ -138,11 +138,11 @@ def test_unknown_outputs_are_refused_with_the_nearest(small: Any, outputs: Any, 
 
 def test_the_duration_varies_only_where_nothing_is_kept_over_time(small: Any) -> None:
     small["vary"].append({"path": "run.duration", "kind": "list", "values": ["0.1 s", "0.2 s"]})
+    assert "'run.duration' cannot vary where trajectories or bands are kept" in refused(small)
+    small["outputs"] = {"metrics": ["rms_error"]}
     assert "'run.duration' is set and also varies" in refused(small)
     for table in small["configurations"]:
         table["overrides"] = [text for text in table["overrides"] if not text.startswith("run.duration")]
-    assert "'run.duration' cannot vary where trajectories or bands are kept" in refused(small)
-    small["outputs"] = {"metrics": ["rms_error"]}
     assert load_study(small).runs == 64
 
 
