@@ -130,8 +130,8 @@ def infer_settings(
     ran = _run(points, say, 0, count)
     even = int(ran.completed.sum())
     for number, size in enumerate(rounds[1:]):
-        # Every other round looks where the improvement does not count, so that it can be judged by the rest.
-        left_out = (IMPROVEMENT,) if number % 2 else ()
+        # Every third round looks where the improvement does not count, so that it can be judged by the rest.
+        left_out = (IMPROVEMENT,) if number % 3 == 1 else ()
         agrees = np.where(ran.completed, agreement(ran.metrics, left_out), 0.0)
         proposal = next_proposal(points, agrees / _density(points, proposals, rounds), CELLS, chance)
         if proposal is None:
