@@ -53,7 +53,9 @@ class Setting:
 SETTINGS: tuple[Setting, ...] = (
     Setting("reference level", "N m", "not printed; 5.5 N m is the most that 55 psi_g can hold", 3.0, 9.0),
     Setting("ramp time", "s", "not printed", 0.25, 3.0, is_logarithmic=True),
-    Setting(HOLD, "s", "not printed", choices=(0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)),
+    Setting(
+        HOLD, "s", "not printed; with the ramp rounded up to half a second", choices=(0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
+    ),
     Setting("angle", "deg", "not printed; within the range of figure 7", 25.0, 125.0),
     Setting(DEAD_VOLUME, "cm^3", "lines are in V_i, no number is printed", 0.5, 30.0, is_logarithmic=True),
     Setting("source pressure", "psi_g", "55 psi_g is printed for the step response, 50 for the flow", 45.0, 60.0),
@@ -123,8 +125,8 @@ def columns(draws: Draws, valve: str) -> dict[str, Floats]:
 
 
 def whole_durations(times: Floats) -> Floats:
-    """Durations [s] as whole multiples of 50 ms, so that every sample period and every output fits."""
-    return np.asarray(np.round(times / 0.05) * 0.05)
+    """Durations [s] rounded up to half seconds: every period fits, and many runs share a clock."""
+    return np.asarray(np.ceil(times / 0.5) * 0.5)
 
 
 def discharge_coefficients(reading: Floats, valve: str) -> Floats:

@@ -127,20 +127,24 @@ def infer_settings(
     rounds = [count // 3, *[(count - count // 3) // ROUNDS] * ROUNDS]
     points = spread(rounds[0], seed)
     proposals: list[Proposal | None] = [None]
+    densities = [_density(None, points)]
     ran = _run(points, say, 0, count)
     even = int(ran.completed.sum())
     for number, size in enumerate(rounds[1:]):
         # Every third round looks where the improvement does not count, so that it can be judged by the rest.
         left_out = (IMPROVEMENT,) if number % 3 == 1 else ()
         agrees = np.where(ran.completed, agreement(ran.metrics, left_out), 0.0)
-        proposal = next_proposal(points, agrees / _density(points, proposals, rounds), CELLS, chance)
+        proposal = next_proposal(points, agrees / _mixture(densities, rounds), CELLS, chance)
         if proposal is None:
             break
-        proposals.append(proposal)
         added = proposal.drawn(size, chance)
         ran = ran.joined(_run(added, say, len(points), count))
         points = np.concatenate([points, added])
-    density = _density(points, proposals, rounds)[ran.completed]
+        earlier = zip(densities, proposals, strict=True)
+        densities = [np.concatenate([known, _density(one, added)]) for known, one in earlier]
+        proposals.append(proposal)
+        densities.append(_density(proposal, points))
+    density = _mixture(densities, rounds)[ran.completed]
     metrics = {valve: {name: column[ran.completed] for name, column in of.items()} for valve, of in ran.metrics.items()}
     return Family(values_of(points[ran.completed]), metrics, density, even, len(points), seed)
 
@@ -178,13 +182,16 @@ def _run(points: Floats, say: Callable[[str], None], before: int, count: int) ->
     return ran
 
 
-def _density(points: Floats, proposals: list[Proposal | None], sizes: list[int]) -> Floats:
-    """How densely points were drawn, over the even spread, from the mixture of the proposals; None is the even one."""
-    used = sizes[: len(proposals)]
-    total = np.zeros(len(points))
-    for proposal, size in zip(proposals, used, strict=True):
-        total += size * (np.ones(len(points)) if proposal is None else proposal.density(points))
-    return total / sum(used)
+def _density(proposal: Proposal | None, points: Floats) -> Floats:
+    """How densely a proposal draws at points, over the even spread, which None is."""
+    return np.ones(len(points)) if proposal is None else proposal.density(points)
+
+
+def _mixture(densities: Sequence[Floats], sizes: Sequence[int]) -> Floats:
+    """How densely points were drawn, over the even spread, from the mixture of the proposals used so far."""
+    used = sizes[: len(densities)]
+    total = sum(size * density for density, size in zip(densities, used, strict=True))
+    return np.asarray(total / sum(used))
 
 
 def implied(family: Family) -> list[Implied]:
