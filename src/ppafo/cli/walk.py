@@ -18,6 +18,7 @@ from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.errors import DataError, ScenarioError
 
 if TYPE_CHECKING:
+    from ppafo.studies.endurance import Endurance
     from ppafo.walking import Comparison, Configuration
     from ppafo.walking.population import Population
 
@@ -66,6 +67,7 @@ def _one(configuration: "Configuration", minutes: float, parsed: argparse.Namesp
 
     load_drawing()
     from ppafo.reporting.walk_files import WALK_FOLDER, walk_document, walk_files
+    from ppafo.studies.endurance.of_walk import endurance_of_walk
 
     folder = parsed.out if parsed.out is not None else Path("out") / f"walk-{configuration.name}"
     checked_seconds(configuration, minutes)
@@ -73,10 +75,11 @@ def _one(configuration: "Configuration", minutes: float, parsed: argparse.Namesp
     comparison = compare_walks(configuration, minutes, _progress)
     if minutes > _LONG:
         tell("drawing and writing")
-    files = walk_files(comparison)
+    life = endurance_of_walk(comparison.with_device)
+    files = walk_files(comparison, life)
     write_owned_folder(folder, files, WALK_FOLDER)
-    document = walk_document(comparison) | {"folder": str(folder), "files": sorted(files)}
-    print_result("\n".join(_lines(comparison, folder, sorted(files))), document, parsed.json)
+    document = walk_document(comparison, life) | {"folder": str(folder), "files": sorted(files)}
+    print_result("\n".join(_lines(comparison, life, folder, sorted(files))), document, parsed.json)
     return _exit_code(comparison)
 
 
@@ -92,15 +95,14 @@ def _progress(done: float, total: float) -> None:
         tell(f"walked {done:.0f} of {total:.0f} min")
 
 
-def _lines(comparison: "Comparison", folder: Path, files: list[str]) -> list[str]:
+def _lines(comparison: "Comparison", life: "Endurance | None", folder: Path, files: list[str]) -> list[str]:
     from ppafo.reporting.walk_table import bottle_sentence, safety_sentence, walk_table
-    from ppafo.studies.endurance.of_walk import endurance_of_walk
 
     result = comparison.with_device
     strides = f"{result.metrics['strides'].value:.0f} strides" if "strides" in result.metrics else "no strides"
     head = f"{result.configuration.name}: {result.status.kind}, {strides} of {result.configuration.gait.name}"
     safety = safety_sentence(comparison)
-    bottle = bottle_sentence(endurance_of_walk(result))
+    bottle = bottle_sentence(life)
     remarks = [line for remark in (bottle, safety) if remark for line in ("", remark)]
     return [head, "", *walk_table(comparison), *remarks, "", f"written: {folder} ({', '.join(files)})"]
 

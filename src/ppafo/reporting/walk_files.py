@@ -22,7 +22,7 @@ from ppafo.simulation.document import UNITS, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.storage.owned_folder import FolderKind, read_json
-from ppafo.studies.endurance.of_walk import endurance_of_walk
+from ppafo.studies.endurance import Endurance
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.strides import PER_STRIDE, PHASES
 from ppafo.walking.walk import WalkResult
@@ -36,8 +36,11 @@ ANIMATION = "legs.gif"
 _FORMATS = ("png", "svg")
 
 
-def walk_files(comparison: Comparison) -> dict[str, bytes]:
-    """Return every file of a walk by name; a walk that diverged has numbers and no pictures."""
+def walk_files(comparison: Comparison, life: Endurance | None) -> dict[str, bytes]:
+    """Return every file of a walk by name; a walk that diverged has numbers and no pictures.
+
+    ``life`` is how long one bottle lasts on it, None where it took no gas.
+    """
     worn, bare = comparison.with_device, comparison.without_device
     contents = {
         "recording.nc": netcdf_bytes(worn.recording, None),
@@ -50,8 +53,8 @@ def walk_files(comparison: Comparison) -> dict[str, bytes]:
     }
     pictures = walk_pictures(comparison) if worn.averages and bare.averages else {}
     contents |= pictures
-    contents[REPORT] = walk_report(comparison, pictures).encode()
-    document = walk_document(comparison) | {"files": sorted([*contents, WALK_FILE])}
+    contents[REPORT] = walk_report(comparison, pictures, life).encode()
+    document = walk_document(comparison, life) | {"files": sorted([*contents, WALK_FILE])}
     return {**contents, WALK_FILE: f"{json_text(document)}\n".encode()}
 
 
@@ -70,7 +73,7 @@ def walk_pictures(comparison: Comparison) -> dict[str, bytes]:
     return contents | {ANIMATION: animation(comparison)}
 
 
-def walk_document(comparison: Comparison) -> dict[str, Any]:
+def walk_document(comparison: Comparison, life: Endurance | None) -> dict[str, Any]:
     """Return what ``walk.json`` says, as data that JSON can hold, in SI units."""
     configuration = comparison.with_device.configuration
     return {
@@ -81,7 +84,7 @@ def walk_document(comparison: Comparison) -> dict[str, Any]:
         "status_off": plain(comparison.without_device.status),
         "minutes": float(comparison.with_device.recording.time[-1]) / 60.0,
         "metrics": plain(dict(comparison.with_device.metrics)),
-        "bottle": bottle_document(endurance_of_walk(comparison.with_device)),
+        "bottle": bottle_document(life),
         "metrics_off": plain(dict(comparison.without_device.metrics)),
         "healthy": plain(dict(comparison.healthy)),
         "versions": {"ppafo": ppafo.__version__, "python": platform.python_version(), "numpy": np.__version__},
@@ -112,7 +115,7 @@ def _table(columns: Mapping[str, Floats]) -> bytes:
     return ("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]) + "\n").encode()
 
 
-def walk_report(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
+def walk_report(comparison: Comparison, pictures: Mapping[str, bytes], life: Endurance | None) -> str:
     """Return the report as HTML, with the figures inside."""
     configuration = comparison.with_device.configuration
     walks = (comparison.with_device, comparison.without_device)
@@ -134,7 +137,7 @@ def walk_report(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
         "is_completed": comparison.is_completed,
         "messages": [walk.status.message for walk in walks if not walk.status.is_completed],
         "safety": safety_sentence(comparison),
-        "bottle": bottle_sentence(endurance_of_walk(comparison.with_device)),
+        "bottle": bottle_sentence(life),
         "columns": COLUMNS,
         "rows": walk_rows(comparison),
         "figures": figures,
