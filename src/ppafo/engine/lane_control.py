@@ -1,7 +1,7 @@
 """What the lanes do at a sample: sense, control, and keep what sensors and valve get late."""
 
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
-from ppafo.model.gait_sensors import GaitMeasurement, GaitSeen, measure_gait
+from ppafo.model.gait_sensors import GaitMeasurement, measure_gait
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
 from ppafo.model.vane import actuator_torque
@@ -72,10 +72,9 @@ def sense_gait(rows: LaneRows) -> list[str]:
     return [
         *[rows.load(group) for group in ("walk", "sensors", "gait_sensors", "gait_seen")],
         pressures,
-        f"seen = {rows.add(measure_gait)}(sensors, gait_sensors, gait_seen, state.angle, pressure_1, pressure_2, "
-        "walk.heel_force, walk.toe_force, plant.torque_constant, step_index * timing.step, "
+        f"seen, gait_seen = {rows.add(measure_gait)}(sensors, gait_sensors, gait_seen, state.angle, pressure_1, "
+        "pressure_2, walk.heel_force, walk.toe_force, plant.torque_constant, step_index * timing.step, "
         "sample_index)",
-        f"gait_seen = {rows.add(GaitSeen)}(seen.heel_force, seen.toe_force, seen.angle)",
         *rows.store("gait_seen"),
     ]
 

@@ -14,7 +14,7 @@ from ppafo.engine.rows import table
 from ppafo.engine.scheme.walking import DeviceShare, WalkState
 from ppafo.model.columns import larger, whole
 from ppafo.model.gait import GaitSeries, GaitTiming
-from ppafo.model.gait_sensors import GaitSeen, GaitSensors
+from ppafo.model.gait_sensors import NOTHING_SEEN, GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.sensors import SensorParameters
@@ -121,7 +121,7 @@ def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:
     if walk is None:
         return [], []
     parameters = [walk.leg, walk.share, walk.gait, walk.timing, walk.sensors]
-    return parameters, [walk.initial, GaitSeen(0.0, 0.0, 0.0)]
+    return parameters, [walk.initial, NOTHING_SEEN]
 
 
 def _members(group: Members, groups: int) -> list[Members]:

@@ -25,23 +25,44 @@ class Fault(NamedTuple):
 
 
 class GaitSensors(NamedTuple):
-    """Force sensors: how fast they follow [1/s], noise and step [N], share of samples that are lost; faults of all."""
+    """How sensors follow, noise and step of the forces [N], shares of samples that are lost, and faults.
+
+    ``follow_rate`` [1/s] is that of the force sensors; ``angle_memory`` and ``pressure_memory`` are what is left of a
+    first-order sensor's last value after one sample, 0 for one that follows at once.
+    """
 
     follow_rate: float
     force_noise: float
     force_quantum: float
     lost_share: float
+    angle_memory: float
+    pressure_memory: float
+    angle_lost_share: float
+    pressure_lost_share: float
     heel_fault: Fault
     toe_fault: Fault
     angle_fault: Fault
+    pressure_1_fault: Fault
+    pressure_2_fault: Fault
 
 
 class GaitSeen(NamedTuple):
-    """Last readings: forces under heel and toes [N], angle [rad]."""
+    """Last readings: forces under heel and toes [N], angle [rad], absolute pressures [Pa].
+
+    The last three are angle and pressures as a first-order sensor follows them, before noise and steps.
+    """
 
     heel_force: float
     toe_force: float
     angle: float
+    pressure_1: float
+    pressure_2: float
+    smooth_angle: float
+    smooth_pressure_1: float
+    smooth_pressure_2: float
+
+
+NOTHING_SEEN = GaitSeen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def followed(shown: float, true: float, follow_rate: float, step: float) -> float:
@@ -63,6 +84,12 @@ def force_reading(sensors: GaitSensors, force: float, last: float, seed: int, sa
     return last if unit_noise(seed, sample, channel + 2) < sensors.lost_share else shown
 
 
+def kept(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
+    """A reading, or the last one where the sample is lost; the first one never is."""
+    share = lost_share if sample > 0 else 0.0
+    return last if unit_noise(seed, sample, channel) < share else reading
+
+
 def measure_gait(
     sensors: SensorParameters,
     gait_sensors: GaitSensors,
@@ -75,17 +102,27 @@ def measure_gait(
     torque_constant: float,
     time: float,
     sample: int,
-) -> GaitMeasurement:
-    """Measurement of one sample with noise, steps, lost samples and faults."""
+) -> tuple[GaitMeasurement, GaitSeen]:
+    """Measurement of one sample with bandwidth, noise, steps, lost samples and faults, and what to remember of it."""
     seed = int(sensors.seed)
-    seen = measure(sensors, angle, pressure_1, pressure_2, torque_constant, sample)
+    # A sensor has settled before the walk begins.
+    angle_memory = gait_sensors.angle_memory if sample > 0 else 0.0
+    pressure_memory = gait_sensors.pressure_memory if sample > 0 else 0.0
+    smooth_angle = angle + (last.smooth_angle - angle) * angle_memory
+    smooth_1 = pressure_1 + (last.smooth_pressure_1 - pressure_1) * pressure_memory
+    smooth_2 = pressure_2 + (last.smooth_pressure_2 - pressure_2) * pressure_memory
+    seen = measure(sensors, smooth_angle, smooth_1, smooth_2, torque_constant, sample)
     heel = force_reading(gait_sensors, heel_force, last.heel_force, seed, sample, 3)
     toe = force_reading(gait_sensors, toe_force, last.toe_force, seed, sample, 4)
-    return GaitMeasurement(
-        faulty(gait_sensors.angle_fault, seen.angle, last.angle, time),
-        seen.pressure_1,
-        seen.pressure_2,
-        seen.torque,
-        faulty(gait_sensors.heel_fault, heel, last.heel_force, time),
-        faulty(gait_sensors.toe_fault, toe, last.toe_force, time),
-    )
+    turned = kept(last.angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
+    first = kept(last.pressure_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
+    second = kept(last.pressure_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
+    shown_angle = faulty(gait_sensors.angle_fault, turned, last.angle, time)
+    shown_1 = faulty(gait_sensors.pressure_1_fault, first, last.pressure_1, time)
+    shown_2 = faulty(gait_sensors.pressure_2_fault, second, last.pressure_2, time)
+    shown_heel = faulty(gait_sensors.heel_fault, heel, last.heel_force, time)
+    shown_toe = faulty(gait_sensors.toe_fault, toe, last.toe_force, time)
+    # Who works out the torque has only the readings, true or not.
+    torque = torque_constant * (shown_1 - shown_2)
+    remembered = GaitSeen(shown_heel, shown_toe, shown_angle, shown_1, shown_2, smooth_angle, smooth_1, smooth_2)
+    return GaitMeasurement(shown_angle, shown_1, shown_2, torque, shown_heel, shown_toe), remembered

@@ -43,6 +43,7 @@ def population_document(population: Population) -> dict[str, Any]:
         "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
         "wearers": population.count,
         "diverged": population.diverged,
+        "vented": population.vented,
         "minutes": population.minutes,
         "seed": population.seed,
         "varied": {

@@ -44,6 +44,8 @@ def population_table(population: Population) -> list[str]:
     for name, item in SHOWN.items():
         cells = "".join(f"  {text:>8}" for text in _cells(tables[name], item))
         lines.append(f"{f'{item.title} ({item.unit})':<{title}}{cells}")
+    if population.vented:
+        lines += ["", f"safe state: the controllers of {population.vented} wearers vented both chambers for good"]
     return lines
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ppafo.control.kind import ControllerKind
 from ppafo.gait import Gait
-from ppafo.model.gait_sensors import GaitSensors
+from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.device import Device
 from ppafo.walking.wearer import Wearer
@@ -38,9 +38,9 @@ class Configuration:
         """True where nothing but the bandwidth of the force sensors stands between foot and controller."""
         noise = self.sensors[:4]
         gait = self.gait_sensors
-        faults = (gait.heel_fault, gait.toe_fault, gait.angle_fault)
-        failing = any(fault.time < NEVER for fault in faults)
-        return not (any(noise) or gait.force_noise or gait.force_quantum or gait.lost_share or failing)
+        failing = any(fault.time < NEVER for fault in gait if isinstance(fault, Fault))
+        _, *rest = (value for value in gait if not isinstance(value, Fault))
+        return not (any(noise) or any(rest) or failing)
 
 
 NEVER = 1.0e9

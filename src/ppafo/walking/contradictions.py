@@ -2,11 +2,16 @@
 
 from collections.abc import Iterator, Mapping
 
+from ppafo.control.walking.catalog import FITS_ON_OFF_VALVES
 from ppafo.errors import ScenarioError
 from ppafo.simulation.reading import Reading, written
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.planning import walking_valve
 
-_NEWTON, _RADIAN, _SECOND, _METRE = "N", "rad", "s", "m"
+_NEWTON, _RADIAN, _SECOND, _METRE, _PASCAL = "N", "rad", "s", "m", "Pa_a"
+
+COMPRESSION = 1.25
+"""Highest pressure in a chamber over that of the supply, with room: 1.14 in the shipped walks."""
 
 
 def check_walk(configuration: Configuration, reading: Reading) -> None:
@@ -27,11 +32,13 @@ def _of_default(reading: Reading, path: str, reason: str) -> ScenarioError:
 
 def _contradictions(configuration: Configuration) -> Iterator[tuple[str, str]]:
     yield from _segments(configuration)
+    yield from _valve(configuration)
     if "load_threshold" in configuration.settings:
         yield from _thresholds(configuration)
         yield from _times(configuration)
         yield from _angles(configuration)
         yield from _gait(configuration)
+        yield from _pressures(configuration)
     if "peak_time" in configuration.settings:
         yield from _profile(configuration.settings)
 
@@ -44,6 +51,14 @@ def _segments(configuration: Configuration) -> Iterator[tuple[str, str]]:
     if wearer.foot_mass_centre > wearer.toe_lever:
         lever = written(wearer.toe_lever, _METRE)
         yield "wearer.foot_mass_centre", f"lies beyond the toes: wearer.toe_lever is {lever}"
+
+
+def _valve(configuration: Configuration) -> Iterator[tuple[str, str]]:
+    name, valve = configuration.controller.name, configuration.device.valve.kind
+    if valve != "proportional" and name not in FITS_ON_OFF_VALVES:
+        fitting = " or ".join(sorted(FITS_ON_OFF_VALVES))
+        remedy = f"take device.valve 'proportional', or controller.kind {fitting}"
+        yield "controller.kind", f"opens its valve by degrees, which a {valve} valve cannot: {remedy}"
 
 
 def _thresholds(configuration: Configuration) -> Iterator[tuple[str, str]]:
@@ -63,6 +78,13 @@ def _times(configuration: Configuration) -> Iterator[tuple[str, str]]:
     if not 0.5 * stride < settings["first_stride_time"] < 2.0 * stride:
         shown = written(round(stride, 4), _SECOND)
         yield "controller.first_stride_time", f"must be between half and twice the stride of the gait, which is {shown}"
+    if settings["flat_from"] >= settings["flat_to"]:
+        yield "controller.flat_from", f"must be below controller.flat_to, which is {settings['flat_to']:g}"
+    delay = walking_valve(configuration.device.valve).command_delay(configuration.device.valve.settings)
+    for name in ("fill_time", "vent_time"):
+        if settings[name] <= delay:
+            shown = written(delay, _SECOND)
+            yield f"controller.{name}", f"must be longer than the dead time of the valve, which is {shown}"
     if settings["frozen_time"] <= 2.0 * configuration.period:
         shown = written(configuration.period, _SECOND)
         yield "controller.frozen_time", f"must be longer than two samples of the controller, one is {shown}"
@@ -87,6 +109,21 @@ def _gait(configuration: Configuration) -> Iterator[tuple[str, str]]:
             "or take controller.kind=off"
         )
         yield "controller.kind", reason
+
+
+def _pressures(configuration: Configuration) -> Iterator[tuple[str, str]]:
+    settings, supply = configuration.settings, configuration.device.supply
+    atmosphere = written(supply.atmospheric_pressure, _PASCAL)
+    lowest = min(supply.pressure, supply.dorsiflexion_pressure)
+    highest = max(supply.pressure, supply.dorsiflexion_pressure)
+    if settings["lowest_pressure"] >= supply.atmospheric_pressure:
+        yield "controller.lowest_pressure", f"must be below the atmosphere, which is {atmosphere}"
+    if not supply.atmospheric_pressure < settings["filled_pressure"] < lowest:
+        shown = written(lowest, _PASCAL)
+        yield "controller.filled_pressure", f"must be between atmosphere and supply, which are {atmosphere} and {shown}"
+    if settings["highest_pressure"] <= COMPRESSION * highest:
+        shown = written(round(COMPRESSION * highest, 1), _PASCAL)
+        yield "controller.highest_pressure", f"a moving foot compresses a chamber to above it; must be above {shown}"
 
 
 def _profile(settings: Mapping[str, float]) -> Iterator[tuple[str, str]]:

@@ -15,14 +15,22 @@ WALK_SENSORS = (
     Quantity("force_noise", "N", "standard deviation of the measured forces", 0.0, 0.0, 1.0e4),
     Quantity("force_resolution", "N", "step of the measured forces", 0.0, 0.0, 1.0e3),
     Quantity("lost_share", "1", "share of the force samples that are lost; the last one stands then", 0.0, 0.0, 1.0),
+    Quantity("angle_lost_share", "1", "share of the angle samples that are lost", 0.0, 0.0, 1.0),
+    Quantity("pressure_lost_share", "1", "share of the pressure samples that are lost", 0.0, 0.0, 1.0),
 )
+ANGLE_BANDWIDTH = Quantity("angle_bandwidth", "Hz", "up to which the angle sensor follows", None, 0.1, 1.0e6)
+PRESSURE_BANDWIDTH = Quantity("pressure_bandwidth", "Hz", "up to which the pressure sensors follow", None, 0.1, 1.0e6)
+BANDWIDTHS = (ANGLE_BANDWIDTH, PRESSURE_BANDWIDTH)
+"""Sensors that follow at once unless one is given."""
 
-FAULTY = ("heel", "toe", "angle")
+FAULTY = ("heel", "toe", "angle", "pressure_1", "pressure_2")
 FAULT_TIME = Quantity("time", "s", "when the sensor fails", None, 0.0, 1.0e6)
 READINGS = {
     "heel": Quantity("reading", "N", "what it shows from then on", 0.0, -1.0e6, 1.0e6),
     "toe": Quantity("reading", "N", "what it shows from then on", 0.0, -1.0e6, 1.0e6),
     "angle": Quantity("reading", "rad", "what it shows from then on", 0.0, -100.0, 100.0),
+    "pressure_1": Quantity("reading", "Pa_a", "what it shows from then on", 0.0, -1.0e9, 1.0e9),
+    "pressure_2": Quantity("reading", "Pa_a", "what it shows from then on", 0.0, -1.0e9, 1.0e9),
 }
 FAULT_KINDS = {"frozen": "shows its last value", "stuck": "shows one reading"}
 
@@ -37,7 +45,7 @@ def quantities(controller: str) -> dict[str, Quantity]:
     sections = {
         "wearer": WEARER,
         "controller": (RATE, PERIOD, *controller_settings(controller)),
-        "sensors": (*WALK_SENSORS, SEED),
+        "sensors": (*WALK_SENSORS, *BANDWIDTHS, SEED),
         "run": (STEP,),
     }
     found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}

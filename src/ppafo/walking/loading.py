@@ -14,6 +14,7 @@ from ppafo.documents.problems import first_problem
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.gait import NORMATIVE, Gait, load_gait
+from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters import apply_overrides, build_device, load_parameter_set
@@ -24,8 +25,10 @@ from ppafo.simulation.reading import Reading
 from ppafo.walking.configuration import NEVER, Configuration
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
+    ANGLE_BANDWIDTH,
     FAULT_TIME,
     FAULTY,
+    PRESSURE_BANDWIDTH,
     READINGS,
     SEED,
     STEP,
@@ -146,8 +149,20 @@ def _gait_sensors(reading: Reading) -> GaitSensors:
         values["force_noise"],
         values["force_resolution"],
         values["lost_share"],
+        _memory(reading, ANGLE_BANDWIDTH),
+        _memory(reading, PRESSURE_BANDWIDTH),
+        values["angle_lost_share"],
+        values["pressure_lost_share"],
         *faults,
     )
+
+
+def _memory(reading: Reading, bandwidth: Quantity) -> float:
+    """Return what is left of a sensor's last value after one sample, 0 where no bandwidth is given."""
+    path = f"sensors.{bandwidth.name}"
+    if value_at(reading.document, path) is None:
+        return 0.0
+    return math.exp(-_TURN * reading.number(path, bandwidth) * _period(reading))
 
 
 def _fault(reading: Reading, sensor: str) -> Fault:

@@ -17,6 +17,7 @@ from ppafo.walking.anthropometry import Build, bounded_normal, drawn_builds, sca
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.declaration import LARGEST_SEED
 from ppafo.walking.planning import plan_walk
+from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.varied_gait import VariedGaits, varied_gaits
 from ppafo.walking.walk import REMEDY, Progress, checked_seconds, plan_of, silent
 
@@ -60,6 +61,7 @@ class Population:
     """Wearers and what came of their walks, each an array (wearers,) by name, in SI units.
 
     ``diverged`` counts the wearers whose walk left what is possible; they are not in ``outcomes`` nor in ``traits``.
+    ``vented`` counts those whose controller stopped trusting its sensors and vented both chambers for good.
     """
 
     configuration: Configuration
@@ -68,6 +70,7 @@ class Population:
     traits: Mapping[str, Floats]
     outcomes: Mapping[str, Floats]
     diverged: int
+    vented: int
 
     @property
     def count(self) -> int:
@@ -110,7 +113,8 @@ def walk_population(
         "stance_share": gaits.timing["toe_off"],
     }
     kept = [{name: values[good] for name, values in table.items()} for table in (traits, outcomes)]
-    return Population(configuration, minutes, seed, kept[0], kept[1], int(wearers - good.sum()))
+    vented = int((rows[SAFE_ROW][good] > 0.5).sum()) if SAFE_ROW in rows else 0
+    return Population(configuration, minutes, seed, kept[0], kept[1], int((~good).sum()), vented)
 
 
 def _walked(batch: Batch, progress: Progress) -> Floats:

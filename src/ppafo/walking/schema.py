@@ -42,6 +42,7 @@ def walk_file() -> type[BaseModel]:
     """Return the model of a walk file."""
     seed = Annotated[int, Field(ge=0, le=declaration.LARGEST_SEED)]
     sensors = quantity_fields(declaration.WALK_SENSORS)
+    sensors |= {item.name: optional(number_type(item), item.summary) for item in declaration.BANDWIDTHS}
     sensors["seed"] = (seed, Field(1, description=declaration.SEED.summary))
     faults = {name: optional(_fault(name), f"fault of the {name} sensor") for name in declaration.FAULTY}
     fields: dict[str, Any] = {

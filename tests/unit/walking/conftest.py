@@ -20,7 +20,7 @@ from ppafo.walking.planning import WalkPlan, plan_walk
 from ppafo.walking.wearer import paper_subject
 
 NO_FAULT = Fault(1.0e9, 0.0, 0.0)
-IDEAL = GaitSensors(200.0, 0.0, 0.0, 0.0, NO_FAULT, NO_FAULT, NO_FAULT)
+IDEAL = GaitSensors(200.0, *(0.0,) * 7, *(NO_FAULT,) * 5)
 QUIET = SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0)
 
 

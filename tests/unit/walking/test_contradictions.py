@@ -1,5 +1,6 @@
 """Mistakes in a walk file or an override: one line that names what, and what is allowed."""
 
+import math
 import tomllib
 from dataclasses import replace
 from importlib import resources
@@ -29,6 +30,17 @@ MISTAKES = {
     "wearer.body_mass=5 kg": "must be at least 10 kg and at most 300 kg",
     "controller.kind=event_of": "'event_of' is not known",
     "faults.heel.time=3 s": "'faults.heel.kind' is missing",
+    "faults.pressure_1.kind=stuck; faults.pressure_1.time=3 s; faults.pressure_1.reading=3 N": "a pressure level is",
+    "controller.kind=event_proportional": "which a solenoid valve cannot: take device.valve 'proportional', or cont",
+    "controller.flat_from=0.3": "must be below controller.flat_to, which is 0.24",
+    "supply.atmospheric_pressure=80 kPa_a; controller.lowest_pressure=90 kPa_a": "must be below the atmosphere, which",
+    "controller.filled_pressure=60 psi_g": "must be between atmosphere and supply, which are 0 psi_g and 50 psi_g",
+    "controller.highest_pressure=60 psi_g": "compresses a chamber to above it; must be above 66.1",
+    "sensors.angle_bandwidth=0 Hz": "must be at least 0.1 Hz and at most 1e",
+    "sensors.pressure_lost_share=2": "must be at least 0 and at most 1",
+}
+ON_A_PROPORTIONAL_VALVE = {
+    "valve.delay=60 ms": "controller.fill_time, which is not given and has its default: must be longer than the dead",
 }
 PROFILE = {
     "controller.peak_time=0.9; controller.fall_time=0.2": "the torque would end after the stride",
@@ -43,6 +55,24 @@ def test_a_mistake_is_named_in_one_line(overrides: str) -> None:
     with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[overrides]) as caught:
         load_walk("solenoid", overrides.split("; "))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("overrides", ON_A_PROPORTIONAL_VALVE)
+def test_a_mistake_with_a_proportional_valve_is_named(overrides: str) -> None:
+    with pytest.raises(ScenarioError, match=ON_A_PROPORTIONAL_VALVE[overrides]):
+        load_walk("proportional", overrides.split("; "))
+
+
+def test_an_on_off_controller_works_a_proportional_valve() -> None:
+    assert load_walk("proportional", ["controller.kind=event_on_off"]).controller.name == "event_on_off"
+
+
+def test_bandwidths_are_what_is_left_after_a_sample() -> None:
+    slow = load_walk("solenoid", ["sensors.angle_bandwidth=20 Hz", "controller.rate=500 Hz"])
+    assert slow.gait_sensors.angle_memory == pytest.approx(math.exp(-2.0 * math.pi * 20.0 / 500.0))
+    assert slow.gait_sensors.pressure_memory == 0.0
+    assert not slow.has_ideal_sensors
+    assert load_walk("solenoid", ["sensors.force_bandwidth=10 Hz"]).has_ideal_sensors
 
 
 @pytest.mark.parametrize("overrides", PROFILE)

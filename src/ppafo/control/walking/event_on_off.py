@@ -50,7 +50,7 @@ def update(
     command = -1.0 if lifting > 0.5 else VENT
     command = command if held else VENT
     command = 1.0 if phase.phase == phases.PUSH_OFF else command
-    command = VENT if watch.vented > 0.5 else command
+    command, watch = safety.carried_out(watch, command, period)
     return command, EventOnOffState(phase, watch, lifting if held else 0.0)
 
 

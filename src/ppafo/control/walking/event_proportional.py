@@ -82,7 +82,7 @@ def update(
     command = held if phases.lifts(phase.phase) else VENT
     command = max(-1.0, min(1.0, proposed)) if pushes else command
     command = max(-1.0, min(1.0, command)) if command < VENT else VENT
-    command = VENT if watch.vented > 0.5 else command
+    command, watch = safety.carried_out(watch, command, period)
     return command, EventProportionalState(phase, watch, integral, measurement.angle)
 
 

@@ -1,42 +1,82 @@
 """When a controller of walking stops trusting its sensors and vents both chambers for good.
 
-Three signs: readings that no foot gives (out of range), readings that contradict each other or the gait (a stance or a
-swing without end, a stride without heel strike), and a sensor that does not change while the others do (frozen).
+Four signs: readings that no foot and no chamber gives (out of range), readings that contradict each other or the gait
+(a stance or a swing without end, a foot that stands flat on one sensor), readings that contradict the valve (a chamber
+that was filled and shows no pressure, or was vented and shows some), and a sensor that does not change while the others
+do (frozen). A pressure at rest may stay the same for long, most of all in the steps of a converter, so a frozen
+pressure is found by the third sign: no single reading is right for a filled chamber and for a vented one.
+
+Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
 """
 
 from typing import NamedTuple
 
 from ppafo.control.walking.phases import LANDING, MID_STANCE, SWING, PhaseState
+from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.gait_sensors import GaitMeasurement
 
 
 class SafetyRules(NamedTuple):
-    """Largest force [N], lowest and highest angle [rad], longest time in one phase [stride times], frozen time [s]."""
+    """What readings can be, and how long a contradiction may last; ``declaration.SAFETY_QUANTITIES`` says it of each.
+
+    Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``) or [s], strides, and
+    absolute pressures [Pa]. ``fill_time`` is that of a valve fully open; half open it takes twice as long.
+    """
 
     largest_force: float
     lowest_angle: float
     highest_angle: float
     longest_phase: float
     frozen_time: float
+    most_toe_strides: float
+    flat_from: float
+    flat_to: float
+    lowest_pressure: float
+    highest_pressure: float
+    filled_pressure: float
+    fill_time: float
+    vent_time: float
 
 
-class SafetyState(NamedTuple):
-    """1 once vented; last readings; how long each has not changed [s]; 1 where this stance began on the toes."""
+class Ordered(NamedTuple):
+    """How long the valve has now been told to fill chambers 1 and 2, by its opening, and to vent both [s]."""
 
-    vented: float
+    filling_1: float
+    filling_2: float
+    venting: float
+
+
+class Shown(NamedTuple):
+    """Last readings of heel, toe [N] and angle [rad], and how long each has not changed [s]."""
+
     heel_force: float
     toe_force: float
     angle: float
     heel_still: float
     toe_still: float
     angle_still: float
+
+
+class SafetyState(NamedTuple):
+    """1 once vented; last readings; strides in a row that began on the toes; what the valve was told.
+
+    ``steady`` is 1 where the last stride took about the stride time.
+    """
+
+    vented: float
+    shown: Shown
     toe_strides: float
+    steady: float
+    ordered: Ordered
 
 
-START = SafetyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+START = SafetyState(0.0, Shown(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, Ordered(0.0, 0.0, 0.0))
 
-MOST_TOE_STRIDES = 2.0
-"""Strides in a row that begin on the toes before the heel sensor counts as lost."""
+STEADY = 0.1
+"""A stride that is longer or shorter than the stride time by less than this share of it is a usual one."""
+
+LEAST_OPENING = 0.1
+"""Commands below this may lie within the overlap of a valve: they do not count as opening it."""
 
 
 def still(last: float, reading: float, since: float, period: float) -> float:
@@ -44,34 +84,89 @@ def still(last: float, reading: float, since: float, period: float) -> float:
     return since + period if reading == last else 0.0
 
 
+def next_shown(last: Shown, seen: GaitMeasurement, period: float) -> Shown:
+    """Readings after a sample."""
+    return Shown(
+        seen.heel_force,
+        seen.toe_force,
+        seen.angle,
+        still(last.heel_force, seen.heel_force, last.heel_still, period),
+        still(last.toe_force, seen.toe_force, last.toe_still, period),
+        still(last.angle, seen.angle, last.angle_still, period),
+    )
+
+
+def out_of_range(rules: SafetyRules, seen: GaitMeasurement) -> bool:
+    """True where a reading is none that foot or chamber can give."""
+    force = max(seen.heel_force, seen.toe_force) > rules.largest_force
+    angle = (seen.angle < rules.lowest_angle) | (seen.angle > rules.highest_angle)
+    low, high = min(seen.pressure_1, seen.pressure_2), max(seen.pressure_1, seen.pressure_2)
+    return force | angle | (low < rules.lowest_pressure) | (high > rules.highest_pressure)
+
+
+def frozen(rules: SafetyRules, shown: Shown, phase: PhaseState) -> bool:
+    """True where a reading stays the same while it must change.
+
+    An unloaded force sensor shows the same for long, and so does the angle of a foot that is held in the swing.
+    """
+    heel = (shown.heel_still > rules.frozen_time) & (phase.heel.loaded > 0.5)
+    toe = (shown.toe_still > rules.frozen_time) & (phase.toe.loaded > 0.5)
+    return heel | toe | ((shown.angle_still > rules.frozen_time) & (phase.phase != SWING))
+
+
+def contradicts_gait(
+    rules: SafetyRules, before: PhaseState, phase: PhaseState, toe_strides: float, steady: float
+) -> bool:
+    """True where forces do not follow each other as in a gait."""
+    endless = phase.in_phase > rules.longest_phase * phase.stride_time
+    skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
+    begun = phase.since_strike > rules.flat_from * phase.stride_time
+    flat = begun & (phase.since_strike < rules.flat_to * phase.stride_time) & (steady > 0.5)
+    lost = flat & (min(phase.heel.loaded, phase.toe.loaded) < 0.5)
+    return endless | skips_toes | lost | (toe_strides > rules.most_toe_strides)
+
+
+def contradicts_valve(rules: SafetyRules, ordered: Ordered, phase: PhaseState, seen: GaitMeasurement) -> bool:
+    """True where a pressure is not what the valve was told long enough.
+
+    A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat.
+    """
+    no_rise_1 = (ordered.filling_1 > rules.fill_time) & (seen.pressure_1 < rules.filled_pressure)
+    no_rise_2 = (ordered.filling_2 > rules.fill_time) & (seen.pressure_2 < rules.filled_pressure)
+    stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
+    shows = max(seen.pressure_1, seen.pressure_2) > rules.filled_pressure
+    return no_rise_1 | no_rise_2 | (stands & (ordered.venting > rules.vent_time) & shows)
+
+
 def watched(
     rules: SafetyRules, state: SafetyState, before: PhaseState, phase: PhaseState, seen: GaitMeasurement, period: float
 ) -> SafetyState:
     """State after a sample; ``before`` and ``phase`` are the phases before and after it."""
-    heel_still = still(state.heel_force, seen.heel_force, state.heel_still, period)
-    toe_still = still(state.toe_force, seen.toe_force, state.toe_still, period)
-    angle_still = still(state.angle, seen.angle, state.angle_still, period)
-    largest = max(seen.heel_force, seen.toe_force)
-    outside = largest > rules.largest_force or seen.angle < rules.lowest_angle or seen.angle > rules.highest_angle
-    # An unloaded sensor shows the same zero for long; a loaded one never shows the same force twice for long.
-    frozen_force = (heel_still > rules.frozen_time and seen.heel_force > 0.0) or (
-        toe_still > rules.frozen_time and seen.toe_force > 0.0
-    )
-    frozen_angle = angle_still > rules.frozen_time and phase.phase != SWING
-    endless = phase.in_phase > rules.longest_phase * phase.stride_time
-    enters = before.phase == SWING and phase.phase != SWING
+    shown = next_shown(state.shown, seen, period)
+    enters = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = phase.phase == MID_STANCE
     toe_strides = (state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides
-    skips_toes = before.phase == LANDING and phase.phase == SWING
-    disagree = toe_strides > MOST_TOE_STRIDES or (skips_toes and phase.strikes > 1.5)
-    fails = outside or frozen_force or frozen_angle or endless or disagree
-    return SafetyState(
-        1.0 if fails else state.vented,
-        seen.heel_force,
-        seen.toe_force,
-        seen.angle,
-        heel_still,
-        toe_still,
-        angle_still,
-        toe_strides,
+    usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
+    steady = (1.0 if usual else 0.0) if enters else state.steady
+    wrong = out_of_range(rules, seen) | frozen(rules, shown, phase)
+    wrong = wrong | contradicts_gait(rules, before, phase, toe_strides, steady)
+    fails = wrong | contradicts_valve(rules, state.ordered, phase, seen)
+    return SafetyState(1.0 if fails else state.vented, shown, toe_strides, steady, state.ordered)
+
+
+def fed(since: float, opening: float, period: float) -> float:
+    """How long a chamber has now been fed [s], by the opening towards it; 0 where the valve is shut or empties it."""
+    return since + opening * period if opening > LEAST_OPENING else 0.0
+
+
+def carried_out(state: SafetyState, command: float, period: float) -> tuple[float, SafetyState]:
+    """The command that goes to the valve, ``VENT`` once vented, and the state that remembers it."""
+    given = VENT if state.vented > 0.5 else command
+    vents = given > VENTS_ABOVE
+    opening = 0.0 if vents else max(-1.0, min(1.0, given))
+    ordered = Ordered(
+        fed(state.ordered.filling_1, opening, period),
+        fed(state.ordered.filling_2, -opening, period),
+        state.ordered.venting + period if vents else 0.0,
     )
+    return given, SafetyState(state.vented, state.shown, state.toe_strides, state.steady, ordered)

@@ -1,0 +1,165 @@
+"""Each sign by which a controller of walking stops trusting its sensors, by itself."""
+
+import pytest
+
+from ppafo.control.walking import phases, safety
+from ppafo.control.walking.declaration import SAFETY_QUANTITIES
+from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
+from ppafo.control.walking.safety import Ordered, SafetyRules, SafetyState
+from ppafo.model.command import VENT
+from ppafo.model.gait_sensors import GaitMeasurement
+
+RULES = SafetyRules(*[float(item.default or 0.0) for item in SAFETY_QUANTITIES])
+PERIOD = 1.0e-3
+GOOD = GaitMeasurement(1.5, 1.1e5, 1.05e5, 0.0, 300.0, 200.0)
+
+
+def phase(name: float, since: float, heel: float = 1.0, toe: float = 1.0, in_phase: float = 0.1) -> PhaseState:
+    return PhaseState(name, Switch(heel, 0.0), Switch(toe, 0.0), in_phase, since, 1.0, 5.0)
+
+
+def vents(
+    seen: GaitMeasurement = GOOD,
+    now: PhaseState | None = None,
+    before: PhaseState | None = None,
+    state: SafetyState = safety.START,
+    rules: SafetyRules = RULES,
+) -> bool:
+    after = now or phase(MID_STANCE, 0.1)
+    return safety.watched(rules, state, before or after, after, seen, PERIOD).vented > 0.5
+
+
+def test_the_rules_are_declared_in_their_order() -> None:
+    assert tuple(item.name for item in SAFETY_QUANTITIES) == SafetyRules._fields
+    assert RULES.most_toe_strides == 1.0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"heel_force": 3001.0},
+        {"toe_force": 3001.0},
+        {"angle": 0.29},
+        {"angle": 2.41},
+        {"pressure_1": 2.9e4},
+        {"pressure_2": 2.9e4},
+        {"pressure_1": 2.1e6},
+        {"pressure_2": 2.1e6},
+    ],
+)
+def test_a_reading_out_of_range_vents_at_once(change: dict[str, float]) -> None:
+    assert not vents()
+    assert vents(GOOD._replace(**change))
+
+
+def still_for(seconds: float, seen: GaitMeasurement, now: PhaseState) -> bool:
+    state = safety.START
+    for sample in range(round(seconds / PERIOD)):
+        moving = seen._replace(angle=seen.angle + 1.0e-9 * sample)
+        state = safety.watched(RULES, state, now, now, moving, PERIOD)
+    return state.vented > 0.5
+
+
+def test_a_loaded_force_that_stays_the_same_is_frozen_and_an_unloaded_one_is_not() -> None:
+    assert not still_for(0.24, GOOD, phase(MID_STANCE, 0.1))
+    assert still_for(0.26, GOOD, phase(MID_STANCE, 0.1))
+    assert still_for(0.26, GOOD, phase(PUSH_OFF, 0.5, heel=0.0))
+    # A dead sensor may show some newtons for ever; that the foot never loads it is another sign.
+    assert not still_for(2.0, GOOD._replace(heel_force=5.0, toe_force=5.0), phase(SWING, 0.5, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(("name", "is_sign"), [(SWING, False), (LANDING, True), (MID_STANCE, True), (PUSH_OFF, True)])
+def test_an_angle_that_stays_the_same_is_a_sign_but_in_the_swing(name: float, is_sign: bool) -> None:
+    now = phase(name, 0.5, heel=0.0, toe=0.0)
+    shown = safety.START.shown._replace(angle=GOOD.angle, angle_still=0.25)
+    assert vents(now=now, state=safety.START._replace(shown=shown)) is is_sign
+
+
+@pytest.mark.parametrize(("heel", "toe"), [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
+def test_a_foot_that_must_stand_flat_loads_both_sensors(heel: float, toe: float) -> None:
+    steady = safety.START._replace(steady=1.0)
+    flat, early, late = (phase(MID_STANCE, since, heel, toe) for since in (0.2, 0.15, 0.26))
+    assert vents(now=flat, state=steady)
+    assert not vents(now=early, state=steady)
+    assert not vents(now=late, state=steady)
+    assert not vents(now=flat), "no usual stride came before"
+    assert not vents(now=phase(MID_STANCE, 0.2), state=steady)
+
+
+@pytest.mark.parametrize(("last", "steady"), [(0.95, 1.0), (1.05, 1.0), (0.88, 0.0), (1.12, 0.0)])
+def test_only_a_stride_that_took_about_the_stride_time_is_a_usual_one(last: float, steady: float) -> None:
+    before, now = phase(SWING, last, 0.0, 0.0), phase(LANDING, 0.0, 1.0, 0.0)
+    assert safety.watched(RULES, safety.START, before, now, GOOD, PERIOD).steady == steady
+
+
+def test_strides_that_begin_on_the_toes_are_counted_in_a_row() -> None:
+    swing, on_toes, on_heel = phase(SWING, 1.3), phase(MID_STANCE, 0.0, 0.0, 1.0), phase(LANDING, 0.0)
+    once = safety.watched(RULES, safety.START, swing, on_toes, GOOD, PERIOD)
+    assert (once.toe_strides, once.vented) == (1.0, 0.0)
+    assert vents(now=on_toes, before=swing, state=once)
+    assert not vents(now=on_heel, before=swing, state=once)
+    assert safety.watched(RULES, once, swing, on_heel, GOOD, PERIOD).toe_strides == 0.0
+    assert not vents(now=on_toes, before=swing, state=once, rules=RULES._replace(most_toe_strides=2.0))
+
+
+def test_a_phase_without_end_and_a_stride_without_toes_vent() -> None:
+    assert vents(now=phase(PUSH_OFF, 1.3, 0.0, in_phase=1.21))
+    assert vents(now=phase(SWING, 0.4, 0.0, 0.0), before=phase(LANDING, 0.4))
+    assert not vents(now=phase(MID_STANCE, 0.1), before=phase(LANDING, 0.1))
+
+
+def after_commands(command: float, seconds: float) -> SafetyState:
+    state = safety.START
+    for _ in range(round(seconds / PERIOD)):
+        _, state = safety.carried_out(state, command, PERIOD)
+    return state
+
+
+@pytest.mark.parametrize(("command", "name"), [(1.0, "pressure_1"), (-1.0, "pressure_2")])
+def test_a_chamber_that_was_filled_shows_pressure(command: float, name: str) -> None:
+    filled = GOOD._replace(pressure_1=3.0e5, pressure_2=3.0e5)
+    empty = filled._replace(**{name: 1.0e5})
+    assert vents(empty, state=after_commands(command, 0.052))
+    assert not vents(filled, state=after_commands(command, 0.052))
+    assert not vents(empty, state=after_commands(command, 0.048))
+    assert not vents(empty, state=after_commands(0.5 * command, 0.098)), "half open it takes twice as long"
+    assert vents(empty, state=after_commands(0.5 * command, 0.104))
+    assert not vents(empty, state=after_commands(0.05 * command, 20.0)), "within the overlap of a valve"
+    assert not vents(empty, state=after_commands(-command, 1.0))
+
+
+@pytest.mark.parametrize("name", ["pressure_1", "pressure_2"])
+def test_a_vented_chamber_shows_no_pressure_while_the_foot_stands_flat(name: str) -> None:
+    stuck = GOOD._replace(**{name: 1.5e5})
+    flat = phase(MID_STANCE, 0.1)
+    assert vents(stuck, flat, state=after_commands(VENT, 0.252))
+    assert not vents(stuck, flat, state=after_commands(VENT, 0.248))
+    assert not vents(GOOD, flat, state=after_commands(VENT, 0.252))
+    for moving in (phase(SWING, 0.8, 0.0, 0.0), phase(LANDING, 0.1, 1.0, 0.0), phase(MID_STANCE, 0.4, 0.0, 1.0)):
+        assert not vents(stuck, moving, state=after_commands(VENT, 0.252)), "the foot moves and presses gas out"
+
+
+@pytest.mark.parametrize("reading", [1.02e5, 1.2e5, 1.3e5, 2.0e5, 4.0e5])
+def test_no_single_reading_is_right_for_a_filled_and_a_vented_chamber(reading: float) -> None:
+    frozen = GOOD._replace(pressure_1=reading)
+    pushes, stands = phase(PUSH_OFF, 0.5, 0.0), phase(MID_STANCE, 0.4)
+    found = [
+        vents(frozen, pushes, state=after_commands(1.0, 0.06)),
+        vents(frozen, stands, state=after_commands(VENT, 0.3)),
+    ]
+    assert found.count(True) == 1
+
+
+def test_once_vented_it_stays_so() -> None:
+    state = safety.watched(RULES, safety.START, phases.START, phases.START, GOOD._replace(angle=9.0), PERIOD)
+    for command in (1.0, -0.3, 0.0):
+        state = safety.watched(RULES, state, phases.START, phases.START, GOOD, PERIOD)
+        given, state = safety.carried_out(state, command, PERIOD)
+        assert given == VENT
+    assert state.ordered == Ordered(0.0, 0.0, pytest.approx(3.0 * PERIOD))
+
+
+def test_a_change_of_direction_begins_to_fill_anew() -> None:
+    state = after_commands(1.0, 0.04)
+    _, state = safety.carried_out(state, -1.0, PERIOD)
+    assert state.ordered == Ordered(0.0, pytest.approx(PERIOD), 0.0)

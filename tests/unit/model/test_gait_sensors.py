@@ -1,0 +1,98 @@
+"""What a controller of walking sees: bandwidth, lost samples and faults of angle, pressures and forces."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ppafo.model.gait_sensors import NOTHING_SEEN, Fault, GaitMeasurement, GaitSeen, GaitSensors, measure_gait
+from ppafo.model.sensors import SensorParameters
+
+QUIET = SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0)
+NEVER = Fault(1.0e9, 0.0, 0.0)
+IDEAL = GaitSensors(200.0, *(0.0,) * 7, *(NEVER,) * 5)
+TORQUE_CONSTANT = 1.7e-5
+PERIOD = 1.0e-3
+TRUE = (1.5, 3.0e5, 1.0e5, 400.0, 120.0)
+
+
+def seen(
+    sensors: GaitSensors, sample: int, last: GaitSeen, true: tuple[float, ...] = TRUE, quiet: SensorParameters = QUIET
+) -> tuple[GaitMeasurement, GaitSeen]:
+    return measure_gait(quiet, sensors, last, *true, TORQUE_CONSTANT, sample * PERIOD, sample)
+
+
+def test_an_ideal_sensor_shows_what_is_there() -> None:
+    angle, first, second, heel, toe = TRUE
+    shown, _ = seen(IDEAL, 7, NOTHING_SEEN)
+    assert shown == (angle, first, second, TORQUE_CONSTANT * (first - second), heel, toe)
+
+
+@pytest.mark.parametrize("name", ["pressure_1", "pressure_2"])
+def test_the_torque_comes_from_the_pressures_that_the_sensors_show(name: str) -> None:
+    broken = IDEAL._replace(**{f"{name}_fault": Fault(0.002, 0.0, 2.0e5)})
+    before, last = seen(broken, 1, NOTHING_SEEN)
+    after, _ = seen(broken, 2, last)
+    assert before.torque == pytest.approx(TORQUE_CONSTANT * 2.0e5)
+    assert getattr(after, name) == 2.0e5
+    assert after.torque == pytest.approx(TORQUE_CONSTANT * (after.pressure_1 - after.pressure_2))
+    assert after.torque == pytest.approx(TORQUE_CONSTANT * 1.0e5)
+
+
+@pytest.mark.parametrize("name", ["heel", "toe", "angle", "pressure_1", "pressure_2"])
+def test_a_frozen_sensor_shows_its_last_reading_and_the_others_go_on(name: str) -> None:
+    broken = IDEAL._replace(**{f"{name}_fault": Fault(0.002, 1.0, 0.0)})
+    _, last = seen(broken, 1, NOTHING_SEEN)
+    moved = tuple(1.1 * value for value in TRUE)
+    for sample in (2, 3, 4):
+        shown, last = seen(broken, sample, last, moved)
+    field = f"{name}_force" if name in ("heel", "toe") else name
+    truth = dict(zip(("angle", "pressure_1", "pressure_2", "heel_force", "toe_force"), TRUE, strict=True))
+    for other, value in truth.items():
+        assert getattr(shown, other) == pytest.approx(value if other == field else 1.1 * value), other
+
+
+def test_a_bandwidth_makes_a_sensor_follow_as_a_first_order_one_from_a_settled_start() -> None:
+    bandwidth = 20.0
+    memory = math.exp(-2.0 * math.pi * bandwidth * PERIOD)
+    slow = IDEAL._replace(angle_memory=memory, pressure_memory=memory)
+    shown, last = seen(slow, 0, NOTHING_SEEN)
+    assert shown[:3] == TRUE[:3], "settled before the walk begins"
+    stepped = (2.5, 4.0e5, 1.2e5, 400.0, 120.0)
+    for sample in range(1, 31):
+        shown, last = seen(slow, sample, last, stepped)
+    left = math.exp(-2.0 * math.pi * bandwidth * 30 * PERIOD)
+    assert 0.01 < left < 0.1
+    assert shown[:3] == pytest.approx([new + (old - new) * left for old, new in zip(TRUE, stepped[:3], strict=False)])
+    assert (shown.heel_force, shown.toe_force) == TRUE[3:], "the force sensors have a follow rate of their own"
+
+
+def test_lost_samples_show_the_last_reading_as_often_as_stated_and_never_at_first() -> None:
+    losing = IDEAL._replace(angle_lost_share=0.3, pressure_lost_share=0.6)
+    count, last, kept = 4000, NOTHING_SEEN, np.zeros(3)
+    for sample in range(count):
+        true = tuple(value + sample for value in TRUE)
+        shown, last = seen(losing, sample, last, true)
+        kept += [reading == value for reading, value in zip(shown[:3], true[:3], strict=True)]
+        if sample == 0:
+            assert kept.tolist() == [1.0, 1.0, 1.0]
+        assert shown.heel_force == true[3]
+    np.testing.assert_allclose(1.0 - kept / count, [0.3, 0.6, 0.6], atol=0.03)
+
+
+def test_samples_of_both_pressures_are_lost_independently() -> None:
+    losing, last, together = IDEAL._replace(pressure_lost_share=0.5), NOTHING_SEEN, []
+    for sample in range(2000):
+        true = tuple(value + sample for value in TRUE)
+        shown, last = seen(losing, sample, last, true)
+        together.append((shown.pressure_1 == true[1], shown.pressure_2 == true[2]))
+    assert abs(np.corrcoef(np.array(together, dtype=float).T)[0, 1]) < 0.08
+
+
+def test_noise_and_steps_come_after_the_bandwidth() -> None:
+    slow = IDEAL._replace(angle_memory=0.9)
+    coarse = QUIET._replace(angle_quantum=0.1)
+    _, last = seen(slow, 0, NOTHING_SEEN, quiet=coarse)
+    shown, last = seen(slow, 1, last, (2.0, *TRUE[1:]), coarse)
+    assert last.smooth_angle == pytest.approx(1.55)
+    assert shown.angle == pytest.approx(round(shown.angle, 1))

@@ -1,0 +1,164 @@
+"""Every fault of every sensor, in every part of the stride, against the table of the page on walking."""
+
+import re
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.engine.lanes import Batch, run_batch
+from ppafo.engine.rows import leaf_paths, numbers
+from ppafo.engine.run import batch_of
+from ppafo.model.gait_sensors import Fault, GaitSensors
+from ppafo.model.plant import chamber_pressures
+from ppafo.simulation.sampled import state_row_numbers
+from ppafo.units import parse_quantity
+from ppafo.walking import load_walk, walk_population
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.walk import plan_of
+
+PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
+SECTION = PAGE.partition("## When a sensor fails")[2].partition("\n## ")[0]
+CONFIGURATIONS = ("solenoid", "proportional")
+PHASES = 20
+"""Instants of a stride at which each fault begins."""
+FIRST_FAULT = 3.0
+"""Strides before the first fault."""
+AFTER = 1.6
+"""Strides that are watched after the latest fault."""
+LANES = 32
+RECORD_EVERY = 2
+
+Floats = NDArray[np.float64]
+
+
+def rows_of(first: str) -> list[list[str]]:
+    """Cells of the rows of the section's table whose head begins with ``first``."""
+    table = re.search(rf"^\| {first}.*?\n\|[-|]+\n((?:\|.*\n)+)", SECTION, re.MULTILINE)
+    assert table is not None
+    return [[cell.strip().replace("`", "") for cell in line.strip("|\n").split("|")] for line in table[1].splitlines()]
+
+
+FAULTS = {what: (sensor, fault, float(strides)) for what, sensor, fault, strides in rows_of("What fails")}
+VENTED = {
+    name: (parse_quantity(pressure, "Pa_d", STANDARD_ATMOSPHERE), parse_quantity(time, "s", STANDARD_ATMOSPHERE))
+    for name, pressure, time in rows_of("Configuration")
+}
+
+
+def sensors_of(name: str, what: str) -> GaitSensors:
+    """Sensors of the configuration with the fault as the table gives it, from the beginning of the walk."""
+    sensor, fault, _ = FAULTS[what]
+    kind, _, reading = fault.partition(" at ")
+    given = [f"faults.{sensor}.kind={kind}", f"faults.{sensor}.time=0 s"]
+    return load_walk(name, given + ([f"faults.{sensor}.reading={reading}"] if reading else [])).gait_sensors
+
+
+def beginning(sensors: GaitSensors, time: float) -> GaitSensors:
+    """The same sensors with their fault from a time [s] on."""
+    late = {name: fault._replace(time=time) for name, fault in sensors._asdict().items() if fault_at_once(fault)}
+    assert len(late) == 1
+    return sensors._replace(**late)
+
+
+def fault_at_once(value: object) -> bool:
+    return isinstance(value, Fault) and value.time == 0.0
+
+
+@dataclass(frozen=True)
+class Injected:
+    """Samples [s], when each fault begins and is found [s] (faults, PHASES), and the higher of both gauge pressures.
+
+    ``pressure`` [Pa] is (samples, faults, PHASES); ``stride`` is the stride time [s].
+    """
+
+    time: Floats
+    begins: Floats
+    found: Floats
+    pressure: Floats
+    stride: float
+
+
+@lru_cache
+def injected(name: str) -> Injected:
+    configuration = load_walk(name)
+    stride = configuration.gait.stride_time
+    begins = (FIRST_FAULT + np.arange(PHASES) / PHASES) * stride
+    sensors = [beginning(sensors_of(name, what), time) for what in FAULTS for time in begins.tolist()]
+    faulty = replace(configuration, gait_sensors=sensors[0])
+    run = plan_walk(plan_of(faulty, (FIRST_FAULT + 1.0 + AFTER) * stride))
+    single = batch_of(run)
+    paths = [path for group, row in single.program.parameter_rows().items() for path in leaf_paths(row, group)]
+    places = [paths.index(path) for path in leaf_paths(GaitSensors, "gait_sensors")]
+    parameters = np.repeat(single.parameters, len(sensors), axis=1)
+    parameters[places] = np.array([numbers(one) for one in sensors]).T
+    states = np.repeat(single.states, len(sensors), axis=1)
+    rows, clock = state_row_numbers(run), replace(single.clock, record_every=RECORD_EVERY)
+    names = ("controller_state.safety.vented", "state.angle", "state.mass_1", "state.mass_2")
+    records = []
+    for first in range(0, len(sensors), LANES):
+        part = slice(first, first + LANES)
+        record = run_batch(Batch(single.program, clock, parameters[:, part], states[:, part])).record
+        records.append(record[:, [rows[item] for item in names]])
+    vented, *state = np.concatenate(records, axis=2).transpose(1, 0, 2)
+    pressure = np.maximum(*chamber_pressures(run.plant, *state)) - run.plant.atmospheric_pressure
+    time = np.arange(vented.shape[0]) * run.step * RECORD_EVERY
+    found = np.where(vented[-1] > 0.5, time[np.argmax(vented > 0.5, axis=0)], np.inf)
+    shape = (len(FAULTS), PHASES)
+    return Injected(time, np.tile(begins, (len(FAULTS), 1)), found.reshape(shape), pressure.reshape(-1, *shape), stride)
+
+
+@pytest.mark.parametrize("name", CONFIGURATIONS)
+@pytest.mark.parametrize("what", FAULTS)
+def test_a_fault_is_found_within_the_stated_time_wherever_in_the_stride_it_begins(name: str, what: str) -> None:
+    walks, row = injected(name), list(FAULTS).index(what)
+    late = (walks.found[row] - walks.begins[row]) / walks.stride
+    assert late.min() >= 0.0, "nothing is found before it happens"
+    assert late.max() <= FAULTS[what][2]
+
+
+@pytest.mark.parametrize("name", CONFIGURATIONS)
+@pytest.mark.parametrize("what", FAULTS)
+def test_both_chambers_then_lose_their_pressure_for_good(name: str, what: str) -> None:
+    walks, row = injected(name), list(FAULTS).index(what)
+    most, within = VENTED[name]
+    due = walks.time[:, None] >= walks.found[row] + within
+    assert due.sum(axis=0).min() * walks.time[1] > 0.2 * walks.stride, "there is something to see"
+    assert walks.pressure[:, row][due].max() <= most
+    assert walks.pressure[walks.time < walks.begins.min(), row].max() > 5.0 * most, "the device worked before"
+
+
+def test_the_table_has_every_sensor_dead_frozen_and_beyond_its_range() -> None:
+    sensors = {"heel", "toe", "angle", "pressure_1", "pressure_2"}
+    kinds = {(sensor, fault.partition(" ")[0]) for sensor, fault, _ in FAULTS.values()}
+    assert kinds == {(sensor, kind) for sensor in sensors for kind in ("stuck", "frozen")}
+    at_once = {sensor for sensor, _, strides in FAULTS.values() if strides <= 0.01}
+    assert at_once == sensors
+
+
+IDEAL: list[str] = []
+STEPS = ["force_resolution=15 N", "angle_resolution=2 deg", "pressure_resolution=5 kPa_d"]
+NOISE = [
+    *("force_noise=10 N", "angle_noise=0.5 deg", "pressure_noise=2 kPa_d"),
+    *("lost_share=0.1", "angle_lost_share=0.1", "pressure_lost_share=0.1"),
+    *("angle_bandwidth=30 Hz", "pressure_bandwidth=50 Hz"),
+]
+
+
+@pytest.mark.parametrize("name", CONFIGURATIONS)
+@pytest.mark.parametrize("sensors", [IDEAL, STEPS, NOISE], ids=["ideal", "steps", "noise"])
+def test_nobody_of_two_hundred_wearers_is_vented_without_a_fault(name: str, sensors: list[str]) -> None:
+    configuration = load_walk(name, [f"sensors.{text}" for text in sensors])
+    people = walk_population(configuration, 0.4, 200, seed=1)
+    assert (people.count, people.diverged, people.vented) == (200, 0, 0)
+    assert people.outcomes["gas"].min() > 1.0e-4
+
+
+def test_wearers_whose_controller_vented_are_counted() -> None:
+    configuration = load_walk("solenoid", ["faults.heel.kind=stuck", "faults.heel.time=3 s"])
+    people = walk_population(configuration, 0.15, 9)
+    assert people.vented == 9
