@@ -11,7 +11,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.refinement import filling_time
 from ppafo.engine.rows import rebuild
-from ppafo.engine.run import Run, Walk, whole_and_rest
+from ppafo.engine.run import Lines, Run, Walk, whole_and_rest
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState, foot_direction
 from ppafo.gait import Gait
 from ppafo.gait.gait import Curve
@@ -22,6 +22,7 @@ from ppafo.model.gait import GaitSeries, GaitTiming, gait_at
 from ppafo.model.gait_sensors import GaitSensors
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle
 from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
+from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves import dump
 from ppafo.model.valves.catalog import VALVES
@@ -71,6 +72,7 @@ class WalkPlan:
     period: float = 1.0e-3
     step: float = 1.0e-3
     record_interval: float = 1.0e-3
+    supply_lines: SupplyLines | None = None
 
 
 def plan_walk(plan: WalkPlan) -> Run:
@@ -82,7 +84,7 @@ def plan_walk(plan: WalkPlan) -> Run:
     valve, settings = walking_valve(plan.device.valve), plan.device.valve.settings
     delay = valve.command_delay(settings)
     coarse = max(1, math.ceil(plan.period / plan.step - 1.0e-9))
-    steps = coarse * _parts(plant, plan.period / coarse)
+    steps = coarse * _parts(plant, plan.supply_lines, plan.period / coarse)
     step = plan.period / steps
     lag = whole_and_rest(delay, step)[1] * step
     record_every = max(1, round(plan.record_interval / step))
@@ -106,6 +108,7 @@ def plan_walk(plan: WalkPlan) -> Run:
         signal_delay=0.0,
         command_delay=delay,
         walk=walk,
+        lines=None if plan.supply_lines is None else Lines(plan.supply_lines, full_lines(plant, plan.supply_lines)),
     )
 
 
@@ -118,6 +121,7 @@ def _program(plan: WalkPlan, valve: ValveModel, late_commands: bool) -> Program:
         ideal_sensors=plan.has_ideal_sensors,
         late_commands=late_commands,
         walks=True,
+        has_lines=plan.supply_lines is not None,
     )
 
 
@@ -136,9 +140,10 @@ def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
     )
 
 
-def _parts(plant: PlantParameters, step: float) -> int:
-    """Parts of a step [s] that follow the chambers at the angles of walking."""
+def _parts(plant: PlantParameters, lines: SupplyLines | None, step: float) -> int:
+    """Parts of a step [s] that follow the chambers at the angles of walking, and the lines that feed them."""
     volume = min(chamber_volumes(plant, ANGLES[0])[0], chamber_volumes(plant, ANGLES[1])[1])
+    volume = volume if lines is None else min(volume, lines.volume_1, lines.volume_2)
     return max(1, math.ceil(step * STEPS_PER_FILLING / filling_time(plant, volume) - 1.0e-9))
 
 
@@ -167,6 +172,12 @@ def vented(plant: PlantParameters, angle: float, angular_velocity: float) -> Pla
     volumes = chamber_volumes(plant, angle)
     mass_1, mass_2 = (chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes)
     return PlantState(angle, angular_velocity, mass_1, mass_2, 0.0, 0.0, 0.0)
+
+
+def full_lines(plant: PlantParameters, lines: SupplyLines) -> LineState:
+    """Both lines at the pressures that their regulators are set to, and nothing let through yet."""
+    mass_1 = chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product)
+    return LineState(mass_1, chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product), 0.0)
 
 
 def gait_series(gait: Gait) -> GaitSeries:

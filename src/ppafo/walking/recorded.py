@@ -8,6 +8,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix
 from ppafo.model.plant import chamber_pressures
+from ppafo.model.regulator import LineState, line_pressures
 from ppafo.signals import Channel, Recording
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.posture import ankle_path
@@ -43,6 +44,11 @@ def recorded(configuration: Configuration, run: Run, time: Floats, record: Mappi
         "supplied_mass": (record["state.supplied_mass"], "kg"),
         "vented_mass": (record["state.vented_mass"], "kg"),
     }
+    if run.lines is not None:
+        gas = LineState(*(record[f"line_state.{name}"] for name in LineState._fields))  # type: ignore[arg-type]
+        line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, gas)
+        channels |= {"line_pressure_1": (line_1, "Pa"), "line_pressure_2": (line_2, "Pa")}
+        channels["regulated_mass"] = (gas.regulated_mass, "kg")
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
         channels["safe_state"] = (record[SAFE_ROW], "-")

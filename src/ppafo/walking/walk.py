@@ -142,6 +142,7 @@ def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
         period=configuration.period,
         step=configuration.step,
         record_interval=next(interval for longest, interval in RECORD_INTERVALS if seconds <= longest),
+        supply_lines=configuration.supply_lines,
     )
 
 
