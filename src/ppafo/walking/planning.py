@@ -28,6 +28,7 @@ from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
+from ppafo.signals.recording import Floats
 from ppafo.simulation.plan import exact_orifice
 from ppafo.walking.wearer import Wearer
 
@@ -42,6 +43,9 @@ HEEL_RISE = math.radians(3.0)
 
 USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
 """Shares of the stance at which the heel rises where the angles do not show it, and at the latest."""
+
+EVENT_PHASES = np.linspace(0.0, 1.0, 1001)[150:]
+"""Phases at which events are looked for, from the first flat foot on."""
 
 CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
 """Shares of the swing between which the toes must clear the ground."""
@@ -170,14 +174,14 @@ def vented(plant: PlantParameters, angle: float, angular_velocity: float) -> Pla
 
 
 def gait_series(gait: Gait) -> GaitSeries:
-    """The gait as the engine takes it; a moment or a force that nobody measured is 0."""
+    """The gait as the engine takes it; a moment, a force or a motion of the knee that nobody measured is 0."""
     return GaitSeries(
         _series(gait, "shank_angle"),
         _series(gait, "ankle_angle"),
         _series(gait, "ankle_moment"),
         _series(gait, "vertical_force"),
-        ZERO,
-        ZERO,
+        _series(gait, "knee_forward"),
+        _series(gait, "knee_up"),
     )
 
 
@@ -197,20 +201,27 @@ def followed(curve: Curve) -> Curve:
 
 def gait_timing(gait: Gait) -> GaitTiming:
     """Events of the gait, the heel's rise and the flat foot's angle from its own angles."""
-    phases = np.linspace(0.0, 1.0, 1001)
     shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
-    foot = shank.sampled(phases) - ankle.sampled(phases) + 0.5 * math.pi
-    flat = (phases >= FLAT_FROM) & (phases <= FLAT_TO)
-    ground_angle = float(np.median(foot[flat]))
-    steep = np.flatnonzero((phases > FLAT_TO) & (foot < ground_angle - HEEL_RISE))
-    heel_off = float(phases[steep[0]]) if steep.size else USUAL_HEEL_RISE * gait.stance_share
-    swing = 1.0 - gait.stance_share
-    return GaitTiming(
-        frequency=1.0 / gait.stride_time,
-        start=0.0,
-        heel_off=min(heel_off, LATEST_HEEL_RISE * gait.stance_share),
-        toe_off=gait.stance_share,
-        clearance_from=gait.stance_share + CLEARANCE_FROM * swing,
-        clearance_to=gait.stance_share + CLEARANCE_TO * swing,
-        ground_angle=ground_angle,
+    foot = shank.sampled(EVENT_PHASES) - ankle.sampled(EVENT_PHASES) + 0.5 * math.pi
+    events = gait_events(foot[None, :], np.array([gait.stance_share]))
+    return GaitTiming(1.0 / gait.stride_time, 0.0, *(float(values[0]) for values in events))
+
+
+def gait_events(foot: Floats, stance_share: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """The fields of ``GaitTiming`` after ``start``, for feet that stand at angles [rad] (people, phases).
+
+    ``foot`` is over the horizontal, at ``EVENT_PHASES``; ``stance_share`` is (people,).
+    """
+    flat = (EVENT_PHASES >= FLAT_FROM) & (EVENT_PHASES <= FLAT_TO)
+    ground_angle = np.median(foot[:, flat], axis=1)
+    steep = (foot < (ground_angle - HEEL_RISE)[:, None]) & (EVENT_PHASES > FLAT_TO)
+    usual = USUAL_HEEL_RISE * stance_share
+    heel_off = np.where(steep.any(axis=1), EVENT_PHASES[np.argmax(steep, axis=1)], usual)
+    swing = 1.0 - stance_share
+    return (
+        np.minimum(heel_off, LATEST_HEEL_RISE * stance_share),
+        stance_share,
+        stance_share + CLEARANCE_FROM * swing,
+        stance_share + CLEARANCE_TO * swing,
+        ground_angle,
     )
