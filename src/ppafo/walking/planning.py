@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.engine.program import NoParameters, Program
@@ -28,6 +29,7 @@ from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
+from ppafo.signals.recording import Floats
 from ppafo.simulation.plan import exact_orifice
 from ppafo.walking.wearer import Wearer
 
@@ -37,8 +39,8 @@ HARMONICS = 8
 FLAT_FROM, FLAT_TO = 0.15, 0.35
 """Phases between which every foot stands flat; the angle of the foot is taken from there."""
 
-HEEL_RISE = math.radians(3.0)
-"""The heel has left the ground when the foot is steeper than flat by this."""
+NEARLY_FLAT = math.radians(3.0)
+"""The heel has left the ground when the foot is steeper than flat by this; the toes are about to meet it at as much."""
 
 USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
 """Shares of the stance at which the heel rises where the angles do not show it, and at the latest."""
@@ -75,7 +77,7 @@ class WalkPlan:
 
 def plan_walk(plan: WalkPlan) -> Run:
     """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
-    leg = plan.wearer.leg()
+    leg = plan.wearer.leg()._replace(heel_lever=heel_lever(plan.gait, plan.wearer))
     bare = plant_parameters(plan.device)
     plant = with_leg(bare, leg)
     walk = _walk(plan, leg, bare)
@@ -124,7 +126,7 @@ def _program(plan: WalkPlan, valve: ValveModel, late_commands: bool) -> Program:
 def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
     """The leg of a walk, at its first heel strike; ``bare`` is the device without it."""
     gait, timing = gait_series(plan.gait), gait_timing(plan.gait)
-    start = gait_at(gait, timing, leg.body_mass, leg.gravity, 0.0)
+    start = gait_at(gait, timing, leg, 0.0)
     foot = foot_direction(start.shank, start.ankle)
     return Walk(
         leg=leg,
@@ -195,14 +197,36 @@ def followed(curve: Curve) -> Curve:
     return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
 
 
-def gait_timing(gait: Gait) -> GaitTiming:
-    """Events of the gait, the heel's rise and the flat foot's angle from its own angles."""
+def heel_lever(gait: Gait, wearer: Wearer) -> float:
+    """Lever [m] of the ground force about the ankle where the measured foot has nearly come down.
+
+    From the measured moment; that of the heel itself bounds it, and stands in where moment or force are missing.
+    """
+    if gait.ankle_moment is None or gait.vertical_force is None:
+        return wearer.heel_lever
+    phases, foot = _foot_angles(gait)
+    down = foot < _flat_angle(phases, foot) + NEARLY_FLAT
+    landing = float(phases[np.argmax(down)])
+    moment, force = followed(gait.ankle_moment).value(landing), followed(gait.vertical_force).value(landing)
+    return min(max(-moment / max(force * STANDARD_GRAVITY, 1.0), 0.0), wearer.heel_lever)
+
+
+def _foot_angles(gait: Gait) -> tuple[Floats, Floats]:
+    """Phases, and angles [rad] of the measured foot over the horizontal."""
     phases = np.linspace(0.0, 1.0, 1001)
     shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
-    foot = shank.sampled(phases) - ankle.sampled(phases) + 0.5 * math.pi
-    flat = (phases >= FLAT_FROM) & (phases <= FLAT_TO)
-    ground_angle = float(np.median(foot[flat]))
-    steep = np.flatnonzero((phases > FLAT_TO) & (foot < ground_angle - HEEL_RISE))
+    return phases, shank.sampled(phases) - ankle.sampled(phases) + 0.5 * math.pi
+
+
+def _flat_angle(phases: Floats, foot: Floats) -> float:
+    return float(np.median(foot[(phases >= FLAT_FROM) & (phases <= FLAT_TO)]))
+
+
+def gait_timing(gait: Gait) -> GaitTiming:
+    """Events of the gait, the heel's rise and the flat foot's angle from its own angles."""
+    phases, foot = _foot_angles(gait)
+    ground_angle = _flat_angle(phases, foot)
+    steep = np.flatnonzero((phases > FLAT_TO) & (foot < ground_angle - NEARLY_FLAT))
     heel_off = float(phases[steep[0]]) if steep.size else USUAL_HEEL_RISE * gait.stance_share
     swing = 1.0 - gait.stance_share
     return GaitTiming(

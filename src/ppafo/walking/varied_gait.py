@@ -14,8 +14,8 @@ from ppafo.walking.planning import (
     FLAT_FROM,
     FLAT_TO,
     HARMONICS,
-    HEEL_RISE,
     LATEST_HEEL_RISE,
+    NEARLY_FLAT,
     USUAL_HEEL_RISE,
 )
 
@@ -108,7 +108,7 @@ def _events(shank: Series, ankle: Series, stance_share: Floats) -> tuple[Floats,
         foot = (shank.cosines - ankle.cosines)[part] @ cosine + (shank.sines - ankle.sines)[part] @ sine
         foot += level[:, None]
         ground[part] = np.median(foot[:, flat], axis=1)
-        steep = (foot < (ground[part] - HEEL_RISE)[:, None]) & (_GRID > FLAT_TO)
+        steep = (foot < (ground[part] - NEARLY_FLAT)[:, None]) & (_GRID > FLAT_TO)
         usual = USUAL_HEEL_RISE * stance_share[part]
         heel_off[part] = np.where(steep.any(axis=1), _GRID[np.argmax(steep, axis=1)], usual)
     return ground, np.minimum(heel_off, LATEST_HEEL_RISE * stance_share)

@@ -7,11 +7,9 @@ from ppafo.model import contact as ground
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import (
     LegParameters,
-    centrifugal_torques,
     foot_inertia_about_ankle,
-    gravity_torques,
-    mass_matrix,
     passive_torque,
+    torque_of_shank,
 )
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures
 from ppafo.model.turns import TURN, sine_and_cosine
@@ -86,22 +84,24 @@ def leg_torque(
     """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
 
     The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the weight of the foot plate, and
-    the ground under the heel.
+    the ground under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles,
+    so that a wearer who has all of them and no device walks the measured gait.
     """
-    # theta is phi less the angle of the foot plus 90 deg.
-    sine_theta = now.cosine_shank * foot.cosine + now.sine_shank * foot.sine
-    cosine_theta = now.cosine_shank * foot.sine - now.sine_shank * foot.cosine
-    matrix = mass_matrix(leg, cosine_theta)
-    turning = centrifugal_torques(leg, sine_theta, now.shank_rate, 0.0)
-    weight = gravity_torques(
-        leg, now.sine_shank, now.cosine_shank, foot.sine, foot.cosine, now.knee_forward, now.knee_up
-    )
-    # The measured moment is that of muscles and tissue together.
-    muscles = now.moment - passive_torque(leg, now.ankle)
+    heel = ground.heel_torque(contact, now, leg.heel_lever)
+    muscles = now.healthy_torque - heel - passive_torque(leg, now.ankle)
     wearer = leg.residual_share * muscles + passive_torque(leg, angle)
-    heel = now.force * leg.heel_lever if contact == ground.HEEL else 0.0
-    inertial = matrix.coupling * now.shank_acceleration + turning.ankle + weight.ankle
-    return wearer + heel + share.gravity_torque * foot.cosine - inertial
+    carried = torque_of_shank(
+        leg,
+        now.sine_shank,
+        now.cosine_shank,
+        foot.sine,
+        foot.cosine,
+        now.shank_rate,
+        now.shank_acceleration,
+        now.knee_forward,
+        now.knee_up,
+    )
+    return wearer + heel + share.gravity_torque * foot.cosine - carried
 
 
 def begin_walk(
