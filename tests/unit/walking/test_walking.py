@@ -158,3 +158,12 @@ def test_a_stride_that_begins_without_heel_strike_gets_no_push_before_its_time(
     early = (walk.time > 3.3) & (phase > 0.1) & (phase < 0.35)
     assert (walk["controller_state.phase.phase"][early] != 3.0).all(), "push-off begins at two fifths of the stride"
     assert (walk["controller_state.phase.phase"][walk.time < 3.3] == 3.0).any()
+
+
+def test_a_foot_that_comes_first_with_its_toes_does_not_slap(walked: Callable[[str], Any]) -> None:
+    dropped, lifted = walked("off"), walked("event_on_off")
+    # The walk begins at a heel strike with the healthy ankle.
+    assert dropped["walk.landings"][-1] == 1
+    assert dropped["walk.toe_landings"][-1] >= 6
+    assert lifted["walk.landings"][-1] >= 6
+    assert lifted["walk.slap_rates"][-1] / lifted["walk.landings"][-1] < -5.0

@@ -38,10 +38,10 @@ class WalkState(NamedTuple):
     """Where the foot stands, the gait and the foot's direction now, what the wearer gets, and totals since the start.
 
     ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
-    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``slap_rate`` of the foot at the last landing
-    [rad/s]; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, landings,
-    strikes with the toes first, sums of slap rates [rad/s] and clearances [m], work of T_ex while the foot rolls over
-    the toes [J].
+    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``slap_rate`` of the toes at the last landing
+    [rad/s]; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, landings of
+    the toes after the heel, strikes with the toes first, sums of slap rates [rad/s] and clearances [m], work of T_ex
+    while the foot rolls over the toes [J].
     """
 
     contact: float
@@ -216,6 +216,8 @@ def counted(
     lowest = min(walk.clearance, height if watched else walk.clearance)
     strikes = landed.strikes > 0.5
     on_toes = walk.contact == ground.TOE
+    # A foot that met the ground with its toes brings its heel down: that is no slap.
+    slaps = landed.slaps > 0.5 and foot_rate < 0.0
     return WalkState(
         landed.contact,
         landed.offset,
@@ -224,12 +226,12 @@ def counted(
         given,
         walk.heel_force + (heel - walk.heel_force) * share,
         walk.toe_force + (toe - walk.toe_force) * share,
-        foot_rate if landed.slaps > 0.5 else walk.slap_rate,
+        foot_rate if slaps else walk.slap_rate,
         NO_CLEARANCE if strikes else lowest,
         walk.strides + landed.strikes,
-        walk.landings + landed.slaps,
+        walk.landings + (1.0 if slaps else 0.0),
         walk.toe_landings + (1.0 if strikes and touches_first else 0.0),
-        walk.slap_rates + (foot_rate if landed.slaps > 0.5 else 0.0),
+        walk.slap_rates + (foot_rate if slaps else 0.0),
         walk.clearances + (lowest if strikes and lowest < NO_CLEARANCE else 0.0),
         walk.push_off_work + (0.5 * (given + walk.external_torque) * turned if on_toes else 0.0),
     )
