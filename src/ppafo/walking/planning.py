@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.engine.program import NoParameters, Program
@@ -38,8 +39,8 @@ HARMONICS = 8
 FLAT_FROM, FLAT_TO = 0.15, 0.35
 """Phases between which every foot stands flat; the angle of the foot is taken from there."""
 
-HEEL_RISE = math.radians(3.0)
-"""The heel has left the ground when the foot is steeper than flat by this."""
+NEARLY_FLAT = math.radians(3.0)
+"""The heel has left the ground when the foot is steeper than flat by this; the toes are about to meet it at as much."""
 
 USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
 """Shares of the stance at which the heel rises where the angles do not show it, and at the latest."""
@@ -79,7 +80,7 @@ class WalkPlan:
 
 def plan_walk(plan: WalkPlan) -> Run:
     """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
-    leg = plan.wearer.leg()
+    leg = plan.wearer.leg()._replace(heel_lever=heel_lever(plan.gait, plan.wearer))
     bare = plant_parameters(plan.device)
     plant = with_leg(bare, leg)
     walk = _walk(plan, leg, bare)
@@ -128,7 +129,7 @@ def _program(plan: WalkPlan, valve: ValveModel, late_commands: bool) -> Program:
 def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
     """The leg of a walk, at its first heel strike; ``bare`` is the device without it."""
     gait, timing = gait_series(plan.gait), gait_timing(plan.gait)
-    start = gait_at(gait, timing, leg.body_mass, leg.gravity, 0.0)
+    start = gait_at(gait, timing, leg, 0.0)
     foot = foot_direction(start.shank, start.ankle)
     return Walk(
         leg=leg,
@@ -199,10 +200,29 @@ def followed(curve: Curve) -> Curve:
     return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
 
 
+def heel_lever(gait: Gait, wearer: Wearer) -> float:
+    """Lever [m] of the ground force about the ankle where the measured foot has nearly come down.
+
+    From the measured moment; that of the heel itself bounds it, and stands in where moment or force are missing.
+    """
+    if gait.ankle_moment is None or gait.vertical_force is None:
+        return wearer.heel_lever
+    phases = np.linspace(0.0, FLAT_FROM, 151)
+    down = _foot_angles(gait, phases) < gait_timing(gait).ground_angle + NEARLY_FLAT
+    landing = float(phases[np.argmax(down)]) if down.any() else FLAT_FROM
+    moment, force = followed(gait.ankle_moment).value(landing), followed(gait.vertical_force).value(landing)
+    return min(max(-moment / max(force * STANDARD_GRAVITY, 1.0), 0.0), wearer.heel_lever)
+
+
+def _foot_angles(gait: Gait, phases: Floats) -> Floats:
+    """Angles [rad] of the measured foot over the horizontal."""
+    shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
+    return shank.sampled(phases) - ankle.sampled(phases) + 0.5 * math.pi
+
+
 def gait_timing(gait: Gait) -> GaitTiming:
     """Events of the gait, the heel's rise and the flat foot's angle from its own angles."""
-    shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
-    foot = shank.sampled(EVENT_PHASES) - ankle.sampled(EVENT_PHASES) + 0.5 * math.pi
+    foot = _foot_angles(gait, EVENT_PHASES)
     events = gait_events(foot[None, :], np.array([gait.stance_share]))
     return GaitTiming(1.0 / gait.stride_time, 0.0, *(float(values[0]) for values in events))
 
@@ -214,7 +234,7 @@ def gait_events(foot: Floats, stance_share: Floats) -> tuple[Floats, Floats, Flo
     """
     flat = (EVENT_PHASES >= FLAT_FROM) & (EVENT_PHASES <= FLAT_TO)
     ground_angle = np.median(foot[:, flat], axis=1)
-    steep = (foot < (ground_angle - HEEL_RISE)[:, None]) & (EVENT_PHASES > FLAT_TO)
+    steep = (foot < (ground_angle - NEARLY_FLAT)[:, None]) & (EVENT_PHASES > FLAT_TO)
     usual = USUAL_HEEL_RISE * stance_share
     heel_off = np.where(steep.any(axis=1), EVENT_PHASES[np.argmax(steep, axis=1)], usual)
     swing = 1.0 - stance_share

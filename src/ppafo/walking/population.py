@@ -33,7 +33,9 @@ class Number:
 OUTCOMES: dict[str, Number] = {
     "gas": Number("kg", "gas taken from the supply in one stride"),
     "push_off_work": Number("J", "work of T_ex while the foot rolls over the toes, in one stride"),
-    "slap_rate": Number("rad/s", "rate of the foot when it lands flat, below 0 with the toes falling"),
+    "slap_rate": Number(
+        "rad/s", "rate of the toes as they come down after the heel, below 0; 0 where they always came first"
+    ),
     "toe_clearance": Number("m", "lowest toes in mid-swing against the wearer's healthy gait"),
     "toe_landing": Number("-", "share of the strides in which the toes met the ground before the heel"),
 }

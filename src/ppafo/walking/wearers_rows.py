@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run import Run, batch_of
 from ppafo.gait.gait import KNEE
 from ppafo.model.chambers import chamber_mass
-from ppafo.model.leg import LegParameters
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.plant import chamber_volumes
 from ppafo.walking.anthropometry import Build, bounded_normal, scaled_segments
 from ppafo.walking.configuration import Configuration
@@ -30,12 +31,13 @@ def batch_of_many(
     """The run's column for every wearer, with what differs written over it; nothing is recorded on the way."""
     single = batch_of(run)
     count = build.mass.size
-    segments = scaled_segments(configuration.wearer, build)
+    assert run.walk is not None, "a population walks"
+    segments = scaled_segments(replace(configuration.wearer, heel_lever=run.walk.leg.heel_lever), build)
     parameters, states = (np.repeat(column, count, axis=1) for column in (single.parameters, single.states))
     _overwrite(
         parameters, row_numbers(single.program.parameter_rows()), _parameter_rows(run, segments, gaits, generator)
     )
-    _overwrite(states, row_numbers(single.program.state_rows()), _state_rows(run, segments["body_mass"], gaits))
+    _overwrite(states, row_numbers(single.program.state_rows()), _state_rows(run, segments, gaits))
     still = replace(single.clock, record_every=0)
     return Batch(single.program, still, parameters, states)
 
@@ -84,35 +86,47 @@ def _thresholds(run: Run, count: int, generator: np.random.Generator) -> dict[st
     }
 
 
-def _state_rows(run: Run, body_mass: Floats, gaits: VariedGaits) -> dict[str, Floats]:
+def _state_rows(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits) -> dict[str, Floats]:
     """The start at a heel strike with the wearer's own angles and vented chambers."""
+    now = _gait_at_heel_strike(run, segments, gaits)
+    plant = run.plant
+    volumes = chamber_volumes(plant, now["ankle"])  # type: ignore[arg-type]
+    masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
+    return {f"walk.now.{name}": values for name, values in now.items()} | {
+        "state.angle": now["ankle"],
+        "state.angular_velocity": now["ankle_rate"],
+        "state.mass_1": np.asarray(masses[0]),
+        "state.mass_2": np.asarray(masses[1]),
+    }
+
+
+def _gait_at_heel_strike(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits) -> dict[str, Floats]:
+    """The fields of ``GaitNow`` (wearers,) at phase 0."""
     assert run.walk is not None, "a population walks"
     frequency = gaits.timing["frequency"]
     shank, shank_rate, shank_acceleration = gaits.series["shank"].at_heel_strike(frequency)
     ankle, ankle_rate, ankle_acceleration = gaits.series["ankle"].at_heel_strike(frequency)
-    moment = body_mass * gaits.series["moment"].at_heel_strike(frequency)[0]
-    force = body_mass * run.walk.leg.gravity * gaits.series["force"].at_heel_strike(frequency)[0]
+    moment, force = (gaits.series[name].at_heel_strike(frequency)[0] for name in ("moment", "force"))
     knee = {name: gaits.series[name].at_heel_strike(frequency)[0] for name in KNEE}
-    plant = run.plant
-    volumes = chamber_volumes(plant, ankle)  # type: ignore[arg-type]
-    masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
-    now = {
+    # A leg of arrays: the functions of the leg are plain arithmetic.
+    own = {name: row for name, row in segments.items() if name in LegParameters._fields}
+    leg: Any = run.walk.leg._replace(**own)  # type: ignore[arg-type]
+    torque: Any = torque_of_shank
+    foot = shank - ankle + 0.5 * np.pi
+    directions = np.sin(shank), np.cos(shank), np.sin(foot), np.cos(foot)
+    carried = torque(leg, *directions, shank_rate, shank_acceleration, knee["knee_forward"], knee["knee_up"])
+    return {
         "shank": shank,
         "shank_rate": shank_rate,
         "shank_acceleration": shank_acceleration,
         "ankle": ankle,
         "ankle_rate": ankle_rate,
         "ankle_acceleration": ankle_acceleration,
-        "moment": moment,
-        "force": np.maximum(force, 0.0),
-        "sine_shank": np.sin(shank),
-        "cosine_shank": np.cos(shank),
-        "sine_healthy_foot": np.cos(shank - ankle),
+        "moment": leg.body_mass * moment,
+        "force": np.maximum(leg.body_mass * leg.gravity * force, 0.0),
+        "sine_shank": directions[0],
+        "cosine_shank": directions[1],
+        "sine_healthy_foot": directions[2],
+        "healthy_torque": carried + foot_inertia_about_ankle(leg) * ankle_acceleration + leg.ankle_damping * ankle_rate,
         **knee,
-    }
-    return {f"walk.now.{name}": values for name, values in now.items()} | {
-        "state.angle": ankle,
-        "state.angular_velocity": ankle_rate,
-        "state.mass_1": np.asarray(masses[0]),
-        "state.mass_2": np.asarray(masses[1]),
     }

@@ -48,7 +48,7 @@ def swung(plan: Any, forward: float, up: float) -> tuple[Any, Callable[[str], Fl
         angle_max=9.0,
     )
     timing = walk.timing._replace(start=walk.timing.toe_off)
-    begin = gait_at(walk.gait, timing, walk.leg.body_mass, walk.leg.gravity, 0.0)
+    begin = gait_at(walk.gait, timing, walk.leg, 0.0)
     first = walk.initial._replace(contact=SWING, now=begin, foot=foot_direction(begin.shank, begin.ankle))
     initial = run.initial._replace(angle=begin.ankle, angular_velocity=begin.ankle_rate)
     moved = replace(walk, timing=timing, initial=first)
@@ -92,7 +92,7 @@ def needed_moment(gait: Gait, leg: LegParameters, phases: Floats) -> Floats:
     series, timing = gait_series(gait), gait_timing(gait)
     found = []
     for phase in phases.tolist():
-        now = gait_at(series, timing, leg.body_mass, leg.gravity, phase * gait.stride_time)
+        now = gait_at(series, timing, leg, phase * gait.stride_time)
         foot = foot_direction(now.shank, now.ankle)
         matrix = mass_matrix(leg, float(np.cos(now.ankle)))
         turning = centrifugal_torques(leg, float(np.sin(now.ankle)), now.shank_rate, now.ankle_rate)
