@@ -135,7 +135,7 @@ def lead_walk(rows: LaneRows) -> list[list[str]]:
     """Two phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
     if not rows.program.walks:
         return []
-    gait = f"{rows.add(gait_at)}(gait, gait_timing, leg.body_mass, leg.gravity, time + length)"
+    gait = f"{rows.add(gait_at)}(gait, gait_timing, leg, time + length)"
     foot = f"{rows.add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)"
     return [
         [rows.load("gait"), f"next_gait = {gait}", *rows.keep("next_gait")],

@@ -33,8 +33,8 @@ CHANNELS: dict[str, ChannelKind] = {
         "rad", "ankle angle of the gait that the wearer would walk, growing in plantarflexion"
     ),
     "device_power": ChannelKind("W", "power that the device gives to the wearer, T_ex times the angular velocity"),
-    "knee_torque": ChannelKind(
-        "N m", "T_1 of equation (11), what moves shank and foot without the ground; for the swing"
+    "swing_knee_torque": ChannelKind(
+        "N m", "T_1 of equation (11) in the swing, what moves shank and foot; 0 on the ground"
     ),
     "contact": ChannelKind(PLAIN_NUMBER, "foot and ground: 0 free, 1 on the heel, 2 flat, 3 on the toes", is_held=True),
     "controller_phase": ChannelKind(

@@ -6,6 +6,7 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
+from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.regulator import LineState, line_pressures
@@ -35,7 +36,7 @@ def recorded(configuration: Configuration, run: Run, time: Floats, record: Mappi
         "torque": (run.plant.torque_constant * np.subtract(pressure_1, pressure_2), "N m"),
         "external_torque": (external, "N m"),
         "device_power": (external * rate, "W"),
-        "knee_torque": (knee_torque(run, time, record), "N m"),
+        "swing_knee_torque": (swing_knee_torque(run, time, record), "N m"),
         "toe_height": (path.toe_height(record["walk.now.phase"], record["walk.now.shank"], angle), "m"),
         "command": (record["result.command"], "-"),
         "contact": (record["walk.contact"], "-"),
@@ -56,8 +57,11 @@ def recorded(configuration: Configuration, run: Run, time: Floats, record: Mappi
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
 
 
-def knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
-    """T_1 of equation (11) [N m]: what moves shank and foot as prescribed, without the ground; for the swing."""
+def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
+    """T_1 of equation (11) [N m] in the swing: what moves shank and foot as prescribed; 0 on the ground.
+
+    There it would need the horizontal force of the ground, which a gait file does not have.
+    """
     assert run.walk is not None, "a walk has a leg"
     leg = run.walk.leg
     theta, phi = record["state.angle"], record["walk.now.shank"]
@@ -68,4 +72,4 @@ def knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
     forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
     weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)  # type: ignore[arg-type]
     inertial = matrix.shank * record["walk.now.shank_acceleration"] + matrix.coupling * ankle_acceleration
-    return np.asarray(inertial + turning.knee + weight.knee)
+    return np.where(record["walk.contact"] == SWING, inertial + turning.knee + weight.knee, 0.0)

@@ -182,6 +182,8 @@ def _metrics(
     found = {}
     for name, item in PER_STRIDE.items():
         values = strides[name][SETTLING:]
+        if name == "slap_rate":
+            values = values[values < 0.0]
         if values.size:
             found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean")
     found["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")
