@@ -2,8 +2,10 @@
 
     python scripts/fit_built_in_gait.py FOLDER > src/ppafo/gait/normative/falisse2019-subject1.toml
 
-FOLDER holds falisse2019_s1_1p33_stride.csv and falisse2019_s1_trials.csv, derived from the files of Falisse et al.
-(2019). The data are not part of the package; the coefficients are. Errors of the fit go to standard error.
+FOLDER holds falisse2019_derived, with falisse2019_s1_1p33_stride.csv and falisse2019_s1_trials.csv, and
+falisse2019_subject1, with IK_average_walking_FGC.mat: the mean stride of Falisse et al. (2019) as they publish it, from
+which the way of the knee comes. The data are not part of the package; the coefficients are. Errors of the fit go to
+standard error.
 """
 
 import csv
@@ -12,10 +14,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from scipy.io import loadmat
 
-from ppafo.gait.document import gait_toml
 from ppafo.gait.fourier import HARMONICS, FitError, fit_curve
-from ppafo.gait.gait import Curve, Gait
+from ppafo.gait.gait import KNEE, Curve, Gait
+from ppafo.gait.recorded.knee import knee_position
+from ppafo.gait.writing import gait_toml
 
 DIGITS = 5
 BODY_MASS = 62.0
@@ -27,6 +31,9 @@ COLUMNS = {
 }
 """Column of each curve, sign and zero: the table counts dorsiflexion above 0 from neutral."""
 ANGLES = ("shank_angle", "ankle_angle")
+THIGH_LENGTH = 0.3969
+"""Hip to knee [m] in the authors' scaled model of the subject: github.com/antoinefalisse/3dpredictsim (MIT licence),
+ExternalFunctions/PredSim.cpp, knee_r at (-0.0045, -0.3969, 0) in femur_r."""
 SOURCE = (
     "Falisse et al. 2019, J R Soc Interface 16:20190402, doi:10.1098/rsif.2019.0402; "
     "github.com/antoinefalisse/3dpredictsim (MIT licence), subject 1: means of 11 overground strides"
@@ -34,7 +41,10 @@ SOURCE = (
 NOTES = (
     "One healthy adult at self-selected speed. Curves filtered by the authors; the force does not vanish entirely in "
     "swing. Fitted by scripts/fit_built_in_gait.py to 101 samples of the mean stride. Root mean square and largest "
-    "error of the fit: {errors}."
+    "error of the fit: {errors}. Accelerations of the knee: second derivatives of series through its way in the plane, "
+    "from pelvis_tx, pelvis_ty, pelvis_tilt and hip_flexion_r of the authors' mean stride (IK_average_walking_FGC, of "
+    "the same phases) with a thigh of 0.3969 m (their scaled model, ExternalFunctions/PredSim.cpp); the errors "
+    "are of that way. How much strides differ in them is not known."
 )
 
 
@@ -49,6 +59,27 @@ def rounded(curve: Curve) -> Curve:
     """Return the curve with as many digits as the fit deserves; what it still does not carry is left out."""
     cosines, sines = (tuple(round(value, DIGITS) for value in values) for values in (curve.cosines, curve.sines))
     return Curve(round(curve.mean, DIGITS), cosines, sines, round(curve.deviation, DIGITS))
+
+
+def knee_way(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Return the way of the knee over one stride, forward and up [m], without the mean speed of the walk."""
+    (content,) = (value for name, value in loadmat(path, squeeze_me=True).items() if not name.startswith("__"))
+    labels, rows = content["colheaders"].item(), content["data"].item()
+    columns = {str(label): rows[:, number] for number, label in enumerate(labels)}
+    lean = np.radians(columns["pelvis_tilt"] + columns["hip_flexion_r"])
+    ways = knee_position(columns["pelvis_tx"], columns["pelvis_ty"], lean, THIGH_LENGTH)
+    phase = np.linspace(0.0, 1.0, lean.size)
+    forward, up = (way - (way[-1] - way[0]) * phase for way in ways)
+    return forward, up
+
+
+def fitted_knee(path: Path, stride_time: float) -> dict[str, tuple[Curve, FitError]]:
+    """Return both accelerations of the knee by name, and what the series leave of its way [m]."""
+    found = {}
+    for name, way in zip(KNEE, knee_way(path), strict=True):
+        curve, error = fit_curve(way, HARMONICS[name])
+        found[name] = rounded(curve.derivative(stride_time).derivative(stride_time)), error
+    return found
 
 
 def fitted(stride: Mapping[str, np.ndarray]) -> dict[str, tuple[Curve, FitError]]:
@@ -70,9 +101,12 @@ def in_si(name: str, curve: Curve) -> Curve:
 
 def built_in_gait(folder: Path) -> Gait:
     """Return the gait fitted to the tables in a folder."""
-    found = fitted(table(folder / "falisse2019_s1_1p33_stride.csv"))
-    trials = table(folder / "falisse2019_s1_trials.csv")
-    units = {name: " deg" if name in ANGLES else "" for name in found}
+    derived = folder / "falisse2019_derived"
+    trials = table(derived / "falisse2019_s1_trials.csv")
+    stride_time = round(float(trials["stride_time_s_est"].mean()), 4)
+    found = fitted(table(derived / "falisse2019_s1_1p33_stride.csv"))
+    found |= fitted_knee(folder / "falisse2019_subject1" / "IK_average_walking_FGC.mat", stride_time)
+    units = {name: " deg" if name in ANGLES else " m" if name in KNEE else "" for name in found}
     errors = "; ".join(
         f"{name} {error.root_mean_square:.2g} and {error.largest:.2g}{units[name]}"
         for name, (_, error) in found.items()
@@ -86,7 +120,7 @@ def built_in_gait(folder: Path) -> Gait:
         notes=NOTES.format(errors=errors),
         body_mass=BODY_MASS,
         walking_speed=round(float(trials["speed_m_s_est"].mean()), 2),
-        stride_time=round(float(trials["stride_time_s_est"].mean()), 4),
+        stride_time=stride_time,
         stride_time_deviation=round(float(trials["stride_time_s_est"].std(ddof=1)), 4),
         stance_share=round(float(trials["stance_pct"].mean()) / 100.0, 4),
         stance_share_deviation=round(float(trials["stance_pct"].std(ddof=1)) / 100.0, 4),
@@ -95,6 +129,8 @@ def built_in_gait(folder: Path) -> Gait:
         ankle_angle=curves["ankle_angle"],
         ankle_moment=curves["ankle_moment"],
         vertical_force=curves["vertical_force"],
+        knee_forward=curves["knee_forward"],
+        knee_up=curves["knee_up"],
     )
 
 

@@ -1,5 +1,6 @@
 """The commands of the page on the bottle are run as they stand there, and its numbers are those that come out."""
 
+import itertools
 import json
 import re
 import shlex
@@ -7,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
+import ppafo
 from ppafo.cli.main import main
 from ppafo.studies.endurance import list_bottles
 from ppafo.studies.endurance.bottle import PAPER_BOTTLE
+from ppafo.walking import load_walk
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "how-long-does-the-bottle-last.md"
 TEXT = " ".join(PAGE.read_text(encoding="utf-8").split())
@@ -17,6 +20,11 @@ COMMANDS = [
     shlex.split(line) for line in re.findall(r"^    ppafo (.*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
 ]
 ROWS = re.findall(r"^\| `([^`]+=[^`]+)` \| (\d+) \| ([a-z ]+) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+
+SEVERAL = ["endurance", "out/walk-solenoid", "out/walk-proportional"]
+REGULATED = re.findall(
+    r"^\| `([\w-]+)` \| (-|`supply_line\.[^`]+`) \| (.*) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE
+)
 
 
 def results(words: list[str], capsys: pytest.CaptureFixture[str]) -> dict[str, float]:
@@ -30,12 +38,14 @@ def test_the_commands_of_the_page_run_one_after_the_other_and_give_its_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert len(COMMANDS) == 9
+    assert len(COMMANDS) == 15
     steps, savings = [], []
     for words in COMMANDS:
         assert main(words) == 0
-        capsys.readouterr()
-        if words[0] == "endurance" and "--list" not in words:
+        said = capsys.readouterr().out
+        if words[:2] == SEVERAL[:2]:
+            assert said.splitlines() == shown_below(words)
+        elif words[0] == "endurance" and "--list" not in words:
             document = results(words, capsys)
             steps.append(round(document["result"]["steps"]))  # type: ignore[index]
             savings += [document["reuse"]["balance"]["returned_mass"]] if "reuse" in document else []  # type: ignore[index]
@@ -43,6 +53,37 @@ def test_the_commands_of_the_page_run_one_after_the_other_and_give_its_numbers(
         assert re.search(rf"\b{count} (steps|tasks)", TEXT), count
     assert [f"{saved * 1e3:.3g}" for saved in savings] == re.findall(r"saves (\S+) g", TEXT)
     assert (tmp_path / "out" / "bottle" / "endurance.png").is_file()
+    saved = results([*SEVERAL, "--reuse", "reservoir_volume=50 cm^3"], capsys)["recordings"][SEVERAL[1]]  # type: ignore[index]
+    exec(re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)[0], {})
+    grams, minutes = 1e3 * saved["reuse"]["balance"]["returned_mass"], saved["result"]["walking_time"] / 60.0
+    assert capsys.readouterr().out == f"{grams:.3f} g less a stride, {minutes:.2f} min\n"
+
+
+def shown_below(words: list[str]) -> list[str]:
+    """Lines that the page shows under a command."""
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    start = next(
+        number for number, line in enumerate(lines) if line.startswith("    ppafo") and shlex.split(line)[1:] == words
+    )
+    block = itertools.takewhile(lambda line: not line or line.startswith("    "), lines[start + 2 :])
+    shown = [line.removeprefix("    ") for line in block]
+    return shown[: max(number for number, line in enumerate(shown) if line) + 1]
+
+
+@pytest.mark.parametrize(("name", "change", "numbers"), REGULATED)
+def test_a_row_of_the_regulators_is_what_comes_out(name: str, change: str, numbers: str) -> None:
+    metrics = ppafo.walk(name, 0.2, overrides=re.findall(r"`(.*)`", change)).metrics
+    gas, work, toes = (metrics[metric].value for metric in ("gas", "push_off_work", "toe_clearance"))
+    assert numbers == f"{1e3 * gas:.3f} | {work:.2f} | {1e2 * toes:.1f}"
+
+
+def test_the_lines_of_the_page_are_those_that_stand_in_for_them(tmp_path: Path) -> None:
+    section = re.findall(r"^```toml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)[0]
+    head = 'schema_version = 1\nname = "own"\n[device]\nset = "ppafo2011"\nvalve = "solenoid"\n'
+    (tmp_path / "own.toml").write_text(f'{head}[controller]\nkind = "off"\n{section}')
+    given = load_walk(tmp_path / "own.toml")
+    assert given.supply_lines == load_walk("solenoid-regulators").supply_lines
+    assert not given.assumed
 
 
 def test_steps_of_a_warm_bottle_are_those_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
@@ -61,6 +102,7 @@ def test_a_row_of_the_table_is_what_comes_out(
 
 def test_the_table_has_rows() -> None:
     assert len(ROWS) == 10
+    assert len(REGULATED) == 7
 
 
 def test_a_bottle_of_the_page_comes_with_the_package() -> None:

@@ -36,7 +36,10 @@ def test_the_commands_and_the_python_of_the_page_run(
 
 
 def test_the_map_and_the_table_of_the_page_are_read(tmp_path: Path) -> None:
-    assert GaitMap.model_validate(tomllib.loads(blocks("toml")[0])).shank_angle.terms is not None
+    whole, *knees = (tomllib.loads(block) for block in blocks("toml"))
+    assert GaitMap.model_validate(whole).shank_angle.terms is not None
+    maps = [GaitMap.model_validate(whole | knee).knee for knee in knees]
+    assert [knee is not None and knee.thigh_length for knee in maps] == [None, "0.42 m"]
     path = tmp_path / "walk.csv"
     path.write_text(blocks("csv")[0] + "0.02,14.7,87.4,81.0\n")
     assert set(read_table(path).columns) == {"shank_angle", "ankle_angle", "vertical_force"}

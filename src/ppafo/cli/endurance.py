@@ -10,7 +10,7 @@ from ppafo.errors import DataError, ParameterError, UnitError
 
 if TYPE_CHECKING:
     from ppafo.storage.owned_folder import FolderKind
-    from ppafo.studies.endurance import Draw
+    from ppafo.studies.endurance import Bottle, Endurance, Schedule
 
 _STEP_TIME = "1.1 s"
 _WALK, _REST, _LONGEST = "10 min", "0 s", "1440 min"
@@ -19,17 +19,18 @@ _WALK, _REST, _LONGEST = "10 min", "0 s", "1440 min"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument(
-        "recording",
+        "recordings",
         metavar="RECORDING",
-        nargs="?",
+        nargs="*",
         type=Path,
-        help="a .csv or .nc file with supplied_mass, or a result folder; repeated for ever",
+        help="a .csv or .nc file with supplied_mass, a result folder or that of a walk; repeated for ever; several "
+        "are shown side by side",
     )
     parser.add_argument("--gas-per-step", metavar="MASS", help="gas of one step, for example '0.3 g'")
     parser.add_argument(
         "--step-time",
         metavar="TIME",
-        help=f"time of one step; default '{_STEP_TIME}', or all of the recording",
+        help=f"time of one step; default '{_STEP_TIME}', or all of the recording, or a stride of a walk",
     )
     parser.add_argument("--peak-flow", metavar="FLOW", help="largest flow, for example '4.5 g/s'; default the mean one")
     parser.add_argument("--bottle", metavar="BOTTLE", help="name of a bottle or a .toml file; default the paper's")
@@ -44,7 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         action="append",
         default=[],
-        help="reuse the exhaust for dorsiflexion, for example 'reservoir_volume=50 cm^3'; may be given again",
+        help="reuse the exhaust for dorsiflexion, for example 'reservoir_volume=50 cm^3'; what is not given of the "
+        "chambers is taken from a walk; may be given again",
     )
     add_override_argument(parser)
     add_json_argument(parser)
@@ -55,22 +57,31 @@ def run(parsed: argparse.Namespace) -> int:
     """Follow the bottle, print and write."""
     if parsed.list:
         return _list(parsed)
-    from ppafo.reporting.endurance_report import endurance_document, endurance_files, endurance_text
-    from ppafo.storage.owned_folder import check_owned_folder, write_owned_folder
-    from ppafo.studies.endurance import Schedule, endurance, load_bottle, parse_reuse
+    from ppafo.studies.endurance import Schedule, load_bottle
     from ppafo.studies.endurance.bottle import PAPER_BOTTLE
 
-    kind = _folder_kind()
-    if parsed.out is not None:
-        check_owned_folder(parsed.out, kind)
+    if bool(parsed.recordings) == (parsed.gas_per_step is not None):
+        raise ParameterError("give either a recording or --gas-per-step, for example --gas-per-step '0.3 g'")
     bottle = load_bottle(parsed.bottle or PAPER_BOTTLE, parsed.overrides)
     schedule = Schedule(
         _quantity("--walk", parsed.walk, "s"),
         _quantity("--rest", parsed.rest, "s"),
         _quantity("--longest", parsed.longest, "s"),
     )
-    cycle = parse_reuse(parsed.reuse, bottle) if parsed.reuse else None
-    made = endurance(bottle, _draw(parsed), schedule, cycle)
+    return (_several if len(parsed.recordings) > 1 else _one)(parsed, bottle, schedule)
+
+
+def _one(parsed: argparse.Namespace, bottle: "Bottle", schedule: "Schedule") -> int:
+    from ppafo.reporting.endurance_report import endurance_document, endurance_files, endurance_text
+    from ppafo.storage.owned_folder import check_owned_folder, write_owned_folder
+
+    kind = _folder_kind()
+    if parsed.out is not None:
+        check_owned_folder(parsed.out, kind)
+    if parsed.recordings:
+        made = _of_recording(parsed.recordings[0], parsed, bottle, schedule)
+    else:
+        made = _of_numbers(parsed, bottle, schedule)
     lines = endurance_text(made)
     if parsed.out is not None:
         load_drawing()
@@ -80,21 +91,46 @@ def run(parsed: argparse.Namespace) -> int:
     return EXIT_GOOD
 
 
-def _draw(parsed: argparse.Namespace) -> "Draw":
-    from ppafo.studies.endurance import draw_of_numbers, draw_of_recording
+def _several(parsed: argparse.Namespace, bottle: "Bottle", schedule: "Schedule") -> int:
+    from ppafo.reporting.endurance_report import endurance_document
+    from ppafo.reporting.endurance_table import endurance_table
 
-    if (parsed.recording is None) == (parsed.gas_per_step is None):
-        raise ParameterError("give either a recording or --gas-per-step, for example --gas-per-step '0.3 g'")
-    step_time = None if parsed.step_time is None else _quantity("--step-time", parsed.step_time, "s")
-    if parsed.recording is None:
-        mass = _quantity("--gas-per-step", parsed.gas_per_step, "kg")
-        peak = None if parsed.peak_flow is None else _quantity("--peak-flow", parsed.peak_flow, "kg/s")
-        return draw_of_numbers(mass, _quantity("", _STEP_TIME, "s") if step_time is None else step_time, peak)
+    if parsed.out is not None:
+        raise ParameterError("--out writes the course of one recording; give one, or leave --out away")
+    names = [str(path) for path in parsed.recordings]
+    if len(set(names)) < len(names):
+        raise ParameterError("the same recording is given twice")
+    made = {str(path): _of_recording(path, parsed, bottle, schedule) for path in parsed.recordings}
+    document = {"recordings": {name: endurance_document(one) for name, one in made.items()}}
+    print_result("\n".join(endurance_table(made)), document, parsed.json)
+    return EXIT_GOOD
+
+
+def _of_numbers(parsed: argparse.Namespace, bottle: "Bottle", schedule: "Schedule") -> "Endurance":
+    from ppafo.studies.endurance import draw_of_numbers, endurance, parse_reuse
+
+    mass = _quantity("--gas-per-step", parsed.gas_per_step, "kg")
+    step_time = _quantity("--step-time", parsed.step_time or _STEP_TIME, "s")
+    peak = None if parsed.peak_flow is None else _quantity("--peak-flow", parsed.peak_flow, "kg/s")
+    plan = parse_reuse(parsed.reuse, bottle) if parsed.reuse else None
+    return endurance(bottle, draw_of_numbers(mass, step_time, peak), schedule, plan)
+
+
+def _of_recording(path: Path, parsed: argparse.Namespace, bottle: "Bottle", schedule: "Schedule") -> "Endurance":
+    from ppafo.storage.recordings import read_recording
+    from ppafo.studies.endurance import draw_of_recording, endurance, parse_reuse
+    from ppafo.studies.endurance.of_walk import endurance_of_walked
+    from ppafo.studies.endurance.walked import is_walk_folder, read_walked
+
     if parsed.peak_flow is not None:
         raise ParameterError("--peak-flow belongs to --gas-per-step; a recording says its largest flow itself")
-    from ppafo.storage.recordings import read_recording
-
-    return draw_of_recording(read_recording(parsed.recording), step_time)
+    if is_walk_folder(path):
+        if parsed.step_time is not None:
+            raise ParameterError(f"--step-time: a step of {path} is a stride of its walk; leave it away")
+        return endurance_of_walked(read_walked(path), bottle, schedule, parsed.reuse)
+    step_time = None if parsed.step_time is None else _quantity("--step-time", parsed.step_time, "s")
+    plan = parse_reuse(parsed.reuse, bottle) if parsed.reuse else None
+    return endurance(bottle, draw_of_recording(read_recording(path), step_time), schedule, plan)
 
 
 def _quantity(option: str, text: str, unit: str) -> float:

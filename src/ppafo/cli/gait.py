@@ -56,6 +56,9 @@ def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--speed", metavar="SPEED", help="walking speed, such as '1.2 m/s'; needed to scale the gait later"
     )
+    parser.add_argument(
+        "--stature", metavar="LENGTH", help="of the wearer, such as '1.75 m'; gives the thigh that OpenSim files lack"
+    )
     parser.add_argument("--low-pass", metavar="FREQUENCY", help="smooth the curves, such as '6 Hz'; not unless given")
     parser.add_argument("--least-strides", metavar="N", default="2", help="refuse fewer whole strides; default 2")
     parser.add_argument("--name", metavar="NAME", default="imported-gait", help="name of the gait and of its file")
@@ -113,6 +116,7 @@ def _settings(parsed: argparse.Namespace) -> "ImportSettings":
         least_strides=_whole("--least-strides", parsed.least_strides),
         name=parsed.name,
         title=parsed.title,
+        stature=None if parsed.stature is None else _quantity("--stature", parsed.stature, "m"),
     )
 
 

@@ -1,6 +1,7 @@
 """The rows of one program in a lane block, and the lines that load and store them."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, final
 
 from ppafo.engine.program import Program
@@ -8,6 +9,18 @@ from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector
 
 LANES = 32
+"""Most runs of a block."""
+
+FIRST_CACHE = 48 * 1024
+"""Bytes of the first-level data cache of a core; a block that does not fit takes half as many runs."""
+
+
+@lru_cache(maxsize=64)
+def lanes_of(program: Program) -> int:
+    """Runs of one block of a program."""
+    groups = (program.state_rows(), program.parameter_rows(), program.step_rows())
+    rows = sum(len(leaf_paths(row, name)) for group in groups for name, row in group.items())
+    return LANES if 8 * LANES * rows <= FIRST_CACHE else LANES // 2
 
 
 @final

@@ -2,7 +2,7 @@
 
 from ppafo.engine.lane_control import control_loop, remember_commands, remember_signals
 from ppafo.engine.lane_meters import measure_loop
-from ppafo.engine.lane_rows import LANES, LaneRows, indented
+from ppafo.engine.lane_rows import LaneRows, indented, lanes_of
 from ppafo.engine.lane_step import plant_loop
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
@@ -40,7 +40,7 @@ def lane_source(program: Program) -> str:
         f"def advance({ARGUMENTS}):",
         *indented(
             [
-                f"x = np.empty(({rows.count}, {LANES}))",
+                f"x = np.empty(({rows.count}, {lanes_of(program)}))",
                 "width = states.shape[1]",
                 *_copy("x", 0, "states", 0, len(rows.state_at)),
                 *_copy("x", len(rows.state_at), "parameters", 0, len(rows.parameter_at)),

@@ -1,7 +1,7 @@
 """What the lanes do in a step: valve, gas and vane, whole or in parts where something changes abruptly inside it."""
 
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
-from ppafo.engine.scheme import motion, parts, pneumatics, thermal_gas, walking
+from ppafo.engine.scheme import motion, parts, pneumatics, supply_lines, thermal_gas, walking
 from ppafo.model.gait import gait_at
 
 IMPOSSIBLE_RATE = 1.0e6
@@ -36,6 +36,7 @@ def opening(rows: LaneRows) -> list[str]:
     names = ["timing", "plant", "valve", "result", "state", "valve_state"]
     names += ["thermal", "masses"] if rows.program.is_thermal else []
     names += ["leg", "share", "gait_timing", "walk"] if rows.program.walks else []
+    names += ["lines", "line_state"] if rows.program.has_lines else []
     return [*[rows.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
 
 
@@ -116,17 +117,25 @@ def begin(rows: LaneRows) -> list[str]:
     valve, add = rows.program.valve, rows.add
     return [
         f"shown, valve_state = {add(valve.advance)}(valve, valve_state, command, time, length)",
-        f"port_1, port_2 = {add(valve.connect)}(plant, shown)",
+        connect(rows, "line_state"),
         *lead(rows),
         begin_gas(rows),
     ]
+
+
+def connect(rows: LaneRows, line_state: str) -> str:
+    """The ports of both chambers; where there are lines, at the pressures that they have in ``line_state``."""
+    source = "plant"
+    if rows.program.has_lines:
+        source = f"{rows.add(supply_lines.fed_plant)}(plant, lines, {line_state})"
+    return f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"
 
 
 def lead_walk(rows: LaneRows) -> list[list[str]]:
     """Two phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
     if not rows.program.walks:
         return []
-    gait = f"{rows.add(gait_at)}(gait, gait_timing, leg.body_mass, leg.gravity, time + length)"
+    gait = f"{rows.add(gait_at)}(gait, gait_timing, leg, time + length)"
     foot = f"{rows.add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)"
     return [
         [rows.load("gait"), f"next_gait = {gait}", *rows.keep("next_gait")],
@@ -161,13 +170,15 @@ def begin_gas(rows: LaneRows) -> str:
         return f"gas = {add(thermal_gas.begin_thermal_gas)}(plant, thermal, state, masses, next_angle, {given})"
     if program.is_held:
         return f"gas = {add(pneumatics.begin_still_gas)}(plant, state, {given})"
+    if program.has_lines:
+        return f"gas = {add(supply_lines.begin_fed_gas)}(plant, lines, line_state, state, next_angle, {given})"
     return f"gas = {add(pneumatics.begin_moving_gas)}(plant, state, next_angle, {given})"
 
 
 def feed(rows: LaneRows) -> list[str]:
     """The second stage: the gas of the step, and where a led vane is at its end."""
-    valve, add = rows.program.valve, rows.add
-    lines = [*rows.load_step(), f"port_1, port_2 = {add(valve.connect)}(plant, shown)", *end_gas(rows)]
+    add = rows.add
+    lines = [*rows.load_step(), connect(rows, "gas.lines.after"), *end_gas(rows)]
     if rows.program.angle is not None and not rows.program.is_held:
         lines.append(f"state = {add(motion.with_motion)}(state, begun.next_angle, begun.next_rate)")
     return lines
@@ -182,6 +193,14 @@ def end_gas(rows: LaneRows) -> list[str]:
             f"change = {add(thermal_gas.end_thermal_gas)}(plant, thermal, gas, {given})",
             f"state, masses = {add(thermal_gas.with_thermal_gas)}(state, masses, change)",
             *rows.store("masses"),
+        ]
+    if program.has_lines:
+        given_2 = f"port_2, length, {add(program.valve.port_flow)}"
+        return [
+            f"change = {add(pneumatics.end_moving_gas)}(plant, gas.chambers, {given})",
+            f"line_state = {add(supply_lines.end_lines)}(plant, lines, line_state, gas, change, {given_2})",
+            f"state = {add(motion.with_gas)}(state, change)",
+            *rows.store("line_state"),
         ]
     end = pneumatics.end_still_gas if program.is_held else pneumatics.end_moving_gas
     return [f"change = {add(end)}(plant, gas, {given})", f"state = {add(motion.with_gas)}(state, change)"]

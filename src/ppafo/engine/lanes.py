@@ -1,4 +1,4 @@
-"""Runs many devices at once: blocks of 32 lanes, spread over threads, the same numbers in any order.
+"""Runs many devices at once: blocks of up to 32 lanes, spread over threads, the same numbers in any order.
 
 A run's result does not depend on its block, its place in it or the number of threads, because every lane goes
 through the same instructions and no lane sees another.
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.cache import load_generated
-from ppafo.engine.lane_rows import LANES
+from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lane_source import lane_source
 from ppafo.engine.program import Program
 
@@ -88,7 +88,8 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     """Run a batch block by block, and give each result away at once: ``take(runs, result)``, from several threads."""
     module = load_program(batch.program)
     runs = batch.states.shape[1]
-    starts = range(0, runs, LANES)
+    lanes = lanes_of(batch.program)
+    starts = range(0, runs, lanes)
     workers = min(len(starts), threads or os.cpu_count() or 1)
 
     waiting = iter(starts)
@@ -97,7 +98,7 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     def work() -> None:
         for start in waiting:
             if not stop.is_set():
-                block = slice(start, min(start + LANES, runs))
+                block = slice(start, min(start + lanes, runs))
                 take(block, _run_block(module, batch, block, stop))
 
     if workers == 1:
@@ -132,7 +133,7 @@ def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Ev
 
 
 class LaneBlock:
-    """Up to 32 runs in progress; ``states`` (rows, 32) may be read and written between two calls of ``advance``."""
+    """One block of runs in progress; ``states`` (rows, runs) may be read and written between two ``advance``."""
 
     def __init__(self, module: ModuleType, clock: Clock, parameters: Floats, states: Floats, traced: int = 0) -> None:
         self._module = module

@@ -8,12 +8,14 @@ from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import constant
 from ppafo.engine.scheme.motion import FreeStep, LedStep
 from ppafo.engine.scheme.pneumatics import MovingGas, StillGas
+from ppafo.engine.scheme.supply_lines import FedGas
 from ppafo.engine.scheme.thermal_gas import ThermalGas
 from ppafo.engine.scheme.walking import DeviceShare, WalkState, WalkStep
 from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
+from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import Course, MeterKind
@@ -48,8 +50,9 @@ class Program:
     ``late_commands`` True adds a dead time before the valve; a step is then done in two parts, before and after the
     instant at which a command arrives, each with valve parameters of its own length. ``is_thermal`` True gives the
     gas an energy balance instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose
-    foot is free or where the ground and a gait lead it (``angle`` is None then). ``meters`` are updated at every
-    sample that a recording would have, ``traced`` names channels that are kept at some of them.
+    foot is free or where the ground and a gait lead it (``angle`` is None then). ``has_lines`` True feeds a walking
+    device from lines behind regulators instead of constant pressures. ``meters`` are updated at every sample that a
+    recording would have, ``traced`` names channels that are kept at some of them.
     """
 
     valve: ValveModel
@@ -60,6 +63,7 @@ class Program:
     late_commands: bool
     is_thermal: bool = False
     walks: bool = False
+    has_lines: bool = False
     meters: tuple[MeterKind, ...] = ()
     traced: tuple[str, ...] = ()
 
@@ -77,6 +81,7 @@ class Program:
             "sensors": SensorParameters,
             **({"leg": LegParameters, "share": DeviceShare, "gait": GaitSeries} if self.walks else {}),
             **({"gait_timing": GaitTiming, "gait_sensors": GaitSensors} if self.walks else {}),
+            **({"lines": SupplyLines} if self.has_lines else {}),
         }
 
     def state_rows(self) -> dict[str, type]:
@@ -88,6 +93,7 @@ class Program:
             "valve_state": self.valve.state,
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
             **({"walk": WalkState, "gait_seen": GaitSeen} if self.walks else {}),
+            **({"line_state": LineState} if self.has_lines else {}),
             "course": Course if self.follows_reference else NoParameters,
             **{group: kind.state for group, kind in self.meter_groups.items()},
         }
@@ -121,7 +127,7 @@ class Program:
         """Groups of numbers that the first stage of a step hands to the later phases, in order."""
         free = WalkStep if self.walks else FreeStep
         begun = free if self.angle is None else (NoParameters if self.is_held else LedStep)
-        isothermal = StillGas if self.is_held else MovingGas
+        isothermal = StillGas if self.is_held else (FedGas if self.has_lines else MovingGas)
         _, shown, _ = get_type_hints(self.valve.connect).values()
         gait = {"next_gait": GaitNow} if self.walks else {}
         return {**gait, "begun": begun, "gas": ThermalGas if self.is_thermal else isothermal, "shown": shown}

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.lane_rows import LANES
+from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, Floats, LaneBlock, joined, load_program
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
@@ -67,7 +67,8 @@ def led_by_recording(program: Program) -> Program:
 def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     """Run devices on the same recorded inputs; with a command, the program must leave it to the caller."""
     runs = batch.states.shape[1]
-    blocks = [slice(first, min(first + LANES, runs)) for first in range(0, runs, LANES)]
+    lanes = lanes_of(batch.program)
+    blocks = [slice(first, min(first + lanes, runs)) for first in range(0, runs, lanes)]
     return joined([_replay_block(batch, inputs, block) for block in blocks])
 
 

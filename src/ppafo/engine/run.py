@@ -17,6 +17,7 @@ from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import NOTHING_SEEN, GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
+from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
 
 Members = NDArray[np.intp]
@@ -35,6 +36,14 @@ class Walk:
     timing: GaitTiming
     sensors: GaitSensors
     initial: WalkState
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """What lines behind regulators add to a run; the regulators are set to the supply pressures of the plant."""
+
+    parameters: SupplyLines
+    initial: LineState
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +75,7 @@ class Run:
     signal_delay: float
     command_delay: float
     walk: Walk | None = None
+    lines: Lines | None = None
 
     @property
     def period(self) -> float:
@@ -96,13 +106,15 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     timing = LaneTiming(run.step, run.period, command_lag, signal_lag)
     plant, valve = [run.plant, run.thermal], [run.valve, run.early_valve]
     walk, walk_states = _walk_groups(run.walk)
-    rest = [run.controller, run.reference, run.path, run.sensors, *walk]
+    lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
+    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines]
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
     masses = ThermalState(run.initial.mass_1, run.initial.mass_2) if program.is_thermal else NoParameters()
     result = LaneResult(0.0, NEVER_FAILED)
-    states = table([result, run.initial, masses, program.valve.initial(), controller_state, *walk_states], runs)
+    further = [*walk_states, *line_states]
+    states = table([result, run.initial, masses, program.valve.initial(), controller_state, *further], runs)
     counts = np.empty((runs, 5), dtype=np.int64)
     wholes = (run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     for column, count in enumerate(wholes):

@@ -1,8 +1,6 @@
-"""The layout of a gait file, and how one becomes a ``Gait`` and a ``Gait`` one."""
+"""The layout of a gait file, and how one becomes a ``Gait``."""
 
 import functools
-import json
-from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError
@@ -10,22 +8,18 @@ from pydantic import BaseModel, Field, ValidationError
 from ppafo.documents.models import NAME, optional, published_schema, table
 from ppafo.documents.problems import first_problem
 from ppafo.errors import DataError, UnitError
-from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait
-from ppafo.units import from_si, parse_quantity, to_si
-
-WRITTEN_UNITS: dict[str, str] = {"rad": "deg"}
-"""Angles are written in degrees; every other curve in its own unit."""
+from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
+from ppafo.units import parse_quantity, to_si
 
 _MOST_HARMONICS = 40
-_DIGITS = 12
-"""Written of a coefficient; degrees made of radians carry noise behind these."""
-_PLAIN = "-"
 _SUMMARIES = {
     "shank_angle": "shank angle from the vertical, above 0 while the ankle is in front of the knee",
     "ankle_angle": "ankle angle, 90 deg neutral, growing in plantarflexion",
     "ankle_moment": "internal ankle moment per body mass, above 0 in plantarflexion",
     "vertical_force": "vertical ground reaction on this foot in body weights, above 0 upwards",
     "centre_of_pressure": "where it acts, forward of the ankle along the foot; without meaning in swing",
+    "knee_forward": "acceleration of the knee in walking direction",
+    "knee_up": "acceleration of the knee upwards, without gravity",
 }
 _LIMITS = {
     "subject.body_mass": ("kg", 1.0, 500.0),
@@ -123,6 +117,8 @@ def gait_of(document: dict[str, Any], file: str) -> Gait:
         ankle_moment=curves.get("ankle_moment"),
         vertical_force=curves.get("vertical_force"),
         centre_of_pressure=curves.get("centre_of_pressure"),
+        knee_forward=curves.get("knee_forward"),
+        knee_up=curves.get("knee_up"),
     )
 
 
@@ -149,7 +145,7 @@ def _curve(given: dict[str, Any], name: str, file: str) -> Curve:
         raise DataError(f"{file}: {name} has {counts}; a series has as many of both")
 
     def si(value: float) -> float:
-        return to_si(float(value), _spelled(given["unit"]), _spelled(CURVES[name]))
+        return to_si(float(value), plain_unit(given["unit"]), plain_unit(CURVES[name]))
 
     return Curve(
         si(given["mean"]),
@@ -162,50 +158,3 @@ def _curve(given: dict[str, Any], name: str, file: str) -> Curve:
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a gait file."""
     return published_schema(gait_file(), "ppafo gait")
-
-
-def gait_toml(gait: Gait) -> str:
-    """Return the text of a gait file; reading it back gives the same gait, to rounding of the angles."""
-    return "\n".join(_lines(gait)) + "\n"
-
-
-def _lines(gait: Gait) -> Iterator[str]:
-    yield "schema_version = 1"
-    texts = {"name": gait.name, "title": gait.title, "origin": gait.origin, "source": gait.source, "notes": gait.notes}
-    yield from (f"{key} = {_text(value)}" for key, value in texts.items() if value)
-    yield from ("", "[subject]", f'body_mass = "{gait.body_mass!r} kg"')
-    for key in ("walking_speed", "recorded_speed"):
-        speed = getattr(gait, key)
-        if speed is not None:
-            yield f'{key} = "{speed!r} m/s"'
-    yield from ("", "[stride]", f'time = "{gait.stride_time!r} s"', f'stance_share = "{gait.stance_share!r}"')
-    if gait.stride_time_deviation:
-        yield f'time_deviation = "{gait.stride_time_deviation!r} s"'
-    if gait.stance_share_deviation:
-        yield f'stance_share_deviation = "{gait.stance_share_deviation!r}"'
-    yield f"count = {gait.strides}"
-    for name, curve in gait.curves.items():
-        yield from ("", f"[{name}]", *_series(curve, CURVES[name]))
-
-
-def _series(curve: Curve, si_unit: str) -> Iterator[str]:
-    unit = WRITTEN_UNITS.get(si_unit, si_unit)
-
-    def written(value: float) -> str:
-        return repr(float(f"{from_si(value, _spelled(unit), _spelled(si_unit)):.{_DIGITS}g}"))
-
-    yield f"unit = {_text(unit)}"
-    yield f"mean = {written(curve.mean)}"
-    yield f"cosine = [{', '.join(map(written, curve.cosines))}]"
-    yield f"sine = [{', '.join(map(written, curve.sines))}]"
-    yield f"deviation = {written(curve.deviation)}"
-
-
-def _spelled(unit: str) -> str:
-    """Return the unit as ``ppafo.units`` writes it: a plain number has none."""
-    return "" if unit == _PLAIN else unit
-
-
-def _text(text: str) -> str:
-    """Return a basic string of TOML; what JSON escapes is escaped in the same way there, but for DEL."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -14,6 +14,8 @@ HARMONICS: dict[str, int] = {
     "ankle_moment": 10,
     "vertical_force": 12,
     "centre_of_pressure": 10,
+    "knee_forward": 6,
+    "knee_up": 6,
 }
 """As many as bring the fit well below the spread between strides, and not more: each one roughens the acceleration."""
 

@@ -5,15 +5,15 @@
 - ``ankle_moment`` [N m/kg]: internal moment of the wearer per body mass, above 0 in plantarflexion.
 - ``vertical_force`` [body weights]: ground reaction on this foot, above 0 upwards.
 - ``centre_of_pressure`` [m]: where it acts, forward of the ankle along the foot; without meaning while the foot is off.
+- ``knee_forward``, ``knee_up`` [m/s^2]: acceleration of the knee in the sagittal plane, without gravity.
 
 With a flat foot theta is 90 deg plus phi. The phase counts strides from one heel strike of the foot to its next.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from ppafo.errors import DataError, nearest_name
-from ppafo.model.periodic import periodic_motion, periodic_value
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -28,10 +28,20 @@ CURVES: dict[str, str] = {
     "ankle_moment": "N m/kg",
     "vertical_force": "-",
     "centre_of_pressure": "m",
+    "knee_forward": "m/s^2",
+    "knee_up": "m/s^2",
 }
 """The curves of a gait and the unit in which each is kept; the first two are always there."""
 
 REQUIRED = ("shank_angle", "ankle_angle")
+
+KNEE = ("knee_forward", "knee_up")
+"""Curves that are accelerations: they go with the square of the cadence."""
+
+
+def plain_unit(unit: str) -> str:
+    """Return the unit of a curve as ``ppafo.units`` writes it: a plain number has none."""
+    return unit.removeprefix("-")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,22 +67,33 @@ class Curve:
 
     def value(self, phase: float) -> float:
         """Return the value at a phase [strides]."""
-        return periodic_value(self.mean, self.cosines, self.sines, phase)
-
-    def motion(self, phase: float, stride_time: float) -> tuple[float, float, float]:
-        """Return value, rate and acceleration by time at a phase [strides], for a stride of this time [s]."""
-        return periodic_motion(self.mean, self.cosines, self.sines, phase, stride_time)
+        return float(self.sampled(phase))
 
     def rate(self, phase: float, stride_time: float) -> float:
         """Return the first derivative by time at a phase [strides], for a stride of this time [s]."""
-        return self.motion(phase, stride_time)[1]
+        return self.derivative(stride_time).value(phase)
 
     def acceleration(self, phase: float, stride_time: float) -> float:
         """Return the second derivative by time at a phase [strides], for a stride of this time [s]."""
-        return self.motion(phase, stride_time)[2]
+        return self.derivative(stride_time).rate(phase, stride_time)
+
+    def derivative(self, stride_time: float) -> "Curve":
+        """Return the derivative by time for a stride of this time [s]; how much strides differ in it is not known."""
+        import numpy as np
+
+        angular = 2.0 * np.pi / stride_time * (1.0 + np.arange(self.harmonics))
+        cosines, sines = angular * np.array(self.sines), -angular * np.array(self.cosines)
+        return Curve(0.0, tuple(cosines.tolist()), tuple(sines.tolist()))
+
+    def scaled(self, factor: float) -> "Curve":
+        """Return the curve times a factor, the deviation between strides with it."""
+        cosines, sines = (tuple(factor * value for value in values) for values in (self.cosines, self.sines))
+        return replace(
+            self, mean=factor * self.mean, cosines=cosines, sines=sines, deviation=abs(factor) * self.deviation
+        )
 
     def sampled(self, phases: "ArrayLike") -> "Floats":
-        """Return the values at many phases [strides], for figures."""
+        """Return the values at many phases [strides]."""
         import numpy as np
 
         turns = 2.0 * np.pi * np.multiply.outer(np.asarray(phases, dtype=np.float64), 1.0 + np.arange(self.harmonics))
@@ -102,6 +123,8 @@ class Gait:
     ankle_moment: Curve | None = None
     vertical_force: Curve | None = None
     centre_of_pressure: Curve | None = None
+    knee_forward: Curve | None = None
+    knee_up: Curve | None = None
     stride_time_deviation: float = 0.0
     stance_share_deviation: float = 0.0
     strides: int = 0

@@ -7,6 +7,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError
 from ppafo.gait.document import gait_of
 from ppafo.gait.gait import Gait
+from ppafo.gait.plausible.stride import check_gait
 
 NORMATIVE = "falisse2019-subject1"
 """The gait that is taken where none is named."""
@@ -25,5 +26,7 @@ def load_gait(name_or_path: str | Path = NORMATIVE) -> Gait:
 
 
 def parse_gait(content: bytes, file: str) -> Gait:
-    """Return the gait in the bytes of a gait file; ``file`` is what messages call it."""
-    return gait_of(_FILE.parse(content, label(file)), label(file))
+    """Return the gait in the bytes of a gait file; ``file`` is what messages call it. DataError where it cannot be."""
+    gait = gait_of(_FILE.parse(content, label(file)), label(file))
+    check_gait(gait, label(file))
+    return gait

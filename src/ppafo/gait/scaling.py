@@ -1,4 +1,4 @@
-"""A gait at another walking speed: the stride gets longer or shorter in time, and nothing else changes."""
+"""A gait at another walking speed: the stride gets longer or shorter in time, and every motion in it stays."""
 
 import math
 from dataclasses import replace
@@ -28,7 +28,8 @@ def at_speed(gait: Gait, speed: float) -> Gait:
     """Return the gait at a walking speed [m/s]: stride time goes with speed to the power of -1/2.
 
     That is a constant walk ratio, step length over cadence (Sekiya and Nagasaki 1998, Gait Posture 7:225). Amplitudes,
-    moments per mass, force in body weights and stance share stay as recorded, so only a small change is allowed.
+    moments per mass, force in body weights and stance share stay as recorded, so only a small change is allowed. So
+    does the way of the knee about its mean speed; its acceleration goes with 1/T^2.
     """
     recorded = _recorded(gait)
     low, high = speed_range(gait)
@@ -44,6 +45,8 @@ def at_speed(gait: Gait, speed: float) -> Gait:
         recorded_speed=recorded,
         stride_time=gait.stride_time * math.sqrt(current / speed),
         stride_time_deviation=gait.stride_time_deviation * math.sqrt(current / speed),
+        knee_forward=gait.knee_forward and gait.knee_forward.scaled(speed / current),
+        knee_up=gait.knee_up and gait.knee_up.scaled(speed / current),
     )
 
 

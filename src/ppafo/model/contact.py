@@ -81,6 +81,16 @@ def heel_share(contact: float, timing: GaitTiming, phase: float) -> float:
     return 1.0 if contact == HEEL else flat
 
 
+def heel_torque(contact: float, now: GaitNow, heel_lever: float) -> float:
+    """Torque [N m] of the ground about the ankle while the foot rolls on its heel, positive in plantarflexion.
+
+    What the measured moment leaves to the ground of the torque that moves the healthy foot. A foot that is still on
+    its heel when the healthy one is flat is turned by the force on ``heel_lever`` [m].
+    """
+    torque = now.healthy_torque + max(-now.moment, now.force * heel_lever)
+    return torque if contact == HEEL else 0.0
+
+
 def ground_forces(contact: float, timing: GaitTiming, now: GaitNow) -> tuple[float, float]:
     """Forces [N] under heel and toes; none in the swing."""
     total = 0.0 if contact == SWING else now.force

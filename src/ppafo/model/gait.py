@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from ppafo.model.fourier import Series, acceleration_at, harmonics, rate_at, value_at
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.turns import TURN, sine_and_cosine
 
 
@@ -41,7 +42,7 @@ class GaitNow(NamedTuple):
     """The gait at an instant: phase in turns, angles [rad] with their derivatives, moment [N m], force [N].
 
     Accelerations of the knee forward and up [m/s^2]; sine and cosine of the shank angle, and sine of the angle of the
-    measured foot over the horizontal.
+    measured foot over the horizontal; torque [N m] that moves the measured foot, by equation (11).
     """
 
     phase: float
@@ -58,6 +59,7 @@ class GaitNow(NamedTuple):
     sine_shank: float
     cosine_shank: float
     sine_healthy_foot: float
+    healthy_torque: float
 
 
 def phase_at(timing: GaitTiming, time: float) -> float:
@@ -66,27 +68,36 @@ def phase_at(timing: GaitTiming, time: float) -> float:
     return turns - float(int(turns))
 
 
-def gait_at(gait: GaitSeries, timing: GaitTiming, body_mass: float, gravity: float, time: float) -> GaitNow:
-    """The gait of a person of a mass [kg] at a time [s]; ``gravity`` [m/s^2] makes newtons of body weights."""
+def gait_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, time: float) -> GaitNow:
+    """The gait of a person with this leg at a time [s]; body mass and gravity make newtons of body weights."""
     phase = phase_at(timing, time)
     at = harmonics(phase)
     shank = value_at(gait.shank, at)
+    shank_rate = rate_at(gait.shank, at, timing.frequency)
+    shank_acceleration = acceleration_at(gait.shank, at, timing.frequency)
     ankle = value_at(gait.ankle, at)
+    ankle_rate = rate_at(gait.ankle, at, timing.frequency)
+    ankle_acceleration = acceleration_at(gait.ankle, at, timing.frequency)
+    forward, up = value_at(gait.knee_forward, at), value_at(gait.knee_up, at)
     sine_shank, cosine_shank = sine_and_cosine(shank / TURN)
-    sine_foot, _ = sine_and_cosine((shank - ankle) / TURN + 0.25)
+    sine_foot, cosine_foot = sine_and_cosine((shank - ankle) / TURN + 0.25)
+    carried = torque_of_shank(
+        leg, sine_shank, cosine_shank, sine_foot, cosine_foot, shank_rate, shank_acceleration, forward, up
+    )
     return GaitNow(
         phase,
         shank,
-        rate_at(gait.shank, at, timing.frequency),
-        acceleration_at(gait.shank, at, timing.frequency),
+        shank_rate,
+        shank_acceleration,
         ankle,
-        rate_at(gait.ankle, at, timing.frequency),
-        acceleration_at(gait.ankle, at, timing.frequency),
-        body_mass * value_at(gait.moment, at),
-        max(body_mass * gravity * value_at(gait.force, at), 0.0),
-        value_at(gait.knee_forward, at),
-        value_at(gait.knee_up, at),
+        ankle_rate,
+        ankle_acceleration,
+        leg.body_mass * value_at(gait.moment, at),
+        max(leg.body_mass * leg.gravity * value_at(gait.force, at), 0.0),
+        forward,
+        up,
         sine_shank,
         cosine_shank,
         sine_foot,
+        carried + foot_inertia_about_ankle(leg) * ankle_acceleration + leg.ankle_damping * ankle_rate,
     )

@@ -14,7 +14,8 @@ class LegParameters(NamedTuple):
 
     ``ankle_stiffness`` [N m/rad] pulls the ankle to ``ankle_rest_angle`` [rad]; ``ankle_damping`` [N m s/rad].
     ``residual_share`` [-] of the measured ankle moment is what the wearer still has: 0 is the paper's full deficit.
-    ``heel_lever`` and ``toe_lever`` [m] reach from the ankle back to the heel and forward to the toes.
+    ``heel_lever`` [m] is that of the ground force about the ankle while the foot rolls on its heel, ``toe_lever`` [m]
+    reaches from the ankle forward to the toes.
     """
 
     shank_length: float
@@ -94,6 +95,31 @@ def gravity_torques(
     shank = leg.shank_mass * leg.shank_mass_centre + leg.foot_mass * leg.shank_length
     foot = leg.foot_mass * leg.foot_mass_centre * (cosine_alpha * up - sine_alpha * knee_forward)
     return LegTorques(shank * (sine_phi * up + cosine_phi * knee_forward) + foot, -foot)
+
+
+def torque_of_shank(
+    leg: LegParameters,
+    sine_phi: float,
+    cosine_phi: float,
+    sine_alpha: float,
+    cosine_alpha: float,
+    shank_rate: float,
+    shank_acceleration: float,
+    knee_forward: float,
+    knee_up: float,
+) -> float:
+    """Torque [N m] that shank, knee and weight ask of the ankle, beside the foot's own acceleration.
+
+    The ankle's row of equation (11) without the term in theta''; angles as in ``gravity_torques``, rates [rad/s],
+    accelerations [rad/s^2], [m/s^2].
+    """
+    # theta is phi less alpha, plus 90 deg.
+    sine_theta = cosine_phi * cosine_alpha + sine_phi * sine_alpha
+    cosine_theta = cosine_phi * sine_alpha - sine_phi * cosine_alpha
+    coupling = mass_matrix(leg, cosine_theta).coupling
+    turning = centrifugal_torques(leg, sine_theta, shank_rate, 0.0)
+    weight = gravity_torques(leg, sine_phi, cosine_phi, sine_alpha, cosine_alpha, knee_forward, knee_up)
+    return coupling * shank_acceleration + turning.ankle + weight.ankle
 
 
 def passive_torque(leg: LegParameters, angle: float) -> float:

@@ -9,6 +9,7 @@ import ppafo
 from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI
 from ppafo.documents.json_text import json_text
 from ppafo.reporting.endurance_figure import ICE_POINT, SECONDS_PER_MINUTE, endurance_figure
+from ppafo.reporting.endurance_table import chambers_sentence
 from ppafo.reporting.style import rendered
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.studies.endurance import Discharge, Endurance, Reuse
@@ -53,6 +54,7 @@ def endurance_document(made: Endurance) -> dict[str, Any]:
     if made.reuse is not None and made.without_reuse is not None:
         cycle, balance = made.reuse.cycle._asdict(), made.reuse.balance._asdict()
         document["reuse"] = {"cycle": cycle, "balance": balance, "without_reuse": _course(made.without_reuse)}
+        document["reuse"]["origins"] = dict(made.reuse.origins)
     return document
 
 
@@ -77,10 +79,11 @@ def _reuse_section(reused: Reuse) -> str:
     cycle = reused.cycle
     pressures = {name: getattr(cycle, name) for name in ("exhaust_pressure", "fill_pressure", "atmospheric_pressure")}
     volumes = {name: getattr(cycle, name) for name in ("exhaust_volume", "fill_volume", "reservoir_volume")}
-    rows = [f"| `{name}` | {value / PASCALS_PER_PSI:.3g} psi absolute |" for name, value in pressures.items()]
-    rows += [f"| `{name}` | {from_si(value, 'cm^3', 'm^3'):.3g} cm^3 |" for name, value in volumes.items()]
-    table = "\n".join(rows)
-    return f"\n## Reuse of the exhaust\n\n{REUSE_ASSUMES}\n\n| Value | |\n|---|---|\n{table}\n"
+    shown = {name: f"{value / PASCALS_PER_PSI:.3g} psi absolute" for name, value in pressures.items()}
+    shown |= {name: f"{from_si(value, 'cm^3', 'm^3'):.3g} cm^3" for name, value in volumes.items()}
+    origins = reused.origins
+    table = "\n".join(f"| `{name}` | {text} | {origins.get(name, 'standard')} |" for name, text in shown.items())
+    return f"\n## Reuse of the exhaust\n\n{REUSE_ASSUMES}\n\n| Value | | Origin |\n|---|---|---|\n{table}\n"
 
 
 def endurance_files(made: Endurance) -> dict[str, bytes]:
@@ -121,6 +124,7 @@ def _reuse_rows(made: Endurance, reused: Reuse, without: Discharge) -> list[tupl
             f"{_grams(balance.returned_mass)} a step, {balance.returned_mass / before:.1%} of "
             f"{_grams(before)}; the exhaust holds {_grams(balance.exhausted_mass)}",
         ),
+        ("chambers", chambers_sentence(reused)),
         ("without reuse", f"{_minutes(without.walking_time)} of walking, {without.steps:.0f} steps"),
     ]
 

@@ -34,6 +34,8 @@ _PANELS: dict[str, _Shown] = {
     "ankle_moment": _Shown("Ankle moment (N m/kg, above 0: plantarflexion)", 1.0, 0.0),
     "vertical_force": _Shown("Vertical ground reaction (body weights)", 1.0, 0.0),
     "centre_of_pressure": _Shown("Centre of pressure (cm forward of the ankle)", 100.0, 0.0),
+    "knee_forward": _Shown("Acceleration of the knee forward (m/s$^2$)", 1.0, 0.0),
+    "knee_up": _Shown("Acceleration of the knee upwards (m/s$^2$, without gravity)", 1.0, 0.0),
 }
 
 

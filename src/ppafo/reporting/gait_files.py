@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from ppafo.documents.json_text import json_text
-from ppafo.gait.document import gait_toml
-from ppafo.gait.gait import CURVES, Gait
+from ppafo.gait.gait import CURVES, Gait, plain_unit
 from ppafo.gait.recorded.events import Stride
 from ppafo.gait.recorded.importing import ImportedGait
 from ppafo.gait.recorded.strides import phases
+from ppafo.gait.writing import gait_toml
 from ppafo.reporting.gait_figure import gait_figure
 from ppafo.reporting.style import rendered
 
@@ -110,11 +110,10 @@ def _plus_minus(deviation: float) -> str:
 
 
 def _line(gait: Gait, name: str, imported: ImportedGait | None) -> str:
-    factor, unit = (_DEGREES, "deg") if CURVES[name] == "rad" else (1.0, CURVES[name].removeprefix("-"))
+    factor, unit = (_DEGREES, "deg") if CURVES[name] == "rad" else (1.0, plain_unit(CURVES[name]))
     curve = gait.curves[name]
     values = factor * curve.sampled(phases())
     text = f"  {name:<18}  from {values.min():7.3g} to {values.max():7.3g} {unit}".rstrip()
-    text += f", between strides {factor * curve.deviation:.2g}"
-    if imported is not None:
-        text += f", series within {factor * imported.fit_errors[name].root_mean_square:.2g} RMS"
-    return text
+    text += f", between strides {factor * curve.deviation:.2g}" if curve.deviation else ", between strides not known"
+    left = 0.0 if imported is None else imported.fit_errors[name].root_mean_square
+    return f"{text}, series within {factor * left:.2g} RMS" if left > _NOISE else text

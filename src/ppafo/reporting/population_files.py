@@ -15,7 +15,8 @@ from ppafo.reporting.style import rendered
 from ppafo.simulation.document import UNITS, plain
 from ppafo.storage.owned_folder import FolderKind, read_json
 from ppafo.walking.anthropometry import CORRELATION, MASS_VARIATION, MOST_DEVIATIONS, STATURE_VARIATION
-from ppafo.walking.population import OUTCOMES, START_VARIATION, THRESHOLD_VARIATION, TRAITS, Population
+from ppafo.walking.population import OUTCOMES, TRAITS, Population
+from ppafo.walking.wearers_rows import START_VARIATION, THRESHOLD_VARIATION
 
 WEARERS_FILE = "wearers.json"
 FORMAT = "ppafo wearers"

@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.reporting.layout import Margins, figure_of_panels
-from ppafo.reporting.style import BLACK, BLUE, CHAMBER_1, CHAMBER_2, GREY, VERMILION, house_style, mark_kind
+from ppafo.reporting.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.walking.comparison import Comparison, healthy_toe_height
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkResult
@@ -83,13 +83,12 @@ def _draw(axes: "Axes", panel: _Panel, result: WalkResult, name: str, colour: st
     if not result.averages or (pressures and not np.any(result.recording["supplied_mass"])):
         return
     atmosphere = result.configuration.device.supply.atmospheric_pressure
-    colours = (CHAMBER_1, CHAMBER_2) if pressures else (colour,)
-    for channel, style, shade in zip(panel.channels, ("-", (0, (4, 2))), colours, strict=False):
+    for channel, style in zip(panel.channels, ("-", (0, (4, 2))), strict=False):
         curves = result.averages[channel]
         factor, zero = (1.0 / PASCALS_PER_PSI, atmosphere) if pressures else (panel.factor, 0.0)
         mean, band = factor * (curves.mean - zero), factor * curves.deviation
-        axes.fill_between(_PERCENT, mean - band, mean + band, color=shade, alpha=0.2, linewidth=0.0)
-        axes.plot(_PERCENT, mean, color=shade, linestyle=style, label=name)
+        axes.fill_between(_PERCENT, mean - band, mean + band, color=colour, alpha=0.2, linewidth=0.0)
+        axes.plot(_PERCENT, mean, color=colour, linestyle=style, label=name)
 
 
 def _healthy(angle: "Axes", toes: "Axes", result: WalkResult) -> None:

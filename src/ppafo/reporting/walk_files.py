@@ -23,12 +23,11 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.storage.owned_folder import FolderKind, read_json
 from ppafo.studies.endurance import Endurance
+from ppafo.studies.endurance.walked import FORMAT, WALK_FILE
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.strides import PER_STRIDE, PHASES
 from ppafo.walking.walk import WalkResult
 
-WALK_FILE = "walk.json"
-FORMAT = "ppafo walk"
 SCHEMA_VERSION = 1
 REPORT = "report.html"
 TEMPLATE = "walk.html.jinja"

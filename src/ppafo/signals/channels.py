@@ -33,8 +33,8 @@ CHANNELS: dict[str, ChannelKind] = {
         "rad", "ankle angle of the gait that the wearer would walk, growing in plantarflexion"
     ),
     "device_power": ChannelKind("W", "power that the device gives to the wearer, T_ex times the angular velocity"),
-    "knee_torque": ChannelKind(
-        "N m", "T_1 of equation (11), what moves shank and foot without the ground; for the swing"
+    "swing_knee_torque": ChannelKind(
+        "N m", "T_1 of equation (11) in the swing, what moves shank and foot; 0 on the ground"
     ),
     "contact": ChannelKind(PLAIN_NUMBER, "foot and ground: 0 free, 1 on the heel, 2 flat, 3 on the toes", is_held=True),
     "controller_phase": ChannelKind(
@@ -57,6 +57,9 @@ CHANNELS: dict[str, ChannelKind] = {
     "bottle_temperature": ChannelKind("K", "temperature of the content of the bottle"),
     "wall_temperature": ChannelKind("K", "temperature of the wall of the bottle"),
     "bottle_pressure": ChannelKind("Pa", "absolute pressure in the bottle"),
+    "line_pressure_1": ChannelKind("Pa", "absolute pressure in the line behind the bottle's regulator"),
+    "line_pressure_2": ChannelKind("Pa", "absolute pressure in the dorsiflexion line, behind the second regulator"),
+    "regulated_mass": ChannelKind("kg", "gas let through by the bottle's regulator since the start"),
     "supply_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve"),
     "dorsiflexion_pressure": ChannelKind("Pa", "absolute pressure at the inlet of the valve for chamber 2"),
     "pressure_difference": ChannelKind("Pa_d", "pressure in chamber 1 less that in chamber 2"),

@@ -41,8 +41,8 @@ def compare_walks(configuration: Configuration, minutes: float, progress: Progre
 
 
 def switched_off(configuration: Configuration) -> Configuration:
-    """The same wearer and device with both chambers vented."""
-    return replace(configuration, name=f"{configuration.name}-off", controller=off.KIND, settings={})
+    """The same wearer and device with both chambers vented; no gas flows, so it needs no lines."""
+    return replace(configuration, name=f"{configuration.name}-off", controller=off.KIND, settings={}, supply_lines=None)
 
 
 def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from ppafo.control.kind import ControllerKind
 from ppafo.gait import Gait
 from ppafo.model.gait_sensors import Fault, GaitSensors
+from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.device import Device
 from ppafo.walking.wearer import Wearer
@@ -15,6 +16,7 @@ from ppafo.walking.wearer import Wearer
 class Configuration:
     """One device on one wearer; ``settings`` of the controller in SI, ``period`` and ``step`` in seconds.
 
+    ``supply_lines`` are the lines behind its regulators, None where the supply pressures are constant.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
 
@@ -32,6 +34,7 @@ class Configuration:
     assumed: Mapping[str, str]
     file: str
     overrides: tuple[str, ...]
+    supply_lines: SupplyLines | None = None
 
     @property
     def has_ideal_sensors(self) -> bool:

@@ -3,6 +3,7 @@
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.declaration import PERIOD, RATE, SENSORS
+from ppafo.walking.supply_line import LINES, SECTION, line_quantities
 from ppafo.walking.wearer import WEARER
 
 LARGEST_SEED = 2**32 - 1
@@ -52,4 +53,6 @@ def quantities(controller: str) -> dict[str, Quantity]:
     for sensor in FAULTY:
         found[f"faults.{sensor}.time"] = FAULT_TIME
         found[f"faults.{sensor}.reading"] = READINGS[sensor]
+    for line in LINES:
+        found |= {f"{SECTION}.{line}.{item.name}": item for item in line_quantities(line)}
     return found

@@ -37,6 +37,7 @@ from ppafo.walking.declaration import (
     quantities,
 )
 from ppafo.walking.schema import walk_file
+from ppafo.walking.supply_line import assumed_lines, supply_lines
 from ppafo.walking.wearer import WEARER, Wearer
 
 _FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
@@ -67,10 +68,11 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
     kind = WALKING_CONTROLLERS[kind_at(document, "controller")]
+    device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
     configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
-        device=_device(document, [text for text in given if is_of_device(split_override(text)[0])], file),
+        device=device,
         gait=_gait(gait or document.get("gait", NORMATIVE), folder, gait is None),
         wearer=Wearer(**reading.section("wearer", WEARER)),
         controller=kind,
@@ -79,9 +81,10 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
         gait_sensors=_gait_sensors(reading),
         period=_period(reading),
         step=reading.number("run.step", STEP),
-        assumed=dict(document.get("assumed", {})),
+        assumed=dict(document.get("assumed", {})) | assumed_lines(reading),
         file=str(name_or_path),
         overrides=given,
+        supply_lines=supply_lines(reading, device),
     )
     check_walk(configuration, reading)
     return configuration

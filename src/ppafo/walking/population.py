@@ -1,36 +1,26 @@
 """Many wearers at once: one column of the engine repeated, rows overwritten, no loop over people."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ppafo.engine.lane_rows import LANES
 from ppafo.engine.lanes import Batch, Floats, run_batch
-from ppafo.engine.rows import leaf_paths
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.engine.run import NEVER_FAILED
 from ppafo.errors import ScenarioError
-from ppafo.model.chambers import chamber_mass
-from ppafo.model.leg import LegParameters
-from ppafo.model.plant import chamber_volumes
-from ppafo.walking.anthropometry import Build, bounded_normal, drawn_builds, scaled_segments
+from ppafo.walking.anthropometry import drawn_builds
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.declaration import LARGEST_SEED
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
-from ppafo.walking.varied_gait import VariedGaits, varied_gaits
+from ppafo.walking.varied_gait import varied_gaits
 from ppafo.walking.walk import REMEDY, Progress, checked_seconds, plan_of, silent
+from ppafo.walking.wearers_rows import batch_of_many, row_numbers
 
 MOST_WEARERS = 1_000_000
 
 STEPS_AT_ONCE = 1.0e8
 """Steps of all wearers of one group together, a few seconds."""
-
-THRESHOLD_VARIATION = 0.15
-"""Standard deviation of thresholds over their values: how a fitter sets them, and how a sensor sits. Assumed."""
-
-START_VARIATION = 0.03
-"""Standard deviation of the share of the stride at which the push-off begins. Assumed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +34,9 @@ class Number:
 OUTCOMES: dict[str, Number] = {
     "gas": Number("kg", "gas taken from the supply in one stride"),
     "push_off_work": Number("J", "work of T_ex while the foot rolls over the toes, in one stride"),
-    "slap_rate": Number("rad/s", "rate of the foot when it lands flat, below 0 with the toes falling"),
+    "slap_rate": Number(
+        "rad/s", "rate of the toes as they come down after the heel, below 0; 0 where they always came first"
+    ),
     "toe_clearance": Number("m", "lowest toes in mid-swing against the wearer's healthy gait"),
     "toe_landing": Number("-", "share of the strides in which the toes met the ground before the heel"),
 }
@@ -100,10 +92,10 @@ def walk_population(
     run = plan_walk(plan_of(configuration, checked_seconds(configuration, minutes)))
     generator = np.random.default_rng(seed)
     build = drawn_builds(wearers, generator)
-    gaits = varied_gaits(configuration.gait, wearers, generator)
-    batch = _batch(configuration, run, build, gaits, generator)
+    gaits = varied_gaits(configuration.gait, build.stature, generator)
+    batch = batch_of_many(configuration, run, build, gaits, generator)
     states = _walked(batch, progress)
-    rows = {path: states[row] for path, row in _rows(batch.program.state_rows()).items()}
+    rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
     good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)
     outcomes = _outcomes(rows, run.step * run.step_count * gaits.timing["frequency"])
     traits = {
@@ -139,93 +131,4 @@ def _outcomes(rows: Mapping[str, Floats], strides: Floats) -> dict[str, Floats]:
         "slap_rate": rows["walk.slap_rates"] / landings,
         "toe_clearance": rows["walk.clearances"] / strikes,
         "toe_landing": rows["walk.toe_landings"] / strikes,
-    }
-
-
-def _batch(
-    configuration: Configuration, run: Run, build: Build, gaits: VariedGaits, generator: np.random.Generator
-) -> Batch:
-    """The run's column for every wearer, with what differs written over it; nothing is recorded on the way."""
-    single = batch_of(run)
-    count = build.mass.size
-    segments = scaled_segments(configuration.wearer, build)
-    parameters, states = (np.repeat(column, count, axis=1) for column in (single.parameters, single.states))
-    _overwrite(parameters, _rows(single.program.parameter_rows()), _parameter_rows(run, segments, gaits, generator))
-    _overwrite(states, _rows(single.program.state_rows()), _state_rows(run, segments["body_mass"], gaits))
-    still = replace(single.clock, record_every=0)
-    return Batch(single.program, still, parameters, states)
-
-
-def _rows(groups: Mapping[str, type]) -> dict[str, int]:
-    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    return {path: number for number, path in enumerate(paths)}
-
-
-def _overwrite(table: Floats, rows: Mapping[str, int], values: Mapping[str, Floats]) -> None:
-    for path, row in values.items():
-        table[rows[path]] = row
-
-
-def _parameter_rows(
-    run: Run, segments: Mapping[str, Floats], gaits: VariedGaits, generator: np.random.Generator
-) -> dict[str, Floats]:
-    found = {f"leg.{name}": values for name, values in segments.items() if name in LegParameters._fields}
-    assert run.walk is not None, "a population walks"
-    foot = segments["foot_inertia"] + segments["foot_mass"] * segments["foot_mass_centre"] ** 2
-    found["plant.inertia"] = run.walk.share.inertia + foot
-    # Everybody has noise of their own, where there is any.
-    found["sensors.seed"] = np.arange(run.sensors.seed, run.sensors.seed + foot.size, dtype=np.float64) % LARGEST_SEED
-    found |= {
-        f"gait.{field}.{name}": values
-        for field, series in gaits.series.items()
-        for name, values in series.rows().items()
-    }
-    found |= {f"gait_timing.{name}": values for name, values in gaits.timing.items()}
-    return found | _thresholds(run, segments["body_mass"].size, generator)
-
-
-def _thresholds(run: Run, count: int, generator: np.random.Generator) -> dict[str, Floats]:
-    """Thresholds of an event-based controller about its settings; both of a sensor move together and stay apart."""
-    rules = getattr(run.controller, "phases", None)
-    if rules is None:
-        return {}
-    scale = 1.0 + THRESHOLD_VARIATION * bounded_normal(generator, (count,))
-    start = rules.push_off_start + START_VARIATION * bounded_normal(generator, (count,))
-    scale[0], start[0] = 1.0, rules.push_off_start
-    return {
-        "controller.phases.load_threshold": rules.load_threshold * scale,
-        "controller.phases.unload_threshold": rules.unload_threshold * scale,
-        "controller.phases.push_off_start": np.clip(start, 0.0, 1.0),
-    }
-
-
-def _state_rows(run: Run, body_mass: Floats, gaits: VariedGaits) -> dict[str, Floats]:
-    """The start at a heel strike with the wearer's own angles and vented chambers."""
-    assert run.walk is not None, "a population walks"
-    frequency = gaits.timing["frequency"]
-    shank, shank_rate, shank_acceleration = gaits.series["shank"].at_heel_strike(frequency)
-    ankle, ankle_rate, ankle_acceleration = gaits.series["ankle"].at_heel_strike(frequency)
-    moment = body_mass * gaits.series["moment"].at_heel_strike(frequency)[0]
-    force = body_mass * run.walk.leg.gravity * gaits.series["force"].at_heel_strike(frequency)[0]
-    plant = run.plant
-    volumes = chamber_volumes(plant, ankle)  # type: ignore[arg-type]
-    masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
-    now = {
-        "shank": shank,
-        "shank_rate": shank_rate,
-        "shank_acceleration": shank_acceleration,
-        "ankle": ankle,
-        "ankle_rate": ankle_rate,
-        "ankle_acceleration": ankle_acceleration,
-        "moment": moment,
-        "force": np.maximum(force, 0.0),
-        "sine_shank": np.sin(shank),
-        "cosine_shank": np.cos(shank),
-        "sine_healthy_foot": np.cos(shank - ankle),
-    }
-    return {f"walk.now.{name}": values for name, values in now.items()} | {
-        "state.angle": ankle,
-        "state.angular_velocity": ankle_rate,
-        "state.mass_1": np.asarray(masses[0]),
-        "state.mass_2": np.asarray(masses[1]),
     }

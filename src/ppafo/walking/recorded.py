@@ -6,8 +6,10 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
+from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix
 from ppafo.model.plant import chamber_pressures
+from ppafo.model.regulator import LineState, line_pressures
 from ppafo.signals import Channel, Recording
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.posture import ankle_path
@@ -34,7 +36,7 @@ def recorded(configuration: Configuration, run: Run, time: Floats, record: Mappi
         "torque": (run.plant.torque_constant * np.subtract(pressure_1, pressure_2), "N m"),
         "external_torque": (external, "N m"),
         "device_power": (external * rate, "W"),
-        "knee_torque": (knee_torque(run, time, record), "N m"),
+        "swing_knee_torque": (swing_knee_torque(run, time, record), "N m"),
         "toe_height": (path.toe_height(record["walk.now.phase"], record["walk.now.shank"], angle), "m"),
         "command": (record["result.command"], "-"),
         "contact": (record["walk.contact"], "-"),
@@ -43,6 +45,11 @@ def recorded(configuration: Configuration, run: Run, time: Floats, record: Mappi
         "supplied_mass": (record["state.supplied_mass"], "kg"),
         "vented_mass": (record["state.vented_mass"], "kg"),
     }
+    if run.lines is not None:
+        gas = LineState(*(record[f"line_state.{name}"] for name in LineState._fields))  # type: ignore[arg-type]
+        line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, gas)
+        channels |= {"line_pressure_1": (line_1, "Pa"), "line_pressure_2": (line_2, "Pa")}
+        channels["regulated_mass"] = (gas.regulated_mass, "kg")
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
         channels["safe_state"] = (record[SAFE_ROW], "-")
@@ -50,8 +57,11 @@ def recorded(configuration: Configuration, run: Run, time: Floats, record: Mappi
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
 
 
-def knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
-    """T_1 of equation (11) [N m]: what moves shank and foot as prescribed, without the ground; for the swing."""
+def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
+    """T_1 of equation (11) [N m] in the swing: what moves shank and foot as prescribed; 0 on the ground.
+
+    There it would need the horizontal force of the ground, which a gait file does not have.
+    """
     assert run.walk is not None, "a walk has a leg"
     leg = run.walk.leg
     theta, phi = record["state.angle"], record["walk.now.shank"]
@@ -62,4 +72,4 @@ def knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
     forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
     weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)  # type: ignore[arg-type]
     inertial = matrix.shank * record["walk.now.shank_acceleration"] + matrix.coupling * ankle_acceleration
-    return np.asarray(inertial + turning.knee + weight.knee)
+    return np.where(record["walk.contact"] == SWING, inertial + turning.knee + weight.knee, 0.0)

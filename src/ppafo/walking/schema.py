@@ -9,7 +9,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.documents.models import NAME, one_of, optional, published_schema, table
 from ppafo.simulation.declaration import SAMPLING
 from ppafo.simulation.schema import device_fields, kind_field, number_type, quantity_fields, titled
-from ppafo.walking import declaration
+from ppafo.walking import declaration, supply_line
 from ppafo.walking.wearer import WEARER
 
 
@@ -37,6 +37,14 @@ def _fault(sensor: str) -> Any:
     )
 
 
+def _lines() -> Any:
+    fields = {
+        line: optional(table(f"{titled(line)}Line", quantity_fields(supply_line.line_quantities(line))), f"{line} line")
+        for line in supply_line.LINES
+    }
+    return table("SupplyLine", fields)
+
+
 @functools.cache
 def walk_file() -> type[BaseModel]:
     """Return the model of a walk file."""
@@ -55,6 +63,7 @@ def walk_file() -> type[BaseModel]:
         "wearer": optional(table("Wearer", quantity_fields(WEARER)), "who walks; the paper's subject unless given"),
         "sensors": optional(table("WalkSensors", sensors), "what the controller sees; ideal unless given"),
         "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
+        supply_line.SECTION: optional(_lines(), "regulators and lines of the gas; constant pressures unless given"),
         "run": optional(table("WalkRun", quantity_fields((declaration.STEP,))), "how it is computed"),
         "assumed": (dict[str, str], Field(default_factory=dict, description="values that no source gives, and why")),
     }

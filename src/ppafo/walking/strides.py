@@ -30,7 +30,9 @@ PER_STRIDE: dict[str, Quantity] = {
     "gas": Quantity("kg", "gas taken from the supply in one stride", "state.supplied_mass"),
     "push_off_work": Quantity("J", "work of T_ex while the foot rolls over the toes", "walk.push_off_work"),
     "slap_rate": Quantity(
-        "rad/s", "rate of the foot when it lands flat, below 0 with the toes falling", "walk.slap_rates"
+        "rad/s",
+        "rate of the toes as they come down after the heel, below 0; 0 where they came first",
+        "walk.slap_rates",
     ),
     "toe_clearance": Quantity("m", "lowest toes in mid-swing against the healthy gait", "walk.clearances"),
     "toe_landing": Quantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),

@@ -5,34 +5,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.gait import Gait
-from ppafo.gait.gait import Curve
+from ppafo.gait.gait import KNEE, Curve
+from ppafo.model.gait import GaitTiming
 from ppafo.signals.recording import Floats
 from ppafo.walking.anthropometry import bounded_normal
-from ppafo.walking.planning import (
-    CLEARANCE_FROM,
-    CLEARANCE_TO,
-    FLAT_FROM,
-    FLAT_TO,
-    HARMONICS,
-    HEEL_RISE,
-    LATEST_HEEL_RISE,
-    USUAL_HEEL_RISE,
-)
+from ppafo.walking.planning import EVENT_PHASES, HARMONICS, gait_events
 
-SERIES = {"shank": "shank_angle", "ankle": "ankle_angle", "moment": "ankle_moment", "force": "vertical_force"}
+SERIES = {
+    "shank": "shank_angle",
+    "ankle": "ankle_angle",
+    "moment": "ankle_moment",
+    "force": "vertical_force",
+    "knee_forward": "knee_forward",
+    "knee_up": "knee_up",
+}
 """Curves that vary, by their field of ``GaitSeries``."""
 
 SHARE_OF_LEVEL = 0.5
 """Share of a curve's variance that moves it as a whole; the rest goes to the harmonics by their power. Assumed: a gait
 file has one deviation for a curve."""
 
-_GRID = np.linspace(0.0, 1.0, 1001)[150:801]
-"""Phases at which the events are looked for: from the flat foot to the latest heel rise."""
 _AT_ONCE = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Series:
+class SeriesOfMany:
     """Coefficients of many curves: mean (people,), cosines and sines (people, 8)."""
 
     mean: Floats
@@ -44,6 +41,10 @@ class Series:
         order = 2.0 * np.pi * np.arange(1, HARMONICS + 1)
         value = self.mean + self.cosines.sum(axis=1)
         return value, frequency * (self.sines @ order), -(frequency**2) * (self.cosines @ order**2)
+
+    def scaled(self, factor: Floats) -> "SeriesOfMany":
+        """The curves times a factor each (people,)."""
+        return SeriesOfMany(self.mean * factor, self.cosines * factor[:, None], self.sines * factor[:, None])
 
     def rows(self) -> dict[str, Floats]:
         """Coefficients (people,) by the field of ``model.fourier.Series``."""
@@ -58,33 +59,31 @@ class Series:
 class VariedGaits:
     """Series by field of ``GaitSeries``, and the timing (people,) by field of ``GaitTiming``."""
 
-    series: dict[str, Series]
+    series: dict[str, SeriesOfMany]
     timing: dict[str, Floats]
     stride_time: Floats
 
 
-def varied_gaits(gait: Gait, count: int, generator: np.random.Generator) -> VariedGaits:
-    """Draw gaits; the first is the one that is varied. A curve that nobody measured stays 0."""
+def varied_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> VariedGaits:
+    """Draw gaits for people of a stature over that of the first (people,); the first walks as ``gait`` says.
+
+    A curve that nobody measured stays 0. The way of the knee is as long as people are tall and walked in their stride
+    time, so its acceleration goes with stature over stride time squared.
+    """
+    count = stature.size
     series = {field: _varied(gait.curves.get(name), count, generator) for field, name in SERIES.items()}
     time = gait.stride_time + gait.stride_time_deviation * bounded_normal(generator, (count,))
     share = gait.stance_share + gait.stance_share_deviation * bounded_normal(generator, (count,))
     time[0], share[0] = gait.stride_time, gait.stance_share
-    ground, heel_off = _events(series["shank"], series["ankle"], share)
-    swing = 1.0 - share
-    timing = {
-        "frequency": 1.0 / time,
-        "heel_off": heel_off,
-        "toe_off": share,
-        "clearance_from": share + CLEARANCE_FROM * swing,
-        "clearance_to": share + CLEARANCE_TO * swing,
-        "ground_angle": ground,
-    }
+    hurry = stature * (gait.stride_time / time) ** 2
+    series |= {name: series[name].scaled(hurry) for name in KNEE}
+    timing = {"frequency": 1.0 / time, **_events(series["shank"], series["ankle"], share)}
     return VariedGaits(series, timing, time)
 
 
-def _varied(curve: Curve | None, count: int, generator: np.random.Generator) -> Series:
+def _varied(curve: Curve | None, count: int, generator: np.random.Generator) -> SeriesOfMany:
     if curve is None:
-        return Series(np.zeros(count), np.zeros((count, HARMONICS)), np.zeros((count, HARMONICS)))
+        return SeriesOfMany(np.zeros(count), np.zeros((count, HARMONICS)), np.zeros((count, HARMONICS)))
     missing = (0.0,) * HARMONICS
     cosines, sines = (np.array((*values, *missing)[:HARMONICS]) for values in (curve.cosines, curve.sines))
     power = 0.5 * (cosines**2 + sines**2)
@@ -93,22 +92,18 @@ def _varied(curve: Curve | None, count: int, generator: np.random.Generator) -> 
     normal = bounded_normal(generator, (2, count, HARMONICS))
     level = curve.deviation * np.sqrt(SHARE_OF_LEVEL) * bounded_normal(generator, (count,))
     normal[:, 0], level[0] = 0.0, 0.0
-    return Series(curve.mean + level, cosines + spread * normal[0], sines + spread * normal[1])
+    return SeriesOfMany(curve.mean + level, cosines + spread * normal[0], sines + spread * normal[1])
 
 
-def _events(shank: Series, ankle: Series, stance_share: Floats) -> tuple[Floats, Floats]:
-    """Angle of the flat foot [rad] and phase of the heel's rise, as ``planning.gait_timing`` finds them."""
-    turns = 2.0 * np.pi * np.outer(np.arange(1, HARMONICS + 1), _GRID)
+def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> dict[str, Floats]:
+    """What ``planning.gait_events`` finds, by field of ``GaitTiming``; some people at a time, to need less memory."""
+    turns = 2.0 * np.pi * np.outer(np.arange(1, HARMONICS + 1), EVENT_PHASES)
     cosine, sine = np.cos(turns), np.sin(turns)
-    flat = (_GRID >= FLAT_FROM) & (_GRID <= FLAT_TO)
-    ground, heel_off = np.empty(stance_share.size), np.empty(stance_share.size)
+    found = []
     for first in range(0, stance_share.size, _AT_ONCE):
         part = slice(first, first + _AT_ONCE)
         level = shank.mean[part] - ankle.mean[part] + 0.5 * np.pi
         foot = (shank.cosines - ankle.cosines)[part] @ cosine + (shank.sines - ankle.sines)[part] @ sine
         foot += level[:, None]
-        ground[part] = np.median(foot[:, flat], axis=1)
-        steep = (foot < (ground[part] - HEEL_RISE)[:, None]) & (_GRID > FLAT_TO)
-        usual = USUAL_HEEL_RISE * stance_share[part]
-        heel_off[part] = np.where(steep.any(axis=1), _GRID[np.argmax(steep, axis=1)], usual)
-    return ground, np.minimum(heel_off, LATEST_HEEL_RISE * stance_share)
+        found.append(gait_events(foot, stance_share[part]))
+    return dict(zip(GaitTiming._fields[2:], np.concatenate(found, axis=1), strict=True))

@@ -142,6 +142,7 @@ def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
         period=configuration.period,
         step=configuration.step,
         record_interval=next(interval for longest, interval in RECORD_INTERVALS if seconds <= longest),
+        supply_lines=configuration.supply_lines,
     )
 
 
@@ -181,6 +182,8 @@ def _metrics(
     found = {}
     for name, item in PER_STRIDE.items():
         values = strides[name][SETTLING:]
+        if name == "slap_rate":
+            values = values[values < 0.0]
         if values.size:
             found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean")
     found["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")

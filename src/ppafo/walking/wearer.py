@@ -15,7 +15,7 @@ WEARER = (
     Quantity("foot_mass_centre", "m", "ankle to the mass centre of the foot", 0.09, 0.0, 0.5),
     Quantity("foot_mass", "kg", "mass of the foot", 1.0, 0.05, 10.0),
     Quantity("foot_inertia", "kg m^2", "inertia of the foot about its mass centre", 0.001, 1.0e-5, 1.0),
-    Quantity("heel_lever", "m", "ankle back to the heel", 0.05, 0.0, 0.2),
+    Quantity("heel_lever", "m", "ankle back to the heel; bounds the lever of the ground force", 0.05, 0.0, 0.2),
     Quantity("toe_lever", "m", "ankle forward to the toes", 0.18, 0.0, 0.5),
     Quantity("ankle_stiffness", "N m/rad", "stiffness of tissue at the ankle", 4.0, 0.0, 500.0),
     Quantity("ankle_rest_angle", "rad", "angle at which tissue pulls neither way", 1.92, 0.5, 3.0),

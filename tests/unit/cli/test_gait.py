@@ -66,6 +66,8 @@ def test_a_recording_is_exported_for_opensim(walk: Path, tmp_path: Path) -> None
         (["show", "falisse2019-subject1", "--speed", "3 m/s"], "can be scaled from 1.06 to 1.6 m/s, not to 3 m/s"),
         (["show", "falisse2019-subject1", "--speed", "1.2"], "--speed '1.2': a number without a unit"),
         (["import", "WALK", "--body-mass", "62"], "--body-mass '62': a number without a unit"),
+        (["import", "WALK", "--body-mass", "62 kg", "--stature", "180"], "--stature '180': a number without a unit"),
+        (["import", "WALK", "--body-mass", "62 kg", "--stature", "180 m"], "a stature of 180 m is not plausible"),
         (["import", "WALK", "--body-mass", "62 kg", "--side", "rigth"], "--side 'rigth' is not known"),
         (["import", "WALK", "--body-mass", "62 kg", "--least-strides", "-"], "--least-strides '-' is not a whole"),
         (["import", "WALK", "--body-mass", "62 kg", "--least-strides", "9"], "has 3 whole strides within"),

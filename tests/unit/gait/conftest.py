@@ -20,6 +20,19 @@ def normative() -> Gait:
 
 
 @pytest.fixture(scope="session")
+def knee_way(normative: Gait) -> Callable[[Floats], tuple[Floats, Floats]]:
+    """Where the knee is at times [s], forward and up [m]: what the accelerations integrate to, at 1.33 m/s."""
+
+    def way(name: str, time: Floats) -> Floats:
+        curve, order = normative.curve(name), 1.0 + np.arange(normative.curve(name).harmonics)
+        phase = 2.0 * np.pi * np.outer(time / normative.stride_time, order)
+        terms = np.cos(phase) * np.array(curve.cosines) + np.sin(phase) * np.array(curve.sines)
+        return np.asarray(-terms @ (normative.stride_time / (2.0 * np.pi * order)) ** 2)
+
+    return lambda time: (1.33 * time + way("knee_forward", time), 0.5 + way("knee_up", time))
+
+
+@pytest.fixture(scope="session")
 def walk(normative: Gait) -> Recording:
     """Six equal strides of it."""
     return walk_recording(normative, STRIDES)
@@ -46,14 +59,23 @@ def columns(walk: Recording) -> dict[str, Floats]:
     return {f"{name} [{walk.unit(name)}]": np.array(walk[name]) for name in walk.names}
 
 
+THIGH_LENGTH = 0.4
+
+
 @pytest.fixture
-def opensim_files(walk: Recording, normative: Gait, tmp_path: Path) -> dict[str, Path]:
-    """Angles, moments and forces of the walk as OpenSim writes them: one foot, degrees, N m, N."""
+def opensim_files(
+    walk: Recording, normative: Gait, knee_way: Callable[[Floats], tuple[Floats, Floats]], tmp_path: Path
+) -> dict[str, Path]:
+    """Angles, moments and forces of the walk as OpenSim writes them: one foot, degrees, N m, N; thigh of 0.4 m."""
     shank, ankle = np.degrees(walk["shank_angle"]), np.degrees(walk["ankle_angle"])
     knee = -20.0 + 15.0 * np.sin(walk.time)
     mass = normative.body_mass
     angles = {"pelvis_tilt": np.full(shank.size, 4.0), "hip_flexion_r": shank - knee - 4.0, "knee_angle_r": knee}
     angles["ankle_angle_r"] = 90.0 - ankle
+    forward, up = knee_way(walk.time)
+    lean = np.radians(shank - knee)
+    angles["pelvis_tx"] = forward - THIGH_LENGTH * np.sin(lean)
+    angles["pelvis_ty"] = up + THIGH_LENGTH * np.cos(lean)
     return {
         "ik": _opensim(tmp_path / "walk_ik.mot", walk.time, angles, "Angles are in degrees."),
         "id": _opensim(tmp_path / "walk_id.sto", walk.time, {"ankle_angle_r_moment": -mass * walk["ankle_moment"]}),

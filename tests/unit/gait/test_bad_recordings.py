@@ -9,12 +9,21 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.gait.recorded import ImportSettings, import_gait
-from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, MomentMap, ShankMap, load_map
+from ppafo.gait.recorded.mapping import (
+    AngleMap,
+    ForceMap,
+    GaitMap,
+    MomentMap,
+    ShankMap,
+    load_map,
+    package_map,
+)
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
 Change = Callable[[dict[str, Floats]], dict[str, Floats]]
 SHANK, ANKLE, MOMENT, FORCE = "shank_angle [rad]", "ankle_angle [rad]", "ankle_moment [N m/kg]", "vertical_force [-]"
+FORWARD, UP = "knee_forward [m/s^2]", "knee_up [m/s^2]"
 
 
 def changed(name: str, change: Callable[[Floats], Floats], new: str = "") -> Change:
@@ -38,7 +47,7 @@ CASES: dict[str, tuple[Change, str]] = {
     "shank from the horizontal": (changed(SHANK, lambda x: x + 1.57), "shank_angle is 106 deg at heel strike and"),
     "ankle counted the other way": (
         changed(ANKLE, lambda x: np.pi - x),
-        "its sign is reversed; change ankle_angle.positive in the gait map",
+        "its sign is reversed; turn it around in the file, or change ankle_angle.positive in a gait",
     ),
     "ankle with zero as neutral": (
         changed(ANKLE, lambda x: x - np.pi / 2.0),
@@ -52,7 +61,17 @@ CASES: dict[str, tuple[Change, str]] = {
         "vertical_force reaches 619 body weights, plausible is 0.5 to 2.5; is the body mass",
     ),
     "force of both feet": (changed(FORCE, lambda x: x + 0.5), "no heel strikes were found"),
-    "force downwards": (changed(FORCE, np.negative), "downwards: its sign is reversed; change vertical_force"),
+    "force downwards": (changed(FORCE, np.negative), "downwards: its sign is reversed; turn it around in the file"),
+    "knee counted backwards": (changed(FORWARD, np.negative), "knee_forward is -10.1 m/s^2 about toe-off and 7.69"),
+    "knee counted down": (
+        changed(UP, np.negative),
+        "turn it around in the file, or change the sign of knee.up in a gait map",
+    ),
+    "knee with gravity": (changed(UP, lambda x: x + 9.81), "an accelerometer shows gravity too: take it away"),
+    "knee in millimetres": (
+        changed(FORWARD, lambda x: 1000.0 * x),
+        "knee_forward moves over 2.02e+04 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; is the unit right",
+    ),
     "unknown unit": (
         changed(SHANK, lambda x: x, "shank_angle [turns]"),
         "column 'shank_angle [turns]': 'turns' is not a known",
@@ -78,6 +97,37 @@ def test_what_no_leg_does_is_refused_with_the_remedy(
         import_gait([path], ImportSettings(62.0))
     assert str(path) in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+SIGNS: dict[str, Change] = {
+    "shank_angle.positive": changed(SHANK, np.negative),
+    "ankle_angle.positive": changed(ANKLE, lambda x: np.pi - x),
+    "ankle_moment.positive": changed(MOMENT, np.negative),
+    "vertical_force.positive": changed(FORCE, np.negative),
+    "knee.forward": changed(FORWARD, np.negative),
+    "knee.up": changed(UP, np.negative),
+}
+
+
+@pytest.mark.parametrize("key", SIGNS)
+def test_the_remedy_changes_the_gait_map_only_where_one_was_given(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], key: str
+) -> None:
+    path = csv_of(SIGNS[key](columns))
+    columns_map = package_map("right").model_copy(update={"centre_of_pressure": None})
+    with pytest.raises(DataError, match=f"change (the sign of )?{re.escape(key)} in the gait map"):
+        import_gait([path], ImportSettings(62.0, columns=columns_map))
+    with pytest.raises(DataError, match=f"turn it around in the file, or change .*{re.escape(key)} in a gait map"):
+        import_gait([path], ImportSettings(62.0))
+
+
+def test_a_reversed_shank_without_a_force_is_named_as_what_it_is(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    reversed_shank = changed(SHANK, np.negative)({name: x for name, x in columns.items() if name != FORCE})
+    with pytest.raises(DataError, match=r"comes from shank_angle: where its sign is reversed, turn it") as refused:
+        import_gait([csv_of(reversed_shank)], ImportSettings(62.0))
+    assert "force" not in str(refused.value)
 
 
 def test_a_wrong_body_mass_shows_in_the_force(csv_of: Callable[..., Path], columns: dict[str, Floats]) -> None:
@@ -134,7 +184,7 @@ def test_a_moment_file_without_a_whole_stride_is_named(opensim_files: dict[str, 
 def test_angles_without_a_unit_ask_for_it(opensim_files: dict[str, Path]) -> None:
     path = opensim_files["ik"]
     path.write_text(path.read_text().replace("Angles are in degrees.", ""))
-    with pytest.raises(DataError, match=r"'pelvis_tilt': the file does not say its unit; give shank_angle.unit in the"):
+    with pytest.raises(DataError, match=r"'pelvis_tilt': the file does not say its unit; give shank_angle.unit in a"):
         import_gait(list(opensim_files.values()), ImportSettings(62.0))
 
 
@@ -177,6 +227,7 @@ def test_an_unknown_kind_of_file_is_refused(tmp_path: Path) -> None:
         (ImportSettings(62000.0), "a body mass of 62000 kg is not plausible"),
         (ImportSettings(float("nan")), "a body mass of nan kg is not plausible"),
         (ImportSettings(62.0, walking_speed=50.0), "a walking speed of 50 m/s is not plausible"),
+        (ImportSettings(62.0, stature=175.0), "a stature of 175 m is not plausible; give it in m, such as '1.75 m'"),
         (ImportSettings(62.0, low_pass=0.1), "a low pass at 0.1 Hz takes the walking away"),
         (ImportSettings(62.0, low_pass=500.0), "cannot be low-passed at 500 Hz: it has 200.3 samples a second"),
         (ImportSettings(62.0, least_strides=0), "the least number of strides is 1, not 0"),
@@ -201,6 +252,11 @@ def test_settings_that_make_no_sense_are_refused(
         (
             "[shank_angle]\nknee = 'K'\n[ankle_angle]\nterms = ['a']\npositive = 'dorsiflexion'\n",
             "give either terms, or",
+        ),
+        (
+            "[shank_angle]\nterms = ['s']\n[ankle_angle]\nterms = ['a']\npositive = 'dorsiflexion'\n"
+            "[knee]\nforward = ['x']\nup = ['y']\nthigh_length = '0.4 m'\n",
+            "thigh_length and thigh_unit have no meaning without thigh",
         ),
         ("[shank_angle\n", "is not valid TOML"),
         ("[shank_angle]\nterm = ['s']\n", "unknown key 'shank_angle.term', did you mean 'terms'"),

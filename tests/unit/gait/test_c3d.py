@@ -11,7 +11,7 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.gait import Gait
 from ppafo.gait.recorded import ImportSettings, import_gait
-from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, ShankMap
+from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, ShankMap
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
@@ -19,7 +19,9 @@ PHASES = np.linspace(0.0, 1.0, 101)
 
 
 @pytest.fixture
-def written(walk: Recording, normative: Gait, tmp_path: Path) -> Callable[..., Path]:
+def written(
+    walk: Recording, normative: Gait, knee_way: Callable[[Floats], tuple[Floats, Floats]], tmp_path: Path
+) -> Callable[..., Path]:
     """Writes the walk as a C3D file of 100 frames a second; points may be added or changed, channels too."""
     ezc3d = pytest.importorskip("ezc3d", reason="the extra c3d is not installed")
 
@@ -27,7 +29,8 @@ def written(walk: Recording, normative: Gait, tmp_path: Path) -> Callable[..., P
         frames = np.arange(0.0, walk.duration, 0.01)
         at = walk.resampled(frames)
         shank, nothing = at["shank_angle"], np.zeros(frames.size)
-        knee = np.array([walk_along * 1300.0 * frames, nothing, nothing + 500.0])
+        forward, up = knee_way(frames)
+        knee = np.array([walk_along * 1000.0 * forward, nothing, 1000.0 * up])
         lean = np.array([walk_along * np.sin(shank), nothing, -np.cos(shank)])
         mass = normative.body_mass
         known = {
@@ -65,11 +68,25 @@ def same(gait: Gait, truth: Gait) -> bool:
     return min(errors) < 0.004 and min(lean) < 0.004
 
 
+def knee_error(gait: Gait, truth: Gait) -> float:
+    """Largest root mean square error of the acceleration of the knee [m/s^2], at the start that fits best."""
+    shift = np.linspace(0.0, 0.01, 21)
+    errors = [
+        max(
+            float(np.sqrt(np.mean((gait.curve(name).sampled(PHASES) - truth.curve(name).sampled(PHASES + s)) ** 2)))
+            for name in ("knee_forward", "knee_up")
+        )
+        for s in shift
+    ]
+    return min(errors)
+
+
 def test_markers_and_outputs_of_plug_in_gait_are_read_by_convention(
     written: Callable[..., Path], normative: Gait
 ) -> None:
     found = import_gait([written()], ImportSettings(normative.body_mass)).gait
     assert same(found, normative)
+    assert knee_error(found, normative) < 0.15
     assert found.curve("ankle_moment").mean == pytest.approx(normative.curve("ankle_moment").mean, abs=0.01)
     assert found.curve("vertical_force").mean == pytest.approx(normative.curve("vertical_force").mean, abs=0.01)
 
@@ -79,9 +96,12 @@ def test_a_force_plate_and_a_walk_the_other_way_need_a_map(written: Callable[...
         shank_angle=ShankMap(knee="RKNE", ankle="RANK", forward="-x"),
         ankle_angle=AngleMap(terms=("RAnkleAngles.x",), positive="dorsiflexion", unit="deg"),
         vertical_force=ForceMap(terms=("Fz1",)),
+        knee=KneeMap(forward=("-RKNE.x",), up=("RKNE.z",)),
     )
     path = written(plate=True, walk_along=-1.0)
-    assert same(import_gait([path], ImportSettings(normative.body_mass, columns=columns)).gait, normative)
+    found = import_gait([path], ImportSettings(normative.body_mass, columns=columns)).gait
+    assert same(found, normative)
+    assert knee_error(found, normative) < 0.15
     with pytest.raises(DataError, match="shank_angle grows while the foot stands"):
         import_gait([path], ImportSettings(normative.body_mass))
 

@@ -1,6 +1,7 @@
 """The built-in gait: what it is, its files, and how it is scaled."""
 
 import dataclasses
+import math
 import re
 import subprocess
 import sys
@@ -12,16 +13,36 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.gait import Gait, at_speed, list_gaits, load_gait, speed_range, walk_recording
-from ppafo.gait.document import gait_toml, json_schema
+from ppafo.gait.document import json_schema
+from ppafo.gait.gait import KNEE, Curve
 from ppafo.gait.loading import parse_gait
+from ppafo.gait.writing import gait_toml
 
 ROOT = Path(__file__).parents[3]
 PHASES = np.linspace(0.0, 1.0, 201)
 
 
-def test_the_sampled_curve_is_the_scalar_one(normative: Gait) -> None:
-    scalar = [normative.ankle_angle.value(phase) for phase in PHASES.tolist()]
-    assert np.allclose(normative.ankle_angle.sampled(PHASES), scalar, atol=1e-8)
+MEAN, COSINES, SINES, STRIDE_TIME = 0.3, (0.5, -0.2, 0.05), (-0.1, 0.4, 0.02), 1.1
+CURVE = Curve(MEAN, COSINES, SINES, 0.1)
+
+
+@pytest.mark.parametrize("phase", [-0.3, 0.0, 0.17, 0.5, 0.99, 7.25])
+def test_a_curve_is_the_sum_of_its_series_and_has_its_derivatives(phase: float) -> None:
+    angles = [2.0 * math.pi * order * phase for order in (1, 2, 3)]
+    wanted = MEAN + sum(a * math.cos(x) + b * math.sin(x) for a, b, x in zip(COSINES, SINES, angles, strict=True))
+    assert CURVE.value(phase) == pytest.approx(wanted, abs=1e-12)
+    step = 1e-4
+    before, now, after = (phase + k * step / STRIDE_TIME for k in (-1, 0, 1))
+    slope = (CURVE.value(after) - CURVE.value(before)) / (2.0 * step)
+    assert CURVE.rate(now, STRIDE_TIME) == pytest.approx(slope, abs=1e-4)
+    bend = (CURVE.rate(after, STRIDE_TIME) - CURVE.rate(before, STRIDE_TIME)) / (2.0 * step)
+    assert CURVE.acceleration(now, STRIDE_TIME) == pytest.approx(bend, abs=1e-3)
+
+
+def test_a_scaled_curve_differs_between_strides_as_much_more() -> None:
+    twice = CURVE.scaled(-2.0)
+    assert twice.deviation == 0.2
+    np.testing.assert_allclose(twice.sampled(PHASES), -2.0 * CURVE.sampled(PHASES))
 
 
 def test_signs_are_those_of_the_package(normative: Gait) -> None:
@@ -69,6 +90,62 @@ def test_a_wrong_gait_file_is_refused_with_key_and_value(normative: Gait, old: s
         parse_gait(text.replace(old, new, 1).encode(), "bad.toml")
 
 
+def negative(curve: Curve) -> Curve:
+    return curve.scaled(-1.0)
+
+
+IMPLAUSIBLE = {
+    "shank": ({"shank_angle": negative}, "shank_angle grows while the foot stands"),
+    "ankle": (
+        {"ankle_angle": lambda c: dataclasses.replace(negative(c), mean=math.pi - c.mean)},
+        "its sign is reversed; write mean, cosine and sine with the other sign about 90 deg",
+    ),
+    "zero of the ankle": (
+        {"ankle_angle": lambda c: dataclasses.replace(c, mean=c.mean - math.pi / 2)},
+        "write its mean so that it is 90 deg when the foot is square to the shank",
+    ),
+    "moment": ({"ankle_moment": negative}, "its sign is reversed; write mean, cosine and sine with the other sign"),
+    "unit of the shank": ({"shank_angle": lambda c: c.scaled(math.radians(1.0))}, "the numbers look like radians"),
+    "force in newton": ({"vertical_force": lambda c: c.scaled(608.0)}, "is the body mass right, and the unit"),
+    "knee forward": (
+        {"knee_forward": negative},
+        "knee_forward is -10.5 m/s^2 about toe-off and 7.82 m/s^2 in the middle of the swing, and it is the other way",
+    ),
+    "knee up": (
+        {"knee_up": negative},
+        "its sign is reversed, or it is of the other knee; write mean, cosine and sine with the other sign",
+    ),
+    "knee with gravity": (
+        {"knee_up": lambda c: dataclasses.replace(c, mean=9.81)},
+        "knee_up is 9.81 m/s^2 on average, and a stride that repeats has 0",
+    ),
+    "knee in another unit": (
+        {"knee_forward": lambda c: c.scaled(100.0)},
+        "knee_forward moves over 2.02e+03 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; is the unit right",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", IMPLAUSIBLE)
+def test_a_gait_file_that_no_leg_walks_is_refused_with_the_remedy(normative: Gait, case: str) -> None:
+    changes, message = IMPLAUSIBLE[case]
+    wrong = dataclasses.replace(normative, **{name: change(normative.curves[name]) for name, change in changes.items()})
+    with pytest.raises(DataError, match=f"^bad.toml: .*{re.escape(message)}") as refused:
+        parse_gait(gait_toml(wrong).encode(), "bad.toml")
+    assert "gait map" not in str(refused.value), "none was given"
+    assert "\n" not in str(refused.value)
+
+
+def test_a_gait_file_needs_no_knee_but_not_half_of_one(normative: Gait) -> None:
+    half = dataclasses.replace(normative, knee_up=None)
+    with pytest.raises(DataError, match=r"half.toml: knee_forward is there without knee_up; give both, or none"):
+        parse_gait(gait_toml(half).encode(), "half.toml")
+    without = dataclasses.replace(normative, knee_forward=None, knee_up=None)
+    again = parse_gait(gait_toml(without).encode(), "without.toml")
+    assert again.knee_forward is again.knee_up is None
+    assert at_speed(again, 1.2).knee_up is None
+
+
 def test_an_unknown_gait_is_answered_with_the_nearest() -> None:
     with pytest.raises(DataError, match="there is no gait 'falisse2019', did you mean 'falisse2019-subject1'"):
         load_gait("falisse2019")
@@ -81,11 +158,19 @@ def test_a_scaled_gait_keeps_the_walk_ratio_and_all_curves(normative: Gait) -> N
     ratio = [gait.walking_speed * gait.stride_time**2 for gait in (normative, slow) if gait.walking_speed is not None]
     assert ratio[1] == pytest.approx(ratio[0], rel=1e-12)
     assert slow.stride_time > normative.stride_time
-    assert slow.curves == normative.curves
+    kept = {name: curve for name, curve in normative.curves.items() if name not in KNEE}
+    assert {name: slow.curves[name] for name in kept} == kept
     assert at_speed(slow, 1.33).stride_time == pytest.approx(normative.stride_time, rel=1e-12)
     assert speed_range(slow) == speed_range(normative)
     again = parse_gait(gait_toml(slow).encode(), "slow.toml")
     assert (again.walking_speed, again.recorded_speed, again.stride_time) == (1.1, 1.33, slow.stride_time)
+
+
+def test_the_way_of_the_knee_stays_when_the_speed_changes(normative: Gait) -> None:
+    slow = at_speed(at_speed(normative, 1.2), 1.1)
+    for name in KNEE:
+        ways = [gait.curve(name).scaled(gait.stride_time**2).sampled(PHASES) for gait in (normative, slow)]
+        np.testing.assert_allclose(ways[1], ways[0], rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("speed", [1.0, 1.7, float("nan")])
@@ -121,10 +206,8 @@ def test_a_walk_repeats_the_stride_and_is_marked_synthetic(normative: Gait) -> N
 
 
 def test_the_built_in_gait_is_what_the_script_makes_of_the_data(shared_data: Path) -> None:
-    folder = shared_data / "gait" / "falisse2019_derived"
-    done = subprocess.run(
-        [sys.executable, ROOT / "scripts" / "fit_built_in_gait.py", folder], capture_output=True, text=True, check=True
-    )
+    command = [sys.executable, ROOT / "scripts" / "fit_built_in_gait.py", shared_data / "gait"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     shipped = ROOT / "src" / "ppafo" / "gait" / "normative" / "falisse2019-subject1.toml"
     assert done.stdout == shipped.read_text(encoding="utf-8")
 

@@ -1,16 +1,29 @@
 """Recorded files become the gait that is in them, whatever their form, unit and sign."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from ppafo.errors import DataError
 from ppafo.gait import CURVES, Gait, walk_recording
-from ppafo.gait.document import gait_toml
+from ppafo.gait.gait import KNEE
 from ppafo.gait.loading import parse_gait
 from ppafo.gait.recorded import ImportSettings, import_gait
-from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, MomentMap, PressureMap, ShankMap
+from ppafo.gait.recorded.mapping import (
+    AngleMap,
+    ForceMap,
+    GaitMap,
+    KneeMap,
+    MomentMap,
+    PressureMap,
+    ShankMap,
+    package_map,
+)
+from ppafo.gait.writing import gait_toml
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
@@ -30,6 +43,8 @@ def gait_start(truth: Gait) -> float:
 
 
 LIMITS = {"shank_angle": 2e-3, "ankle_angle": 2e-3, "ankle_moment": 5e-3, "vertical_force": 5e-3}
+KNEE_LIMIT = 0.05
+"""Of an acceleration that reaches 12 m/s^2."""
 
 
 def assert_same(gait: Gait, truth: Gait, names: tuple[str, ...] = tuple(LIMITS)) -> None:
@@ -84,12 +99,96 @@ def test_opensim_tables_of_one_walk(opensim_files: dict[str, Path], normative: G
     assert found.gait.origin == "measured"
 
 
+@pytest.mark.parametrize("how", ["acceleration", "position", "backwards", "hip and thigh"])
+def test_the_knee_is_read_as_acceleration_as_position_or_from_the_hip(
+    csv_of: Callable[..., Path],
+    columns: dict[str, Floats],
+    walk: Recording,
+    knee_way: Callable[[Floats], tuple[Floats, Floats]],
+    normative: Gait,
+    how: str,
+) -> None:
+    forward, up = knee_way(walk.time)
+    rest = {name: values for name, values in columns.items() if not name.startswith("knee_")}
+    lean = 0.3 * np.cos(6.0 * walk.time)
+    hip = {"hip_x [m]": forward - 0.4 * np.sin(lean), "hip_y [m]": up + 0.4 * np.cos(lean), "thigh [rad]": lean}
+    files, knee = {
+        "acceleration": (columns, package_map("right").knee),
+        "position": (rest | {"knee_forward [mm]": 1000.0 * forward, "knee_up [m]": up}, package_map("right").knee),
+        "backwards": (rest | {"back [m]": -forward, "up [m]": up}, KneeMap(forward=("-back",), up=("up",))),
+        "hip and thigh": (
+            rest | hip,
+            KneeMap(forward=("hip_x",), up=("hip_y",), thigh=("thigh",), thigh_length="40 cm"),
+        ),
+    }[how]
+    columns_map = package_map("right").model_copy(update={"knee": knee, "centre_of_pressure": None})
+    found = import_gait([csv_of(files)], ImportSettings(62.0, columns=columns_map)).gait
+    for name in KNEE:
+        assert largest_difference(found, normative, name) < KNEE_LIMIT
+        assert found.curve(name).deviation < KNEE_LIMIT, "all strides are alike"
+
+
+def test_opensim_angles_give_the_knee_once_the_thigh_is_known(opensim_files: dict[str, Path], normative: Gait) -> None:
+    files = list(opensim_files.values())
+    without = import_gait(files, ImportSettings(62.0))
+    assert without.gait.knee_forward is None
+    assert any("give --stature, or a gait map with knee.thigh_length" in remark for remark in without.remarks)
+    found = import_gait(files, ImportSettings(62.0, stature=0.4 / 0.245))
+    assert max(largest_difference(found.gait, normative, name) for name in KNEE) < KNEE_LIMIT
+    assert "thigh of 0.400 m: 0.245 of the stature (Winter 2009)" in found.remarks
+    taller = import_gait(files, ImportSettings(62.0, stature=1.9)).gait
+    assert largest_difference(taller, normative, "knee_forward") > 10.0 * KNEE_LIMIT
+
+
+def test_a_hip_that_does_not_move_is_refused(opensim_files: dict[str, Path]) -> None:
+    path = opensim_files["ik"]
+    head, _, rows = path.read_text().partition("time\t")
+    labels, *lines = rows.splitlines()
+    fixed = ["\t".join([*line.split("\t")[:5], "0.0", "0.9"]) for line in lines]
+    path.write_text(head + "time\t" + "\n".join([labels, *fixed]) + "\n")
+    with pytest.raises(DataError, match=r"the hip does not move \(pelvis_tx is constant\).*leave the stature out"):
+        import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=1.7))
+
+
+def test_a_knee_that_is_carried_backwards_is_refused(
+    csv_of: Callable[..., Path],
+    columns: dict[str, Floats],
+    walk: Recording,
+    knee_way: Callable[[Floats], tuple[Floats, Floats]],
+) -> None:
+    forward, up = knee_way(walk.time)
+    rest = {name: values for name, values in columns.items() if not name.startswith("knee_")}
+    path = csv_of(rest | {"knee_forward [m]": forward - 2.6 * walk.time, "knee_up [m]": up})
+    with pytest.raises(DataError, match=r"goes back by 1.3 m/s: knee.forward counts against the walk; turn it around"):
+        import_gait([path], ImportSettings(62.0))
+
+
+@pytest.mark.parametrize(
+    ("knee", "message"),
+    [
+        ({"thigh": ("thigh",)}, "knee.thigh needs a length: give knee.thigh_length in the gait map, or the stature"),
+        ({"thigh": ("thigh",), "thigh_length": "40"}, "knee.thigh_length = '40': a number without a unit"),
+        ({"thigh": ("thigh",), "thigh_length": "40 mm"}, "knee.thigh_length = '40 mm' is not plausible"),
+        ({"thigh": ("thigh",), "thigh_length": "0.4 m", "unit": "m/s^2"}, "is added to positions of the hip in m"),
+        ({"unit": "N"}, "column 'knee_forward' [N]: unit 'N' does not fit"),
+    ],
+)
+def test_a_knee_that_cannot_be_worked_out_is_refused(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, knee: dict[str, Any], message: str
+) -> None:
+    mapped = KneeMap(forward=("knee_forward",), up=("knee_up",), **{"unit": "m", **knee})
+    columns_map = package_map("right").model_copy(update={"knee": mapped, "centre_of_pressure": None})
+    path = csv_of({**columns, "thigh [rad]": 0.3 * np.cos(6.0 * walk.time)})
+    with pytest.raises(DataError, match=re.escape(message)):
+        import_gait([path], ImportSettings(62.0, columns=columns_map))
+
+
 def test_a_knee_that_counts_flexion_above_zero_is_recognised(opensim_files: dict[str, Path], normative: Gait) -> None:
     path = opensim_files["ik"]
     head, _, rows = path.read_text().partition("time\t")
     labels, *lines = rows.splitlines()
     cells = [line.split("\t") for line in lines]
-    flipped = ["\t".join([*row[:3], str(-float(row[3])), row[4]]) for row in cells]
+    flipped = ["\t".join([*row[:3], str(-float(row[3])), *row[4:]]) for row in cells]
     path.write_text(head + "time\t" + "\n".join([labels, *flipped]) + "\n")
     assert_same(import_gait(list(opensim_files.values()), ImportSettings(normative.body_mass)).gait, normative)
 

@@ -21,7 +21,7 @@ def imported(tmp_path: Path) -> ImportedGait:
 def test_every_curve_has_a_panel_with_its_events() -> None:
     gait = load_gait()
     figure = gait_figure(gait)
-    assert len(figure.axes) == len(gait.curves) == 4
+    assert len(figure.axes) == len(gait.curves) == 6
     top = figure.axes[0]
     assert {text.get_text() for text in top.texts} == {"heel strike", "toe-off"}
     assert np.degrees(gait.shank_angle.sampled([0.25]))[0] == pytest.approx(top.lines[-1].get_ydata()[25])
@@ -34,6 +34,7 @@ def test_single_strides_and_their_mean_are_drawn_after_an_import(imported: Impor
     assert "synthetic" in {text.get_text() for text in figure.texts}
 
 
-def test_a_gait_without_moment_and_force_has_two_panels() -> None:
-    gait = dataclasses.replace(load_gait(), ankle_moment=None, vertical_force=None, walking_speed=None)
+def test_a_gait_of_angles_only_has_two_panels() -> None:
+    missing = dict.fromkeys(("ankle_moment", "vertical_force", "knee_forward", "knee_up", "walking_speed"))
+    gait = dataclasses.replace(load_gait(), **missing)
     assert len(gait_figure(gait).axes) == 2

@@ -11,7 +11,7 @@ import pytest
 
 from ppafo.errors import DataError, ParameterError, ScenarioError
 from ppafo.gait import load_gait
-from ppafo.gait.document import gait_toml
+from ppafo.gait.writing import gait_toml
 from ppafo.walking import Configuration, list_walks, load_walk, walk, walk_population
 from ppafo.walking.schema import json_schema
 
@@ -82,7 +82,7 @@ def test_a_torque_profile_that_contradicts_itself_is_refused(overrides: str) -> 
 
 
 def test_shipped_walks_load_and_contradict_nothing() -> None:
-    assert list_walks() == ("off", "proportional", "solenoid")
+    assert list_walks() == ("off", "proportional", "proportional-regulators", "solenoid", "solenoid-regulators")
     assert [load_walk(name).name for name in list_walks()] == list(list_walks())
 
 

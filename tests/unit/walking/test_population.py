@@ -8,7 +8,7 @@ import pytest
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import batch_of
 from ppafo.gait import load_gait
-from ppafo.gait.gait import Curve
+from ppafo.gait.gait import KNEE, Curve
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking import load_walk, walk_population
 from ppafo.walking.anthropometry import (
@@ -20,10 +20,10 @@ from ppafo.walking.anthropometry import (
     scaled_segments,
 )
 from ppafo.walking.planning import gait_timing, plan_walk
-from ppafo.walking.population import START_VARIATION, THRESHOLD_VARIATION
-from ppafo.walking.varied_gait import SERIES, Series, varied_gaits
+from ppafo.walking.varied_gait import SERIES, SeriesOfMany, varied_gaits
 from ppafo.walking.walk import plan_of
 from ppafo.walking.wearer import paper_subject
+from ppafo.walking.wearers_rows import START_VARIATION, THRESHOLD_VARIATION
 
 MINUTES = 0.15
 
@@ -42,7 +42,7 @@ def test_the_first_wearer_is_that_of_the_configuration(name: str) -> None:
     assert people.outcomes["slap_rate"][0] == pytest.approx(slaps, rel=1e-9)
 
 
-def varied(curve: Curve | None, series: Series, index: int) -> Curve:
+def varied(curve: Curve | None, series: SeriesOfMany, index: int) -> Curve:
     assert curve is not None
     cosines, sines = (tuple(values[index].tolist()) for values in (series.cosines, series.sines))
     return replace(curve, mean=float(series.mean[index]), cosines=cosines, sines=sines)
@@ -53,7 +53,7 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
     people = walk_population(configuration, MINUTES, count, seed=3)
     generator = np.random.default_rng(3)
     build = drawn_builds(count, generator)
-    gaits = varied_gaits(configuration.gait, count, generator)
+    gaits = varied_gaits(configuration.gait, build.stature, generator)
     scale = 1.0 + THRESHOLD_VARIATION * bounded_normal(generator, (count,))[index]
     start = START_VARIATION * bounded_normal(generator, (count,))[index]
     settings = dict(configuration.settings)
@@ -106,7 +106,7 @@ def test_builds_vary_as_stated_and_keep_the_shares_of_segments() -> None:
 
 def test_gaits_vary_by_the_deviation_of_each_curve() -> None:
     gait = load_gait()
-    gaits = varied_gaits(gait, 4000, np.random.default_rng(1))
+    gaits = varied_gaits(gait, np.ones(4000), np.random.default_rng(1))
     phases = 2.0 * np.pi * np.outer(np.arange(1, 9), np.linspace(0.0, 1.0, 200, endpoint=False))
     for field, curve in (("shank", gait.shank_angle), ("ankle", gait.ankle_angle)):
         series = gaits.series[field]
@@ -114,6 +114,21 @@ def test_gaits_vary_by_the_deviation_of_each_curve() -> None:
         spread = float(np.sqrt(np.mean((values - values.mean(axis=0)) ** 2)))
         assert spread == pytest.approx(curve.deviation, rel=0.06)
     assert gaits.stride_time.std() == pytest.approx(gait.stride_time_deviation, rel=0.06)
+
+
+def test_the_way_of_the_knee_is_as_long_as_people_are_tall() -> None:
+    gait = load_gait()
+    stature = np.linspace(1.0, 1.2, 50)
+    gaits = varied_gaits(gait, stature, np.random.default_rng(1))
+    for name in KNEE:
+        curve, found = gait.curve(name), gaits.series[name]
+        ways = found.cosines[:, : curve.harmonics] * (gaits.stride_time**2)[:, None]
+        assert curve.deviation == 0.0
+        np.testing.assert_allclose(ways, np.outer(stature, curve.cosines) * gait.stride_time**2, rtol=1e-12)
+    noisy = replace(gait, knee_up=replace(gait.curve("knee_up"), deviation=0.4), stride_time_deviation=0.0)
+    people = varied_gaits(noisy, np.ones(4000), np.random.default_rng(1)).series["knee_up"]
+    power = people.mean.var() + 0.5 * (people.cosines.var(axis=0) + people.sines.var(axis=0)).sum()
+    assert np.sqrt(power) == pytest.approx(0.4, rel=0.06)
 
 
 def test_wearers_that_diverge_are_counted_and_left_out() -> None:

@@ -9,7 +9,6 @@ import pytest
 
 from ppafo.model import contact as ground
 from ppafo.model.command import VENT
-from ppafo.model.gait import gait_at
 from ppafo.model.gait_sensors import Fault
 from ppafo.walking.planning import plan_walk
 
@@ -48,44 +47,6 @@ def test_on_the_toes_the_ankle_follows_the_measured_gait(walked: Callable[[str],
     settled = (walk["walk.contact"] == ground.TOE) & (np.abs(walk["walk.offset"]) < 1e-5)
     assert settled.sum() > 300
     np.testing.assert_allclose(walk["state.angle"][settled], walk["walk.now.ankle"][settled], atol=2e-5)
-
-
-def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[str], Any]) -> None:
-    from dataclasses import replace
-
-    from scipy.integrate import solve_ivp
-
-    from ppafo.engine.lanes import run_batch
-    from ppafo.engine.run import batch_of
-    from ppafo.engine.scheme.walking import foot_direction, leg_torque
-    from ppafo.model.contact import SWING
-    from ppafo.simulation.sampled import state_row_numbers
-
-    run = plan_walk(walk_plan("off"))
-    walk = run.walk
-    assert walk is not None
-    # No gas, no friction, no stops: what is left is the leg.
-    plant = run.plant._replace(
-        torque_constant=0.0, static_torque=0.0, dynamic_torque=0.0, angle_min=-9.0, angle_max=9.0
-    )
-    timing = walk.timing._replace(start=walk.timing.toe_off)
-    begin = gait_at(walk.gait, timing, walk.leg.body_mass, walk.leg.gravity, 0.0)
-    initial = run.initial._replace(angle=begin.ankle, angular_velocity=begin.ankle_rate)
-    first = walk.initial._replace(contact=SWING, now=begin, foot=foot_direction(begin.shank, begin.ankle))
-    swinging = replace(walk, timing=timing, initial=first)
-    swing = replace(run, plant=plant, initial=initial, walk=swinging, step_count=300)
-    rows = state_row_numbers(swing)
-    angle = run_batch(batch_of(swing)).record[:, rows["state.angle"], 0]
-
-    def slopes(time: float, y: np.ndarray) -> list[float]:
-        now = gait_at(walk.gait, timing, walk.leg.body_mass, walk.leg.gravity, time)
-        torque = leg_torque(walk.leg, walk.share, SWING, now, y[0], foot_direction(now.shank, y[0]))
-        return [y[1], (torque - plant.viscous_damping * y[1]) / plant.inertia]
-
-    times = np.arange(angle.size) * swing.step
-    judge = solve_ivp(slopes, (0.0, times[-1]), [initial.angle, initial.angular_velocity], t_eval=times, rtol=1e-9)
-    assert np.ptp(judge.y[0]) > 0.1
-    assert np.abs(judge.y[0] - angle).max() < 2e-4
 
 
 def test_a_drop_foot_hangs_without_the_device_and_is_lifted_with_it(walked: Callable[[str], Any]) -> None:
@@ -197,3 +158,12 @@ def test_a_stride_that_begins_without_heel_strike_gets_no_push_before_its_time(
     early = (walk.time > 3.3) & (phase > 0.1) & (phase < 0.35)
     assert (walk["controller_state.phase.phase"][early] != 3.0).all(), "push-off begins at two fifths of the stride"
     assert (walk["controller_state.phase.phase"][walk.time < 3.3] == 3.0).any()
+
+
+def test_a_foot_that_comes_first_with_its_toes_does_not_slap(walked: Callable[[str], Any]) -> None:
+    dropped, lifted = walked("off"), walked("event_on_off")
+    # The walk begins at a heel strike with the healthy ankle.
+    assert dropped["walk.landings"][-1] == 1
+    assert dropped["walk.toe_landings"][-1] >= 6
+    assert lifted["walk.landings"][-1] >= 6
+    assert lifted["walk.slap_rates"][-1] / lifted["walk.landings"][-1] < -5.0

@@ -143,6 +143,18 @@ def begin_moving_gas(
 ) -> MovingGas:
     """First stage of one step [s] in which the volumes run linearly to those of ``next_angle`` [rad]."""
     linear, flows = linearise(plant, state, port_1, port_2, step, port_flow_slopes)
+    return begin_moving_stage(plant, state, next_angle, linear, flows, step)
+
+
+def begin_moving_stage(
+    plant: PlantParameters,
+    state: PlantState,
+    next_angle: float,
+    linear: Linearisation,
+    flows: Flows,
+    step: float,
+) -> MovingGas:
+    """First stage of one step [s] with moving volumes, from all flows at its beginning and their linearisation."""
     volumes = chamber_volumes(plant, state.angle)
     next_volumes = chamber_volumes(plant, next_angle)
     # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.

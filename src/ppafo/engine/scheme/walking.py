@@ -7,11 +7,9 @@ from ppafo.model import contact as ground
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import (
     LegParameters,
-    centrifugal_torques,
     foot_inertia_about_ankle,
-    gravity_torques,
-    mass_matrix,
     passive_torque,
+    torque_of_shank,
 )
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures
 from ppafo.model.turns import TURN, sine_and_cosine
@@ -40,10 +38,10 @@ class WalkState(NamedTuple):
     """Where the foot stands, the gait and the foot's direction now, what the wearer gets, and totals since the start.
 
     ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
-    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``slap_rate`` of the foot at the last landing
-    [rad/s]; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, landings,
-    strikes with the toes first, sums of slap rates [rad/s] and clearances [m], work of T_ex while the foot rolls over
-    the toes [J].
+    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``slap_rate`` of the toes at the last landing
+    [rad/s]; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, landings of
+    the toes after the heel, strikes with the toes first, sums of slap rates [rad/s] and clearances [m], work of T_ex
+    while the foot rolls over the toes [J].
     """
 
     contact: float
@@ -86,22 +84,24 @@ def leg_torque(
     """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
 
     The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the weight of the foot plate, and
-    the ground under the heel.
+    the ground under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles,
+    so that a wearer who has all of them and no device walks the measured gait.
     """
-    # theta is phi less the angle of the foot plus 90 deg.
-    sine_theta = now.cosine_shank * foot.cosine + now.sine_shank * foot.sine
-    cosine_theta = now.cosine_shank * foot.sine - now.sine_shank * foot.cosine
-    matrix = mass_matrix(leg, cosine_theta)
-    turning = centrifugal_torques(leg, sine_theta, now.shank_rate, 0.0)
-    weight = gravity_torques(
-        leg, now.sine_shank, now.cosine_shank, foot.sine, foot.cosine, now.knee_forward, now.knee_up
-    )
-    # The measured moment is that of muscles and tissue together.
-    muscles = now.moment - passive_torque(leg, now.ankle)
+    heel = ground.heel_torque(contact, now, leg.heel_lever)
+    muscles = now.healthy_torque - heel - passive_torque(leg, now.ankle)
     wearer = leg.residual_share * muscles + passive_torque(leg, angle)
-    heel = now.force * leg.heel_lever if contact == ground.HEEL else 0.0
-    inertial = matrix.coupling * now.shank_acceleration + turning.ankle + weight.ankle
-    return wearer + heel + share.gravity_torque * foot.cosine - inertial
+    carried = torque_of_shank(
+        leg,
+        now.sine_shank,
+        now.cosine_shank,
+        foot.sine,
+        foot.cosine,
+        now.shank_rate,
+        now.shank_acceleration,
+        now.knee_forward,
+        now.knee_up,
+    )
+    return wearer + heel + share.gravity_torque * foot.cosine - carried
 
 
 def begin_walk(
@@ -216,6 +216,8 @@ def counted(
     lowest = min(walk.clearance, height if watched else walk.clearance)
     strikes = landed.strikes > 0.5
     on_toes = walk.contact == ground.TOE
+    # A foot that met the ground with its toes brings its heel down: that is no slap.
+    slaps = landed.slaps > 0.5 and foot_rate < 0.0
     return WalkState(
         landed.contact,
         landed.offset,
@@ -224,12 +226,12 @@ def counted(
         given,
         walk.heel_force + (heel - walk.heel_force) * share,
         walk.toe_force + (toe - walk.toe_force) * share,
-        foot_rate if landed.slaps > 0.5 else walk.slap_rate,
+        foot_rate if slaps else walk.slap_rate,
         NO_CLEARANCE if strikes else lowest,
         walk.strides + landed.strikes,
-        walk.landings + landed.slaps,
+        walk.landings + (1.0 if slaps else 0.0),
         walk.toe_landings + (1.0 if strikes and touches_first else 0.0),
-        walk.slap_rates + (foot_rate if landed.slaps > 0.5 else 0.0),
+        walk.slap_rates + (foot_rate if slaps else 0.0),
         walk.clearances + (lowest if strikes and lowest < NO_CLEARANCE else 0.0),
         walk.push_off_work + (0.5 * (given + walk.external_torque) * turned if on_toes else 0.0),
     )

@@ -1,5 +1,6 @@
-"""From recorded files to a gait: tables, what their columns mean, events, strides, and whether that can be true."""
+"""From recorded files to a gait: tables, what their columns mean, events and strides."""
 
-from ppafo.gait.recorded.importing import ImportedGait, ImportSettings, import_gait
+from ppafo.gait.recorded.importing import ImportedGait, import_gait
+from ppafo.gait.recorded.settings import ImportSettings
 
 __all__ = ["ImportSettings", "ImportedGait", "import_gait"]

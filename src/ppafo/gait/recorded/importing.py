@@ -1,44 +1,28 @@
 """Recorded files in, a gait out: tables, map, filter, strides, checks, mean curves and their series."""
 
-import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from ppafo.documents.models import NAME
 from ppafo.errors import DataError
 from ppafo.gait.fourier import HARMONICS, FitError, fit_curve
 from ppafo.gait.gait import REQUIRED, Curve, Gait, Origin
-from ppafo.gait.recorded.checks import Checked, check_force_scale, check_plausible
+from ppafo.gait.plausible.checked import Checked, Given
+from ppafo.gait.plausible.loads import check_force_scale
+from ppafo.gait.plausible.stride import check_plausible
 from ppafo.gait.recorded.events import Stride, strides_from_force, strides_from_shank
+from ppafo.gait.recorded.knee import check_way, knee_remarks
 from ppafo.gait.recorded.mapping import CONVENTIONS, GaitMap, Side
+from ppafo.gait.recorded.settings import ImportSettings, check_settings
 from ppafo.gait.recorded.signal import Signal, low_passed
-from ppafo.gait.recorded.strides import CurveStatistics, covered, statistics, without_outliers
+from ppafo.gait.recorded.strides import CurveStatistics, covered, mean_curve, without_outliers
 from ppafo.gait.recorded.table import CSV, MotionTable, read_table
-from ppafo.gait.recorded.walk import recorded_walk
+from ppafo.gait.recorded.walk import Person, recorded_walk
 
 LARGEST_STRIDE_CHANGE = 0.25
 """Share of the median stride time; a stride that differs by more has a missed event in it, or is no steady walking."""
-
-_UNLOADED_FORCE = 0.02
-_NAME = "imported-gait"
-
-
-@dataclass(frozen=True, slots=True)
-class ImportSettings:
-    """What the files do not say: body mass [kg], side, speed [m/s], map, low pass [Hz], least number of strides."""
-
-    body_mass: float
-    side: Side = "right"
-    columns: GaitMap | None = None
-    walking_speed: float | None = None
-    low_pass: float | None = None
-    least_strides: int = 2
-    name: str = _NAME
-    title: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,61 +48,49 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     Strides come from the vertical force where there is one, else from the shank. DataError names what is wrong with
     file, column and row, and what to do.
     """
-    _check_settings(settings)
+    check_settings(settings)
+    given: Given = "columns" if settings.columns is None else "map"
     tables = [read_table(path) for path in files]
     if not tables:
         raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
-    walk = _walk(tables, settings)
+    columns = settings.columns or _convention(tables, settings.side)
+    person = Person(settings.body_mass, settings.stature)
+    walk = recorded_walk(tables, columns, person, is_default=settings.columns is None)
     events = "vertical_force" if "vertical_force" in walk else "shank_angle"
-    found = _strides(walk, events)
+    found = _strides(walk, events, given)
     smooth = walk if settings.low_pass is None else {n: low_passed(s, settings.low_pass) for n, s in walk.items()}
     usable = [item for item in found if all(covered(walk[name], [item]) for name in REQUIRED)]
     strides, left_out = without_outliers(usable, LARGEST_STRIDE_CHANGE)
-    _check_enough(strides, found, walk, settings.least_strides)
-    curves = {name: _curve(name, signal, strides) for name, signal in smooth.items()}
+    _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events)}, settings.least_strides)
+    curves = {name: mean_curve(name, signal, strides) for name, signal in smooth.items()}
     share, time = _mean([item.stance_share for item in strides]), _mean([item.time for item in strides])
     means = {name: item.mean for name, item in curves.items()}
-    check_plausible(Checked({name: signal.file for name, signal in walk.items()}, means, share, time))
+    check_plausible(Checked({name: signal.file for name, signal in walk.items()}, means, share, time, given))
+    check_way(walk, given)
     fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     gait = _gait(settings, tables, strides, {name: curve for name, (curve, _) in fitted.items()}, events)
     errors = {name: error for name, (_, error) in fitted.items()}
-    remarks = tuple(_remarks(curves, strides, left_out, walk))
+    remarks = (*_remarks(curves, strides, left_out, walk), *knee_remarks(columns.knee, walk, settings.stature))
     names = tuple(str(path) for path in files)
     return ImportedGait(gait, tuple(strides), tuple(left_out), curves, errors, events, names, remarks)
 
 
-def _check_settings(settings: ImportSettings) -> None:
-    if not 1.0 <= settings.body_mass <= 500.0:
-        raise DataError(f"a body mass of {settings.body_mass:g} kg is not plausible; give it in kg, such as '62 kg'")
-    if settings.walking_speed is not None and not 0.05 <= settings.walking_speed <= 4.0:
-        raise DataError(f"a walking speed of {settings.walking_speed:g} m/s is not plausible; walking is 0.05 to 4 m/s")
-    if settings.low_pass is not None and not (math.isfinite(settings.low_pass) and settings.low_pass >= 1.0):
-        raise DataError(f"a low pass at {settings.low_pass:g} Hz takes the walking away; 6 Hz is usual")
-    if re.fullmatch(NAME, settings.name) is None:
-        raise DataError(f"name {settings.name!r} must consist of small letters, digits, '-' and '_'")
-    if settings.least_strides < 1:
-        raise DataError(f"the least number of strides is 1, not {settings.least_strides}")
-
-
-def _walk(tables: Sequence[MotionTable], settings: ImportSettings) -> dict[str, Signal]:
-    """Return the signals, through the user's map or the convention of the files."""
-    if settings.columns is not None:
-        return recorded_walk(tables, settings.columns, settings.body_mass, is_default=False)
+def _convention(tables: Sequence[MotionTable], side: Side) -> GaitMap:
+    """Return the convention of the package for the files."""
     forms = sorted({table.form for table in tables})
     if len(forms) > 1:
         raise DataError(
             f"the files are of different forms ({', '.join(forms)}); name the columns of all of them in a gait map"
         )
-    if forms[0] == CSV and settings.side != "right":
+    if forms[0] == CSV and side != "right":
         raise DataError("a CSV file without a gait map has the columns of one foot; --side left has no meaning there")
-    columns = CONVENTIONS[forms[0]](settings.side)
-    return recorded_walk(tables, columns, settings.body_mass, is_default=True)
+    return CONVENTIONS[forms[0]](side)
 
 
-def _strides(walk: Mapping[str, Signal], events: str) -> list[Stride]:
+def _strides(walk: Mapping[str, Signal], events: str, given: Given) -> list[Stride]:
     if events != "vertical_force":
         return strides_from_shank(walk[events])
-    check_force_scale(walk[events].file, walk[events].values)
+    check_force_scale(walk[events].file, walk[events].values, given)
     return strides_from_force(walk[events])
 
 
@@ -127,35 +99,14 @@ def _check_enough(strides: list[Stride], found: list[Stride], walk: Mapping[str,
         return
     spans = ", ".join(f"{name} {item.time[0]:.4g} to {item.time[-1]:.4g} s" for name, item in walk.items())
     count = f"{len(strides)} whole stride{'' if len(strides) == 1 else 's'}"
-    events = f"{len(found)} in the events" if found else "no heel strikes were found"
+    where = list(walk)[-1]
+    events = (
+        f"{len(found)} in the events" if found else f"no heel strikes were found in {where}: is it the right column?"
+    )
     raise DataError(
         f"{walk['shank_angle'].file}: has {count} within angles and events ({events}; {spans}), {least} are needed; "
         "give a longer recording, or ask for fewer with --least-strides"
     )
-
-
-def _curve(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
-    """Return the curves of the strides that a signal covers; at least one has to be."""
-    inside = covered(signal, strides)
-    if not inside:
-        raise DataError(
-            f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no whole "
-            f"stride ({strides[0].start:.4g} to {strides[0].end:.4g} s is the first); give a longer file, or "
-            "leave it out"
-        )
-    result = statistics(signal, inside)
-    return _bridged(result) if name == "centre_of_pressure" else result
-
-
-def _bridged(result: CurveStatistics) -> CurveStatistics:
-    """Return a centre of pressure with a straight line over swing, where it has no meaning."""
-    phases = np.linspace(0.0, 1.0, result.mean.size)
-    share = _mean([item.stance_share for item in result.strides])
-    inside = (phases > _UNLOADED_FORCE) & (phases < share - _UNLOADED_FORCE)
-    at, first = phases[inside], float(result.mean[inside][0])
-    mean = np.interp(phases, [*at, 1.0 + at[0]], [*result.mean[inside], first], period=None)
-    deviation = np.where(inside, result.deviation, 0.0)
-    return CurveStatistics(result.curves, mean, deviation, result.strides)
 
 
 def _mean(values: Sequence[float]) -> float:
@@ -192,6 +143,8 @@ def _gait(
         ankle_moment=curves.get("ankle_moment"),
         vertical_force=curves.get("vertical_force"),
         centre_of_pressure=curves.get("centre_of_pressure"),
+        knee_forward=curves.get("knee_forward"),
+        knee_up=curves.get("knee_up"),
     )
 
 

@@ -86,6 +86,30 @@ class PressureMap(BaseModel):
     positive: Annotated[Literal["forward", "backward"], Field(description="which way counts above 0")] = "forward"
 
 
+class KneeMap(BaseModel):
+    """Knee in the sagittal plane: its position in m or its acceleration in m/s^2, or hip and thigh instead."""
+
+    model_config = _STRICT
+
+    forward: _Terms
+    up: _Terms
+    unit: _Unit = None
+    thigh: Annotated[
+        _Terms | None,
+        Field(description="lean of the thigh, above 0 with the knee in front; forward and up then are of the hip"),
+    ] = None
+    thigh_unit: Annotated[_Text | None, Field(description="unit of the lean, where the file does not say it")] = None
+    thigh_length: Annotated[
+        _Text | None, Field(description="hip to knee, such as '0.40 m'; without it a share of the stature")
+    ] = None
+
+    @model_validator(mode="after")
+    def _thigh_has_a_lean(self) -> "KneeMap":
+        if self.thigh is None and (self.thigh_length is not None or self.thigh_unit is not None):
+            raise ValueError("thigh_length and thigh_unit have no meaning without thigh")
+        return self
+
+
 class GaitMap(BaseModel):
     """What the columns of recorded files mean; a curve that is not named is not imported."""
 
@@ -97,6 +121,7 @@ class GaitMap(BaseModel):
     ankle_moment: MomentMap | None = None
     vertical_force: ForceMap | None = None
     centre_of_pressure: PressureMap | None = None
+    knee: KneeMap | None = None
 
 
 Side = Literal["right", "left"]
@@ -110,13 +135,15 @@ def package_map(_side: Side) -> GaitMap:
         ankle_moment=MomentMap(terms=("ankle_moment",), positive="plantarflexion"),
         vertical_force=ForceMap(terms=("vertical_force",)),
         centre_of_pressure=PressureMap(terms=("centre_of_pressure",)),
+        knee=KneeMap(forward=("knee_forward",), up=("knee_up",)),
     )
 
 
 def opensim_map(side: Side) -> GaitMap:
     """Return the map of OpenSim's gait models: knee below 0 in flexion as in gait2392, ankle above 0 in dorsiflexion.
 
-    The shank angle is the sum of pelvis tilt, hip and knee flexion: what the sagittal plane shows of them.
+    The shank angle is the sum of pelvis tilt, hip and knee flexion: what the sagittal plane shows of them. So is the
+    lean of the thigh, which hangs at the origin of the pelvis here.
     """
     foot = side[0]
     force = "ground_force_vy" if side == "right" else "l_ground_force_vy"
@@ -125,6 +152,7 @@ def opensim_map(side: Side) -> GaitMap:
         ankle_angle=AngleMap(terms=(f"ankle_angle_{foot}",), positive="dorsiflexion"),
         ankle_moment=MomentMap(terms=(f"ankle_angle_{foot}_moment",), positive="dorsiflexion"),
         vertical_force=ForceMap(terms=(force,)),
+        knee=KneeMap(forward=("pelvis_tx",), up=("pelvis_ty",), thigh=("pelvis_tilt", f"hip_flexion_{foot}")),
     )
 
 
@@ -136,6 +164,7 @@ def plug_in_gait_map(side: Side) -> GaitMap:
         ankle_angle=AngleMap(terms=(f"{foot}AnkleAngles.x",), positive="dorsiflexion", unit="deg"),
         ankle_moment=MomentMap(terms=(f"{foot}AnkleMoment.x",), positive="plantarflexion", unit="N mm/kg"),
         vertical_force=ForceMap(terms=(f"{foot}GroundReactionForce.z",), unit="N/kg"),
+        knee=KneeMap(forward=(f"{foot}KNE.x",), up=(f"{foot}KNE.z",)),
     )
 
 

@@ -1,6 +1,6 @@
 """One signal of a recorded walk, and its low pass."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,11 +15,15 @@ _DOUBLE_PASS = (2.0**0.5 - 1.0) ** 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signal:
-    """Values over time [s], evenly enough sampled, of one file."""
+    """Values over time [s], evenly enough sampled, of one file.
+
+    ``is_position``: a position [m], of which the gait has the acceleration.
+    """
 
     file: str
     time: Floats
     values: Floats
+    is_position: bool = False
 
     @property
     def rate(self) -> float:
@@ -42,4 +46,4 @@ def low_passed(signal: Signal, cut_off: float) -> Signal:
         )
     sections = butter(_ORDER, relative, output="sos")
     values = sosfiltfilt(sections, np.interp(even, signal.time, signal.values))
-    return Signal(signal.file, even, np.asarray(values, dtype=np.float64))
+    return replace(signal, time=even, values=np.asarray(values, dtype=np.float64))

@@ -5,12 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ppafo.errors import DataError
+from ppafo.gait.fourier import HARMONICS
 from ppafo.gait.recorded.events import Stride
+from ppafo.gait.recorded.knee import acceleration_of
 from ppafo.gait.recorded.signal import Signal
 from ppafo.signals.recording import Floats
 
 SAMPLES = 101
 """Phases from 0 to 1, in percent."""
+
+_UNLOADED_FORCE = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,8 +54,44 @@ def statistics(signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
     spline = CubicSpline(signal.time, signal.values)
     at = [np.clip(item.start + item.time * phases(), signal.time[0], signal.time[-1]) for item in strides]
     curves = np.array([spline(times) for times in at])
+    return _over_strides(curves, strides)
+
+
+def _over_strides(curves: Floats, strides: Sequence[Stride]) -> CurveStatistics:
     deviation = curves.std(axis=0, ddof=1) if len(strides) > 1 else np.zeros(SAMPLES)
     return CurveStatistics(curves, curves.mean(axis=0), deviation, tuple(strides))
+
+
+def mean_curve(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
+    """Return the curves of the strides that a signal covers; at least one has to be."""
+    inside = covered(signal, strides)
+    if not inside:
+        raise DataError(
+            f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no whole "
+            f"stride ({strides[0].start:.4g} to {strides[0].end:.4g} s is the first); give a longer file, or "
+            "leave it out"
+        )
+    result = statistics(signal, inside)
+    if signal.is_position:
+        return _differentiated(result, HARMONICS[name])
+    return _bridged(result) if name == "centre_of_pressure" else result
+
+
+def _differentiated(result: CurveStatistics, harmonics: int) -> CurveStatistics:
+    """Return the accelerations [m/s^2] of positions [m], each stride with its own time."""
+    pairs = zip(result.curves, result.strides, strict=True)
+    return _over_strides(np.array([acceleration_of(way, harmonics, item.time) for way, item in pairs]), result.strides)
+
+
+def _bridged(result: CurveStatistics) -> CurveStatistics:
+    """Return a centre of pressure with a straight line over swing, where it has no meaning."""
+    percent = phases()
+    share = float(np.mean([item.stance_share for item in result.strides]))
+    inside = (percent > _UNLOADED_FORCE) & (percent < share - _UNLOADED_FORCE)
+    at, first = percent[inside], float(result.mean[inside][0])
+    mean = np.interp(percent, [*at, 1.0 + at[0]], [*result.mean[inside], first], period=None)
+    deviation = np.where(inside, result.deviation, 0.0)
+    return CurveStatistics(result.curves, mean, deviation, result.strides)
 
 
 def without_outliers(strides: Sequence[Stride], largest: float) -> tuple[list[Stride], list[Stride]]:

@@ -1,35 +1,22 @@
 """The course of a bottle from full to the moment at which it no longer holds the supply pressure."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.errors import ParameterError, SimulationError
+from ppafo.errors import ParameterError
 from ppafo.model.fluid_table import has_liquid
-from ppafo.model.source import (
-    BottleContent,
-    BottleState,
-    bottle_content,
-    bottle_rates,
-    content_energy,
-    content_temperature,
-    delivered_pressure,
-)
+from ppafo.model.source import bottle_content, delivered_pressure
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.studies.endurance.bottle import Bottle
 from ppafo.studies.endurance.draw import Draw, Schedule
-from ppafo.studies.endurance.ending import Ending, Stop, ending, flow_limit, frozen_below, reserve
+from ppafo.studies.endurance.ending import Ending, Stop, ending, flow_limit, reserve
+from ppafo.studies.endurance.stretch import Stretch, content_of, full_bottle, solved_stretch
 
 MOST_STRETCHES = 2000
 SAMPLES = 1001
-
-_RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
-_ABOVE_FREEZING = 0.02
-"""Kelvin above the cold end of the table at which a run stops, so that the end is approached and not sat on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,18 +46,6 @@ class Discharge:
     balance: Balance
 
 
-@dataclass(frozen=True, slots=True)
-class _Stretch:
-    """A time [s] of one draw [kg/s], and the solution in it."""
-
-    start: float
-    end: float
-    draw: float
-    solution: Callable[[Any], Any]
-    last: Floats
-    stopped_by: Stop | None
-
-
 def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
     """Return the course of a full bottle under a draw; walking takes the mean flow of a step.
 
@@ -79,14 +54,14 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
     """
     _check(schedule)
     _check_flow(bottle, draw)
-    start = _start(bottle)
-    stretches: list[_Stretch] = []
+    start = full_bottle(bottle)
+    stretches: list[Stretch] = []
     time, values, walking = 0.0, start, True
     reason: Stop | None = None
     while reason is None:
         length = schedule.longest if schedule.rest == 0.0 else (schedule.walk if walking else schedule.rest)
         end = min(time + length, schedule.longest)
-        stretch = _solved(bottle, draw, time, end, values, walking)
+        stretch = solved_stretch(bottle, draw, time, end, values, walking)
         stretches.append(stretch)
         time, values, walking = stretch.end, stretch.last, not walking
         reason = stretch.stopped_by or ("time" if time >= schedule.longest else None)
@@ -116,74 +91,10 @@ def _check_flow(bottle: Bottle, draw: Draw) -> None:
         )
 
 
-def _start(bottle: Bottle) -> Floats:
-    energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
-    return np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
-
-
-def _content(bottle: Bottle, mass: float, energy: float) -> BottleContent:
-    table = bottle.fluid.table
-    return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
-
-
-def _solved(bottle: Bottle, draw: Draw, start: float, end: float, values: Floats, walking: bool) -> _Stretch:
-    """Return one stretch; walking, it may end early where the supply pressure is no longer held."""
-    from scipy.integrate import solve_ivp
-
-    flow = draw.mean_flow if walking else 0.0
-    events = _events(bottle, draw)[: 2 if walking else 1]
-    if walking and events[1](start, values) <= 0.0:
-        return _Stretch(start, start, flow, lambda _times: values, values, "supply")
-    solution = solve_ivp(
-        _rates(bottle, flow),
-        (start, end),
-        values,
-        method="LSODA",
-        events=events,
-        dense_output=True,
-        rtol=_RELATIVE,
-        atol=_ABSOLUTE,
-    )
-    if solution.status < 0:
-        raise SimulationError(f"the bottle could not be followed beyond {solution.t[-1]:.4g} s: {solution.message}")
-    stopped: Stop = "frozen" if len(solution.t_events[0]) else "supply"
-    last = np.asarray(solution.y[:, -1])
-    return _Stretch(start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None)
-
-
-def _rates(bottle: Bottle, flow: float) -> Callable[[float, Floats], list[float]]:
-    """Return the right-hand side for mass, energy, wall temperature, and the sums of what crossed the border."""
-
-    def rates(_time: float, y: Floats) -> list[float]:
-        state = BottleState(float(y[0]), float(y[1]), float(y[2]))
-        content = _content(bottle, state.mass, state.energy)
-        now = bottle_rates(content, state, flow, bottle.wall, bottle.room_temperature)
-        inside = (now.mass_rate, now.content_energy_rate, now.wall_temperature_rate)
-        return [*inside, flow, now.outflow_power, now.room_heat]
-
-    return rates
-
-
-def _events(bottle: Bottle, draw: Draw) -> list[Any]:
-    """Return what ends a stretch where it falls through 0: kelvins above freezing, and what the supply has to spare."""
-
-    def above_freezing(_time: float, y: Floats) -> float:
-        return _content(bottle, float(y[0]), float(y[1])).temperature - frozen_below(bottle) - _ABOVE_FREEZING
-
-    def to_spare(_time: float, y: Floats) -> float:
-        content = _content(bottle, float(y[0]), float(y[1]))
-        return reserve(bottle, draw, content.pressure, content.temperature)
-
-    events: list[Any] = [above_freezing, to_spare]
-    for event in events:
-        event.terminal, event.direction = True, -1.0
-    return events
-
-
 def _gathered(
     bottle: Bottle,
     draw: Draw,
-    stretches: list[_Stretch],
+    stretches: list[Stretch],
     start: Floats,
     reason: Stop,
 ) -> Discharge:
@@ -203,18 +114,18 @@ def _gathered(
         walking_time=walking,
         total_time=stretches[-1].end,
         steps=walking / draw.step_time,
-        ending=ending(bottle, draw, float(last[0]), _content(bottle, float(last[0]), float(last[1])), reason),
+        ending=ending(bottle, draw, float(last[0]), content_of(bottle, float(last[0]), float(last[1])), reason),
         balance=balance,
     )
 
 
-def _recording(bottle: Bottle, stretches: list[_Stretch]) -> Recording:
+def _recording(bottle: Bottle, stretches: list[Stretch]) -> Recording:
     """Return the course at evenly spaced times, and exactly at its end."""
     times = np.linspace(0.0, stretches[-1].end, SAMPLES)
     ends = np.array([stretch.end for stretch in stretches])
     places = np.minimum(np.searchsorted(ends, times, side="left"), len(stretches) - 1)
     rows = np.array([stretches[place].solution(time) for place, time in zip(places, times, strict=True)])
-    contents = [_content(bottle, float(row[0]), float(row[1])) for row in rows]
+    contents = [content_of(bottle, float(row[0]), float(row[1])) for row in rows]
     flows = [stretches[place].draw for place in places]
     supply = [
         delivered_pressure(bottle.regulator, content.pressure, flow)

@@ -8,6 +8,7 @@ import numpy as np
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import DataError, ParameterError
 from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
 
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
@@ -65,7 +66,7 @@ def draw_of_recording(recording: Recording, step_time: float | None) -> Draw:
     """Return the draw of a recording with ``supplied_mass``, repeated for ever; all of it is one step by default."""
     if "supplied_mass" not in recording:
         raise DataError(f"{recording.label}: has no channel 'supplied_mass'; there are {', '.join(recording.names)}")
-    supplied = recording["supplied_mass"]
+    supplied = _taken(recording)
     gain = float(supplied[-1] - supplied[0])
     if recording.duration <= 0.0 or gain <= 0.0:
         raise DataError(f"{recording.label}: no gas was taken from the supply, so a bottle would last for ever")
@@ -85,11 +86,16 @@ def draw_of_recording(recording: Recording, step_time: float | None) -> Draw:
     return Draw(mean * step, step, peak, f"recording '{recording.label}', {recording.kind}, repeated")
 
 
+def _taken(recording: Recording) -> Floats:
+    """Return the gas [kg] that left the bottle: through its regulator, where there is a line between that and valve."""
+    return recording["regulated_mass" if "regulated_mass" in recording else "supplied_mass"]
+
+
 def largest_flow(recording: Recording) -> float:
     """Return the largest flow [kg/s], averaged over the window or over a recording that is shorter."""
     window = min(PEAK_WINDOW, recording.duration)
     starts = recording.time[recording.time <= recording.time[-1] - window]
     starts = np.append(starts, recording.time[-1] - window)
-    ends = np.interp(starts + window, recording.time, recording["supplied_mass"])
-    begins = np.interp(starts, recording.time, recording["supplied_mass"])
+    ends = np.interp(starts + window, recording.time, _taken(recording))
+    begins = np.interp(starts, recording.time, _taken(recording))
     return float(np.max(ends - begins) / window)

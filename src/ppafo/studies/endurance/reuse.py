@@ -1,6 +1,6 @@
 """Parameters of reusing the exhaust, and what it saves of the gas of a step."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
@@ -11,6 +11,7 @@ from ppafo.model.exhaust_reuse import ReuseBalance, ReuseCycle, reuse_balance
 from ppafo.parameters import load_device
 from ppafo.parameters.declaration import is_within
 from ppafo.studies.endurance.bottle import Bottle
+from ppafo.studies.endurance.walked import FullChambers
 from ppafo.units import parse_quantity
 
 REUSE = (
@@ -27,21 +28,34 @@ TOE_OFF_ANGLE, NEUTRAL_ANGLE = "110 deg", "90 deg"
 """Where the chambers vent and fill unless their volumes are given: 20 deg of plantarflexion at toe-off, and the
 neutral angle at which the paper holds the foot in swing."""
 
+GIVEN = "given"
+_DEFAULT = "the regulator's pressure, and the paper's device at toe-off and in neutral"
+
+
+@dataclass(frozen=True, slots=True)
+class ReusePlan:
+    """A cycle with a reservoir, and where its pressures and volumes come from, by name."""
+
+    cycle: ReuseCycle
+    origins: Mapping[str, str]
+
 
 @dataclass(frozen=True, slots=True)
 class Reuse:
-    """A cycle with a reservoir, and its masses once the reservoir has settled."""
+    """A cycle with a reservoir, its masses once the reservoir has settled, and where its values come from, by name."""
 
     cycle: ReuseCycle
     balance: ReuseBalance
+    origins: Mapping[str, str]
 
 
-def reuse(cycle: ReuseCycle, mass_per_step: float) -> Reuse:
+def reuse(plan: ReusePlan, mass_per_step: float) -> Reuse:
     """Return what a reservoir saves in a cycle: ``balance.returned_mass`` [kg] a step.
 
     ``mass_per_step`` [kg] is what a step takes without a reservoir. ParameterError where the cycle does not belong to
     it: pressures below the atmosphere, or chambers that hold more than the step takes.
     """
+    cycle = plan.cycle
     for name in ("exhaust_pressure", "fill_pressure"):
         if getattr(cycle, name) < cycle.atmospheric_pressure:
             raise ParameterError(f"--reuse {name}: must be at least that of the atmosphere")
@@ -53,14 +67,26 @@ def reuse(cycle: ReuseCycle, mass_per_step: float) -> Reuse:
             f"more than the {mass_per_step * GRAMS_PER_KILOGRAM:.3g} g of the gas use; give the exhaust_pressure, "
             "fill_pressure, exhaust_volume and fill_volume that belong to it"
         )
-    return Reuse(cycle, balance)
+    return Reuse(cycle, balance, plan.origins)
 
 
-def parse_reuse(texts: Iterable[str], bottle: Bottle) -> ReuseCycle:
+def parse_reuse(texts: Iterable[str], bottle: Bottle, chambers: FullChambers | None = None) -> ReusePlan:
     """Return the cycle of texts such as ``reservoir_volume=50 cm^3``; the reservoir must be given.
 
-    Pressures are the regulator's unless given, volumes those of the paper's device at toe-off and in neutral.
+    What is not given of the chambers is that of ``chambers``, of a walk. Without a walk pressures are the regulator's
+    and volumes those of the paper's device at toe-off and in neutral.
     """
+    values = _given(texts)
+    found, origin = (_defaults(bottle), _DEFAULT) if chambers is None else _of_walk(chambers)
+    cycle = ReuseCycle(
+        **(found | values),
+        atmospheric_pressure=STANDARD_ATMOSPHERE,
+        gas_product=bottle.fluid.table.gas_constant * bottle.room_temperature,
+    )
+    return ReusePlan(cycle, {item.name: GIVEN if item.name in values else origin for item in REUSE})
+
+
+def _given(texts: Iterable[str]) -> dict[str, float]:
     values: dict[str, float] = {}
     for text in texts:
         name, separator, quantity = (part.strip() for part in one_line(text).partition("="))
@@ -72,12 +98,7 @@ def parse_reuse(texts: Iterable[str], bottle: Bottle) -> ReuseCycle:
         values[name] = _value(_BY_NAME[name], quantity)
     if "reservoir_volume" not in values:
         raise ParameterError("--reuse: give at least the reservoir, for example --reuse 'reservoir_volume=50 cm^3'")
-    given = _defaults(bottle) | values
-    return ReuseCycle(
-        **given,
-        atmospheric_pressure=STANDARD_ATMOSPHERE,
-        gas_product=bottle.fluid.table.gas_constant * bottle.room_temperature,
-    )
+    return values
 
 
 def _value(quantity: Quantity, text: str) -> float:
@@ -91,6 +112,12 @@ def _value(quantity: Quantity, text: str) -> float:
             f"{quantity.maximum:g} {quantity.unit}"
         )
     return value
+
+
+def _of_walk(chambers: FullChambers) -> tuple[dict[str, float], str]:
+    """Return pressures and volumes of the chambers at their fullest, and the words for where they come from."""
+    names = ("exhaust_pressure", "exhaust_volume", "fill_pressure", "fill_volume")
+    return {name: getattr(chambers, name) for name in names}, f"from the walk, mean over {chambers.strides} strides"
 
 
 def _defaults(bottle: Bottle) -> dict[str, float]:

@@ -2,12 +2,11 @@
 
 from dataclasses import dataclass
 
-from ppafo.model.exhaust_reuse import ReuseCycle
 from ppafo.studies.endurance.bottle import Bottle
 from ppafo.studies.endurance.discharge import Discharge, discharge
 from ppafo.studies.endurance.draw import Draw, Schedule
 from ppafo.studies.endurance.ending import smallest_mass_when_warm
-from ppafo.studies.endurance.reuse import Reuse, reuse
+from ppafo.studies.endurance.reuse import Reuse, ReusePlan, reuse
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +26,9 @@ class Endurance:
     steps_when_warm: float
 
 
-def endurance(bottle: Bottle, draw: Draw, schedule: Schedule, cycle: ReuseCycle | None = None) -> Endurance:
-    """Return how long a full bottle lasts; ``cycle`` takes the gas that a reservoir gives back off every step."""
-    reused = None if cycle is None else reuse(cycle, draw.mass_per_step)
+def endurance(bottle: Bottle, draw: Draw, schedule: Schedule, plan: ReusePlan | None = None) -> Endurance:
+    """Return how long a full bottle lasts; ``plan`` takes the gas that a reservoir gives back off every step."""
+    reused = None if plan is None else reuse(plan, draw.mass_per_step)
     taken = draw if reused is None else draw.less(reused.balance.returned_mass)
     usable = bottle.mass - smallest_mass_when_warm(bottle, taken)
     return Endurance(

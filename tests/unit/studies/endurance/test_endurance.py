@@ -1,5 +1,7 @@
 """How a run ends and why, rests, gas uses from recordings, and reuse in the study."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -177,7 +179,7 @@ def test_a_reservoir_of_nothing_saves_nothing() -> None:
 
 
 def test_defaults_of_reuse_are_the_regulators_pressure_and_the_paper_devices_volumes() -> None:
-    cycle = parse_reuse(["reservoir_volume=50 cm^3", "fill_pressure=30 psi_g"], load_bottle(PAPER_BOTTLE))
+    cycle = parse_reuse(["reservoir_volume=50 cm^3", "fill_pressure=30 psi_g"], load_bottle(PAPER_BOTTLE)).cycle
     assert cycle.reservoir_volume == pytest.approx(50e-6)
     assert cycle.exhaust_pressure == pytest.approx(101325.0 + 50 * 6894.757, rel=1e-6)
     assert cycle.fill_pressure == pytest.approx(101325.0 + 30 * 6894.757, rel=1e-6)
@@ -201,8 +203,8 @@ def test_reuse_that_makes_no_sense_is_refused(texts: list[str], words: str) -> N
 
 
 def test_chambers_that_hold_more_than_a_step_takes_are_refused() -> None:
-    cycle = parse_reuse(["reservoir_volume=50 cm^3"], load_bottle(PAPER_BOTTLE))
+    plan = parse_reuse(["reservoir_volume=50 cm^3"], load_bottle(PAPER_BOTTLE))
     with pytest.raises(ParameterError, match=r"more than the 0\.3 g"):
-        reuse(cycle, 3e-4)
+        reuse(plan, 3e-4)
     with pytest.raises(ParameterError, match="at least that of the atmosphere"):
-        reuse(cycle._replace(fill_pressure=9e4), 1e-3)
+        reuse(replace(plan, cycle=plan.cycle._replace(fill_pressure=9e4)), 1e-3)

@@ -1,0 +1,87 @@
+"""Shank and ankle: range, lean, zero and sign."""
+
+import numpy as np
+
+from ppafo.errors import DataError
+from ppafo.gait.plausible.checked import Checked, Given
+
+SHANK_RANGE = (25.0, 120.0)
+ANKLE_RANGE = (5.0, 80.0)
+ANKLE_LIMITS = (40.0, 150.0)
+MIDSTANCE = slice(15, 41)
+"""Percent of the stride in which the foot stands: the ankle then turns as the shank does."""
+_LEAST_SHANK_TRAVEL = 8.0
+_LARGEST_FOOT_ANGLE = 35.0
+
+
+def check_shank(walk: Checked) -> None:
+    """Refuse a shank that no leg has."""
+    phi = np.degrees(walk.curves["shank_angle"])
+    place = f"{walk.file['shank_angle']}: shank_angle"
+    travel = float(np.ptp(phi))
+    low, high = SHANK_RANGE
+    if not low <= travel <= high:
+        raise DataError(
+            f"{place} moves over {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
+            f"{_unit_hint(travel, low, high)}"
+        )
+    if float(np.mean(phi[MIDSTANCE][:5])) < float(np.mean(phi[MIDSTANCE][-5:])):
+        raise DataError(
+            f"{place} grows while the foot stands: the shank would fall back over it; "
+            f"{walk.other_sign('shank_angle.positive')}{_other_foot(walk)}"
+        )
+    if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
+        raise DataError(
+            f"{place} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average; plausible is above "
+            "-10 and -50 to 10 deg (0 is vertical, above 0 the ankle is in front); its zero or its columns are wrong"
+            f"{_other_foot(walk)}"
+        )
+
+
+def check_ankle(walk: Checked) -> None:
+    """Refuse an ankle that no leg has, or not with this shank."""
+    theta, phi = (np.degrees(walk.curves[name]) for name in ("ankle_angle", "shank_angle"))
+    place = f"{walk.file['ankle_angle']}: ankle_angle"
+    travel = float(np.ptp(theta))
+    low, high = ANKLE_RANGE
+    if not low <= travel <= high:
+        raise DataError(
+            f"{place} moves over {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
+            f"{_unit_hint(travel, low, high)}"
+        )
+    stand, lean = theta[MIDSTANCE], phi[MIDSTANCE]
+    slope = float(np.polyfit(lean, stand, 1)[0]) if np.ptp(lean) > _LEAST_SHANK_TRAVEL else 1.0
+    if slope < 0.0:
+        raise DataError(
+            f"{place} goes into plantarflexion while the shank rotates forward over the standing foot "
+            f"({slope:.2g} deg per deg, plausible is about 1): its sign is reversed; "
+            f"{walk.other_sign('ankle_angle.positive', 'the other sign about 90 deg')}"
+        )
+    foot = float(np.mean(stand - 90.0 - lean))
+    if abs(foot) > _LARGEST_FOOT_ANGLE or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
+        raise DataError(
+            f"{place} would tilt the standing foot by {foot:.0f} deg, plausible is within {_LARGEST_FOOT_ANGLE:g} deg "
+            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.given]}"
+        )
+
+
+_NEUTRAL: dict[Given, str] = {
+    "map": "give ankle_angle.neutral in the gait map: what the file shows when the foot is square to the shank",
+    "columns": "write it as 90 deg when the foot is square to the shank, or give a gait map with ankle_angle.neutral",
+    "gait_file": "write its mean so that it is 90 deg when the foot is square to the shank",
+}
+
+
+def _other_foot(walk: Checked) -> str:
+    if walk.given == "gait_file" or "vertical_force" not in walk.curves:
+        return ""
+    return ", or the force is of the other foot: choose the other side, or the column of this foot"
+
+
+def _unit_hint(travel: float, low: float, high: float) -> str:
+    """Return which unit would make a range of an angle plausible."""
+    if low <= np.degrees(travel) <= high:
+        return "the numbers look like radians: give 'rad' as their unit"
+    if low <= np.radians(travel) <= high:
+        return "the numbers look like degrees: give 'deg' as their unit"
+    return "check unit and columns"

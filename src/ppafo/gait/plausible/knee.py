@@ -1,0 +1,46 @@
+"""Acceleration of the knee: size, mean and sign."""
+
+import numpy as np
+
+from ppafo.errors import DataError
+from ppafo.gait.gait import KNEE
+from ppafo.gait.plausible.checked import Checked
+
+KNEE_TRAVEL = (0.5, 80.0)
+KNEE_MEAN = 1.5
+
+_PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.4, 0.7))}
+"""Parts of the swing, from toe-off, in which the knee is driven on and up, and in which it is held back and falls."""
+
+
+def check_knee(walk: Checked) -> None:
+    """Refuse accelerations of the knee, where there are some, that no leg has."""
+    there = [name for name in KNEE if name in walk.curves]
+    if len(there) == 1:
+        (missing,) = set(KNEE) - set(there)
+        raise DataError(f"{walk.file[there[0]]}: {there[0]} is there without {missing}; give both, or none")
+    for name in there:
+        _check_knee(name, walk)
+
+
+def _check_knee(name: str, walk: Checked) -> None:
+    values, place = walk.curves[name], f"{walk.file[name]}: {name}"
+    travel, mean, (low, high) = float(np.ptp(values)), float(np.mean(values[:-1])), KNEE_TRAVEL
+    if abs(mean) > KNEE_MEAN:
+        raise DataError(
+            f"{place} is {mean:.3g} m/s^2 on average, and a stride that repeats has 0 (within {KNEE_MEAN:g} is let "
+            "pass); an accelerometer shows gravity too: take it away"
+        )
+    if not low <= travel <= high:
+        raise DataError(
+            f"{place} moves over {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
+            "is the unit right (m/s^2, or m for a position)?"
+        )
+    swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
+    driven, held = (float(np.mean(values[(swung >= low) & (swung <= high)])) for low, high in _PARTS[name])
+    if driven < held:
+        raise DataError(
+            f"{place} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in the middle of the swing, and it is "
+            "the other way round in walking: its sign is reversed, or it is of the other knee; "
+            f"{walk.other_sign(f'the sign of knee.{name[5:]}')}"
+        )

@@ -1,0 +1,61 @@
+"""Ankle moment and vertical force: size and sign."""
+
+import numpy as np
+
+from ppafo.errors import DataError
+from ppafo.gait.plausible.checked import Checked, Given, other_sign
+from ppafo.signals.recording import Floats
+
+MOMENT_PEAK = (0.05, 3.5)
+FORCE_PEAK = (0.5, 2.5)
+FORCE_MEAN = (0.25, 0.75)
+
+
+def check_force_scale(file: str, force: Floats, given: Given) -> None:
+    """Refuse a vertical force [body weights] in which no heel strike can be found, by its unit or its sign."""
+    lowest, highest = (float(value) for value in np.percentile(force, (2.0, 98.0)))
+    low, high = FORCE_PEAK
+    if -lowest > highest:
+        raise DataError(
+            f"{file}: vertical_force is {lowest:.3g} body weights at its largest, downwards: its sign is reversed; "
+            f"{other_sign(given, 'vertical_force.positive')}"
+        )
+    if not low <= highest <= high:
+        raise DataError(
+            f"{file}: vertical_force reaches {highest:.3g} body weights, plausible is {low:g} to {high:g}; "
+            "is the body mass right, and the unit (N, '-')?"
+        )
+
+
+def check_moment(walk: Checked) -> None:
+    """Refuse an ankle moment, where there is one, that no leg has."""
+    if "ankle_moment" not in walk.curves:
+        return
+    moment = walk.curves["ankle_moment"]
+    place = f"{walk.file['ankle_moment']}: ankle_moment"
+    if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > float(np.max(moment)):
+        raise DataError(
+            f"{place} is {np.min(moment):.3g} N m/kg at its largest, into dorsiflexion: its sign is reversed; "
+            f"{walk.other_sign('ankle_moment.positive')}"
+        )
+    peak, (low, high) = float(np.max(moment)), MOMENT_PEAK
+    if not low <= peak <= high:
+        raise DataError(
+            f"{place} reaches {peak:.3g} N m/kg, plausible is {low:g} to {high:g} N m/kg; is the unit right "
+            "(N m, N m/kg, N mm/kg) and the body mass?"
+        )
+
+
+def check_force(walk: Checked) -> None:
+    """Refuse a vertical force, where there is one, that no walk has."""
+    if "vertical_force" not in walk.curves:
+        return
+    force = walk.curves["vertical_force"]
+    place = f"{walk.file['vertical_force']}: vertical_force"
+    peak, mean = float(np.max(force)), float(np.mean(force))
+    if not FORCE_PEAK[0] <= peak <= FORCE_PEAK[1] or not FORCE_MEAN[0] <= mean <= FORCE_MEAN[1]:
+        raise DataError(
+            f"{place} is {mean:.3g} body weights on average and {peak:.3g} at its peak, plausible is "
+            f"{FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g} and {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}; "
+            "is the body mass right, and the unit (N, '-')?"
+        )

@@ -1,0 +1,104 @@
+"""Two pressure regulators and the lines behind them, with droop and a largest flow: the supply of a walking device.
+
+The bottle's regulator fills the plantarflexion line. The second regulator sits on the device, behind the first: it
+takes its gas from that line and fills the dorsiflexion line. Each lets through
+
+    mass flow = clip((set pressure - line pressure) / droop, 0, largest flow),
+
+where the second one cannot regulate to more than its inlet has. A line is a volume of isothermal gas, equation (3);
+no gas flows back through a regulator. The lines are stepped with the outflow of the step spread evenly over it: the
+regulator's linear part is solved in closed form, so that a small droop asks for no small step.
+"""
+
+from typing import NamedTuple
+
+
+class SupplyLines(NamedTuple):
+    """Droop [Pa s/kg] and largest flow [kg/s] of both regulators, volumes [m^3] of both lines.
+
+    1 is the plantarflexion line behind the bottle's regulator, 2 the dorsiflexion line behind the device's.
+    """
+
+    droop_1: float
+    largest_flow_1: float
+    volume_1: float
+    droop_2: float
+    largest_flow_2: float
+    volume_2: float
+
+
+class LineState(NamedTuple):
+    """Gas in both lines, and gas that the bottle's regulator has let through since the start [kg]."""
+
+    mass_1: float
+    mass_2: float
+    regulated_mass: float
+
+
+class LineStep(NamedTuple):
+    """Lines after a step, and by how much [Pa] line 1 would have risen in it without the second regulator's draw."""
+
+    after: LineState
+    inlet_rise: float
+
+
+def regulator_flow(set_pressure: float, line_pressure: float, droop: float, largest_flow: float) -> float:
+    """Mass flow [kg/s] through a regulator: over the fall of its pressure [Pa] by the droop [Pa s/kg], at most all."""
+    return min(max((set_pressure - line_pressure) / droop, 0.0), largest_flow)
+
+
+def line_pressures(lines: SupplyLines, gas_product: float, state: LineState) -> tuple[float, float]:
+    """Absolute pressures of both lines [Pa]; ``gas_product`` is R T/M [J/kg]. Equation (3)."""
+    return state.mass_1 * gas_product / lines.volume_1, state.mass_2 * gas_product / lines.volume_2
+
+
+def regulated_mass(
+    lacking: float, loss: float, stiffness: float, droop: float, largest_flow: float, step: float
+) -> float:
+    """Mass [kg] that a regulator lets through in a step [s].
+
+    ``lacking`` [Pa] is the set pressure less the line's at the beginning; it would grow by ``loss`` [Pa], evenly over
+    the step, if nothing came through, and shrinks by ``stiffness`` [Pa/kg] for what does.
+    """
+    steps = step * stiffness / droop
+    # 1 / (1 + x + x^2/2) stands for exp(-x): of second order, between 0 and 1, and the lanes keep it in vector code.
+    scale = 1.0 / (1.0 + steps + 0.5 * steps * steps)
+    regained = lacking * steps * (1.0 + 0.5 * steps) + loss * 0.5 * steps * (1.0 + steps)
+    return min(max(regained * scale / stiffness, 0.0), largest_flow * step)
+
+
+def step_lines(
+    lines: SupplyLines,
+    set_1: float,
+    set_2: float,
+    gas_product: float,
+    state: LineState,
+    taken_1: float,
+    taken_2: float,
+    inlet_rise: float,
+    step: float,
+) -> LineStep:
+    """Both lines after a step [s] in which the valves took two masses [kg] from them; set pressures absolute [Pa].
+
+    ``inlet_rise`` [Pa] is what is known of line 1's own rise, 0 in a first guess: it matters where the second
+    regulator stands open because its inlet has less than it is set to.
+    """
+    per_mass_1, per_mass_2 = gas_product / lines.volume_1, gas_product / lines.volume_2
+    pressure_1, pressure_2 = line_pressures(lines, gas_product, state)
+    stands_open = pressure_1 < set_2
+    passed_2 = regulated_mass(
+        min(set_2, pressure_1) - pressure_2,
+        taken_2 * per_mass_2 + (inlet_rise if stands_open else 0.0),
+        per_mass_2 + (per_mass_1 if stands_open else 0.0),
+        lines.droop_2,
+        lines.largest_flow_2,
+        step,
+    )
+    left = taken_1 + passed_2
+    passed_1 = regulated_mass(
+        set_1 - pressure_1, left * per_mass_1, per_mass_1, lines.droop_1, lines.largest_flow_1, step
+    )
+    after = LineState(
+        state.mass_1 + passed_1 - left, state.mass_2 + passed_2 - taken_2, state.regulated_mass + passed_1
+    )
+    return LineStep(after, (passed_1 - taken_1) * per_mass_1)

@@ -1,0 +1,132 @@
+"""The rows of the engine for many wearers: the column of one run repeated, and what differs written over it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.lanes import Batch, Floats
+from ppafo.engine.rows import leaf_paths
+from ppafo.engine.run import Run, batch_of
+from ppafo.gait.gait import KNEE
+from ppafo.model.chambers import chamber_mass
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
+from ppafo.model.plant import chamber_volumes
+from ppafo.walking.anthropometry import Build, bounded_normal, scaled_segments
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.declaration import LARGEST_SEED
+from ppafo.walking.varied_gait import VariedGaits
+
+THRESHOLD_VARIATION = 0.15
+"""Standard deviation of thresholds over their values: how a fitter sets them, and how a sensor sits. Assumed."""
+
+START_VARIATION = 0.03
+"""Standard deviation of the share of the stride at which the push-off begins. Assumed."""
+
+
+def batch_of_many(
+    configuration: Configuration, run: Run, build: Build, gaits: VariedGaits, generator: np.random.Generator
+) -> Batch:
+    """The run's column for every wearer, with what differs written over it; nothing is recorded on the way."""
+    single = batch_of(run)
+    count = build.mass.size
+    assert run.walk is not None, "a population walks"
+    segments = scaled_segments(replace(configuration.wearer, heel_lever=run.walk.leg.heel_lever), build)
+    parameters, states = (np.repeat(column, count, axis=1) for column in (single.parameters, single.states))
+    _overwrite(
+        parameters, row_numbers(single.program.parameter_rows()), _parameter_rows(run, segments, gaits, generator)
+    )
+    _overwrite(states, row_numbers(single.program.state_rows()), _state_rows(run, segments, gaits))
+    still = replace(single.clock, record_every=0)
+    return Batch(single.program, still, parameters, states)
+
+
+def row_numbers(groups: Mapping[str, type]) -> dict[str, int]:
+    """Number of each row by its path."""
+    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
+    return {path: number for number, path in enumerate(paths)}
+
+
+def _overwrite(table: Floats, rows: Mapping[str, int], values: Mapping[str, Floats]) -> None:
+    for path, row in values.items():
+        table[rows[path]] = row
+
+
+def _parameter_rows(
+    run: Run, segments: Mapping[str, Floats], gaits: VariedGaits, generator: np.random.Generator
+) -> dict[str, Floats]:
+    found = {f"leg.{name}": values for name, values in segments.items() if name in LegParameters._fields}
+    assert run.walk is not None, "a population walks"
+    foot = segments["foot_inertia"] + segments["foot_mass"] * segments["foot_mass_centre"] ** 2
+    found["plant.inertia"] = run.walk.share.inertia + foot
+    # Everybody has noise of their own, where there is any.
+    found["sensors.seed"] = np.arange(run.sensors.seed, run.sensors.seed + foot.size, dtype=np.float64) % LARGEST_SEED
+    found |= {
+        f"gait.{field}.{name}": values
+        for field, series in gaits.series.items()
+        for name, values in series.rows().items()
+    }
+    found |= {f"gait_timing.{name}": values for name, values in gaits.timing.items()}
+    return found | _thresholds(run, segments["body_mass"].size, generator)
+
+
+def _thresholds(run: Run, count: int, generator: np.random.Generator) -> dict[str, Floats]:
+    """Thresholds of an event-based controller about its settings; both of a sensor move together and stay apart."""
+    rules = getattr(run.controller, "phases", None)
+    if rules is None:
+        return {}
+    scale = 1.0 + THRESHOLD_VARIATION * bounded_normal(generator, (count,))
+    start = rules.push_off_start + START_VARIATION * bounded_normal(generator, (count,))
+    scale[0], start[0] = 1.0, rules.push_off_start
+    return {
+        "controller.phases.load_threshold": rules.load_threshold * scale,
+        "controller.phases.unload_threshold": rules.unload_threshold * scale,
+        "controller.phases.push_off_start": np.clip(start, 0.0, 1.0),
+    }
+
+
+def _state_rows(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits) -> dict[str, Floats]:
+    """The start at a heel strike with the wearer's own angles and vented chambers."""
+    now = _gait_at_heel_strike(run, segments, gaits)
+    plant = run.plant
+    volumes = chamber_volumes(plant, now["ankle"])  # type: ignore[arg-type]
+    masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
+    return {f"walk.now.{name}": values for name, values in now.items()} | {
+        "state.angle": now["ankle"],
+        "state.angular_velocity": now["ankle_rate"],
+        "state.mass_1": np.asarray(masses[0]),
+        "state.mass_2": np.asarray(masses[1]),
+    }
+
+
+def _gait_at_heel_strike(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits) -> dict[str, Floats]:
+    """The fields of ``GaitNow`` (wearers,) at phase 0."""
+    assert run.walk is not None, "a population walks"
+    frequency = gaits.timing["frequency"]
+    shank, shank_rate, shank_acceleration = gaits.series["shank"].at_heel_strike(frequency)
+    ankle, ankle_rate, ankle_acceleration = gaits.series["ankle"].at_heel_strike(frequency)
+    moment, force = (gaits.series[name].at_heel_strike(frequency)[0] for name in ("moment", "force"))
+    knee = {name: gaits.series[name].at_heel_strike(frequency)[0] for name in KNEE}
+    # A leg of arrays: the functions of the leg are plain arithmetic.
+    own = {name: row for name, row in segments.items() if name in LegParameters._fields}
+    leg: Any = run.walk.leg._replace(**own)  # type: ignore[arg-type]
+    torque: Any = torque_of_shank
+    foot = shank - ankle + 0.5 * np.pi
+    directions = np.sin(shank), np.cos(shank), np.sin(foot), np.cos(foot)
+    carried = torque(leg, *directions, shank_rate, shank_acceleration, knee["knee_forward"], knee["knee_up"])
+    return {
+        "shank": shank,
+        "shank_rate": shank_rate,
+        "shank_acceleration": shank_acceleration,
+        "ankle": ankle,
+        "ankle_rate": ankle_rate,
+        "ankle_acceleration": ankle_acceleration,
+        "moment": leg.body_mass * moment,
+        "force": np.maximum(leg.body_mass * leg.gravity * force, 0.0),
+        "sine_shank": directions[0],
+        "cosine_shank": directions[1],
+        "sine_healthy_foot": directions[2],
+        "healthy_torque": carried + foot_inertia_about_ankle(leg) * ankle_acceleration + leg.ankle_damping * ankle_rate,
+        **knee,
+    }

@@ -1,0 +1,166 @@
+"""The foot in the swing and on its heel, against Lagrange's equations of the leg written here once more."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.run import Run, batch_of
+from ppafo.engine.scheme.walking import DeviceShare, foot_direction, leg_torque
+from ppafo.gait import Gait
+from ppafo.model import contact as ground
+from ppafo.model.gait import gait_at
+from ppafo.simulation.sampled import state_row_numbers
+from ppafo.walking.planning import followed, plan_walk
+from ppafo.walking.wearer import Wearer, paper_subject
+
+
+class Judge:
+    """The ankle in the swing from the curves of a gait file: theta'' from the foot's angular momentum about the ankle.
+
+    The foot hangs on an ankle that accelerates with the shank, so its angle alpha over the horizontal obeys
+    ``I alpha'' = -m c (a_y + g) cos(alpha) + m c a_x sin(alpha) - torque`` with the torque in plantarflexion.
+    """
+
+    def __init__(self, gait: Gait, wearer: Wearer, plate: DeviceShare) -> None:
+        self.wearer, self.plate, self.stride = wearer, plate, gait.stride_time
+        self.shank = followed(gait.shank_angle)
+        self.healthy = followed(gait.ankle_angle)
+        self.knee = [followed(gait.curve(name)) for name in ("knee_forward", "knee_up")]
+        self.moment = wearer.foot_mass * wearer.foot_mass_centre
+        self.inertia = wearer.foot_inertia + self.moment * wearer.foot_mass_centre
+
+    def at(self, curve: Any, phase: float) -> tuple[float, float, float]:
+        """Value and two derivatives by time, from differences of the curve."""
+        small = 1.0e-4
+        before, here, after = (curve.value((phase + way * small) % 1.0) for way in (-1.0, 0.0, 1.0))
+        by_time = small * self.stride
+        return here, (after - before) / (2.0 * by_time), (after - 2.0 * here + before) / by_time**2
+
+    def without_torque(self, phase: float, angle: float) -> float:
+        """Torque [N m] in plantarflexion of which I alpha'' = -(torque + this)."""
+        phi, rate, acceleration = self.at(self.shank, phase)
+        length = self.wearer.shank_length
+        knee_forward, knee_up = (curve.value(phase % 1.0) for curve in self.knee)
+        forward = length * (acceleration * math.cos(phi) - rate**2 * math.sin(phi)) + knee_forward
+        up = length * (acceleration * math.sin(phi) + rate**2 * math.cos(phi)) + knee_up + 9.80665
+        alpha = phi - angle + 0.5 * math.pi
+        return self.moment * (up * math.cos(alpha) - forward * math.sin(alpha))
+
+    def tissue(self, angle: float, rate: float) -> float:
+        """Torque [N m] of tissue."""
+        wearer = self.wearer
+        return wearer.ankle_stiffness * (wearer.ankle_rest_angle - angle) - wearer.ankle_damping * rate
+
+    def muscles(self, phase: float) -> float:
+        """Torque [N m] that a healthy wearer adds to tissue along the measured ankle in the swing."""
+        _, _, shank_acceleration = self.at(self.shank, phase)
+        angle, rate, acceleration = self.at(self.healthy, phase)
+        turning = self.inertia * (shank_acceleration - acceleration)
+        return -turning - self.without_torque(phase, angle) - self.tissue(angle, rate)
+
+    def slopes(self, phase: float, angle: float, rate: float) -> list[float]:
+        """Rate and acceleration of the ankle; the foot plate turns with the foot against the shank."""
+        _, _, shank_acceleration = self.at(self.shank, phase)
+        alpha = self.at(self.shank, phase)[0] - angle + 0.5 * math.pi
+        torque = self.tissue(angle, rate) + self.plate.gravity_torque * math.cos(alpha)
+        torque += self.wearer.residual_share * self.muscles(phase) - self.plate.viscous_damping * rate
+        needed = self.inertia * shank_acceleration + torque + self.without_torque(phase, angle)
+        return [rate, needed / (self.inertia + self.plate.inertia)]
+
+
+def swing_of(run: Run, begin_phase: float, steps: int) -> Run:
+    """The part of a walk from a phase on, without gas, friction and stops: what is left is the leg."""
+    walk = run.walk
+    assert walk is not None
+    plant = run.plant._replace(
+        torque_constant=0.0, static_torque=0.0, dynamic_torque=0.0, angle_min=-9.0, angle_max=9.0
+    )
+    timing = walk.timing._replace(start=begin_phase)
+    begin = gait_at(walk.gait, timing, walk.leg, 0.0)
+    initial = run.initial._replace(angle=begin.ankle, angular_velocity=begin.ankle_rate)
+    first = walk.initial._replace(contact=ground.SWING, now=begin, foot=foot_direction(begin.shank, begin.ankle))
+    return replace(
+        run, plant=plant, initial=initial, walk=replace(walk, timing=timing, initial=first), step_count=steps
+    )
+
+
+def angles_of(run: Run) -> np.ndarray:
+    return run_batch(batch_of(run)).record[:, state_row_numbers(run)["state.angle"], 0]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4])
+def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[str], Any], share: float) -> None:
+    plan = replace(walk_plan("off"), wearer=replace(paper_subject(), residual_share=share))
+    swing = swing_of(plan_walk(plan), plan.gait.stance_share, 300)
+    assert swing.walk is not None
+    angle = angles_of(swing)
+    judge = Judge(plan.gait, plan.wearer, swing.walk.share)
+    times = np.arange(angle.size) * swing.step
+
+    def slopes(time: float, y: np.ndarray) -> list[float]:
+        return judge.slopes(plan.gait.stance_share + time / plan.gait.stride_time, y[0], y[1])
+
+    start = [swing.initial.angle, swing.initial.angular_velocity]
+    solution = solve_ivp(slopes, (0.0, times[-1]), start, t_eval=times, rtol=1e-9, atol=1e-11)
+    assert np.ptp(solution.y[0]) > 0.1
+    assert np.abs(solution.y[0] - angle).max() < 2e-4
+
+
+def test_a_wearer_with_all_muscles_and_no_device_walks_the_measured_gait(walk_plan: Callable[[str], Any]) -> None:
+    plan = replace(walk_plan("off"), wearer=replace(paper_subject(), residual_share=1.0))
+    run = plan_walk(plan)
+    assert run.walk is not None
+    light = replace(run.walk, share=DeviceShare(0.0, 0.0, 0.0))
+    bare = run.plant._replace(
+        inertia=run.plant.inertia - run.walk.share.inertia,
+        viscous_damping=run.walk.leg.ankle_damping,
+        torque_constant=0.0,
+        static_torque=0.0,
+        dynamic_torque=0.0,
+    )
+    walk = replace(run, walk=light, plant=bare)
+    rows = state_row_numbers(walk)
+    record = run_batch(batch_of(walk)).record[:, :, 0]
+    away = np.abs(record[:, rows["state.angle"]] - record[:, rows["walk.now.ankle"]])
+    contact = record[:, rows["walk.contact"]]
+    assert np.degrees(away[contact == ground.SWING].max()) < 0.05
+    assert np.degrees(away[contact == ground.HEEL].max()) < 1.0
+    assert record[-1, rows["walk.toe_landings"]] == 0
+
+
+def test_the_ground_under_the_heel_turns_the_toes_down(walk_plan: Callable[[str], Any]) -> None:
+    walk = plan_walk(walk_plan("off")).walk
+    assert walk is not None
+    for phase in (0.03, 0.06, 0.2):
+        now = gait_at(walk.gait, walk.timing._replace(start=phase), walk.leg, 0.0)
+        foot = foot_direction(now.shank, now.ankle)
+        on_heel = leg_torque(walk.leg, walk.share, ground.HEEL, now, now.ankle, foot)
+        in_air = leg_torque(walk.leg, walk.share, ground.SWING, now, now.ankle, foot)
+        # No more than the whole force at the heel.
+        assert 0.0 < on_heel - in_air < 0.05 * now.force
+
+
+def test_before_the_foot_is_flat_the_ground_gives_what_was_measured(walk_plan: Callable[[str], Any]) -> None:
+    walk = plan_walk(walk_plan("off")).walk
+    assert walk is not None
+    for phase in (0.03, 0.05, 0.07):
+        now = gait_at(walk.gait, walk.timing._replace(start=phase), walk.leg, 0.0)
+        given = ground.heel_torque(ground.HEEL, now, walk.leg.heel_lever)
+        assert given == pytest.approx(now.healthy_torque - now.moment)
+
+
+def test_the_weight_of_the_foot_plate_pulls_the_toes_down(walk_plan: Callable[[str], Any]) -> None:
+    walk = plan_walk(walk_plan("off")).walk
+    assert walk is not None
+    now = walk.initial.now
+    level = foot_direction(0.0, 0.5 * math.pi)
+    heavy, light = (
+        leg_torque(walk.leg, DeviceShare(0.0, 0.0, weight), ground.SWING, now, 1.5, level) for weight in (2.0, 0.0)
+    )
+    assert heavy - light == pytest.approx(2.0)
