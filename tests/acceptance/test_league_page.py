@@ -10,6 +10,8 @@ import pytest
 import ppafo
 from ppafo.cli.main import build_parser, main
 from ppafo.studies.league import ENTRANTS, learn
+from ppafo.studies.league.walking import WALKING_ENTRANTS, walking_task
+from ppafo.studies.league.walking.nominal import walked_measures
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "compare-controllers.md"
 TEXT = PAGE.read_text(encoding="utf-8")
@@ -40,7 +42,7 @@ def test_the_commands_of_the_page_are_understood_and_its_simulations_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert len(commands()) == 5
+    assert len(commands()) == 6
     for words in commands():
         assert callable(build_parser(words[0]).parse_args(words).run)
         if words[0] == "simulate":
@@ -70,3 +72,21 @@ def test_errors_and_gas_of_a_table_are_those_of_a_run(heading: str) -> None:
         error, gas = float(shown[entrant.name][0]), float(shown[entrant.name][2])
         assert metrics["rms_error"].value == pytest.approx(error, abs=6e-5), entrant.name
         assert 1e3 * metrics["gas_supplied"].value == pytest.approx(gas, abs=6e-4), entrant.name
+
+
+def test_errors_toes_and_gas_of_the_walking_table_are_those_of_a_walk() -> None:
+    shown = table_after("## On a leg that walks")
+    assert set(shown) == {entrant.name for entrant in WALKING_ENTRANTS}
+    task = walking_task()
+    for entrant in WALKING_ENTRANTS:
+        found = walked_measures(task, task.configuration(entrant.kind, entrant.valve))
+        error, at_lag, toes, gas = (float(shown[entrant.name][column]) for column in (0, 3, 4, 5))
+        assert found["torque_error"] == pytest.approx(error, abs=6e-4), entrant.name
+        assert found["lagged_error"] == pytest.approx(at_lag, abs=6e-4), entrant.name
+        assert 1e2 * found["toe_height"] == pytest.approx(toes, abs=0.06), entrant.name
+        assert 1e3 * found["gas"] == pytest.approx(gas, abs=6e-4), entrant.name
+
+
+def test_no_number_of_the_walking_table_is_below_the_bound() -> None:
+    for cells in table_after("## On a leg that walks").values():
+        assert all(cell == "-" or float(cell) >= 0.0 for cell in (cells[1], cells[6]))

@@ -52,7 +52,7 @@ def run(parsed: argparse.Namespace) -> int:
         return _list(parsed)
     from ppafo.walking.loading import load_walk
 
-    minutes = _minutes(parsed.minutes)
+    minutes = minutes_of(parsed.minutes)
     configuration = load_walk(parsed.config, parsed.overrides, parsed.gait)
     if parsed.wearers is not None:
         return _many(configuration, minutes, parsed)
@@ -161,7 +161,8 @@ def _list(parsed: argparse.Namespace) -> int:
     return EXIT_GOOD
 
 
-def _minutes(text: str) -> float:
+def minutes_of(text: str) -> float:
+    """Return minutes from a number or a time with its unit; ScenarioError for anything else."""
     from ppafo.errors import UnitError
     from ppafo.units import parse_quantity
 

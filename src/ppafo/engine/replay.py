@@ -14,7 +14,7 @@ from ppafo.control.kind import ProfileKind
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, Floats, LaneBlock, joined, load_program
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths
+from ppafo.engine.rows import row_numbers
 
 COMMAND = "result.command"
 
@@ -75,8 +75,8 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
 def _replay_block(batch: Batch, inputs: StepInputs, runs: slice) -> BatchResult:
     program, parameters, command = batch.program, inputs.parameters, inputs.command
     block = LaneBlock(load_program(program), batch.clock, batch.parameters[:, runs], batch.states[:, runs])
-    command_row = _numbered(program.state_rows())[COMMAND]
-    numbered = _numbered(program.parameter_rows())
+    command_row = row_numbers(program.state_rows())[COMMAND]
+    numbered = row_numbers(program.parameter_rows())
     rows = [numbered[path] for path in parameters]
     table = np.array([*parameters.values(), *(() if command is None else (command,))])
     starts = _changes(table)
@@ -93,8 +93,3 @@ def _changes(table: Floats) -> list[int]:
     """Steps at which any input differs from the step before, the first step among them."""
     changed = (np.diff(table, axis=1) != 0.0).any(axis=0)
     return [0, *(np.flatnonzero(changed) + 1).tolist()]
-
-
-def _numbered(groups: dict[str, type]) -> dict[str, int]:
-    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    return {path: number for number, path in enumerate(paths)}

@@ -1,6 +1,6 @@
 """How NamedTuples of floats lie in the rows of a lane block: one row for each number, nested ones flattened."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -18,6 +18,12 @@ def leaf_paths(row: type, prefix: str) -> list[str]:
         path = f"{prefix}.{name}"
         paths += leaf_paths(hints[name], path) if is_row(hints[name]) else [path]
     return paths
+
+
+def row_numbers(groups: Mapping[str, type]) -> dict[str, int]:
+    """Row of every number of some groups of rows, by its path such as ``state.angle``."""
+    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
+    return {path: number for number, path in enumerate(paths)}
 
 
 def row_expression(row: type, path: str, cells: dict[str, str], name_of: Callable[[type], str]) -> str:

@@ -9,6 +9,7 @@ from ppafo.studies.league import League, Standing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 _SIZE = (8.0, 5.4)
@@ -17,8 +18,8 @@ _MARGIN, _LEAST_RANGE = 1.2, 4.0
 """Factors: around everything drawn, and the least that an axis spans."""
 _NAMED = ((10.0, (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)), (200.0, (1.0, 2.0, 5.0)), (float("inf"), (1.0,)))
 """Which multiples of the powers of ten are named on an axis that spans less than a factor."""
-_COLOURS = {"proportional": BLUE, "solenoid": VERMILION}
-_MARKERS = "osD^v<>PX*hd"
+COLOURS = {"proportional": BLUE, "solenoid": VERMILION}
+MARKERS = "osD^v<>PX*hd"
 
 
 def league_figure(league: League) -> "Figure":
@@ -32,7 +33,7 @@ def league_figure(league: League) -> "Figure":
         for valve in league.bounds:
             _draw_bound(axes, league, valve)
         for number, standing in enumerate(league.standings):
-            _draw_standing(axes, standing, _MARKERS[number % len(_MARKERS)])
+            _draw_standing(axes, standing, MARKERS[number % len(MARKERS)])
         _scale(axes)
         for valve in league.bounds:
             _draw_end(axes, league, valve)
@@ -46,17 +47,22 @@ def league_figure(league: League) -> "Figure":
 
 def _scale(axes: "Axes") -> None:
     """Make both axes logarithmic, with numbers as people write them."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(*_limits(axes, 0))
     axes.set_ylim(*_limits(axes, 1))
     for axis in (axes.xaxis, axes.yaxis):
-        lowest, highest = axis.get_view_interval()
-        axis.set_major_locator(LogLocator(subs=next(subs for most, subs in _NAMED if highest < most * lowest)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter(NullFormatter())
+        named_logarithms(axis)
+
+
+def named_logarithms(axis: "Axis") -> None:
+    """Name so many numbers on a logarithmic axis as fit, written as people write them."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    lowest, highest = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=next(subs for most, subs in _NAMED if highest < most * lowest)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _draw_bound(axes: "Axes", league: League, valve: str) -> None:
@@ -64,7 +70,7 @@ def _draw_bound(axes: "Axes", league: League, valve: str) -> None:
     optima = [bound.least_error, *bound.curve]
     errors = [optimum.rms_error for optimum in optima]
     gas = [_GRAMS * optimum.gas for optimum in optima]
-    colour = _COLOURS.get(valve, GREY)
+    colour = COLOURS.get(valve, GREY)
     axes.plot(errors, gas, color=colour, label=f"lower bound, {valve}")
 
 
@@ -74,7 +80,7 @@ def _draw_end(axes: "Axes", league: League, valve: str) -> None:
     error, gas = bound.least_error.rms_error, _GRAMS * bound.least_error.gas
     left, top = axes.get_xlim()[0], axes.get_ylim()[1]
     end = ([left, error], [gas, gas]) if bound.is_attainable else ([error, error], [gas, top])
-    axes.plot(*end, color=_COLOURS.get(valve, GREY), linewidth=0.9, linestyle=":")
+    axes.plot(*end, color=COLOURS.get(valve, GREY), linewidth=0.9, linestyle=":")
 
 
 def _limits(axes: "Axes", which: int) -> tuple[float, float]:
@@ -89,7 +95,7 @@ def _draw_standing(axes: "Axes", standing: Standing, marker: str) -> None:
     error, gas = standing.value("rms_error"), standing.value("gas_supplied")
     if error is None or gas is None:
         return
-    colour = _COLOURS.get(standing.entrant.valve, BLACK)
+    colour = COLOURS.get(standing.entrant.valve, BLACK)
     robust = standing.robustness
     if robust is not None and not robust.failed:
         axes.plot([robust.error(0.05), robust.error(0.95)], [_GRAMS * gas] * 2, color=colour, linewidth=0.9, alpha=0.6)

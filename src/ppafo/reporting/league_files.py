@@ -27,6 +27,13 @@ def league_files(league: League) -> dict[str, bytes]:
     return contents
 
 
+INTRODUCTION = """Every controller was simulated on the device. Errors are in N m, gas in g. "Above least" is the
+distance to the lower bound of the controller's own valve: to the least error that any control could have, and to the
+least gas with which its own error could be had."""
+CAPTION = """A mark for each controller; thin lines: 5 to 95 % of its error on drawn devices. Lines: lower bounds by
+valve, for the device that is not drawn: others may lie beyond them."""
+
+
 def league_report(league: League, figure: bytes) -> str:
     """Return the report as HTML; the figure is the content of an SVG file."""
     first = league.standings[0]
@@ -34,7 +41,9 @@ def league_report(league: League, figure: bytes) -> str:
         TEMPLATE,
         {
             "scenario": league.scenario,
-            "device": first.result.scenario.device.name,
+            "introduction": INTRODUCTION.replace("the device", f"the device {first.result.scenario.device.name}", 1),
+            "caption": CAPTION,
+            "alternative": "Gas over RMS error of every controller, with the lower bounds",
             "overrides": list(league.overrides),
             "head": HEAD,
             "rows": league_rows(league),

@@ -41,7 +41,7 @@ def league_table(league: League) -> list[str]:
     return [
         f"{league.scenario}{_changed(league)}: errors in N m, gas in g",
         "",
-        *(_line(row, widths) for row in rows),
+        *(aligned(row, widths) for row in rows),
         "",
         *league_notes(league),
     ]
@@ -145,7 +145,8 @@ def _failed(standing: Standing) -> str:
     return f"{standing.entrant.name} diverged on {failed} of the drawn devices"
 
 
-def _line(row: Sequence[str], widths: Sequence[int]) -> str:
+def aligned(row: Sequence[str], widths: Sequence[int]) -> str:
+    """Return one line of a league: two names to the left, numbers to the right."""
     names = [f"{cell:<{width}}" for cell, width in zip(row[:2], widths[:2], strict=True)]
     numbers = [f"{cell:>{width}}" for cell, width in zip(row[2:], widths[2:], strict=True)]
     return "  ".join([*names, *numbers]).rstrip()

@@ -6,7 +6,7 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.lanes import BatchResult, Floats, LaneBlock, load_program
-from ppafo.engine.rows import leaf_paths
+from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of, whole_and_rest
 from ppafo.errors import SimulationError
 from ppafo.model.plant import chamber_pressures
@@ -39,9 +39,7 @@ def run_sampled(run: Run, controller: PythonController) -> BatchResult:
 
 def state_row_numbers(run: Run) -> dict[str, int]:
     """Row of each number of the state, by its path such as ``state.angle``."""
-    groups = run.program.state_rows()
-    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    return {path: number for number, path in enumerate(paths)}
+    return row_numbers(run.program.state_rows())
 
 
 def _checked(command: object, controller: PythonController, time: float) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ppafo.engine.lane_rows import LANES
 from ppafo.engine.lanes import Batch, Floats, run_batch
+from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.errors import ScenarioError
 from ppafo.walking.anthropometry import drawn_builds
@@ -15,7 +16,7 @@ from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.varied_gait import varied_gaits
 from ppafo.walking.walk import REMEDY, Progress, checked_seconds, plan_of, silent
-from ppafo.walking.wearers_rows import batch_of_many, row_numbers
+from ppafo.walking.wearers_rows import batch_of_many
 
 MOST_WEARERS = 1_000_000
 

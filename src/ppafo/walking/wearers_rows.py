@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.lanes import Batch, Floats
-from ppafo.engine.rows import leaf_paths
+from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.gait.gait import KNEE
 from ppafo.model.chambers import chamber_mass
@@ -40,12 +40,6 @@ def batch_of_many(
     _overwrite(states, row_numbers(single.program.state_rows()), _state_rows(run, segments, gaits))
     still = replace(single.clock, record_every=0)
     return Batch(single.program, still, parameters, states)
-
-
-def row_numbers(groups: Mapping[str, type]) -> dict[str, int]:
-    """Number of each row by its path."""
-    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    return {path: number for number, path in enumerate(paths)}
 
 
 def _overwrite(table: Floats, rows: Mapping[str, int], values: Mapping[str, Floats]) -> None:

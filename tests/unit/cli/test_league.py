@@ -1,13 +1,16 @@
 """``ppafo league``, from words to files."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from ppafo.cli import league
 from ppafo.cli.main import build_parser, main
 from ppafo.reporting.league_files import NAMES
-from ppafo.studies.league import DRAWS, ENTRANTS, TASK
+from ppafo.studies.league import DRAWS, ENTRANTS, TASK, walking
+from ppafo.studies.league.walking.task import CONFIGURATION, MINUTES
 
 SHORT = ["--set", "run.duration=0.4 s", "--set", "reference.ramp_time=0.2 s", "--set", "reference.level=2 N m"]
 
@@ -53,4 +56,42 @@ def test_a_number_of_draws_that_is_none_is_refused(capsys: pytest.CaptureFixture
 
 def test_the_defaults_of_the_command_are_those_of_the_study() -> None:
     parsed = build_parser("league").parse_args(["league"])
-    assert (parsed.scenario, parsed.draws) == (TASK, DRAWS)
+    assert (parsed.scenario or league._TASK, parsed.draws) == (TASK, DRAWS)
+    walks = build_parser("league").parse_args(["league", "--walk"])
+    assert (walks.walk, walks.minutes or league._MINUTES) == (CONFIGURATION, str(MINUTES))
+
+
+def test_a_walking_league_is_printed_and_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    two = [entrant for entrant in walking.WALKING_ENTRANTS if entrant.name in ("event_proportional", "off")]
+    monkeypatch.setattr(walking, "walking_league", partial(walking.walking_league, entrants=two))
+    monkeypatch.setattr(walking.bound, "find_spec", lambda _: None)
+    out = tmp_path / "out"
+    assert main(["league", "--walk", "--minutes", "6 s", "--draws", "2", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert sorted(entry.name for entry in out.iterdir()) == sorted(NAMES)
+    document = json.loads((out / "league.json").read_text())
+    assert [standing["name"] for standing in document["standings"]] == ["event_proportional", "off"]
+    assert document["seconds"] == pytest.approx(6.0)
+    assert "\nevent_proportional " in printed
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["torque-task-proportional", "--walk"], "give a scenario or --walk, not both"),
+        (["--minutes", "0.2"], "--minutes belongs to a leg that walks"),
+        (["--gait", "falisse2019-subject1"], "--gait belongs to a leg that walks"),
+        (["--walk", "proportionl"], "did you mean 'proportional'"),
+        (["--walk", "--minutes", "5"], "a league walks 0.1 to 1 minutes"),
+        (["--walk", "--minutes", "soon"], "a number of minutes"),
+        (["--walk", "--set", "controller.kind=off"], "brings its own"),
+    ],
+)
+def test_words_that_do_not_go_together_are_one_line(
+    words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["league", *words, "--out", str(tmp_path / "out")]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

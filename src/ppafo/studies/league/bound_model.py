@@ -12,8 +12,8 @@ from typing import Any
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import PlantParameters
 
-Openings = Callable[[Any, Any], tuple[Any, Any, Any, Any]]
-"""From the shares of time towards chamber 1 and towards chamber 2 to source 1, vent 1, source 2 and vent 2."""
+Openings = Callable[..., tuple[Any, Any, Any, Any]]
+"""From the shares of time of a valve's ways, towards chamber 1 first, to source 1, vent 1, source 2 and vent 2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +67,15 @@ def smooth_flow(pressure_a: Any, pressure_b: Any, conductance: float, curve: Flo
 
 
 def chamber_rates(
-    plant: PlantParameters, openings: Openings, volumes: Volumes, pressures: tuple[Any, Any], towards: tuple[Any, Any]
+    plant: PlantParameters,
+    openings: Openings,
+    volumes: Volumes,
+    pressures: tuple[Any, Any],
+    ways: tuple[Any, ...],
 ) -> ChamberRates:
-    """Rates of isothermal chambers at absolute pressures [Pa], for shares of time towards each. Eqs (3) to (9)."""
+    """Rates of isothermal chambers at absolute pressures [Pa], for shares of time of each way. Eqs (3) to (9)."""
     pressure_1, pressure_2 = pressures
-    source_1, vent_1, source_2, vent_2 = openings(*towards)
+    source_1, vent_1, source_2, vent_2 = openings(*ways)
     full, curve, ambient = plant.valve_conductance, plant.valve_curve, plant.atmospheric_pressure
     leak = smooth_flow(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
     fed_1 = source_1 * smooth_flow(plant.supply_pressure, pressure_1, full, curve)

@@ -1,6 +1,6 @@
 """Common random draws of the device: every controller meets the same devices, none of them the one it believes in."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,13 +77,14 @@ UNCERTAINTIES = (
 
 def drawn_devices(scenario: Scenario, factors: "np.ndarray[tuple[int, int], np.dtype[np.float64]]") -> list[Scenario]:
     """The scenario with each of the devices that the rows of ``factors`` (draws, uncertainties) make of its own."""
-    scenarios = []
-    for row in factors:
-        device = scenario.device
-        for uncertainty, factor in zip(UNCERTAINTIES, row, strict=True):
-            device = uncertainty.scaled(device, float(factor))
-        scenarios.append(replace(scenario, device=device))
-    return scenarios
+    return [replace(scenario, device=drawn_device(scenario.device, row.tolist())) for row in factors]
+
+
+def drawn_device(device: Device, factors: Sequence[float]) -> Device:
+    """The device with each of its uncertain values times a factor, in the order of ``UNCERTAINTIES``."""
+    for uncertainty, factor in zip(UNCERTAINTIES, factors, strict=True):
+        device = uncertainty.scaled(device, factor)
+    return device
 
 
 def drawn_factors(draws: int, seed: int = SEED) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":

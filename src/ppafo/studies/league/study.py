@@ -46,9 +46,15 @@ def league(
     return League(str(scenario), tuple(overrides), tuple(standings), absent, draws, bounds, reason)
 
 
-def _check(scenario: str | Path, overrides: Sequence[str], draws: int) -> None:
+def checked_draws(draws: int) -> int:
+    """The number of draws; ScenarioError where it is none that a league takes."""
     if not 0 <= draws <= MOST_DRAWS:
         raise ScenarioError(f"draws = {draws}: must be from 0 to {MOST_DRAWS}")
+    return draws
+
+
+def _check(scenario: str | Path, overrides: Sequence[str], draws: int) -> None:
+    checked_draws(draws)
     for override in overrides:
         path, _ = split_override(override)
         if path.startswith(SPECIAL):
