@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.refinement import filling_time
-from ppafo.engine.rows import rebuild
 from ppafo.engine.run import Lines, Run, Walk, whole_and_rest
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState, foot_direction
 from ppafo.gait import Gait
@@ -31,7 +29,7 @@ from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
 from ppafo.signals.recording import Floats
-from ppafo.simulation.plan import exact_orifice
+from ppafo.simulation.plan import controller_parameters, exact_orifice
 from ppafo.walking.wearer import Wearer
 
 HARMONICS = 8
@@ -165,11 +163,6 @@ def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
 def walking_valve(valve: Valve) -> ValveModel:
     """The valve of a walking device; a proportional one has a dump valve for free motion."""
     return dump.choose(valve.settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(valve.settings)
-
-
-def controller_parameters(kind: ControllerKind, settings: dict[str, float]) -> Any:
-    """The NamedTuple of a controller, nested ones filled in the order of its quantities."""
-    return rebuild(kind.parameters, [settings[item.name] for item in kind.quantities])
 
 
 def vented(plant: PlantParameters, angle: float, angular_velocity: float) -> PlantState:

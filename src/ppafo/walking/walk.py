@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.control.walking.phases import PUSH_OFF
 from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, LaneBlock, load_program
 from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError
@@ -156,8 +157,21 @@ def _gathered(
     strides = per_stride(record, starts)
     settled = starts[SETTLING:]
     averages = averaged(recording, settled)
-    metrics = _metrics(configuration, strides, averages) | _safety(recording)
+    metrics = _metrics(configuration, strides, averages) | _tracking(recording, settled) | _safety(recording)
     return WalkResult(configuration, recording, strides, averages, metrics, status, starts)
+
+
+def _tracking(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Metric]:
+    """How well a controller that wants a torque gets it in push-off; nothing for others or without strides."""
+    if "reference" not in recording or starts.size < 2:
+        return {}
+    walked = slice(int(starts[0]), int(starts[-1]))
+    pushes = recording["controller_phase"][walked] == PUSH_OFF
+    error = (recording["reference"] - recording["torque"])[walked][pushes]
+    if not error.size:
+        return {}
+    rms = float(np.sqrt(np.mean(error**2)))
+    return {"push_off_error": Metric(rms, "N m", "RMS of the torque wanted less the actuator torque in push-off")}
 
 
 def _safety(recording: Recording) -> dict[str, Metric]:
