@@ -13,8 +13,11 @@ from typing import Any
 import pytest
 
 import ppafo
+from ppafo.control import controllers
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.model.command import VENT
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import Valve
@@ -22,6 +25,7 @@ from ppafo.simulation.loading import parse_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import LedMotion
 from ppafo.simulation.schema import scenario_file
+from ppafo.walking.schema import walk_file
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
 
@@ -125,6 +129,26 @@ def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteres
     narrow = ppafo.simulate(scenario_from_dict(content))
     assert hysteresis.KIND.name == narrow.scenario.control.kind
     assert 1 <= wide.metrics["switchings"].value < narrow.metrics["switchings"].value
+
+
+def test_the_controller_of_the_page_walks(
+    hysteresis: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "ppafo.control.controllers.hysteresis", hysteresis)
+    monkeypatch.setattr(controllers, "hysteresis", hysteresis, raising=False)
+    text = blocks("add-a-controller.md", "python")[2]
+    module = module_of(text, "event_hysteresis", tmp_path, monkeypatch)
+    monkeypatch.setitem(WALKING_CONTROLLERS, module.KIND.name, module.KIND)
+    walk_file.cache_clear()
+    try:
+        walked = ppafo.walk("proportional", 0.1, ["controller.kind=event_hysteresis", "controller.band=0.5 N m"])
+    finally:
+        walk_file.cache_clear()
+    assert walked.status.is_completed
+    assert "safe_state_time" not in walked.metrics
+    assert walked.metrics["push_off_work"].value > 0.5
+    command = walked.recording["command"]
+    assert set(command.round(12)) <= {-1.0, 0.0, 1.0, VENT}
 
 
 def test_the_valve_of_the_page_agrees_with_the_reference_solver(

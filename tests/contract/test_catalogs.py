@@ -9,8 +9,9 @@ import pytest
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.lane_meters import TRACED
-from ppafo.engine.rows import numbers, rebuild
+from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.metrics import METRICS, MetricKind
 from ppafo.model.plant import Openings
 from ppafo.model.sensors import Measurement
@@ -18,7 +19,7 @@ from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveKind, ValveModel
 from ppafo.signals.channels import CHANNELS
 
-CATALOGS = [*CONTROLLERS.items(), *PROFILES.items(), *VALVES.items()]
+CATALOGS = [*CONTROLLERS.items(), *WALKING_CONTROLLERS.items(), *PROFILES.items(), *VALVES.items()]
 
 
 def defaults(kind: ControllerKind | ProfileKind | ValveKind) -> dict[str, float]:
@@ -46,9 +47,22 @@ def test_catalogue_entries_are_found_by_their_own_name_and_say_what_they_are(nam
         assert quantity.default is None or quantity.minimum <= quantity.default <= quantity.maximum
 
 
+def field_names(row: type) -> list[str]:
+    """Names of all numbers in a NamedTuple class, those of nested ones in their place."""
+    return [path.rpartition(".")[2] for path in leaf_paths(row, "")]
+
+
 @pytest.mark.parametrize("kind", [*CONTROLLERS.values(), *PROFILES.values()], ids=lambda kind: kind.name)
 def test_declared_quantities_are_the_fields_of_the_parameters_in_order(kind: ControllerKind | ProfileKind) -> None:
-    assert tuple(item.name for item in kind.quantities) == kind.parameters._fields  # type: ignore[attr-defined]
+    assert [item.name for item in kind.quantities] == field_names(kind.parameters)
+
+
+@pytest.mark.parametrize("kind", WALKING_CONTROLLERS.values(), ids=lambda kind: kind.name)
+def test_quantities_of_walking_controllers_end_in_the_name_of_their_field(kind: ControllerKind) -> None:
+    names = [item.name for item in kind.quantities]
+    assert len(set(names)) == len(names)
+    for name, field in zip(names, field_names(kind.parameters), strict=True):
+        assert name.endswith(field)
 
 
 @pytest.mark.parametrize("kind", CONTROLLERS.values(), ids=lambda kind: kind.name)
@@ -56,7 +70,7 @@ def test_declared_quantities_are_the_fields_of_the_parameters_in_order(kind: Con
 def test_controllers_return_commands_from_minus_one_to_one_and_a_state_of_the_same_kind(
     kind: ControllerKind, torque: float
 ) -> None:
-    parameters = kind.parameters(**defaults(kind))
+    parameters = rebuild(kind.parameters, list(defaults(kind).values()))
     state = kind.initial
     for _ in range(5):
         command, state = kind.update(parameters, state, 2.0, Measurement(1.3, 2e5, 1e5, torque), 1e-3)

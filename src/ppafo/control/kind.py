@@ -12,9 +12,9 @@ from ppafo.model.sensors import Measurement
 class ControllerKind:
     """A controller in the catalogue.
 
-    ``parameters`` is a NamedTuple class whose fields are the quantities in order, ``state`` one of floats, and
-    ``initial`` its start. ``update(parameters, state, reference, measurement, period)`` returns the command from -1
-    to 1 and the next state, once every ``period`` [s].
+    ``parameters`` is a NamedTuple class whose numbers, those of nested ones in their place, are the quantities in
+    order; ``initial`` is the start of the state, a NamedTuple of floats or of further ones. ``update(parameters, state,
+    reference, measurement, period)`` returns the command from -1 to 1 and the next state, once every ``period`` [s].
     """
 
     name: str

@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.reporting.style import GREY
 from ppafo.signals.recording import Floats
-from ppafo.walking.planning import gait_timing
+from ppafo.walking.followed_gait import gait_timing
 from ppafo.walking.posture import Posture, ankle_path
 from ppafo.walking.walk import WalkResult
 

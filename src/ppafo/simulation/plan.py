@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.kind import ProfileKind
+from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.refinement import MOST_DIVISIONS, divisions
+from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Run, whole_and_rest
 from ppafo.errors import ScenarioError
 from ppafo.model.chambers import chamber_mass
@@ -73,7 +74,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         initial=initial_state(scenario, plant),
         valve=prepared_valve(valve, settings, step - lag),
         early_valve=prepared_valve(valve, settings, lag) if program.late_commands else (),
-        controller=() if controller is None else controller.parameters(**control.settings),
+        controller=() if controller is None else controller_parameters(controller, control.settings),
         reference=profile_parameters(scenario.reference),
         path=() if isinstance(motion, FreeMotion) else profile_parameters(motion.profile),
         sensors=sensor_parameters(scenario),
@@ -133,6 +134,11 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
         sensors.pressure_quantum,
         sensors.seed,
     )
+
+
+def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> Any:
+    """The NamedTuple of a controller, nested ones filled in the order of its quantities; settings may be arrays."""
+    return rebuilt(kind.parameters, [settings[item.name] for item in kind.quantities])
 
 
 def profile_parameters(choice: ProfileChoice) -> tuple[float, ...]:

@@ -9,10 +9,11 @@ from ppafo.control.walking import off
 from ppafo.metrics import Metric
 from ppafo.signals.recording import Floats
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.planning import gait_timing
+from ppafo.walking.followed_gait import gait_timing
 from ppafo.walking.posture import ankle_path
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import Progress, WalkResult, healthy_positive_work, silent, walk
+from ppafo.walking.walk import Progress, WalkResult, silent, walk
+from ppafo.walking.walk_metrics import healthy_positive_work
 
 Say = Callable[[str], None]
 

@@ -39,6 +39,8 @@ def _contradictions(configuration: Configuration) -> Iterator[tuple[str, str]]:
         yield from _angles(configuration)
         yield from _gait(configuration)
         yield from _pressures(configuration)
+    if "push_off_end" in configuration.settings:
+        yield from _push_off(configuration.settings)
     if "peak_time" in configuration.settings:
         yield from _profile(configuration.settings)
 
@@ -124,6 +126,12 @@ def _pressures(configuration: Configuration) -> Iterator[tuple[str, str]]:
     if settings["highest_pressure"] <= COMPRESSION * highest:
         shown = written(round(COMPRESSION * highest, 1), _PASCAL)
         yield "controller.highest_pressure", f"a moving foot compresses a chamber to above it; must be above {shown}"
+
+
+def _push_off(settings: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    start, end = settings["push_off_start"], settings["push_off_end"]
+    if end <= start:
+        yield "controller.push_off_end", f"must be above controller.push_off_start, which is {start:g}"
 
 
 def _profile(settings: Mapping[str, float]) -> Iterator[tuple[str, str]]:

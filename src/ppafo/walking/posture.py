@@ -12,7 +12,7 @@ import numpy as np
 from ppafo.gait import Gait
 from ppafo.model.gait import GaitTiming
 from ppafo.signals.recording import Floats
-from ppafo.walking.planning import followed
+from ppafo.walking.followed_gait import followed
 from ppafo.walking.wearer import Wearer
 
 ANKLE_HEIGHT_SHARE = 0.039 / 0.246

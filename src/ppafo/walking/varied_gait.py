@@ -9,7 +9,7 @@ from ppafo.gait.gait import KNEE, Curve
 from ppafo.model.gait import GaitTiming
 from ppafo.signals.recording import Floats
 from ppafo.walking.anthropometry import bounded_normal
-from ppafo.walking.planning import EVENT_PHASES, HARMONICS, gait_events
+from ppafo.walking.followed_gait import EVENT_PHASES, HARMONICS, gait_events
 
 SERIES = {
     "shank": "shank_angle",
@@ -96,7 +96,7 @@ def _varied(curve: Curve | None, count: int, generator: np.random.Generator) -> 
 
 
 def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> dict[str, Floats]:
-    """What ``planning.gait_events`` finds, by field of ``GaitTiming``; some people at a time, to need less memory."""
+    """What ``gait_events`` finds, by field of ``GaitTiming``; some people at a time, to need less memory."""
     turns = 2.0 * np.pi * np.outer(np.arange(1, HARMONICS + 1), EVENT_PHASES)
     cosine, sine = np.cos(turns), np.sin(turns)
     found = []

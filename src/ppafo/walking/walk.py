@@ -20,7 +20,8 @@ from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import WalkPlan, plan_walk
 from ppafo.walking.recorded import recorded
-from ppafo.walking.strides import PER_STRIDE, SETTLING, Curves, averaged, per_stride, stride_starts
+from ppafo.walking.strides import SETTLING, Curves, averaged, per_stride, stride_starts
+from ppafo.walking.walk_metrics import walk_metrics
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -156,16 +157,8 @@ def _gathered(
     strides = per_stride(record, starts)
     settled = starts[SETTLING:]
     averages = averaged(recording, settled)
-    metrics = _metrics(configuration, strides, averages) | _safety(recording)
+    metrics = walk_metrics(configuration, recording, strides, averages, settled)
     return WalkResult(configuration, recording, strides, averages, metrics, status, starts)
-
-
-def _safety(recording: Recording) -> dict[str, Metric]:
-    """When the controller stopped trusting its sensors; nothing where it never did."""
-    if "safe_state" not in recording or not recording["safe_state"].any():
-        return {}
-    time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
-    return {"safe_state_time": Metric(time, "s", "when the controller vented both chambers for good")}
 
 
 def _status(failed: float, states: Floats) -> Status:
@@ -173,43 +166,3 @@ def _status(failed: float, states: Floats) -> Status:
         return Status("completed", None, "completed")
     time = failed if failed < NEVER_FAILED else 0.0
     return Status("diverged", time, f"diverged at t = {time:.6g} s; {REMEDY}")
-
-
-def _metrics(
-    configuration: Configuration, strides: Mapping[str, Floats], averages: Mapping[str, Curves]
-) -> dict[str, Metric]:
-    """Means over the strides after the first ones, and what they are of a healthy ankle."""
-    found = {}
-    for name, item in PER_STRIDE.items():
-        values = strides[name][SETTLING:]
-        if name == "slap_rate":
-            values = values[values < 0.0]
-        if values.size:
-            found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean")
-    found["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")
-    healthy = healthy_positive_work(configuration)
-    if healthy > 0.0:
-        found["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
-        if "push_off_work" in found:
-            share = found["push_off_work"].value / healthy
-            found["push_off_share"] = Metric(
-                share, "-", "work of T_ex in push-off over the healthy ankle's positive work"
-            )
-    if "angle" in averages:
-        away = averages["angle"].mean - averages["healthy_angle"].mean
-        found["angle_difference"] = Metric(
-            float(np.sqrt(np.mean(away**2))), "rad", "RMS difference of the mean ankle angle to the healthy one"
-        )
-    return found
-
-
-def healthy_positive_work(configuration: Configuration) -> float:
-    """Positive work [J] of the measured ankle moment in one stride of the wearer; 0 where no moment was measured."""
-    gait = configuration.gait
-    if "ankle_moment" not in gait.curves:
-        return 0.0
-    phases = np.linspace(0.0, 1.0, 2001)
-    moment = configuration.wearer.body_mass * gait.curve("ankle_moment").sampled(phases)
-    angle = gait.ankle_angle.sampled(phases)
-    power = np.maximum(moment * np.gradient(angle, phases), 0.0)
-    return float(np.trapezoid(power, phases))

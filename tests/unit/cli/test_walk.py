@@ -129,9 +129,10 @@ def test_json_is_the_only_thing_printed(tmp_path: Path, capsys: pytest.CaptureFi
 def test_the_list_names_every_walk(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["walk", "--list"]) == 0
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
-    assert names == ["off", "proportional", "proportional-regulators", "solenoid", "solenoid-regulators"]
+    learning, regulators = "proportional-learning", "proportional-regulators"
+    assert names == ["off", "proportional", learning, regulators, "solenoid", "solenoid-regulators"]
     assert main(["walk", "--list", "--json"]) == 0
-    assert len(json.loads(capsys.readouterr().out)["walks"]) == 5
+    assert len(json.loads(capsys.readouterr().out)["walks"]) == 6
 
 
 def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[str]) -> None:

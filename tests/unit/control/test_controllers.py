@@ -10,6 +10,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers.damped_proportional import KNOTS, learnt_command
 from ppafo.control.controllers.on_off_dead_zone import OnOffDeadZoneParameters, OnOffDeadZoneState
 from ppafo.control.controllers.sliding_mode import SlidingModeParameters, SlidingModeState
+from ppafo.engine.rows import rebuilt
 from ppafo.model.sensors import Measurement
 
 PERIOD = 1.0e-3
@@ -24,7 +25,8 @@ def seen(torque: float) -> Measurement:
 def parameters(kind: str, **changed: float) -> Any:
     """Parameters of a controller at their defaults, some of them changed."""
     chosen = CONTROLLERS[kind]
-    return chosen.parameters(**({item.name: item.default for item in chosen.quantities} | changed))
+    settings = {item.name: item.default for item in chosen.quantities} | changed
+    return rebuilt(chosen.parameters, settings.values())
 
 
 def commands(kind: str, torques: list[float], reference: float = 2.0, **changed: float) -> list[float]:

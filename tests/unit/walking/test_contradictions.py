@@ -21,6 +21,7 @@ MISTAKES = {
     "controller.first_stride_time=5 s": "between half and twice the stride of the gait, which is 1.0384 s",
     "controller.frozen_time=10 ms; controller.rate=100 Hz": "longer than two samples of the controller, one is 0.01 s",
     "controller.lowest_angle=100 deg; controller.highest_angle=90 deg": "must be below controller.highest_angle",
+    "controller.push_off_end=0.39": "must be above controller.push_off_start, which is 0.4",
     "controller.swing_angle=135 deg": "lies outside of what sensor and device reach, 20 deg to 130 deg",
     "wearer.shank_mass_centre=0.5 m": "lies beyond the ankle: wearer.shank_length is 0.46 m",
     "wearer.toe_lever=0.08 m": "wearer.foot_mass_centre, which is not given and has its default",
@@ -82,7 +83,8 @@ def test_a_torque_profile_that_contradicts_itself_is_refused(overrides: str) -> 
 
 
 def test_shipped_walks_load_and_contradict_nothing() -> None:
-    assert list_walks() == ("off", "proportional", "proportional-regulators", "solenoid", "solenoid-regulators")
+    learning, regulators = "proportional-learning", "proportional-regulators"
+    assert list_walks() == ("off", "proportional", learning, regulators, "solenoid", "solenoid-regulators")
     assert [load_walk(name).name for name in list_walks()] == list(list_walks())
 
 

@@ -16,7 +16,8 @@ from ppafo.gait import Gait
 from ppafo.model import contact as ground
 from ppafo.model.gait import gait_at
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.walking.planning import followed, plan_walk
+from ppafo.walking.followed_gait import followed
+from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import Wearer, paper_subject
 
 

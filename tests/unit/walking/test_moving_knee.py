@@ -23,7 +23,8 @@ from ppafo.model.leg import (
 )
 from ppafo.signals.recording import Floats
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.walking.planning import gait_series, gait_timing, plan_walk
+from ppafo.walking.followed_gait import gait_series, gait_timing
+from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import paper_subject
 
 NOTHING = (0.0,)

@@ -19,7 +19,8 @@ from ppafo.walking.anthropometry import (
     drawn_builds,
     scaled_segments,
 )
-from ppafo.walking.planning import gait_timing, plan_walk
+from ppafo.walking.followed_gait import gait_timing
+from ppafo.walking.planning import plan_walk
 from ppafo.walking.varied_gait import SERIES, SeriesOfMany, varied_gaits
 from ppafo.walking.walk import plan_of
 from ppafo.walking.wearer import paper_subject

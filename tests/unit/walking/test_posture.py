@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.gait import load_gait
-from ppafo.walking.planning import gait_timing
+from ppafo.walking.followed_gait import gait_timing
 from ppafo.walking.posture import MID_SWING_CLEARANCE, AnklePath, ankle_path
 from ppafo.walking.wearer import paper_subject
 

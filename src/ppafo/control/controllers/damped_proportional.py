@@ -51,13 +51,27 @@ class DampedProportionalParameters(NamedTuple):
     knot_30: float
 
 
-class DampedProportionalState(NamedTuple):
-    """Time since the start [s], torque one sample ago [N m], filtered rate of the torque [N m/s], start mark."""
+class DampedGains(NamedTuple):
+    """Gain [1/(N m)], damping [s/(N m)], time constant of its filter [s]."""
 
-    elapsed: float
+    proportional_gain: float
+    damping: float
+    damping_filter: float
+
+
+class TorqueSlope(NamedTuple):
+    """Torque one sample ago [N m], its filtered rate [N m/s], start mark."""
+
     torque: float
     slope: float
     started: float
+
+
+class DampedProportionalState(NamedTuple):
+    """Time since the start [s], and the torque's course."""
+
+    elapsed: float
+    course: TorqueSlope
 
 
 def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> float:
@@ -69,6 +83,19 @@ def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> 
     return first + share * (parameters[FIRST_KNOT + before + 1] - first)
 
 
+def damped_command(
+    gains: DampedGains, course: TorqueSlope, reference: float, torque: float, ahead: float, period: float
+) -> tuple[float, TorqueSlope]:
+    """Command: gain times torque error [N m], less damping times the torque's own rate, plus what is given ahead [-].
+
+    Damping acts on the rate of the torque, not of the error, so that a step of the reference gives no kick.
+    """
+    change = (torque - course.torque) * course.started
+    slope = course.slope + (change - period * course.slope) / (period + gains.damping_filter)
+    feedback = gains.proportional_gain * (reference - torque) - gains.damping * slope
+    return max(-1.0, min(1.0, feedback + ahead)), TorqueSlope(torque, slope, 1.0)
+
+
 def update(
     parameters: DampedProportionalParameters,
     state: DampedProportionalState,
@@ -76,25 +103,26 @@ def update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, DampedProportionalState]:
-    """Command: gain times torque error, less damping times the torque's own rate, plus what was learnt.
+    """Command of ``damped_command`` with what the table has learnt ahead of it."""
+    gains = DampedGains(parameters.proportional_gain, parameters.damping, parameters.damping_filter)
+    ahead = learnt_command(parameters, state.elapsed)
+    command, course = damped_command(gains, state.course, reference, measurement.torque, ahead, period)
+    return command, DampedProportionalState(state.elapsed + period, course)
 
-    Damping acts on the rate of the torque, not of the error, so that a step of the reference gives no kick.
-    """
-    change = (measurement.torque - state.torque) * state.started
-    slope = state.slope + (change - period * state.slope) / (period + parameters.damping_filter)
-    feedback = parameters.proportional_gain * (reference - measurement.torque) - parameters.damping * slope
-    command = max(-1.0, min(1.0, feedback + learnt_command(parameters, state.elapsed)))
-    return command, DampedProportionalState(state.elapsed + period, measurement.torque, slope, 1.0)
 
+GAIN_QUANTITIES = (
+    Quantity("proportional_gain", "1/(N m)", "command per torque error", 1.7, 0.0, 1.0e3),
+    Quantity("damping", "s/(N m)", "command per rate of the torque, against it", 0.0067, 0.0, 1.0e3),
+    Quantity("damping_filter", "s", "time constant of the filter on the torque's rate", 0.0011, 0.0, 10.0),
+)
+"""Fields of ``DampedGains`` in order."""
 
 KIND = ControllerKind(
     name="damped_proportional",
     summary="Proportional control with damping injection and a feed-forward table that iterative learning fills.",
     source="Zhang, Cheah and Collins 2015, Experimental comparison of torque control methods on an ankle exoskeleton",
     quantities=(
-        Quantity("proportional_gain", "1/(N m)", "command per torque error", 1.7, 0.0, 1.0e3),
-        Quantity("damping", "s/(N m)", "command per rate of the torque, against it", 0.0067, 0.0, 1.0e3),
-        Quantity("damping_filter", "s", "time constant of the filter on the torque's rate", 0.0011, 0.0, 10.0),
+        *GAIN_QUANTITIES,
         Quantity("knot_spacing", "s", "time between two knots of the table", 0.1, 1.0e-3, 1.0e3),
         *(
             Quantity(f"knot_{number}", "", f"learnt command at knot {number}", 0.0, -1.0, 1.0)
@@ -102,6 +130,6 @@ KIND = ControllerKind(
         ),
     ),
     parameters=DampedProportionalParameters,
-    initial=DampedProportionalState(0.0, 0.0, 0.0, 0.0),
+    initial=DampedProportionalState(0.0, TorqueSlope(0.0, 0.0, 0.0)),
     update=update,
 )

@@ -9,23 +9,11 @@ from ppafo.model.sensors import Measurement
 
 
 class FeedbackLinearisationParameters(NamedTuple):
-    """Decay rate of the error [1/s], filter of the angle's rate [s], and the believed device as ``NominalChambers``."""
+    """Decay rate of the error [1/s], filter of the angle's rate [s], and the believed device."""
 
     convergence_rate: float
     rate_filter: float
-    torque_constant: float
-    volume_per_angle: float
-    angle_min: float
-    angle_max: float
-    dead_volume_1: float
-    dead_volume_2: float
-    gas_product: float
-    valve_conductance: float
-    leak_conductance: float
-    critical_ratio: float
-    supply_pressure: float
-    dorsiflexion_pressure: float
-    atmospheric_pressure: float
+    nominal: NominalChambers
 
 
 class FeedbackLinearisationState(NamedTuple):
@@ -35,25 +23,6 @@ class FeedbackLinearisationState(NamedTuple):
     angle: float
     angular_velocity: float
     started: float
-
-
-def nominal_chambers(parameters: FeedbackLinearisationParameters) -> NominalChambers:
-    """The believed device among the parameters."""
-    return NominalChambers(
-        parameters.torque_constant,
-        parameters.volume_per_angle,
-        parameters.angle_min,
-        parameters.angle_max,
-        parameters.dead_volume_1,
-        parameters.dead_volume_2,
-        parameters.gas_product,
-        parameters.valve_conductance,
-        parameters.leak_conductance,
-        parameters.critical_ratio,
-        parameters.supply_pressure,
-        parameters.dorsiflexion_pressure,
-        parameters.atmospheric_pressure,
-    )
 
 
 def update(
@@ -69,7 +38,7 @@ def update(
     velocity = state.angular_velocity
     velocity = velocity + (turned - period * velocity) / (period + parameters.rate_filter)
     rates = torque_rates(
-        nominal_chambers(parameters), measurement.angle, velocity, measurement.pressure_1, measurement.pressure_2
+        parameters.nominal, measurement.angle, velocity, measurement.pressure_1, measurement.pressure_2
     )
     wanted = reference_rate + parameters.convergence_rate * (reference - measurement.torque)
     return opening_for_rate(rates, wanted), FeedbackLinearisationState(reference, measurement.angle, velocity, 1.0)

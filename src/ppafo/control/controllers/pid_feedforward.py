@@ -19,27 +19,11 @@ NEARLY_SUPPLY = 0.999
 
 
 class PidFeedforwardParameters(NamedTuple):
-    """Those of ``PidParameters``, the weight of the feed-forward [-], the believed device as ``NominalChambers``."""
+    """Gains of the feedback, weight of the feed-forward [-], and the believed device."""
 
-    proportional_gain: float
-    integral_gain: float
-    derivative_gain: float
-    derivative_filter: float
-    anti_windup: float
+    feedback: PidParameters
     feedforward: float
-    torque_constant: float
-    volume_per_angle: float
-    angle_min: float
-    angle_max: float
-    dead_volume_1: float
-    dead_volume_2: float
-    gas_product: float
-    valve_conductance: float
-    leak_conductance: float
-    critical_ratio: float
-    supply_pressure: float
-    dorsiflexion_pressure: float
-    atmospheric_pressure: float
+    nominal: NominalChambers
 
 
 class PidFeedforwardState(NamedTuple):
@@ -47,36 +31,6 @@ class PidFeedforwardState(NamedTuple):
 
     feedback: PidState
     reference: float
-
-
-def pid_of(parameters: PidFeedforwardParameters) -> PidParameters:
-    """The gains of the feedback."""
-    return PidParameters(
-        parameters.proportional_gain,
-        parameters.integral_gain,
-        parameters.derivative_gain,
-        parameters.derivative_filter,
-        parameters.anti_windup,
-    )
-
-
-def nominal_chambers(parameters: PidFeedforwardParameters) -> NominalChambers:
-    """The believed device among the parameters."""
-    return NominalChambers(
-        parameters.torque_constant,
-        parameters.volume_per_angle,
-        parameters.angle_min,
-        parameters.angle_max,
-        parameters.dead_volume_1,
-        parameters.dead_volume_2,
-        parameters.gas_product,
-        parameters.valve_conductance,
-        parameters.leak_conductance,
-        parameters.critical_ratio,
-        parameters.supply_pressure,
-        parameters.dorsiflexion_pressure,
-        parameters.atmospheric_pressure,
-    )
 
 
 def rates_on_reference(nominal: NominalChambers, reference: float, angle: float) -> TorqueRates:
@@ -97,10 +51,10 @@ def update(
 ) -> tuple[float, PidFeedforwardState]:
     """Command: PID of the torque error, equation (13), and the opening that the reference's rate needs."""
     rate = (reference - state.reference) / period * state.feedback.started
-    rates = rates_on_reference(nominal_chambers(parameters), reference, measurement.angle)
+    rates = rates_on_reference(parameters.nominal, reference, measurement.angle)
     ahead = parameters.feedforward * opening_for_rate(rates, rate)
     error = reference - measurement.torque
-    command, feedback = pid_command(pid_of(parameters), state.feedback, error, ahead, period)
+    command, feedback = pid_command(parameters.feedback, state.feedback, error, ahead, period)
     return command, PidFeedforwardState(feedback, reference)
 
 

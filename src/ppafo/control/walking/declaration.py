@@ -1,4 +1,7 @@
-"""Settings that all event-based controllers share, in the order of ``PhaseRules`` and ``SafetyRules``."""
+"""Settings that event-based controllers share, in the order of the fields that they fill."""
+
+from collections.abc import Mapping
+from dataclasses import replace
 
 from ppafo.model.declaration import Quantity
 
@@ -26,3 +29,41 @@ SAFETY_QUANTITIES = (
     Quantity("fill_time", "s", "a chamber is filled when the open valve has fed it for this long", 0.05, 1.0e-3, 10.0),
     Quantity("vent_time", "s", "both chambers are vented when the valve has done it for this long", 0.25, 1.0e-3, 10.0),
 )
+
+HOLD_QUANTITIES = (
+    Quantity("swing_angle", "rad", "angle about which the lifted foot is held", 1.46, 0.5, 2.5),
+    Quantity("hold_stiffness", "N m/rad", "torque wanted per angle from it", 5.3, 0.0, 1.0e3),
+    Quantity("hold_damping", "N m s/rad", "torque wanted against the angle's rate", 0.17, 0.0, 1.0e3),
+    Quantity("angle_rate_filter", "s", "time constant of the filter on the angle's rate", 0.002, 0.0, 1.0),
+)
+
+PUSH_OFF_QUANTITIES = (
+    Quantity("peak_torque", "N m", "peak of the torque in push-off", 5.0, 0.0, 1.0e3),
+    Quantity("peak_time", "1", "phase of the peak, share of the stride time", 0.53, 0.1, 0.9),
+    Quantity("rise_time", "1", "share of the stride time from zero to the peak", 0.15, 0.01, 0.8),
+    Quantity("fall_time", "1", "share of the stride time from the peak to zero", 0.09, 0.01, 0.8),
+)
+
+ASSISTANCE_QUANTITIES = (
+    *HOLD_QUANTITIES,
+    Quantity("landing_peak_torque", "N m", "peak of the torque in dorsiflexion while landing", 2.9, 0.0, 1.0e3),
+    Quantity("landing_peak_time", "1", "phase of that peak", 0.032, 0.0, 0.9),
+    Quantity("landing_rise_time", "1", "share of the stride time from zero to that peak", 0.05, 0.01, 0.8),
+    Quantity("landing_fall_time", "1", "share of the stride time from that peak to zero", 0.15, 0.01, 0.8),
+    *PUSH_OFF_QUANTITIES,
+    Quantity("swing_peak_torque", "N m", "peak of the torque in dorsiflexion in the swing", 2.7, 0.0, 1.0e3),
+    Quantity("swing_peak_time", "1", "phase of that peak", 0.75, 0.1, 1.0),
+    Quantity("swing_rise_time", "1", "share of the stride time from zero to that peak", 0.1, 0.01, 0.8),
+    Quantity("swing_fall_time", "1", "share of the stride time from that peak to zero", 0.23, 0.01, 0.8),
+    Quantity("largest_torque", "N m", "no more is wanted either way; about what 50 psi_g can hold", 5.0, 0.0, 1.0e3),
+)
+"""Fields of ``Assistance`` in order."""
+
+ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES)
+"""What every law declares after its own settings that follows ``assistance``."""
+
+
+def with_defaults(quantities: tuple[Quantity, ...], defaults: Mapping[str, float]) -> tuple[Quantity, ...]:
+    """The quantities of a law with other defaults for walking, by name; those not named keep theirs."""
+    assert set(defaults) <= {item.name for item in quantities}, "a default belongs to a quantity"
+    return tuple(replace(item, default=defaults.get(item.name, item.default)) for item in quantities)

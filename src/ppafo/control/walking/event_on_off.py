@@ -1,7 +1,8 @@
 """Event-based control of a pair of solenoid valves: each phase of the gait has its valve configuration.
 
-Landing and swing: the dorsiflexion side holds the foot up, at neutral within a band. Mid-stance: both chambers vented,
-free motion. Push-off: the plantarflexion side. The functional tasks of figure 1A of the paper.
+Landing and swing: the dorsiflexion side holds the foot up, at an angle within a band. Mid-stance: both chambers vented,
+free motion. Push-off: the plantarflexion side, vented again before the toes leave the ground, so that its gas does not
+hold the foot down in the swing. The functional tasks of figure 1A of the paper.
 """
 
 from typing import NamedTuple
@@ -17,10 +18,11 @@ from ppafo.model.gait_sensors import GaitMeasurement
 
 
 class EventOnOffParameters(NamedTuple):
-    """Angle of the foot in the swing [rad], band about it [rad], and the rules of phases and safety."""
+    """Angle of the lifted foot [rad], band about it [rad], end of push-off [turns], rules of phases and safety."""
 
     swing_angle: float
     band: float
+    push_off_end: float
     phases: PhaseRules
     safety: SafetyRules
 
@@ -49,7 +51,8 @@ def update(
     held = phases.lifts(phase.phase)
     command = -1.0 if lifting > 0.5 else VENT
     command = command if held else VENT
-    command = 1.0 if phase.phase == phases.PUSH_OFF else command
+    in_time = phase.since_strike < parameters.push_off_end * phase.stride_time
+    command = 1.0 if phase.phase == phases.PUSH_OFF and in_time else command
     command, watch = safety.carried_out(watch, command, period)
     return command, EventOnOffState(phase, watch, lifting if held else 0.0)
 
@@ -59,10 +62,11 @@ KIND = ControllerKind(
     summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
     quantities=(
-        Quantity("swing_angle", "rad", "angle at which the foot is held in the swing", 1.5707963267948966, 0.5, 2.5),
+        Quantity("swing_angle", "rad", "angle at which the foot is held in the swing", 1.64, 0.5, 2.5),
         Quantity(
-            "band", "rad", "the foot is lifted above the angle plus this, let go below it less this", 0.03, 0.0, 0.5
+            "band", "rad", "the foot is lifted above the angle plus this, let go below it less this", 0.097, 0.0, 0.5
         ),
+        Quantity("push_off_end", "1", "share of the stride time at which the push-off is over", 0.58, 0.1, 1.0),
         *PHASE_QUANTITIES,
         *SAFETY_QUANTITIES,
     ),

@@ -10,7 +10,7 @@ from ppafo.gait import Gait
 from ppafo.model.gait import GaitTiming
 from ppafo.model.plant import PlantParameters, chamber_pressures
 from ppafo.studies.league.walking.measures import Course
-from ppafo.walking.planning import followed, gait_timing
+from ppafo.walking.followed_gait import followed, gait_timing
 from ppafo.walking.posture import AnklePath, ankle_path
 from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.wearer import Wearer

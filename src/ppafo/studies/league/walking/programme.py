@@ -67,7 +67,10 @@ class _Unknowns:
 
 
 def programme(run: Run, valve: str, stride: Stride, path: AnklePath) -> Programme:
-    """The programme of a stride for the plant and the leg of a run; ``path`` places the toes over the ground."""
+    """The programme of a stride for the plant and the leg of a run, equations (1) and (11).
+
+    ``path`` places the toes over the ground.
+    """
     import casadi
 
     assert run.walk is not None, "a stride is walked"

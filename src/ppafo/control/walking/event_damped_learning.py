@@ -1,0 +1,92 @@
+"""Damped proportional torque control whose feed-forward for the push-off is learnt from stride to stride, walking.
+
+The law of Zhang, Cheah and Collins (2015), with the table of ``learnt_table``.
+"""
+
+from typing import NamedTuple
+
+from ppafo.control.controllers import damped_proportional
+from ppafo.control.controllers.damped_proportional import DampedGains, TorqueSlope, damped_command
+from ppafo.control.kind import ControllerKind
+from ppafo.control.walking import assistance, learnt_table, phases, safety
+from ppafo.control.walking.assistance import Assistance, Wish
+from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
+from ppafo.control.walking.learnt_table import LearningRules, LearntTable
+from ppafo.control.walking.phases import PhaseRules, PhaseState
+from ppafo.control.walking.safety import SafetyRules, SafetyState
+from ppafo.model.declaration import Quantity
+from ppafo.model.gait_sensors import GaitMeasurement
+
+
+class EventDampedLearningParameters(NamedTuple):
+    """Gains of the law and of learning, what is wanted, and the rules of phases and safety."""
+
+    law: DampedGains
+    learning: LearningRules
+    assistance: Assistance
+    phases: PhaseRules
+    safety: SafetyRules
+
+
+class EventDampedLearningState(NamedTuple):
+    """Phase, safety, the torque wanted, the torque's course, and what was learnt."""
+
+    phase: PhaseState
+    safety: SafetyState
+    wish: Wish
+    law: TorqueSlope
+    table: LearntTable
+
+
+def update(
+    parameters: EventDampedLearningParameters,
+    state: EventDampedLearningState,
+    reference: float,
+    measurement: GaitMeasurement,
+    period: float,
+) -> tuple[float, EventDampedLearningState]:
+    """Command from -1 to 1, or ``VENT``; the reference is not used."""
+    assisted = assistance.followed(parameters, state, measurement, period)
+    phase, torque, profile = assisted.phase, measurement.torque, parameters.assistance.push_off
+    pushes = phase.phase == phases.PUSH_OFF
+    table = learnt_table.taught(
+        parameters.learning,
+        state.table,
+        profile,
+        phase.since_strike,
+        phase.stride_time,
+        assisted.wish.torque - torque if pushes else 0.0,
+        period * assisted.acts if pushes else 0.0,
+    )
+    place = learnt_table.place_in_table(profile, phase.since_strike, phase.stride_time)
+    ahead = learnt_table.learnt(table, place) if pushes else 0.0
+    law = TorqueSlope(state.law.torque, state.law.slope * assisted.goes_on, state.law.started * assisted.goes_on)
+    command, law = damped_command(parameters.law, law, assisted.wish.torque, torque, ahead, period)
+    command, watch = assistance.given(assisted, command, period)
+    return command, EventDampedLearningState(phase, watch, assisted.wish, law, table)
+
+
+TUNED = {
+    "proportional_gain": 1.4,
+    "damping": 0.0046,
+    "damping_filter": 0.001,
+}
+"""SI units; found with ``python -m ppafo.studies.league.walking_tuning event_damped_learning``."""
+
+KIND = ControllerKind(
+    name="event_damped_learning",
+    summary="Event-based torque profiles for each phase, followed by damped control that learns the push-off.",
+    source=f"the paper, figure 1A (phases); {damped_proportional.KIND.source}",
+    quantities=(
+        *with_defaults(damped_proportional.GAIN_QUANTITIES, TUNED),
+        Quantity("learning_gain", "1/(N m)", "command learnt per mean torque error of a stride", 0.67, 0.0, 1.0e3),
+        Quantity("forgetting", "1", "share of what was learnt that a stride forgets", 0.005, 0.0, 1.0),
+        Quantity("lead", "s", "how much earlier the table is read than it was learnt", 0.02, 0.0, 0.2),
+        *ASSISTING_QUANTITIES,
+    ),
+    parameters=EventDampedLearningParameters,
+    initial=EventDampedLearningState(
+        phases.START, safety.START, assistance.START, TorqueSlope(0.0, 0.0, 0.0), learnt_table.EMPTY
+    ),
+    update=update,
+)

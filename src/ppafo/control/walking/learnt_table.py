@@ -1,0 +1,127 @@
+"""A table of commands over the push-off that is learnt from stride to stride, while walking.
+
+The law of Zhang, Cheah and Collins (2015) for a knot of the table, from one stride n to the next:
+
+    table_{n+1} = (1 - forgetting) table_n + gain e_n
+
+Here e_n is the mean torque error over the time of the knot, which takes the place of their filter over strides, and
+the table is read a lead earlier than it was learnt, because the torque follows a command late. The knots learn while
+the stride passes over them, so no stride has to be kept; they are written out one by one, which in the lanes is one
+straight line of arithmetic for all wearers at once.
+"""
+
+from typing import NamedTuple
+
+from ppafo.control.walking.torque_profile import TorqueProfile
+
+KNOTS = 16
+
+
+class LearningRules(NamedTuple):
+    """Gain [1/(N m)], share of a knot that a stride forgets [-], lead [s]."""
+
+    learning_gain: float
+    forgetting: float
+    lead: float
+
+
+class LearntTable(NamedTuple):
+    """Learnt commands [-] at knots that lie evenly from the beginning to the end of the torque profile."""
+
+    knot_0: float
+    knot_1: float
+    knot_2: float
+    knot_3: float
+    knot_4: float
+    knot_5: float
+    knot_6: float
+    knot_7: float
+    knot_8: float
+    knot_9: float
+    knot_10: float
+    knot_11: float
+    knot_12: float
+    knot_13: float
+    knot_14: float
+    knot_15: float
+
+
+EMPTY = LearntTable(*(0.0,) * KNOTS)
+
+
+def near(place: float, knot: float) -> float:
+    """Weight of a knot at a place, both counted in knots: 1 at the knot, 0 from its neighbours on."""
+    return max(0.0, 1.0 - abs(place - knot))
+
+
+def learnt(table: LearntTable, place: float) -> float:
+    """Command [-] at a place counted in knots: straight between knots, 0 outside of the table."""
+    return (
+        table.knot_0 * near(place, 0.0)
+        + table.knot_1 * near(place, 1.0)
+        + table.knot_2 * near(place, 2.0)
+        + table.knot_3 * near(place, 3.0)
+        + table.knot_4 * near(place, 4.0)
+        + table.knot_5 * near(place, 5.0)
+        + table.knot_6 * near(place, 6.0)
+        + table.knot_7 * near(place, 7.0)
+        + table.knot_8 * near(place, 8.0)
+        + table.knot_9 * near(place, 9.0)
+        + table.knot_10 * near(place, 10.0)
+        + table.knot_11 * near(place, 11.0)
+        + table.knot_12 * near(place, 12.0)
+        + table.knot_13 * near(place, 13.0)
+        + table.knot_14 * near(place, 14.0)
+        + table.knot_15 * near(place, 15.0)
+    )
+
+
+def moved(knot: float, weight: float, step: float, forgetting: float) -> float:
+    """Command of a knot after a sample of some weight: forgotten a little, moved by a step, from -1 to 1."""
+    return max(-1.0, min(1.0, knot + weight * (step - forgetting * knot)))
+
+
+def place_in_table(profile: TorqueProfile, since_strike: float, stride_time: float) -> float:
+    """Place in the table, counted in knots, at a time since the heel strike in a stride of some length, both [s]."""
+    begun = since_strike / stride_time - profile.peak_time + profile.rise_time
+    return begun / (profile.rise_time + profile.fall_time) * (KNOTS - 1.0)
+
+
+def taught(
+    rules: LearningRules,
+    table: LearntTable,
+    profile: TorqueProfile,
+    since_strike: float,
+    stride_time: float,
+    error: float,
+    duration: float,
+) -> LearntTable:
+    """The table after a sample with a torque error [N m] that stood for some time [s], 0 where nothing is learnt.
+
+    While a stride passes over a knot, the weights of its samples add up to 1.
+    """
+    knot_time = (profile.rise_time + profile.fall_time) * stride_time / (KNOTS - 1.0)
+    place = place_in_table(profile, since_strike - rules.lead, stride_time)
+    return moved_table(table, place, duration / knot_time, rules.learning_gain * error, rules.forgetting)
+
+
+def moved_table(table: LearntTable, place: float, weight: float, step: float, forgetting: float) -> LearntTable:
+    """The table with the two knots at a place moved in part: each by its share of the sample's ``weight``."""
+    return LearntTable(
+        moved(table.knot_0, near(place, 0.0) * weight, step, forgetting),
+        moved(table.knot_1, near(place, 1.0) * weight, step, forgetting),
+        moved(table.knot_2, near(place, 2.0) * weight, step, forgetting),
+        moved(table.knot_3, near(place, 3.0) * weight, step, forgetting),
+        moved(table.knot_4, near(place, 4.0) * weight, step, forgetting),
+        moved(table.knot_5, near(place, 5.0) * weight, step, forgetting),
+        moved(table.knot_6, near(place, 6.0) * weight, step, forgetting),
+        moved(table.knot_7, near(place, 7.0) * weight, step, forgetting),
+        moved(table.knot_8, near(place, 8.0) * weight, step, forgetting),
+        moved(table.knot_9, near(place, 9.0) * weight, step, forgetting),
+        moved(table.knot_10, near(place, 10.0) * weight, step, forgetting),
+        moved(table.knot_11, near(place, 11.0) * weight, step, forgetting),
+        moved(table.knot_12, near(place, 12.0) * weight, step, forgetting),
+        moved(table.knot_13, near(place, 13.0) * weight, step, forgetting),
+        moved(table.knot_14, near(place, 14.0) * weight, step, forgetting),
+        moved(table.knot_15, near(place, 15.0) * weight, step, forgetting),
+    )

@@ -1,0 +1,107 @@
+"""A gait as the engine follows it: eight harmonics of each curve, its events, and how the heel meets the ground."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ppafo.constants import STANDARD_GRAVITY
+from ppafo.gait import Gait
+from ppafo.gait.gait import Curve
+from ppafo.model.fourier import Series
+from ppafo.model.gait import GaitSeries, GaitTiming
+from ppafo.signals.recording import Floats
+from ppafo.walking.wearer import Wearer
+
+HARMONICS = 8
+"""Harmonics that the engine follows; those of the built-in gait above are below 0.04 deg and 0.4 % of body weight."""
+
+FLAT_FROM, FLAT_TO = 0.15, 0.35
+"""Phases between which every foot stands flat; the angle of the foot is taken from there."""
+
+NEARLY_FLAT = math.radians(3.0)
+"""The heel has left the ground when the foot is steeper than flat by this; the toes are about to meet it at as much."""
+
+USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
+"""Shares of the stance at which the heel rises where the angles do not show it, and at the latest."""
+
+EVENT_PHASES = np.linspace(0.0, 1.0, 1001)[150:]
+"""Phases at which events are looked for, from the first flat foot on."""
+
+CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
+"""Shares of the swing between which the toes must clear the ground."""
+
+ZERO = Series(*(0.0,) * 17)
+
+
+def gait_series(gait: Gait) -> GaitSeries:
+    """The gait as the engine takes it; a moment, a force or a motion of the knee that nobody measured is 0."""
+    return GaitSeries(
+        _series(gait, "shank_angle"),
+        _series(gait, "ankle_angle"),
+        _series(gait, "ankle_moment"),
+        _series(gait, "vertical_force"),
+        _series(gait, "knee_forward"),
+        _series(gait, "knee_up"),
+    )
+
+
+def _series(gait: Gait, name: str) -> Series:
+    curve = gait.curves.get(name)
+    if curve is None:
+        return ZERO
+    missing = (0.0,) * HARMONICS
+    pairs = zip((*curve.cosines, *missing)[:HARMONICS], (*curve.sines, *missing)[:HARMONICS], strict=True)
+    return Series(curve.mean, *[number for pair in pairs for number in pair])
+
+
+def followed(curve: Curve) -> Curve:
+    """The curve with the harmonics that the engine follows."""
+    return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
+
+
+def heel_lever(gait: Gait, wearer: Wearer) -> float:
+    """Lever [m] of the ground force about the ankle where the measured foot has nearly come down.
+
+    From the measured moment; that of the heel itself bounds it, and stands in where moment or force are missing.
+    """
+    if gait.ankle_moment is None or gait.vertical_force is None:
+        return wearer.heel_lever
+    phases = np.linspace(0.0, FLAT_FROM, 151)
+    down = _foot_angles(gait, phases) < gait_timing(gait).ground_angle + NEARLY_FLAT
+    landing = float(phases[np.argmax(down)]) if down.any() else FLAT_FROM
+    moment, force = followed(gait.ankle_moment).value(landing), followed(gait.vertical_force).value(landing)
+    return min(max(-moment / max(force * STANDARD_GRAVITY, 1.0), 0.0), wearer.heel_lever)
+
+
+def _foot_angles(gait: Gait, phases: Floats) -> Floats:
+    """Angles [rad] of the measured foot over the horizontal."""
+    shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
+    return shank.sampled(phases) - ankle.sampled(phases) + 0.5 * math.pi
+
+
+def gait_timing(gait: Gait) -> GaitTiming:
+    """Events of the gait, the heel's rise and the flat foot's angle from its own angles."""
+    foot = _foot_angles(gait, EVENT_PHASES)
+    events = gait_events(foot[None, :], np.array([gait.stance_share]))
+    return GaitTiming(1.0 / gait.stride_time, 0.0, *(float(values[0]) for values in events))
+
+
+def gait_events(foot: Floats, stance_share: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """The fields of ``GaitTiming`` after ``start``, for feet that stand at angles [rad] (people, phases).
+
+    ``foot`` is over the horizontal, at ``EVENT_PHASES``; ``stance_share`` is (people,).
+    """
+    flat = (EVENT_PHASES >= FLAT_FROM) & (EVENT_PHASES <= FLAT_TO)
+    ground_angle = np.median(foot[:, flat], axis=1)
+    steep = (foot < (ground_angle - NEARLY_FLAT)[:, None]) & (EVENT_PHASES > FLAT_TO)
+    usual = USUAL_HEEL_RISE * stance_share
+    heel_off = np.where(steep.any(axis=1), EVENT_PHASES[np.argmax(steep, axis=1)], usual)
+    swing = 1.0 - stance_share
+    return (
+        np.minimum(heel_off, LATEST_HEEL_RISE * stance_share),
+        stance_share,
+        stance_share + CLEARANCE_FROM * swing,
+        stance_share + CLEARANCE_TO * swing,
+        ground_angle,
+    )

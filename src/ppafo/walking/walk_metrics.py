@@ -1,0 +1,85 @@
+"""What comes of a walk as numbers: means over the strides, what they are of a healthy ankle, tracking and safety."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.control.walking.phases import PUSH_OFF
+from ppafo.engine.lanes import Floats
+from ppafo.metrics import Metric
+from ppafo.signals import Recording
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.strides import PER_STRIDE, SETTLING, Curves
+
+
+def walk_metrics(
+    configuration: Configuration,
+    recording: Recording,
+    strides: Mapping[str, Floats],
+    averages: Mapping[str, Curves],
+    starts: NDArray[np.intp],
+) -> dict[str, Metric]:
+    """Metrics of a walk by name; ``starts`` are the samples right after each heel strike, the first ones left out."""
+    return _of_strides(configuration, strides, averages) | _tracking(recording, starts) | _safety(recording)
+
+
+def _of_strides(
+    configuration: Configuration, strides: Mapping[str, Floats], averages: Mapping[str, Curves]
+) -> dict[str, Metric]:
+    """Means over the strides after the first ones, and what they are of a healthy ankle."""
+    found = {}
+    for name, item in PER_STRIDE.items():
+        values = strides[name][SETTLING:]
+        if name == "slap_rate":
+            values = values[values < 0.0]
+        if values.size:
+            found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean")
+    found["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")
+    healthy = healthy_positive_work(configuration)
+    if healthy > 0.0:
+        found["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
+        if "push_off_work" in found:
+            share = found["push_off_work"].value / healthy
+            found["push_off_share"] = Metric(
+                share, "-", "work of T_ex in push-off over the healthy ankle's positive work"
+            )
+    if "angle" in averages:
+        away = averages["angle"].mean - averages["healthy_angle"].mean
+        found["angle_difference"] = Metric(
+            float(np.sqrt(np.mean(away**2))), "rad", "RMS difference of the mean ankle angle to the healthy one"
+        )
+    return found
+
+
+def _tracking(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Metric]:
+    """How well a controller that wants a torque gets it in push-off; nothing for others or without strides."""
+    if "reference" not in recording or starts.size < 2:
+        return {}
+    walked = slice(int(starts[0]), int(starts[-1]))
+    pushes = recording["controller_phase"][walked] == PUSH_OFF
+    error = (recording["reference"] - recording["torque"])[walked][pushes]
+    if not error.size:
+        return {}
+    rms = float(np.sqrt(np.mean(error**2)))
+    return {"push_off_error": Metric(rms, "N m", "RMS of the torque wanted less the actuator torque in push-off")}
+
+
+def _safety(recording: Recording) -> dict[str, Metric]:
+    """When the controller stopped trusting its sensors; nothing where it never did."""
+    if "safe_state" not in recording or not recording["safe_state"].any():
+        return {}
+    time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
+    return {"safe_state_time": Metric(time, "s", "when the controller vented both chambers for good")}
+
+
+def healthy_positive_work(configuration: Configuration) -> float:
+    """Positive work [J] of the measured ankle moment in one stride of the wearer; 0 where no moment was measured."""
+    gait = configuration.gait
+    if "ankle_moment" not in gait.curves:
+        return 0.0
+    phases = np.linspace(0.0, 1.0, 2001)
+    moment = configuration.wearer.body_mass * gait.curve("ankle_moment").sampled(phases)
+    angle = gait.ankle_angle.sampled(phases)
+    power = np.maximum(moment * np.gradient(angle, phases), 0.0)
+    return float(np.trapezoid(power, phases))

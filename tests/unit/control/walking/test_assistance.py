@@ -1,0 +1,148 @@
+"""What torque is wanted in each phase, and what a law forgets where another task begins."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.control.controllers.feedback_linearisation import FeedbackLinearisationState
+from ppafo.control.walking import assistance
+from ppafo.control.walking.assistance import Assistance, Hold
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.control.walking.event_feedback_linearisation import restarted
+from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
+from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
+from ppafo.engine.rows import rebuild
+from ppafo.model.command import VENT
+from ppafo.model.gait_sensors import GaitMeasurement
+
+PERIOD = 1.0e-3
+PROFILE = TorqueProfile(4.0, 0.5, 0.2, 0.1)
+RULES = Assistance(
+    Hold(1.5, 10.0, 0.5, 0.0),
+    landing=TorqueProfile(1.0, 0.05, 0.05, 0.1),
+    push_off=PROFILE,
+    swing=TorqueProfile(2.0, 0.8, 0.1, 0.3),
+    largest_torque=5.0,
+)
+FOLLOWING = [
+    name for name, kind in WALKING_CONTROLLERS.items() if "peak_time" in {item.name for item in kind.quantities}
+]
+
+
+def at(phase: float, share: float) -> PhaseState:
+    """The wearer in a phase at a share of a stride of 1.2 s."""
+    off = Switch(0.0, 0.0)
+    return PhaseState(phase, off, off, 0.1, 1.2 * share, 1.2, 3.0)
+
+
+def test_a_profile_rises_from_zero_to_its_peak_and_falls_to_zero() -> None:
+    assert [profile_torque(PROFILE, phase) for phase in (0.0, 0.3, 0.6, 1.0)] == pytest.approx([0.0] * 4)
+    assert profile_torque(PROFILE, 0.5) == pytest.approx(4.0)
+    assert profile_torque(PROFILE, 0.4) == pytest.approx(2.0), "half way up"
+    assert profile_torque(PROFILE, 0.55) == pytest.approx(2.0), "half way down"
+    phase = np.linspace(0.0, 1.0, 2001)
+    torque = np.array([profile_torque(PROFILE, float(value)) for value in phase])
+    assert np.abs(np.diff(torque)).max() < 1.5 * 4.0 / 0.1 * 0.0005 + 1e-9, "no jump"
+    assert np.all(np.diff(torque)[phase[1:] <= 0.5] >= 0.0)
+    assert np.all(np.diff(torque)[phase[:-1] >= 0.5] <= 0.0)
+
+
+def test_each_phase_wants_its_own_torque() -> None:
+    angle = RULES.hold.swing_angle
+    assert assistance.wanted_torque(RULES, at(PUSH_OFF, 0.5), angle, 0.0) == pytest.approx(4.0)
+    assert assistance.wanted_torque(RULES, at(MID_STANCE, 0.5), angle, 9.0) == 0.0
+    assert assistance.wanted_torque(RULES, at(LANDING, 0.05), angle, 0.0) == pytest.approx(-1.0)
+    assert assistance.wanted_torque(RULES, at(SWING, 0.8), angle, 0.0) == pytest.approx(-2.0)
+
+
+def test_a_lifted_foot_is_held_by_a_spring_and_a_damper_up_to_the_largest_torque() -> None:
+    bare = RULES._replace(swing=PROFILE._replace(peak_torque=0.0))
+    assert assistance.wanted_torque(bare, at(SWING, 0.8), 1.6, 0.0) == pytest.approx(-1.0)
+    assert assistance.wanted_torque(bare, at(SWING, 0.8), 1.5, 2.0) == pytest.approx(-1.0)
+    assert assistance.wanted_torque(bare, at(SWING, 0.8), 3.0, 0.0) == -5.0
+    assert assistance.wanted_torque(bare, at(SWING, 0.8), 0.5, 0.0) == 5.0
+
+
+def test_landing_and_swing_are_one_task_and_the_others_are_not() -> None:
+    assert assistance.same_task(SWING, LANDING)
+    assert assistance.same_task(PUSH_OFF, PUSH_OFF)
+    changes = [(LANDING, MID_STANCE), (MID_STANCE, PUSH_OFF), (PUSH_OFF, SWING), (MID_STANCE, SWING)]
+    assert not any(assistance.same_task(before, after) for before, after in changes)
+
+
+def test_the_rate_of_the_angle_is_filtered_and_has_no_kick_at_the_start() -> None:
+    kind = WALKING_CONTROLLERS["event_pid"]
+    parameters, state = default_parameters("event_pid"), kind.initial
+    first = assistance.followed(parameters, state, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
+    assert first.wish.rate == 0.0
+    _, state = kind.update(parameters, state, 0.0, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
+    second = assistance.followed(parameters, state, seen(1.601, 0.0, 0.0, 0.0), PERIOD)
+    filter_time = parameters.assistance.hold.rate_filter
+    assert second.wish.rate == pytest.approx(0.001 / (PERIOD + filter_time))
+
+
+def one_stride() -> list[GaitMeasurement]:
+    """Landing, mid-stance, push-off and swing, with readings that change as those of sensors do."""
+    loads = [(300.0, 0.0)] * 60 + [(300.0, 300.0)] * 500 + [(0.0, 300.0)] * 90 + [(0.0, 0.0)] * 350
+    return [
+        seen(1.7 + 1e-5 * sample, 1.0, heel * (1.0 + 1e-5 * sample), toe * (1.0 + 1e-5 * sample))
+        for sample, (heel, toe) in enumerate(loads)
+    ]
+
+
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_a_law_acts_in_its_phases_and_leaves_the_foot_free_in_mid_stance(name: str) -> None:
+    kind = WALKING_CONTROLLERS[name]
+    parameters, state = default_parameters(name), kind.initial
+    found: dict[float, list[float]] = {}
+    for measurement in one_stride():
+        command, state = kind.update(parameters, state, 0.0, measurement, PERIOD)
+        found.setdefault(state.phase.phase, []).append(command)
+    assert set(found) == {SWING, LANDING, MID_STANCE, PUSH_OFF}
+    assert set(found[MID_STANCE]) == {VENT}
+    for phase in (SWING, LANDING, PUSH_OFF):
+        assert all(-1.0 <= command <= 1.0 for command in found[phase])
+    assert min(found[LANDING]) < 0.0, "the foot is below the swing angle and is lifted"
+
+
+@pytest.mark.parametrize("name", [name for name in FOLLOWING if name != "event_feedback_linearisation"])
+def test_a_law_forgets_where_another_task_begins(name: str) -> None:
+    kind = WALKING_CONTROLLERS[name]
+    parameters, state = default_parameters(name), kind.initial
+    changes = 0
+    for measurement in one_stride():
+        before = state
+        command, state = kind.update(parameters, before, 0.0, measurement, PERIOD)
+        if not assistance.same_task(before.phase.phase, state.phase.phase):
+            changes += 1
+            fresh = kind.initial._replace(phase=before.phase, safety=before.safety, wish=before.wish)
+            assert command == kind.update(parameters, fresh, 0.0, measurement, PERIOD)[0]
+    assert changes == 3
+
+
+def test_a_new_task_has_no_rate_of_the_torque_wanted_for_the_inverted_chambers() -> None:
+    law = FeedbackLinearisationState(4.0, 1.6, 0.3, 1.0)
+    assert restarted(law, -2.0, 0.0) == FeedbackLinearisationState(-2.0, 1.6, 0.3, 1.0)
+    assert restarted(law, -2.0, 1.0) == law
+
+
+def test_nothing_is_done_once_safety_has_vented() -> None:
+    kind = WALKING_CONTROLLERS["event_pid"]
+    parameters, state = default_parameters("event_pid"), kind.initial
+    _, state = kind.update(parameters, state, 0.0, seen(9.0, 0.0, 0.0, 0.0), PERIOD)
+    command, _ = kind.update(parameters, state, 0.0, seen(1.7, 0.0, 0.0, 0.0), PERIOD)
+    assert command == VENT
+
+
+def default_parameters(name: str) -> Any:
+    """Parameters of a controller at their defaults, but patient with pressures that do not answer the valve."""
+    kind = WALKING_CONTROLLERS[name]
+    parameters = rebuild(kind.parameters, [float(item.default or 0.0) for item in kind.quantities])
+    return parameters._replace(safety=parameters.safety._replace(fill_time=10.0, vent_time=10.0))
+
+
+def seen(angle: float, torque: float, heel: float, toe: float) -> GaitMeasurement:
+    """A measurement with an angle [rad], a torque [N m] and forces [N]."""
+    above = torque / 1.451e-5
+    return GaitMeasurement(angle, 1.01325e5 + max(above, 0.0), 1.01325e5 + max(-above, 0.0), torque, heel, toe)

@@ -1,0 +1,104 @@
+"""Every law on a walking leg: it follows its torque, leaves the foot free in mid-stance, and lifts the toes."""
+
+import itertools
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.control.walking.phases import MID_STANCE, PUSH_OFF
+from ppafo.model.command import VENT
+from ppafo.walking import WalkResult, load_walk, walk
+from ppafo.walking.strides import SETTLING
+
+MINUTES = 0.25
+LARGEST_ERROR = {
+    "event_on_off_dead_zone": 0.3,
+    "event_proportional": 0.5,
+    "event_pid": 0.25,
+    "event_pid_feedforward": 0.25,
+    "event_sliding_mode": 0.25,
+    "event_damped_learning": 0.15,
+    "event_feedback_linearisation": 0.15,
+}
+"""RMS torque error in push-off [N m] that a law keeps below, of a peak of 5 N m."""
+
+
+@pytest.fixture(scope="module")
+def walked() -> Callable[[str], WalkResult]:
+    def run(name: str) -> WalkResult:
+        return walk(load_walk("proportional", [f"controller.kind={name}"]), MINUTES)
+
+    return lru_cache(run)
+
+
+def test_every_law_that_wants_a_torque_is_walked_here() -> None:
+    wanting = {name for name, kind in WALKING_CONTROLLERS.items() if hasattr(kind.initial, "wish")}
+    assert wanting == set(LARGEST_ERROR)
+
+
+@pytest.mark.parametrize("name", LARGEST_ERROR)
+def test_a_law_walks_and_follows_its_torque_in_push_off(walked: Callable[[str], WalkResult], name: str) -> None:
+    result = walked(name)
+    assert result.status.is_completed
+    assert result.metrics["strides"].value >= 10
+    assert "safe_state_time" not in result.metrics
+    assert result.metrics["push_off_error"].value < LARGEST_ERROR[name]
+    assert result.metrics["push_off_work"].value > 1.0
+    assert result.metrics["toe_landing"].value == 0.0
+
+
+@pytest.mark.parametrize("name", LARGEST_ERROR)
+def test_the_foot_is_free_in_mid_stance_and_clears_the_ground_in_mid_swing(
+    walked: Callable[[str], WalkResult], name: str
+) -> None:
+    result = walked(name)
+    free = result.recording["controller_phase"] == MID_STANCE
+    assert free.any()
+    assert (result.recording["command"][free] == VENT).all()
+    assert lowest_toes(result) > 0.0
+
+
+def test_solenoid_valves_lift_the_toes_too_because_the_push_off_ends_in_time() -> None:
+    in_time, late = (walk(load_walk("solenoid", given), MINUTES) for given in ([], ["controller.push_off_end=0.65"]))
+    assert lowest_toes(in_time) > 0.0 > lowest_toes(late)
+    assert in_time.metrics["push_off_work"].value > 0.8
+
+
+def test_the_dead_zone_works_on_solenoid_valves() -> None:
+    overrides = ["controller.kind=event_on_off_dead_zone", "controller.dead_zone=1 N m", "controller.release=0.3 N m"]
+    result = walk(load_walk("solenoid", overrides), MINUTES)
+    assert result.status.is_completed
+    assert "safe_state_time" not in result.metrics
+    assert result.metrics["push_off_work"].value > 0.8
+    assert result.metrics["toe_landing"].value == 0.0
+
+
+def lowest_toes(result: WalkResult) -> float:
+    """Lowest toes over the ground in mid-swing [m] in the mean stride."""
+    gait = result.configuration.gait
+    phase = np.linspace(0.0, 1.0, 101)
+    swing = (phase - gait.stance_share) / (1.0 - gait.stance_share)
+    middle = (swing > 0.2) & (swing < 0.9)
+    return float(result.averages["toe_height"].mean[middle].min())
+
+
+def test_the_error_of_the_learning_law_falls_from_stride_to_stride(walked: Callable[[str], WalkResult]) -> None:
+    result = walked("event_damped_learning")
+    errors = push_off_errors(result)
+    assert errors[-3:].mean() < 0.7 * errors[0]
+    overrides = ["controller.kind=event_damped_learning", "controller.learning_gain=0 1/(N m)"]
+    without = walk(load_walk("proportional", overrides), MINUTES)
+    assert without.metrics["push_off_error"].value > 1.2 * result.metrics["push_off_error"].value
+    assert np.ptp(push_off_errors(without)[SETTLING:]) < 0.02, "nothing is learnt without a gain"
+
+
+def push_off_errors(result: WalkResult) -> np.ndarray:
+    """RMS torque error in push-off [N m] of each stride."""
+    recording, starts = result.recording, result.starts
+    error = recording["reference"] - recording["torque"]
+    pushes = recording["controller_phase"] == PUSH_OFF
+    strides = [slice(first, last) for first, last in itertools.pairwise(starts)]
+    return np.array([np.sqrt(np.mean(error[stride][pushes[stride]] ** 2)) for stride in strides])
