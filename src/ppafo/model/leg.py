@@ -113,13 +113,47 @@ def torque_of_shank(
     The ankle's row of equation (11) without the term in theta''; angles as in ``gravity_torques``, rates [rad/s],
     accelerations [rad/s^2], [m/s^2].
     """
+    return torque_of_shank_on(
+        leg.foot_mass * leg.foot_mass_centre,
+        foot_inertia_about_ankle(leg),
+        leg.shank_length,
+        leg.gravity,
+        sine_phi,
+        cosine_phi,
+        sine_alpha,
+        cosine_alpha,
+        shank_rate,
+        shank_acceleration,
+        knee_forward,
+        knee_up,
+    )
+
+
+def torque_of_shank_on(
+    mass_moment: float,
+    inertia: float,
+    shank_length: float,
+    gravity: float,
+    sine_phi: float,
+    cosine_phi: float,
+    sine_alpha: float,
+    cosine_alpha: float,
+    shank_rate: float,
+    shank_acceleration: float,
+    knee_forward: float,
+    knee_up: float,
+) -> float:
+    """The same [N m] for any body that turns with the foot. The ankle's row of equation (11).
+
+    ``mass_moment`` [kg m] is its mass times the distance along the foot, ``inertia`` [kg m^2] that about the ankle.
+    """
     # theta is phi less alpha, plus 90 deg.
     sine_theta = cosine_phi * cosine_alpha + sine_phi * sine_alpha
     cosine_theta = cosine_phi * sine_alpha - sine_phi * cosine_alpha
-    coupling = mass_matrix(leg, cosine_theta).coupling
-    turning = centrifugal_torques(leg, sine_theta, shank_rate, 0.0)
-    weight = gravity_torques(leg, sine_phi, cosine_phi, sine_alpha, cosine_alpha, knee_forward, knee_up)
-    return coupling * shank_acceleration + turning.ankle + weight.ankle
+    product = mass_moment * shank_length
+    weight = cosine_alpha * (gravity + knee_up) - sine_alpha * knee_forward
+    turning = (product * cosine_theta - inertia) * shank_acceleration
+    return turning - product * sine_theta * shank_rate * shank_rate - mass_moment * weight
 
 
 def passive_torque(leg: LegParameters, angle: float) -> float:

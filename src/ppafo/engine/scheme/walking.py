@@ -10,6 +10,7 @@ from ppafo.model.leg import (
     foot_inertia_about_ankle,
     passive_torque,
     torque_of_shank,
+    torque_of_shank_on,
 )
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures
 from ppafo.model.turns import TURN, sine_and_cosine
@@ -19,7 +20,8 @@ from ppafo.model.vane import actuator_torque
 class DeviceShare(NamedTuple):
     """What the foot plate and the vane add to the leg: inertia [kg m^2], damping [N m s/rad], largest gravity [N m].
 
-    The plant of a walking leg carries the sums of leg and device, and no gravity of its own.
+    They turn with the foot, so the shank's motion moves them too: equation (1) holds for a shank at rest. The plant of
+    a walking leg carries the sums of leg and device, and no gravity of its own.
     """
 
     inertia: float
@@ -83,8 +85,8 @@ def leg_torque(
 ) -> float:
     """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
 
-    The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the weight of the foot plate, and
-    the ground under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles,
+    The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the foot plate, and the ground
+    under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles,
     so that a wearer who has all of them and no device walks the measured gait.
     """
     heel = ground.heel_torque(contact, now, leg.heel_lever)
@@ -101,7 +103,25 @@ def leg_torque(
         now.knee_forward,
         now.knee_up,
     )
-    return wearer + heel + share.gravity_torque * foot.cosine - carried
+    return wearer + heel + plate_torque(leg, share, now, foot) - carried
+
+
+def plate_torque(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> float:
+    """Torque [N m] of foot plate and vane by their weight and the shank's motion, positive in plantarflexion."""
+    return -torque_of_shank_on(
+        share.gravity_torque / leg.gravity,
+        share.inertia,
+        leg.shank_length,
+        leg.gravity,
+        now.sine_shank,
+        now.cosine_shank,
+        foot.sine,
+        foot.cosine,
+        now.shank_rate,
+        now.shank_acceleration,
+        now.knee_forward,
+        now.knee_up,
+    )
 
 
 def begin_walk(
@@ -138,23 +158,23 @@ def external_torque(
     share: DeviceShare,
     state: PlantState,
     torque: float,
-    weight: float,
+    plate: float,
     led: ground.Ankle,
     acceleration: float,
     angle_is_free: bool,
 ) -> float:
     """T_ex [N m]: what a free foot needs, equation (11), or what equation (1) leaves of the actuator on the ground.
 
-    ``torque`` [N m] is that of the leg with the foot plate, ``weight`` what of it the foot plate's weight is.
+    ``torque`` [N m] is that of the leg with the foot plate, ``plate`` the part of the plate.
     """
     speed = state.angular_velocity
     passive_damping = leg.ankle_damping * speed
-    needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - weight)
+    needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - plate)
     pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
     actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
     moving = way * plant.dynamic_torque + share.viscous_damping * speed + share.inertia * led.acceleration
-    given = actuator + weight - moving
+    given = actuator + plate - moving
     return needed if angle_is_free else given
 
 
@@ -183,8 +203,8 @@ def end_walk(
         moved.angular_velocity if free else begun.led.rate,
     )
     acceleration = (after.angular_velocity - state.angular_velocity) / max(step, 1.0e-30)
-    weight = share.gravity_torque * foot.cosine
-    given = external_torque(plant, leg, share, after, torque, weight, begun.led, acceleration, free)
+    plate = plate_torque(leg, share, now, foot)
+    given = external_torque(plant, leg, share, after, torque, plate, begun.led, acceleration, free)
     landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset)
     height = leg.toe_lever * (foot.sine - now.sine_healthy_foot)
     turned = after.angle - state.angle
