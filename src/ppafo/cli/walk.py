@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ppafo.walking.population import Population
 
 DEFAULT_CONFIGURATION = "solenoid"
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+|nan|inf)", re.ASCII)
+_NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 _LONG = 12.0
 """Minutes above which progress is told."""
 

@@ -77,17 +77,20 @@ def faulty(fault: Fault, reading: float, last: float, time: float) -> float:
     return stuck if time >= fault.time else reading
 
 
-def force_reading(sensors: GaitSensors, force: float, last: float, seed: int, sample: int, channel: int) -> float:
-    """A force [N] with noise, steps and lost samples, never below 0."""
+def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, channel: int) -> float:
+    """A force [N] with noise and steps, never below 0."""
     noisy = force + sensors.force_noise * standard_noise(seed, sample, channel)
-    shown = max(quantised(noisy, sensors.force_quantum), 0.0)
-    return last if unit_noise(seed, sample, channel + 2) < sensors.lost_share else shown
+    return max(quantised(noisy, sensors.force_quantum), 0.0)
+
+
+def shown_before(last: float, reading: float, sample: int) -> float:
+    """What a sensor showed before; before the first sample it showed the same, as one that has settled."""
+    return last if sample > 0 else reading
 
 
 def kept(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
-    """A reading, or the last one where the sample is lost; the first one never is."""
-    share = lost_share if sample > 0 else 0.0
-    return last if unit_noise(seed, sample, channel) < share else reading
+    """A reading, or the last one where the sample is lost."""
+    return last if unit_noise(seed, sample, channel) < lost_share else reading
 
 
 def measure_gait(
@@ -112,16 +115,23 @@ def measure_gait(
     smooth_1 = pressure_1 + (last.smooth_pressure_1 - pressure_1) * pressure_memory
     smooth_2 = pressure_2 + (last.smooth_pressure_2 - pressure_2) * pressure_memory
     seen = measure(sensors, smooth_angle, smooth_1, smooth_2, torque_constant, sample)
-    heel = force_reading(gait_sensors, heel_force, last.heel_force, seed, sample, 3)
-    toe = force_reading(gait_sensors, toe_force, last.toe_force, seed, sample, 4)
-    turned = kept(last.angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
-    first = kept(last.pressure_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
-    second = kept(last.pressure_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
-    shown_angle = faulty(gait_sensors.angle_fault, turned, last.angle, time)
-    shown_1 = faulty(gait_sensors.pressure_1_fault, first, last.pressure_1, time)
-    shown_2 = faulty(gait_sensors.pressure_2_fault, second, last.pressure_2, time)
-    shown_heel = faulty(gait_sensors.heel_fault, heel, last.heel_force, time)
-    shown_toe = faulty(gait_sensors.toe_fault, toe, last.toe_force, time)
+    heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
+    toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
+    was_angle = shown_before(last.angle, seen.angle, sample)
+    was_1 = shown_before(last.pressure_1, seen.pressure_1, sample)
+    was_2 = shown_before(last.pressure_2, seen.pressure_2, sample)
+    was_heel = shown_before(last.heel_force, heel, sample)
+    was_toe = shown_before(last.toe_force, toe, sample)
+    kept_angle = kept(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
+    kept_1 = kept(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
+    kept_2 = kept(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
+    kept_heel = kept(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
+    kept_toe = kept(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
+    shown_angle = faulty(gait_sensors.angle_fault, kept_angle, was_angle, time)
+    shown_1 = faulty(gait_sensors.pressure_1_fault, kept_1, was_1, time)
+    shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, was_2, time)
+    shown_heel = faulty(gait_sensors.heel_fault, kept_heel, was_heel, time)
+    shown_toe = faulty(gait_sensors.toe_fault, kept_toe, was_toe, time)
     # Who works out the torque has only the readings, true or not.
     torque = torque_constant * (shown_1 - shown_2)
     remembered = GaitSeen(shown_heel, shown_toe, shown_angle, shown_1, shown_2, smooth_angle, smooth_1, smooth_2)

@@ -42,11 +42,6 @@ class LineStep(NamedTuple):
     inlet_rise: float
 
 
-def regulator_flow(set_pressure: float, line_pressure: float, droop: float, largest_flow: float) -> float:
-    """Mass flow [kg/s] through a regulator: over the fall of its pressure [Pa] by the droop [Pa s/kg], at most all."""
-    return min(max((set_pressure - line_pressure) / droop, 0.0), largest_flow)
-
-
 def line_pressures(lines: SupplyLines, gas_product: float, state: LineState) -> tuple[float, float]:
     """Absolute pressures of both lines [Pa]; ``gas_product`` is R T/M [J/kg]. Equation (3)."""
     return state.mass_1 * gas_product / lines.volume_1, state.mass_2 * gas_product / lines.volume_2

@@ -28,6 +28,12 @@ _REMARK_WIDTH = 105
 _PANELS = 3
 
 
+def minutes_text(seconds: float) -> str:
+    """Return minutes with three digits, and whole ones where there are more."""
+    minutes = seconds / SECONDS_PER_MINUTE
+    return f"{minutes:.0f}" if minutes >= 999.5 else f"{minutes:.3g}"
+
+
 def endurance_figure(made: Endurance) -> "Figure":
     """Return the figure of the course that was asked for; below it stands how it ended."""
     recording = made.discharge.recording

@@ -8,7 +8,7 @@ import numpy as np
 import ppafo
 from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI
 from ppafo.documents.json_text import json_text
-from ppafo.reporting.endurance_figure import ICE_POINT, SECONDS_PER_MINUTE, endurance_figure
+from ppafo.reporting.endurance_figure import ICE_POINT, endurance_figure, minutes_text
 from ppafo.reporting.endurance_table import chambers_sentence
 from ppafo.reporting.style import rendered
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -165,7 +165,7 @@ def _bottle(made: Endurance) -> dict[str, Any]:
 
 
 def _minutes(seconds: float) -> str:
-    return f"{seconds / SECONDS_PER_MINUTE:.3g} min"
+    return f"{minutes_text(seconds)} min"
 
 
 def _grams(kilograms: float) -> str:

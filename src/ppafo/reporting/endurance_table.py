@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI
-from ppafo.reporting.endurance_figure import SECONDS_PER_MINUTE
+from ppafo.reporting.endurance_figure import minutes_text
 from ppafo.reporting.text_table import text_table
 from ppafo.studies.endurance import Discharge, Endurance, Reuse
 from ppafo.studies.endurance.reuse import GIVEN
@@ -33,7 +33,7 @@ def _cells(one: Endurance) -> list[str]:
 
 
 def _course(course: Discharge) -> list[str]:
-    return [f"{course.walking_time / SECONDS_PER_MINUTE:.3g}", f"{course.steps:.0f}"]
+    return [minutes_text(course.walking_time), f"{course.steps:.0f}"]
 
 
 def _origins(made: Mapping[str, Endurance]) -> list[str]:

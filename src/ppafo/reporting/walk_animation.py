@@ -103,7 +103,7 @@ def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Sc
     figure.text(
         0.012,
         0.985,
-        f"{name}, half speed, simulated; dark red: the toes drag",
+        f"{name}, half speed, simulated; dark red: toes more than 1 cm below ground",
         ha="left",
         va="top",
         fontsize=9,

@@ -41,7 +41,7 @@ _PANELS = (
     _Panel("Torque on the wearer, $T_{ex}$ (N m)", ("external_torque",), 1.0, 0.0),
     _Panel("Torque of the actuator (N m)", ("torque",), 1.0, 0.0),
     _Panel("Chambers (psi, gauge; full: plantarflexion, dashed: dorsiflexion)", ("pressure_1", "pressure_2")),
-    _Panel("Toes over the ground (cm; below 0 they drag)", ("toe_height",), 100.0, 0.0),
+    _Panel("Toes over the ground (cm; they drag more than 1 cm below 0)", ("toe_height",), 100.0, 0.0),
 )
 
 

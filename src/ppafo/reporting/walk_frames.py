@@ -31,7 +31,7 @@ def frames_figure(comparison: Comparison) -> "Figure":
         width, height = _SIZE
         name = comparison.with_device.configuration.name
         figure.text(0.12 / width, 1 - 0.12 / height, f"{name}: one stride", ha="left", va="top", fontweight="bold")
-        remark = "grey outline: the healthy foot; cross: toes that would drag; percent of the stride below"
+        remark = "grey outline: the healthy foot; cross: toes more than 1 cm below ground; percent of the stride below"
         figure.text(0.12 / width, 1 - 0.36 / height, remark, ha="left", va="top", fontsize=9, color=GREY)
         mark_kind(figure, comparison.with_device.recording.kind)
         return figure

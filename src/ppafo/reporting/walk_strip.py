@@ -90,6 +90,8 @@ def strip_figure(result: WalkResult) -> "Figure":
         width, height = _SIZE
         title = f"{result.configuration.name}: functional tasks of the paper's figure 1A over the stride"
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
+        remark = "height of a colour: share of the strides"
+        figure.text(0.12 / width, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=8.5, color=GREY)
         mark_kind(figure, result.recording.kind)
         return figure
 

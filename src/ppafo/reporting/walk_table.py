@@ -28,7 +28,7 @@ _ROWS = (
     _Row("push_off_work", "Work on the wearer in push-off", "J", 2),
     _Row("push_off_share", "... of the healthy ankle's positive work", "percent", 1),
     _Row("slap_rate", "Rate of the foot as it comes down", "deg/s", 0),
-    _Row("toe_clearance", "Lowest toes in mid-swing against healthy", "cm", 1),
+    _Row("lowest_toes", "Lowest toes over the ground in mid-swing", "cm", 1),
     _Row("toe_landing", "Strides that begin on the toes", "percent", 0),
     _Row("angle_difference", "Ankle against healthy, RMS over the stride", "deg", 1),
 )

@@ -78,6 +78,12 @@ def written(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE)
     return format_quantity(round(number, 9) if abs(number) > _ROUND else number, unit)
 
 
+def rounded(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
+    """Return an SI value as in ``written`` with six digits, for a message."""
+    unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
+    return f"{from_si(value, unit, si_unit, atmosphere):.6g} {unit}".rstrip()
+
+
 def _form(quantity: Quantity, number: float) -> str:
     if quantity.unit in PLAIN:
         return "a number"

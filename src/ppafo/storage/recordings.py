@@ -24,6 +24,8 @@ def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) ->
         recording = place / WALK_RECORDING
         if recording.is_file() and not (place / RUN_FILE).exists():
             return read_netcdf(recording)
+        if not (place / RUN_FILE).exists():
+            raise DataError(f"{place}: holds no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})")
         return read_result(place).recording
     if place.suffix == ".nc":
         return read_netcdf(place)

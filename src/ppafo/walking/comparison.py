@@ -3,17 +3,15 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ppafo.control.walking import off
 from ppafo.metrics import Metric
 from ppafo.signals.recording import Floats
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.followed_gait import gait_timing
+from ppafo.walking.followed_gait import gait_timing, landing_phase
 from ppafo.walking.posture import ankle_path
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import Progress, WalkResult, silent, walk
-from ppafo.walking.walk_metrics import healthy_positive_work
+from ppafo.walking.walk_metrics import healthy_positive_work, lowest_toes
 
 Say = Callable[[str], None]
 
@@ -52,6 +50,7 @@ def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:
     found = {
         "slap_rate": Metric(_landing_rate(configuration), "rad/s", "rate of the measured foot as it comes down"),
         "toe_clearance": Metric(0.0, "m", "the healthy gait is the measure"),
+        "lowest_toes": lowest_toes(configuration, healthy_toe_height(configuration)),
         "toe_landing": Metric(0.0, "-", "the heel comes first"),
         "angle_difference": Metric(0.0, "rad", "the healthy gait is the measure"),
     }
@@ -69,10 +68,7 @@ def healthy_toe_height(configuration: Configuration) -> Floats:
 
 
 def _landing_rate(configuration: Configuration) -> float:
-    """Fastest fall of the measured toes between heel strike and foot flat [rad/s], below 0."""
+    """Rate of the measured foot as it comes down [rad/s], below 0; taken where a walk takes it, at the landing."""
     gait = configuration.gait
-    rates = [
-        gait.shank_angle.rate(phase, gait.stride_time) - gait.ankle_angle.rate(phase, gait.stride_time)
-        for phase in np.linspace(0.0, 0.15, 151).tolist()
-    ]
-    return float(min(rates))
+    phase = landing_phase(gait)
+    return gait.shank_angle.rate(phase, gait.stride_time) - gait.ankle_angle.rate(phase, gait.stride_time)

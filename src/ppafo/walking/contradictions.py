@@ -4,14 +4,15 @@ from collections.abc import Iterator, Mapping
 
 from ppafo.control.walking.catalog import FITS_ON_OFF_VALVES
 from ppafo.errors import ScenarioError
-from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.reading import Reading, rounded
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.planning import walking_valve
 
 _NEWTON, _RADIAN, _SECOND, _METRE, _PASCAL = "N", "rad", "s", "m", "Pa_a"
 
-COMPRESSION = 1.25
-"""Highest pressure in a chamber over that of the supply, with room: 1.14 in the shipped walks."""
+COMPRESSION, COMPRESSION_IN_LINES = 1.3, 1.6
+"""Highest pressure in a chamber over that of the supply, with room: up to 1.2 in the shipped walks with constant
+supply pressures, up to 1.45 in those with lines, whose regulators let no gas back."""
 
 
 def check_walk(configuration: Configuration, reading: Reading) -> None:
@@ -48,10 +49,10 @@ def _contradictions(configuration: Configuration) -> Iterator[tuple[str, str]]:
 def _segments(configuration: Configuration) -> Iterator[tuple[str, str]]:
     wearer = configuration.wearer
     if wearer.shank_mass_centre > wearer.shank_length:
-        length = written(wearer.shank_length, _METRE)
+        length = rounded(wearer.shank_length, _METRE)
         yield "wearer.shank_mass_centre", f"lies beyond the ankle: wearer.shank_length is {length}"
     if wearer.foot_mass_centre > wearer.toe_lever:
-        lever = written(wearer.toe_lever, _METRE)
+        lever = rounded(wearer.toe_lever, _METRE)
         yield "wearer.foot_mass_centre", f"lies beyond the toes: wearer.toe_lever is {lever}"
 
 
@@ -69,37 +70,40 @@ def _thresholds(configuration: Configuration) -> Iterator[tuple[str, str]]:
     if unload >= load:
         yield (
             "controller.unload_threshold",
-            f"must be below controller.load_threshold, which is {written(load, _NEWTON)}",
+            f"must be below controller.load_threshold, which is {rounded(load, _NEWTON)}",
         )
     if settings["largest_force"] <= load:
-        yield "controller.largest_force", f"must be above controller.load_threshold, which is {written(load, _NEWTON)}"
+        yield "controller.largest_force", f"must be above controller.load_threshold, which is {rounded(load, _NEWTON)}"
 
 
 def _times(configuration: Configuration) -> Iterator[tuple[str, str]]:
     settings, stride = configuration.settings, configuration.gait.stride_time
     if not 0.5 * stride < settings["first_stride_time"] < 2.0 * stride:
-        shown = written(round(stride, 4), _SECOND)
-        yield "controller.first_stride_time", f"must be between half and twice the stride of the gait, which is {shown}"
+        wanted = rounded(round(stride, 4), _SECOND)
+        yield (
+            "controller.first_stride_time",
+            f"must be between half and twice the stride of the gait, which is {wanted}",
+        )
     if settings["flat_from"] >= settings["flat_to"]:
         yield "controller.flat_from", f"must be below controller.flat_to, which is {settings['flat_to']:g}"
     delay = walking_valve(configuration.device.valve).command_delay(configuration.device.valve.settings)
     for name in ("fill_time", "vent_time"):
         if settings[name] <= delay:
-            shown = written(delay, _SECOND)
-            yield f"controller.{name}", f"must be longer than the dead time of the valve, which is {shown}"
+            dead = rounded(delay, _SECOND)
+            yield f"controller.{name}", f"must be longer than the dead time of the valve, which is {dead}"
     if settings["frozen_time"] <= 2.0 * configuration.period:
-        shown = written(configuration.period, _SECOND)
-        yield "controller.frozen_time", f"must be longer than two samples of the controller, one is {shown}"
+        sample = rounded(configuration.period, _SECOND)
+        yield "controller.frozen_time", f"must be longer than two samples of the controller, one is {sample}"
 
 
 def _angles(configuration: Configuration) -> Iterator[tuple[str, str]]:
     settings, actuator = configuration.settings, configuration.device.actuator
     low, high = settings["lowest_angle"], settings["highest_angle"]
     if low >= high:
-        yield "controller.lowest_angle", f"must be below controller.highest_angle, which is {written(high, _RADIAN)}"
+        yield "controller.lowest_angle", f"must be below controller.highest_angle, which is {rounded(high, _RADIAN)}"
     low, high = max(low, actuator.angle_min), min(high, actuator.angle_max)
     if not low < settings["swing_angle"] < high:
-        reach = f"{written(low, _RADIAN)} to {written(high, _RADIAN)}"
+        reach = f"{rounded(low, _RADIAN)} to {rounded(high, _RADIAN)}"
         yield "controller.swing_angle", f"lies outside of what sensor and device reach, {reach}"
 
 
@@ -115,17 +119,18 @@ def _gait(configuration: Configuration) -> Iterator[tuple[str, str]]:
 
 def _pressures(configuration: Configuration) -> Iterator[tuple[str, str]]:
     settings, supply = configuration.settings, configuration.device.supply
-    atmosphere = written(supply.atmospheric_pressure, _PASCAL)
+    atmosphere = rounded(supply.atmospheric_pressure, _PASCAL)
     lowest = min(supply.pressure, supply.dorsiflexion_pressure)
     highest = max(supply.pressure, supply.dorsiflexion_pressure)
     if settings["lowest_pressure"] >= supply.atmospheric_pressure:
         yield "controller.lowest_pressure", f"must be below the atmosphere, which is {atmosphere}"
     if not supply.atmospheric_pressure < settings["filled_pressure"] < lowest:
-        shown = written(lowest, _PASCAL)
-        yield "controller.filled_pressure", f"must be between atmosphere and supply, which are {atmosphere} and {shown}"
-    if settings["highest_pressure"] <= COMPRESSION * highest:
-        shown = written(round(COMPRESSION * highest, 1), _PASCAL)
-        yield "controller.highest_pressure", f"a moving foot compresses a chamber to above it; must be above {shown}"
+        fed = rounded(lowest, _PASCAL)
+        yield "controller.filled_pressure", f"must be between atmosphere and supply, which are {atmosphere} and {fed}"
+    compressed = highest * (COMPRESSION if configuration.supply_lines is None else COMPRESSION_IN_LINES)
+    if settings["highest_pressure"] <= compressed:
+        limit = rounded(compressed, _PASCAL)
+        yield "controller.highest_pressure", f"a moving foot compresses a chamber to above it; must be above {limit}"
 
 
 def _push_off(settings: Mapping[str, float]) -> Iterator[tuple[str, str]]:

@@ -15,7 +15,7 @@ WALK_SENSORS = (
     Quantity("force_bandwidth", "Hz", "up to which the force sensors follow", 30.0, 0.1, 1.0e4),
     Quantity("force_noise", "N", "standard deviation of the measured forces", 0.0, 0.0, 1.0e4),
     Quantity("force_resolution", "N", "step of the measured forces", 0.0, 0.0, 1.0e3),
-    Quantity("lost_share", "1", "share of the force samples that are lost; the last one stands then", 0.0, 0.0, 1.0),
+    Quantity("lost_share", "1", "share of the force samples that are lost", 0.0, 0.0, 1.0),
     Quantity("angle_lost_share", "1", "share of the angle samples that are lost", 0.0, 0.0, 1.0),
     Quantity("pressure_lost_share", "1", "share of the pressure samples that are lost", 0.0, 0.0, 1.0),
 )

@@ -67,11 +67,19 @@ def heel_lever(gait: Gait, wearer: Wearer) -> float:
     """
     if gait.ankle_moment is None or gait.vertical_force is None:
         return wearer.heel_lever
-    phases = np.linspace(0.0, FLAT_FROM, 151)
-    down = _foot_angles(gait, phases) < gait_timing(gait).ground_angle + NEARLY_FLAT
-    landing = float(phases[np.argmax(down)]) if down.any() else FLAT_FROM
+    landing = landing_phase(gait)
     moment, force = followed(gait.ankle_moment).value(landing), followed(gait.vertical_force).value(landing)
     return min(max(-moment / max(force * STANDARD_GRAVITY, 1.0), 0.0), wearer.heel_lever)
+
+
+def landing_phase(gait: Gait) -> float:
+    """Phase at which the measured foot has come down: within ``NEARLY_FLAT`` of flat for the first time.
+
+    The last degrees are those of heel pad and shoe, which the foot of the engine has not: it is flat at once.
+    """
+    phases = np.linspace(0.0, FLAT_FROM, 151)
+    down = _foot_angles(gait, phases) < gait_timing(gait).ground_angle + NEARLY_FLAT
+    return float(phases[np.argmax(down)]) if down.any() else FLAT_FROM
 
 
 def _foot_angles(gait: Gait, phases: Floats) -> Floats:

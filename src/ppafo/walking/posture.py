@@ -22,6 +22,10 @@ Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
 MID_SWING_CLEARANCE = 0.015
 """Healthy toes over the ground in mid-swing [m]; 1 to 2 cm (Winter 1992, Phys Ther 72:45)."""
 
+HAND_OVER = 0.02
+"""Difference of height [m] within which toes and heel both tell how high the ankle is in the swing, at most. Assumed:
+the ankle of a person has no kink; it is 0.9 cm higher than needed where both would touch."""
+
 DEFAULT_SPEED = 1.3
 """Walking speed [m/s] where the gait has none; only for the length of the strides in pictures."""
 
@@ -81,11 +85,20 @@ def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
     toes_down = height * np.cos(foot) - wearer.toe_lever * np.sin(foot)
     heel_down = height * np.cos(foot) + wearer.heel_lever * np.sin(foot)
     swing = np.clip((_GRID - timing.toe_off) / (1.0 - timing.toe_off), 0.0, 1.0)
-    up = np.maximum(toes_down, heel_down) + MID_SWING_CLEARANCE * np.sin(np.pi * swing) ** 2
+    up = _above(toes_down, heel_down, swing) + MID_SWING_CLEARANCE * np.sin(np.pi * swing) ** 2
     length = (gait.walking_speed or DEFAULT_SPEED) * gait.stride_time
     forward = _forward(foot, wearer, height, timing.toe_off, length)
     levers = wearer.heel_lever, wearer.toe_lever
     return AnklePath(forward, up, length, timing.ground_angle, wearer.shank_length, *levers, height)
+
+
+def _above(toes_down: Floats, heel_down: Floats, swing: Floats) -> Floats:
+    """Height of the ankle [m] that keeps toes and heel off the ground; late in the swing one goes over to the other.
+
+    In stance, at toe-off and at heel strike it is the higher of both.
+    """
+    width = HAND_OVER * swing**4 * (1.0 - swing) / (0.8**4 * 0.2)
+    return np.asarray(0.5 * (toes_down + heel_down + np.hypot(toes_down - heel_down, width)))
 
 
 def _forward(foot: Floats, wearer: Wearer, height: float, toe_off: float, length: float) -> Floats:

@@ -10,7 +10,8 @@ from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.strides import PER_STRIDE, SETTLING, Curves
+from ppafo.walking.followed_gait import gait_timing
+from ppafo.walking.strides import PER_STRIDE, PHASES, SETTLING, Curves
 
 
 def walk_metrics(
@@ -44,12 +45,21 @@ def _of_strides(
             found["push_off_share"] = Metric(
                 share, "-", "work of T_ex in push-off over the healthy ankle's positive work"
             )
+    if "toe_height" in averages:
+        found["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
     if "angle" in averages:
         away = averages["angle"].mean - averages["healthy_angle"].mean
         found["angle_difference"] = Metric(
             float(np.sqrt(np.mean(away**2))), "rad", "RMS difference of the mean ankle angle to the healthy one"
         )
     return found
+
+
+def lowest_toes(configuration: Configuration, height: Floats) -> Metric:
+    """Lowest toes in mid-swing, where they must clear the ground, from their height [m] at ``PHASES``."""
+    timing = gait_timing(configuration.gait)
+    first, last = np.searchsorted(PHASES, [timing.clearance_from, timing.clearance_to])
+    return Metric(float(height[first:last].min()), "m", "lowest toes over the ground in mid-swing in the mean stride")
 
 
 def _tracking(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Metric]:

@@ -86,7 +86,10 @@ def _state_rows(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits) ->
     plant = run.plant
     volumes = chamber_volumes(plant, now["ankle"])  # type: ignore[arg-type]
     masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
+    foot = now["shank"] - now["ankle"] + 0.5 * np.pi
     return {f"walk.now.{name}": values for name, values in now.items()} | {
+        "walk.foot.sine": np.sin(foot),
+        "walk.foot.cosine": np.cos(foot),
         "state.angle": now["ankle"],
         "state.angular_velocity": now["ankle_rate"],
         "state.mass_1": np.asarray(masses[0]),

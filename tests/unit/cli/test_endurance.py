@@ -36,6 +36,11 @@ def test_text_says_run_time_steps_and_why_it_ended(capsys: pytest.CaptureFixture
     assert "too cold: its pressure does not hold the supply pressure" in text
 
 
+def test_a_long_run_time_is_in_whole_minutes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["endurance", "--gas-per-step", "0.001 g", "--step-time", "1.1 s"]) == 0
+    assert "run time               1440 min of walking" in capsys.readouterr().out
+
+
 def test_json_is_in_si_and_says_simulated(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*QUICK, "--json", "--set", "bottle.gas_mass=100 g"]) == 0
     document = json.loads(capsys.readouterr().out)
@@ -93,6 +98,8 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path: Path, capsys: pytest.
         (["--gas-per-step", "0.3 g", "--set", "room.temprature=0 degC"], "did you mean 'room.temperature'"),
         (["--gas-per-step", "0.3 g", "--rest", "-1 min"], "rest must be at least 0 s"),
         (["--gas-per-step", "0.3 g", "--reuse", "reservoir_volume=50 cm^3"], "more than the 0.3 g"),
+        ([*QUICK[1:], *("--reuse", "reservoir_volume=50 cm^3") * 2], "--reuse reservoir_volume: given twice"),
+        (["."], ".: holds no result of a walk or a simulation"),
         (["absent.csv"], "absent.csv: cannot be read"),
     ],
 )

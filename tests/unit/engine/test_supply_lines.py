@@ -16,7 +16,7 @@ from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, fed_plant
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
 from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
-from ppafo.model.regulator import LineState, SupplyLines, line_pressures, regulator_flow
+from ppafo.model.regulator import LineState, SupplyLines, line_pressures
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.sampled import state_row_numbers
@@ -59,6 +59,11 @@ def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
         gas = end_lines(plant, lines, gas, begun, change, ports[1], step, single_port_flow)
         state = with_gas(state, change)
     return Filled(state, gas)
+
+
+def regulator_flow(set_pressure: float, line_pressure: float, droop: float, largest_flow: float) -> float:
+    """Mass flow [kg/s] through a regulator: over the fall of its pressure [Pa] by the droop [Pa s/kg], at most all."""
+    return min(max((set_pressure - line_pressure) / droop, 0.0), largest_flow)
 
 
 @cache

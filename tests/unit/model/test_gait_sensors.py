@@ -52,6 +52,16 @@ def test_a_frozen_sensor_shows_its_last_reading_and_the_others_go_on(name: str) 
         assert getattr(shown, other) == pytest.approx(value if other == field else 1.1 * value), other
 
 
+@pytest.mark.parametrize("name", ["heel", "toe", "angle", "pressure_1", "pressure_2"])
+def test_a_sensor_that_is_frozen_from_the_beginning_keeps_its_first_reading(name: str) -> None:
+    broken, last = IDEAL._replace(**{f"{name}_fault": Fault(0.0, 1.0, 0.0)}), NOTHING_SEEN
+    field = f"{name}_force" if name in ("heel", "toe") else name
+    truth = dict(zip(("angle", "pressure_1", "pressure_2", "heel_force", "toe_force"), TRUE, strict=True))
+    for sample in range(3):
+        shown, last = seen(broken, sample, last, tuple((1.0 + 0.1 * sample) * value for value in TRUE))
+        assert getattr(shown, field) == truth[field]
+
+
 def test_a_bandwidth_makes_a_sensor_follow_as_a_first_order_one_from_a_settled_start() -> None:
     bandwidth = 20.0
     memory = math.exp(-2.0 * math.pi * bandwidth * PERIOD)
@@ -68,16 +78,25 @@ def test_a_bandwidth_makes_a_sensor_follow_as_a_first_order_one_from_a_settled_s
 
 
 def test_lost_samples_show_the_last_reading_as_often_as_stated_and_never_at_first() -> None:
-    losing = IDEAL._replace(angle_lost_share=0.3, pressure_lost_share=0.6)
-    count, last, kept = 4000, NOTHING_SEEN, np.zeros(3)
+    losing = IDEAL._replace(angle_lost_share=0.3, pressure_lost_share=0.6, lost_share=0.4)
+    count, last, kept = 4000, NOTHING_SEEN, np.zeros(5)
     for sample in range(count):
         true = tuple(value + sample for value in TRUE)
         shown, last = seen(losing, sample, last, true)
-        kept += [reading == value for reading, value in zip(shown[:3], true[:3], strict=True)]
+        readings = (*shown[:3], shown.heel_force, shown.toe_force)
+        kept += [reading == value for reading, value in zip(readings, true, strict=True)]
         if sample == 0:
-            assert kept.tolist() == [1.0, 1.0, 1.0]
-        assert shown.heel_force == true[3]
-    np.testing.assert_allclose(1.0 - kept / count, [0.3, 0.6, 0.6], atol=0.03)
+            assert kept.tolist() == [1.0] * 5
+    np.testing.assert_allclose(1.0 - kept / count, [0.3, 0.6, 0.6, 0.4, 0.4], atol=0.03)
+
+
+def test_a_first_sample_is_never_lost() -> None:
+    losing = IDEAL._replace(angle_lost_share=1.0, pressure_lost_share=1.0, lost_share=1.0)
+    first, last = seen(losing, 0, NOTHING_SEEN)
+    ideal, _ = seen(IDEAL, 0, NOTHING_SEEN)
+    assert first == ideal
+    second, _ = seen(losing, 1, last, tuple(1.1 * value for value in TRUE))
+    assert second == ideal
 
 
 def test_samples_of_both_pressures_are_lost_independently() -> None:

@@ -23,7 +23,7 @@ from ppafo.walking.walk import plan_of
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
 SECTION = PAGE.partition("## When a sensor fails")[2].partition("\n## ")[0]
-CONFIGURATIONS = ("solenoid", "proportional")
+CONFIGURATIONS = ("solenoid", "proportional", "solenoid-regulators", "proportional-regulators")
 PHASES = 20
 """Instants of a stride at which each fault begins."""
 FIRST_FAULT = 3.0

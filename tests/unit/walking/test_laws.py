@@ -58,31 +58,22 @@ def test_the_foot_is_free_in_mid_stance_and_clears_the_ground_in_mid_swing(
     free = result.recording["controller_phase"] == MID_STANCE
     assert free.any()
     assert (result.recording["command"][free] == VENT).all()
-    assert lowest_toes(result) > 0.0
+    assert result.metrics["lowest_toes"].value > 0.0
 
 
 def test_solenoid_valves_lift_the_toes_too_because_the_push_off_ends_in_time() -> None:
     in_time, late = (walk(load_walk("solenoid", given), MINUTES) for given in ([], ["controller.push_off_end=0.65"]))
-    assert lowest_toes(in_time) > 0.0 > lowest_toes(late)
+    assert in_time.metrics["lowest_toes"].value > 0.0 > late.metrics["lowest_toes"].value
     assert in_time.metrics["push_off_work"].value > 0.8
 
 
-def test_the_dead_zone_works_on_solenoid_valves() -> None:
-    overrides = ["controller.kind=event_on_off_dead_zone", "controller.dead_zone=1 N m", "controller.release=0.3 N m"]
-    result = walk(load_walk("solenoid", overrides), MINUTES)
+@pytest.mark.parametrize("zone", [[], ["controller.dead_zone=1 N m", "controller.release=0.3 N m"]])
+def test_the_dead_zone_works_on_solenoid_valves(zone: list[str]) -> None:
+    result = walk(load_walk("solenoid", ["controller.kind=event_on_off_dead_zone", *zone]), MINUTES)
     assert result.status.is_completed
     assert "safe_state_time" not in result.metrics
     assert result.metrics["push_off_work"].value > 0.8
     assert result.metrics["toe_landing"].value == 0.0
-
-
-def lowest_toes(result: WalkResult) -> float:
-    """Lowest toes over the ground in mid-swing [m] in the mean stride."""
-    gait = result.configuration.gait
-    phase = np.linspace(0.0, 1.0, 101)
-    swing = (phase - gait.stance_share) / (1.0 - gait.stance_share)
-    middle = (swing > 0.2) & (swing < 0.9)
-    return float(result.averages["toe_height"].mean[middle].min())
 
 
 def test_the_error_of_the_learning_law_falls_from_stride_to_stride(walked: Callable[[str], WalkResult]) -> None:

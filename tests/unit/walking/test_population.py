@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
+from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run import batch_of
 from ppafo.gait import load_gait
 from ppafo.gait.gait import KNEE, Curve
@@ -24,7 +25,7 @@ from ppafo.walking.planning import plan_walk
 from ppafo.walking.varied_gait import SERIES, SeriesOfMany, varied_gaits
 from ppafo.walking.walk import plan_of
 from ppafo.walking.wearer import paper_subject
-from ppafo.walking.wearers_rows import START_VARIATION, THRESHOLD_VARIATION
+from ppafo.walking.wearers_rows import START_VARIATION, THRESHOLD_VARIATION, batch_of_many
 
 MINUTES = 0.15
 
@@ -73,6 +74,11 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
     wearer = replace(configuration.wearer, **{name: float(values[index]) for name, values in segments.items()})
     alone = replace(configuration, wearer=wearer, gait=gait, settings=settings)
     run = plan_walk(plan_of(alone, 60.0 * MINUTES))
+    shared = plan_walk(plan_of(configuration, 60.0 * MINUTES))
+    begun = batch_of_many(configuration, shared, build, gaits, np.random.default_rng(3)).states[:, index]
+    paths = [path for group, row in run.program.state_rows().items() for path in leaf_paths(row, group)]
+    for path, value, own in zip(paths, begun.tolist(), batch_of(run).states[:, 0].tolist(), strict=True):
+        assert value == pytest.approx(own, rel=1e-9, abs=1e-12), path
     rows, states = state_row_numbers(run), run_batch(batch_of(run)).states[:, 0]
     strides = run.step * run.step_count / gait.stride_time
     for name, row in (("gas", "state.supplied_mass"), ("push_off_work", "walk.push_off_work")):

@@ -32,6 +32,19 @@ def test_the_healthy_foot_touches_the_ground_in_stance_and_clears_it_in_the_swin
     assert lowest.min() > -1e-3
 
 
+def test_the_ankle_moves_smoothly_through_the_swing_and_sets_the_heel_down(path: AnklePath) -> None:
+    gait = load_gait()
+    phases = np.linspace(0.0, 1.0, 1001)
+    swing = phases[:-2] > gait.stance_share + 0.01
+    assert np.abs(np.diff(path.up, 2)[swing]).max() < 1e-4, "a kink would be 1.6 mm"
+    posture = path.posture(phases[:-1], gait.shank_angle.sampled(phases[:-1]), gait.ankle_angle.sampled(phases[:-1]))
+    assert abs(posture.heel[-1, 1]) < 1e-3
+    late = phases[:-1] > 0.9
+    assert posture.heel[late, 1].min() > -1e-3
+    assert (np.diff(posture.toe[late, 1]) > -1e-3).all()
+    assert (np.diff(posture.heel[late, 1]) < 0.0).all()
+
+
 def test_segments_keep_their_lengths_and_the_ankle_its_angle(path: AnklePath) -> None:
     shank, ankle = angles()
     posture = path.posture(PHASES, shank, ankle + 0.3)

@@ -11,6 +11,7 @@ import pytest
 from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk
+from ppafo.walking.followed_gait import NEARLY_FLAT, gait_timing
 from ppafo.walking.strides import PHASES, SETTLING, averaged, stride_starts
 
 MINUTES = 0.15
@@ -73,6 +74,29 @@ def test_the_comparison_is_the_same_wearer_with_both_chambers_vented() -> None:
     assert worn.metrics["angle_difference"].value < 0.5 * bare.metrics["angle_difference"].value
     assert pair.healthy["push_off_work"].value == pytest.approx(worn.metrics["healthy_positive_work"].value)
     assert -10.0 < pair.healthy["slap_rate"].value < -1.0
+
+
+def test_the_healthy_foot_is_judged_where_it_lands() -> None:
+    gait = load_walk("solenoid").gait
+    shank, ankle = gait.shank_angle, gait.ankle_angle
+    phases = np.linspace(0.0, 0.15, 15001)
+    foot = shank.sampled(phases) - ankle.sampled(phases) + 0.5 * np.pi - gait_timing(gait).ground_angle
+    landing = int(np.argmax(foot < NEARLY_FLAT))
+    assert 0.05 < phases[landing] < 0.12
+    rate = (foot[landing + 5] - foot[landing - 5]) / (phases[landing + 5] - phases[landing - 5]) / gait.stride_time
+    assert compared("solenoid").healthy["slap_rate"].value == pytest.approx(float(rate), rel=0.05)
+    assert rate > 0.9 * np.gradient(foot, phases * gait.stride_time).min(), "past its fastest"
+
+
+def test_the_lowest_toes_are_those_of_the_mean_stride_in_mid_swing() -> None:
+    pair = compared("solenoid")
+    gait = pair.with_device.configuration.gait
+    swing = (np.linspace(0.0, 1.0, 101) - gait.stance_share) / (1.0 - gait.stance_share)
+    middle = (swing > 0.2) & (swing < 0.9)
+    for result in (pair.with_device, pair.without_device):
+        height = result.averages["toe_height"].mean[middle].min()
+        assert result.metrics["lowest_toes"].value == pytest.approx(float(height))
+    assert pair.without_device.metrics["lowest_toes"].value < 0.0 < pair.healthy["lowest_toes"].value < 0.02
 
 
 def test_the_name_of_a_configuration_is_as_good_as_the_configuration() -> None:

@@ -12,8 +12,6 @@ LANDING = 1.0
 MID_STANCE = 2.0
 PUSH_OFF = 3.0
 
-LONG_AGO = 1.0e3
-
 
 class PhaseRules(NamedTuple):
     """Thresholds [N], debounce [s], first stride time [s], weight of a new stride [-], start of push-off [turns]."""

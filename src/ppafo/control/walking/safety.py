@@ -2,9 +2,10 @@
 
 Four signs: readings that no foot and no chamber gives (out of range), readings that contradict each other or the gait
 (a stance or a swing without end, a foot that stands flat on one sensor), readings that contradict the valve (a chamber
-that was filled and shows no pressure, or was vented and shows some), and a sensor that does not change while the others
-do (frozen). A pressure at rest may stay the same for long, most of all in the steps of a converter, so a frozen
-pressure is found by the third sign: no single reading is right for a filled chamber and for a vented one.
+that was filled and shows no pressure, or was vented and shows one that does not fall), and a sensor that does not
+change while the others do (frozen). A pressure at rest may stay the same for long, most of all in the steps of a
+converter, so a frozen pressure is found by the third sign: no single reading is right for a filled chamber and for a
+vented one.
 
 Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
 """
@@ -57,8 +58,15 @@ class Shown(NamedTuple):
     angle_still: float
 
 
+class Followed(NamedTuple):
+    """Chamber pressures as readings followed with ``FALL_TIME`` [Pa]: above a reading that falls."""
+
+    pressure_1: float
+    pressure_2: float
+
+
 class SafetyState(NamedTuple):
-    """1 once vented; last readings; strides in a row that began on the toes; what the valve was told.
+    """1 once vented; last readings; strides in a row that began on the toes; what the valve was told; slow pressures.
 
     ``steady`` is 1 where the last stride took about the stride time.
     """
@@ -68,12 +76,19 @@ class SafetyState(NamedTuple):
     toe_strides: float
     steady: float
     ordered: Ordered
+    followed: Followed
 
 
-START = SafetyState(0.0, Shown(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, Ordered(0.0, 0.0, 0.0))
+START = SafetyState(0.0, Shown(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, Ordered(0.0, 0.0, 0.0), Followed(0.0, 0.0))
 
 STEADY = 0.1
 """A stride that is longer or shorter than the stride time by less than this share of it is a usual one."""
+
+FALL_TIME = 0.03
+"""Time constant [s] of the pressures that tell whether a reading falls."""
+
+FALLS = 0.03
+"""A reading falls that is below its slow pressure by more than this share: a venting chamber at 140 kPa by 0.1."""
 
 LEAST_OPENING = 0.1
 """Commands below this may lie within the overlap of a valve: they do not count as opening it."""
@@ -126,16 +141,33 @@ def contradicts_gait(
     return endless | skips_toes | lost | (toe_strides > rules.most_toe_strides)
 
 
-def contradicts_valve(rules: SafetyRules, ordered: Ordered, phase: PhaseState, seen: GaitMeasurement) -> bool:
+def next_followed(last: Followed, seen: GaitMeasurement, period: float) -> Followed:
+    """Slow pressures after a sample."""
+    share = period / (period + FALL_TIME)
+    return Followed(
+        last.pressure_1 + (seen.pressure_1 - last.pressure_1) * share,
+        last.pressure_2 + (seen.pressure_2 - last.pressure_2) * share,
+    )
+
+
+def remains(rules: SafetyRules, pressure: float, slow: float) -> bool:
+    """True where a vented chamber shows a pressure [Pa] that does not fall."""
+    return (pressure > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
+
+
+def contradicts_valve(
+    rules: SafetyRules, ordered: Ordered, followed: Followed, phase: PhaseState, seen: GaitMeasurement
+) -> bool:
     """True where a pressure is not what the valve was told long enough.
 
-    A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat.
+    A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat. A full
+    chamber vents for longer than ``vent_time`` through a narrow valve while the ankle compresses it, but it does vent.
     """
     no_rise_1 = (ordered.filling_1 > rules.fill_time) & (seen.pressure_1 < rules.filled_pressure)
     no_rise_2 = (ordered.filling_2 > rules.fill_time) & (seen.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
-    shows = max(seen.pressure_1, seen.pressure_2) > rules.filled_pressure
-    return no_rise_1 | no_rise_2 | (stands & (ordered.venting > rules.vent_time) & shows)
+    left = remains(rules, seen.pressure_1, followed.pressure_1) | remains(rules, seen.pressure_2, followed.pressure_2)
+    return no_rise_1 | no_rise_2 | (stands & (ordered.venting > rules.vent_time) & left)
 
 
 def watched(
@@ -150,8 +182,9 @@ def watched(
     steady = (1.0 if usual else 0.0) if enters else state.steady
     wrong = out_of_range(rules, seen) | frozen(rules, shown, phase)
     wrong = wrong | contradicts_gait(rules, before, phase, toe_strides, steady)
-    fails = wrong | contradicts_valve(rules, state.ordered, phase, seen)
-    return SafetyState(1.0 if fails else state.vented, shown, toe_strides, steady, state.ordered)
+    followed = next_followed(state.followed, seen, period)
+    fails = wrong | contradicts_valve(rules, state.ordered, followed, phase, seen)
+    return SafetyState(1.0 if fails else state.vented, shown, toe_strides, steady, state.ordered, followed)
 
 
 def fed(since: float, opening: float, period: float) -> float:
@@ -169,4 +202,4 @@ def carried_out(state: SafetyState, command: float, period: float) -> tuple[floa
         fed(state.ordered.filling_2, -opening, period),
         state.ordered.venting + period if vents else 0.0,
     )
-    return given, SafetyState(state.vented, state.shown, state.toe_strides, state.steady, ordered)
+    return given, SafetyState(state.vented, state.shown, state.toe_strides, state.steady, ordered, state.followed)

@@ -95,6 +95,8 @@ def _given(texts: Iterable[str]) -> dict[str, float]:
             raise ParameterError(
                 f"--reuse {name}: not of the form NAME=VALUE{nearest_name(name, _BY_NAME)}; names are {known}"
             )
+        if name in values:
+            raise ParameterError(f"--reuse {name}: given twice; give it once")
         values[name] = _value(_BY_NAME[name], quantity)
     if "reservoir_volume" not in values:
         raise ParameterError("--reuse: give at least the reservoir, for example --reuse 'reservoir_volume=50 cm^3'")

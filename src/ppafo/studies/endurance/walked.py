@@ -1,5 +1,7 @@
 """What a walk says of its gas: how much a stride takes, and how full each chamber gets in it."""
 
+import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -21,6 +23,10 @@ from ppafo.walking.strides import SETTLING
 
 WALK_FILE = "walk.json"
 FORMAT = "ppafo walk"
+_VOLUMES = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
+_CHANNELS = ("angle", "pressure_1", "pressure_2", "supplied_mass")
+_LEAST = 1.0e-12
+"""Gas [kg] by which a walk that takes none may come out below 0: rounding of its totals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,22 +89,43 @@ def read_walked(folder: Path) -> Walked:
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{path}: is not of a ppafo walk (its 'format' is not '{FORMAT}')")
-    status = document.get("status", {}).get("kind", "completed")
+    status = _table(document, "status", path).get("kind", "completed")
     if status != "completed":
         raise DataError(f"{path}: the walk {status}, so it cannot be repeated")
-    actuator = {name: _number(document, f"configuration.device.actuator.{name}", path) for name in Actuator.__slots__}
-    gas = _number(document, "metrics.gas.value", path) if "gas" in document.get("metrics", {}) else 0.0
-    stride_time = _number(document, "configuration.gait.stride_time", path)
+    actuator = Actuator(
+        *(_number(document, f"configuration.device.actuator.{name}", path) for name in ("angle_min", "angle_max")),
+        *(_number(document, f"configuration.device.actuator.{name}", path, 0.0) for name in _VOLUMES),
+    )
+    has_gas = "gas" in _table(document, "metrics", path)
+    gas = _number(document, "metrics.gas.value", path, -_LEAST) if has_gas else 0.0
+    stride_time = _number(document, "configuration.gait.stride_time", path, 0.0)
     name = document["configuration"].get("name", folder.name)
-    return Walked(str(name), read_recording(folder), gas, stride_time, Actuator(**actuator))
+    return Walked(str(name), _recording(folder), gas, stride_time, actuator)
 
 
-def _number(document: Mapping[str, Any], path: str, file: Path) -> float:
+def _recording(folder: Path) -> Recording:
+    recording = read_recording(folder)
+    for name in _CHANNELS:
+        if name not in recording:
+            raise DataError(f"{recording.label}: has no channel '{name}'; let the walk be written again")
+    return recording
+
+
+def _table(document: Mapping[str, Any], name: str, file: Path) -> Mapping[str, Any]:
+    node = document.get(name, {})
+    if not isinstance(node, Mapping):
+        raise DataError(f"{file}: '{name}' is not a table of names and values; let the walk be written again")
+    return node
+
+
+def _number(document: Mapping[str, Any], path: str, file: Path, above: float = -math.inf) -> float:
     node: Any = document
     for part in path.split("."):
         node = node.get(part) if isinstance(node, Mapping) else None
-    if isinstance(node, bool) or not isinstance(node, int | float) or not np.isfinite(node):
+    if isinstance(node, bool) or not isinstance(node, int | float) or not abs(node) <= sys.float_info.max:
         raise DataError(f"{file}: has no number at '{path}'; let the walk be written again")
+    if node <= above:
+        raise DataError(f"{file}: '{path}' is {node:g}, which no walk has; let the walk be written again")
     return float(node)
 
 

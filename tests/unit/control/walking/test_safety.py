@@ -1,11 +1,13 @@
 """Each sign by which a controller of walking stops trusting its sensors, by itself."""
 
+import math
+
 import pytest
 
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.declaration import SAFETY_QUANTITIES
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
-from ppafo.control.walking.safety import Ordered, SafetyRules, SafetyState
+from ppafo.control.walking.safety import Followed, Ordered, SafetyRules, SafetyState
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -137,6 +139,36 @@ def test_a_vented_chamber_shows_no_pressure_while_the_foot_stands_flat(name: str
     assert not vents(GOOD, flat, state=after_commands(VENT, 0.252))
     for moving in (phase(SWING, 0.8, 0.0, 0.0), phase(LANDING, 0.1, 1.0, 0.0), phase(MID_STANCE, 0.4, 0.0, 1.0)):
         assert not vents(stuck, moving, state=after_commands(VENT, 0.252)), "the foot moves and presses gas out"
+
+
+@pytest.mark.parametrize("name", ["pressure_1", "pressure_2"])
+@pytest.mark.parametrize(("fall_time", "is_sign"), [(0.05, False), (0.11, False), (3.0, True), (1.0e9, True)])
+def test_a_chamber_that_still_vents_is_no_sign_and_one_that_has_stopped_is(
+    name: str, fall_time: float, is_sign: bool
+) -> None:
+    state = after_commands(VENT, 0.252)
+    for sample in range(151):
+        left = 4.0e4 * math.exp((150 - sample) * PERIOD / fall_time)
+        state = stood(state._replace(vented=0.0), sample, **{name: 1.01e5 + left})
+        if 100 <= sample <= 150:
+            assert (state.vented > 0.5) is is_sign
+
+
+def stood(state: SafetyState, sample: int, **pressures: float) -> SafetyState:
+    """State after a sample of a foot that stands flat and whose forces and angle change."""
+    seen = GOOD._replace(angle=1.5 + 1.0e-9 * sample, heel_force=300.0 + sample, toe_force=200.0 + sample, **pressures)
+    flat = phase(MID_STANCE, 0.1)
+    return safety.watched(RULES, state, flat, flat, seen, PERIOD)
+
+
+def test_a_pressure_that_freezes_while_the_chamber_vents_is_found_soon() -> None:
+    state = after_commands(VENT, 0.252)._replace(followed=Followed(2.2e5, GOOD.pressure_2))
+    for sample in range(100):
+        state = stood(state, sample, pressure_1=2.0e5 - 500.0 * sample)
+    assert state.vented < 0.5
+    for sample in range(100, 140):
+        state = stood(state, sample, pressure_1=1.5e5)
+    assert state.vented > 0.5
 
 
 @pytest.mark.parametrize("reading", [1.02e5, 1.2e5, 1.3e5, 2.0e5, 4.0e5])

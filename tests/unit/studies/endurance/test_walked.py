@@ -1,6 +1,7 @@
 """The gas of a walk: how full its chambers get, from its folder as from its result, and what reuse makes of it."""
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -95,12 +96,53 @@ def test_a_folder_says_what_the_walk_says(tmp_path: Path) -> None:
         ('{"format": "ppafo walk", "configuration": {}}', "has no number at 'configuration.device.actuator.angle_min'"),
         ('{"format": "ppafo walk", "status": {"kind": "diverged"}}', "the walk diverged, so it cannot be repeated"),
         ("[", "is not JSON"),
+        ('{"format": "ppafo walk", "status": "completed"}', "'status' is not a table of names and values"),
+        ('{"format": "ppafo walk", "configuration": 3}', "has no number at 'configuration.device.actuator.angle_min'"),
     ],
 )
 def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, words: str) -> None:
     (tmp_path / "walk.json").write_text(content)
     with pytest.raises(DataError, match=words):
         read_walked(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("metrics", None, "'metrics' is not a table of names and values"),
+        ("metrics.gas", None, "has no number at 'metrics.gas.value'"),
+        ("metrics.gas.value", -1.0, "'metrics.gas.value' is -1, which no walk has"),
+        ("metrics.gas.value", 10**400, "has no number at 'metrics.gas.value'"),
+        ("configuration.gait.stride_time", 0, "'configuration.gait.stride_time' is 0, which no walk has"),
+        ("configuration.gait", [], "has no number at 'configuration.gait.stride_time'"),
+        ("configuration.device.actuator.dead_volume_1", -1e-6, "dead_volume_1' is -1e-06, which no walk has"),
+    ],
+)
+def test_a_damaged_walk_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], path: str, value: object, words: str
+) -> None:
+    folder = folder_of(pulses(5.0), tmp_path / "walk")
+    file = folder / "walk.json"
+    document = json.loads(file.read_text())
+    *parts, last = path.split(".")
+    node = document
+    for part in parts:
+        node = node[part]
+    node[last] = value
+    file.write_text(json.dumps(document))
+    assert main(["endurance", str(folder)]) == 2
+    said = capsys.readouterr().err
+    assert re.search(words, said)
+    assert said.count("\n") == 1
+
+
+def test_a_recording_without_pressures_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = pulses(5.0)
+    channels = {name: Channel(made.recording[name], made.recording.unit(name)) for name in ("angle", "supplied_mass")}
+    bare = Recording("bare", made.recording.time, channels, kind="simulated")
+    folder = folder_of(replace(made, recording=bare), tmp_path / "walk")
+    assert main(["endurance", str(folder), "--reuse", "reservoir_volume=50 cm^3"]) == 2
+    assert "has no channel 'pressure_1'" in capsys.readouterr().err
 
 
 def test_reuse_takes_the_chambers_from_the_walk_and_a_given_value_overrides() -> None:
