@@ -40,11 +40,13 @@ SOURCE = (
 )
 NOTES = (
     "One healthy adult at self-selected speed. Curves filtered by the authors; the force does not vanish entirely in "
-    "swing. Fitted by scripts/fit_built_in_gait.py to 101 samples of the mean stride. Root mean square and largest "
-    "error of the fit: {errors}. Accelerations of the knee: second derivatives of series through its way in the plane, "
-    "from pelvis_tx, pelvis_ty, pelvis_tilt and hip_flexion_r of the authors' mean stride (IK_average_walking_FGC, of "
-    "the same phases) with a thigh of 0.3969 m (their scaled model, ExternalFunctions/PredSim.cpp); the errors "
-    "are of that way. How much strides differ in them is not known."
+    "swing. Its mean over the stride is {force:.3f} body weights, as in the authors' table; half of a symmetric walk "
+    "is 0.5, so that the force is {short:.0f} % short of {mass:g} kg. Fitted by scripts/fit_built_in_gait.py to 101 "
+    "samples of the mean stride. Root mean square and largest error of the fit: {errors}. Accelerations of the knee: "
+    "second derivatives of series through its way in the plane, from pelvis_tx, pelvis_ty, pelvis_tilt and "
+    "hip_flexion_r of the authors' mean stride (IK_average_walking_FGC, of the same phases) with a thigh of 0.3969 m "
+    "(their scaled model, ExternalFunctions/PredSim.cpp); the errors are of that way. How much strides differ in them "
+    "is not known."
 )
 
 
@@ -106,6 +108,7 @@ def built_in_gait(folder: Path) -> Gait:
     stride_time = round(float(trials["stride_time_s_est"].mean()), 4)
     found = fitted(table(derived / "falisse2019_s1_1p33_stride.csv"))
     found |= fitted_knee(folder / "falisse2019_subject1" / "IK_average_walking_FGC.mat", stride_time)
+    force = found["vertical_force"][0].mean
     units = {name: " deg" if name in ANGLES else " m" if name in KNEE else "" for name in found}
     errors = "; ".join(
         f"{name} {error.root_mean_square:.2g} and {error.largest:.2g}{units[name]}"
@@ -117,7 +120,7 @@ def built_in_gait(folder: Path) -> Gait:
         title="Healthy adult, 62 kg, overground at 1.33 m/s",
         origin="measured",
         source=SOURCE,
-        notes=NOTES.format(errors=errors),
+        notes=NOTES.format(errors=errors, force=force, short=200.0 * (0.5 - force), mass=BODY_MASS),
         body_mass=BODY_MASS,
         walking_speed=round(float(trials["speed_m_s_est"].mean()), 2),
         stride_time=stride_time,

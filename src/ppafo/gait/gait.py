@@ -150,7 +150,3 @@ class Gait:
             hint = nearest_name(name, curves)
             raise DataError(f"gait '{self.name}' has no curve '{name}'{hint}; it has {', '.join(curves)}")
         return curves[name]
-
-    def is_stance(self, phase: float) -> bool:
-        """Tell whether the foot is on the ground at a phase [strides]."""
-        return phase % 1.0 < self.stance_share

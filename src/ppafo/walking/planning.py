@@ -114,7 +114,7 @@ def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
         gait=gait,
         timing=timing,
         sensors=plan.gait_sensors,
-        initial=WalkState(HEEL, 0.0, start, foot, *(0.0,) * 4, NO_CLEARANCE, *(0.0,) * 6),
+        initial=WalkState(HEEL, 0.0, start, foot, *(0.0,) * 5, NO_CLEARANCE, *(0.0,) * 6),
     )
 
 

@@ -34,6 +34,27 @@ def changed(name: str, change: Callable[[Floats], Floats], new: str = "") -> Cha
     }
 
 
+def exchanged(columns: dict[str, Floats]) -> dict[str, Floats]:
+    """Both accelerations of the knee in each other's place."""
+    return {**columns, FORWARD: columns[UP], UP: columns[FORWARD]}
+
+
+def scaled(names: tuple[str, ...], factor: float) -> Change:
+    """Columns times a factor."""
+    return lambda columns: columns | {name: factor * columns[name] for name in names}
+
+
+def held(names: tuple[str, ...], start: int, samples: int) -> Change:
+    """Columns that keep the value of a sample for many more, as a filled drop-out does; 200 samples a second."""
+
+    def filled(values: Floats) -> Floats:
+        kept = np.array(values)
+        kept[start : start + samples] = kept[start]
+        return kept
+
+    return lambda columns: columns | {name: filled(columns[name]) for name in names or columns}
+
+
 CASES: dict[str, tuple[Change, str]] = {
     "degrees called radians": (
         changed(SHANK, np.degrees),
@@ -55,6 +76,14 @@ CASES: dict[str, tuple[Change, str]] = {
     ),
     "moment counted the other way": (changed(MOMENT, np.negative), "into dorsiflexion: its sign is reversed"),
     "moment of the body per kg": (changed(MOMENT, lambda x: 62.0 * x), "ankle_moment reaches 90.2 N m/kg, plausible"),
+    "moment of the other foot": (
+        changed(MOMENT, lambda x: np.roll(x, 104)),
+        "ankle_moment peaks at 98 % of the stride, but the foot is off the ground from 64 % on; it is of the other",
+    ),
+    "moment on a later clock": (
+        changed(MOMENT, lambda x: np.roll(x, 21)),
+        "ankle_moment peaks at 58 % of the stride and is 0.57 N m/kg in swing, but the foot is off the ground from 64",
+    ),
     "force of the other foot": (changed(FORCE, lambda x: np.roll(x, 104)), "choose the other side"),
     "force in newton without a unit": (
         changed(FORCE, lambda x: 608.0 * x),
@@ -69,8 +98,56 @@ CASES: dict[str, tuple[Change, str]] = {
     ),
     "knee with gravity": (changed(UP, lambda x: x + 9.81), "an accelerometer shows gravity too: take it away"),
     "knee in millimetres": (
-        changed(FORWARD, lambda x: 1000.0 * x),
-        "knee_forward moves over 2.02e+04 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; is the unit right",
+        scaled((FORWARD, UP), 1000.0),
+        "knee_forward and knee_up are 1000 times too large: while the foot is flat",
+    ),
+    "knee forward alone in millimetres": (
+        scaled((FORWARD,), 1000.0),
+        "knee_forward and knee_up differ, knee_forward is 1000 times too large",
+    ),
+    "knee in kilometres": (scaled((FORWARD, UP), 0.001), "knee_forward and knee_up are 1000 times too small"),
+    "knee up alone times g": (scaled((UP,), 9.80665), "differ, knee_up is 9.80665 times too large"),
+    "knee forward alone times g": (scaled((FORWARD,), 9.80665), "differ, knee_forward is 9.80665 times too large"),
+    "knee times g": (scaled((FORWARD, UP), 9.80665), "divide both by 9.80665 in the file"),
+    "knee in centimetres": (
+        scaled((FORWARD, UP), 100.0),
+        "knee_forward moves over 2.02e+03 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; is the unit right",
+    ),
+    "knee exchanged": (
+        exchanged,
+        "knee_forward and knee_up are exchanged: while the foot is flat the knee turns about",
+    ),
+    "knee exchanged and turned": (
+        lambda columns: exchanged(changed(FORWARD, np.negative)(columns)),
+        "knee_forward and knee_up are exchanged, and knee_up has the other sign",
+    ),
+    "knee in g": (
+        scaled((FORWARD, UP), 1.0 / 9.80665),
+        "knee_forward and knee_up are in units of g: while the foot is flat the knee turns about the resting ankle, "
+        "which they miss by 79 %, and by 42 % with that mended; multiply both by 9.80665 in the file",
+    ),
+    "knee in g with gravity": (
+        lambda columns: {**columns, FORWARD: columns[FORWARD] / 9.80665, UP: columns[UP] / 9.80665 + 1.0},
+        "knee_forward and knee_up are in units of g",
+    ),
+    "knee forward alone in g": (scaled((FORWARD,), 1.0 / 9.80665), "differ, knee_forward is in units of g"),
+    "knee exchanged and in g": (
+        lambda columns: scaled((FORWARD, UP), 1.0 / 9.80665)(exchanged(columns)),
+        "are exchanged and in units of g",
+    ),
+    "shank held for a second": (
+        held((SHANK,), 500, 200),
+        "column 'shank_angle' of shank_angle keeps one value from 2.496 to 3.49 s while the wearer walks: a drop-out",
+    ),
+    "everything held for half a second": (
+        held((), 660, 100),
+        "column 'shank_angle' of shank_angle keeps one value from",
+    ),
+    "everything held over a heel strike": (held((), 500, 200), "column 'shank_angle' of shank_angle keeps one value"),
+    "moment held in stance": (held((MOMENT,), 680, 30), "column 'ankle_moment' of ankle_moment keeps one value from"),
+    "shank in noise": (
+        changed(SHANK, lambda x: x + np.random.default_rng(4).normal(0.0, 0.7, x.size)),
+        "of its range and its series misses",
     ),
     "unknown unit": (
         changed(SHANK, lambda x: x, "shank_angle [turns]"),
@@ -134,6 +211,39 @@ def test_a_wrong_body_mass_shows_in_the_force(csv_of: Callable[..., Path], colum
     newtons = changed(FORCE, lambda x: 608.0 * x, "vertical_force [N]")(columns)
     with pytest.raises(DataError, match="is the body mass right"):
         import_gait([csv_of(newtons)], ImportSettings(20.0))
+
+
+def test_a_force_in_swing_may_rest_and_so_may_a_coarse_sensor_where_it_turns(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    step = np.radians(1.5)
+    coarse = {name: step * np.round(columns[name] / step) for name in (SHANK, ANKLE)}
+    resting = np.flatnonzero(np.diff(coarse[ANKLE]) != 0.0)
+    assert np.diff(resting).max() > 0.1 * 200.0, "the case is there: one value for more than 0.1 s"
+    force = np.where(columns[FORCE] < 0.03, 0.0, columns[FORCE])
+    found = import_gait([csv_of({**columns, **coarse, FORCE: force})], ImportSettings(62.0))
+    assert found.gait.strides == 5
+    with pytest.raises(DataError, match="column 'shank_angle' of shank_angle keeps one value from"):
+        import_gait([csv_of(held((SHANK,), 500, 60)({**columns, **coarse}))], ImportSettings(62.0))
+
+
+def test_noise_is_remarked_before_it_is_refused(csv_of: Callable[..., Path], columns: dict[str, Floats]) -> None:
+    noise = np.random.default_rng(4).normal(0.0, 0.2, columns[SHANK].size)
+    path = csv_of({**columns, SHANK: columns[SHANK] + noise})
+    found = import_gait([path], ImportSettings(62.0))
+    (remark,) = found.remarks
+    assert remark.startswith("shank_angle differs between strides by 1")
+    assert "that is noise, or no steady walk; smooth the recording (--low-pass '6 Hz')" in remark
+    assert import_gait([path], ImportSettings(62.0, low_pass=6.0)).remarks == ()
+
+
+@pytest.mark.parametrize(("factor", "shown"), [(0.6, "0.278"), (0.9, "0.417"), (1.3, "0.602")])
+def test_a_force_that_is_not_half_the_weight_is_remarked(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], factor: float, shown: str
+) -> None:
+    (remark,) = import_gait([csv_of(scaled((FORCE,), factor)(columns))], ImportSettings(62.0)).remarks
+    assert remark.startswith(f"the vertical force is {shown} body weights on average, and one leg of a steady walk")
+    assert import_gait([csv_of(columns)], ImportSettings(62.0)).remarks == ()
 
 
 def test_a_jump_of_the_time_is_named_by_row(

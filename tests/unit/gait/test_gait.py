@@ -94,6 +94,11 @@ def negative(curve: Curve) -> Curve:
     return curve.scaled(-1.0)
 
 
+def turned(amplitudes: tuple[float, ...]) -> tuple[float, ...]:
+    """Amplitudes of the curve half a stride later."""
+    return tuple((-1.0) ** order * value for order, value in enumerate(amplitudes, 1))
+
+
 IMPLAUSIBLE = {
     "shank": ({"shank_angle": negative}, "shank_angle grows while the foot stands"),
     "ankle": (
@@ -107,6 +112,14 @@ IMPLAUSIBLE = {
     "moment": ({"ankle_moment": negative}, "its sign is reversed; write mean, cosine and sine with the other sign"),
     "unit of the shank": ({"shank_angle": lambda c: c.scaled(math.radians(1.0))}, "the numbers look like radians"),
     "force in newton": ({"vertical_force": lambda c: c.scaled(608.0)}, "is the body mass right, and the unit"),
+    "moment of the other foot": (
+        {"ankle_moment": lambda c: dataclasses.replace(c, cosines=turned(c.cosines), sines=turned(c.sines))},
+        "peaks at 98 % of the stride, but the foot is off the ground from 64 % on; write the moment of this foot",
+    ),
+    "knee in g": (
+        {"knee_forward": lambda c: c.scaled(1.0 / 9.80665), "knee_up": lambda c: c.scaled(1.0 / 9.80665)},
+        "are in units of g: while the foot is flat",
+    ),
     "knee forward": (
         {"knee_forward": negative},
         "knee_forward is -10.5 m/s^2 about toe-off and 7.82 m/s^2 in the middle of the swing, and it is the other way",
@@ -134,6 +147,14 @@ def test_a_gait_file_that_no_leg_walks_is_refused_with_the_remedy(normative: Gai
         parse_gait(gait_toml(wrong).encode(), "bad.toml")
     assert "gait map" not in str(refused.value), "none was given"
     assert "\n" not in str(refused.value)
+
+
+def test_a_gait_file_with_its_knee_exchanged_is_refused(normative: Gait) -> None:
+    wrong = dataclasses.replace(normative, knee_forward=normative.knee_up, knee_up=normative.knee_forward)
+    with pytest.raises(
+        DataError, match=r"^bad.toml: knee_forward and knee_up are exchanged: .*; exchange them in every"
+    ):
+        parse_gait(gait_toml(wrong).encode(), "bad.toml")
 
 
 def test_a_gait_file_needs_no_knee_but_not_half_of_one(normative: Gait) -> None:
@@ -234,6 +255,15 @@ def test_the_series_stay_as_near_to_the_data_as_the_notes_say(normative: Gait, s
     left = np.abs(series - table[column])
     assert left.max() < largest
     assert left.mean() < 0.2 * table[f"{column}_sd"].mean(), "far below what strides differ by"
+
+
+def test_the_notes_say_how_short_the_force_is(normative: Gait, shared_data: Path) -> None:
+    table = np.genfromtxt(
+        shared_data / "gait" / "falisse2019_derived" / "falisse2019_s1_1p33_stride.csv", delimiter=",", names=True
+    )
+    mean = table["vGRF_BW"][:-1].mean()
+    assert f"Its mean over the stride is {mean:.3f} body weights" in normative.notes
+    assert f"the force is {100.0 * (1.0 - mean / 0.5):.0f} % short of 62 kg" in normative.notes
 
 
 def test_the_rate_of_the_shank_is_the_recorded_one(normative: Gait, shared_data: Path) -> None:

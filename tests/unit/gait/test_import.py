@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from ppafo.gait.recorded.mapping import (
     MomentMap,
     PressureMap,
     ShankMap,
+    Side,
     package_map,
 )
 from ppafo.gait.writing import gait_toml
@@ -272,6 +274,31 @@ def test_what_is_imported_can_be_written_and_loaded(csv_of: Callable[..., Path],
     again = parse_gait(gait_toml(gait).encode(), "mine.toml")
     assert (again.name, again.strides, again.stance_share) == ("mine", gait.strides, gait.stance_share)
     assert all(name in CURVES for name in again.curves)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_a_wrong_body_mass_of_real_walking_is_remarked(shared_data: Path, side: Side) -> None:
+    folder = shared_data / "gait" / "opensim_subject01"
+    files = [folder / "subject01_walk1_ik.mot", folder / "subject01_walk1_grf_15s.mot"]
+    true, wrong = (import_gait(files, ImportSettings(mass, side, stature=1.8034)) for mass in (72.6, 120.0))
+    assert all("thigh" in remark or "acceleration" in remark for remark in true.remarks), "nothing is odd about it"
+    assert wrong.remarks[0].startswith("the vertical force is 0.30")
+    assert "check the body mass, 0.6" in wrong.remarks[0]
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_a_real_knee_taken_for_numbers_in_g_or_exchanged_is_refused(shared_data: Path, side: Side) -> None:
+    folder = shared_data / "gait" / "opensim_subject01"
+    files = [folder / "subject01_walk1_ik.mot", folder / "subject01_walk1_grf_15s.mot"]
+    gait = import_gait(files, ImportSettings(72.6, side, stature=1.8034)).gait
+    assert gait.knee_forward is not None
+    assert gait.knee_up is not None
+    in_g = {name: gait.curve(name).scaled(1.0 / 9.80665) for name in KNEE}
+    with pytest.raises(DataError, match="knee_forward and knee_up are in units of g"):
+        parse_gait(gait_toml(replace(gait, **in_g)).encode(), "g.toml")
+    other = replace(gait, knee_forward=gait.knee_up, knee_up=gait.knee_forward)
+    with pytest.raises(DataError, match="knee_forward and knee_up are exchanged"):
+        parse_gait(gait_toml(other).encode(), "other.toml")
 
 
 def test_real_treadmill_walking_from_opensim(shared_data: Path) -> None:

@@ -31,10 +31,10 @@ SAFETY_QUANTITIES = (
 )
 
 HOLD_QUANTITIES = (
-    Quantity("swing_angle", "rad", "angle about which the lifted foot is held", 1.46, 0.5, 2.5),
-    Quantity("hold_stiffness", "N m/rad", "torque wanted per angle from it", 5.3, 0.0, 1.0e3),
-    Quantity("hold_damping", "N m s/rad", "torque wanted against the angle's rate", 0.17, 0.0, 1.0e3),
-    Quantity("angle_rate_filter", "s", "time constant of the filter on the angle's rate", 0.002, 0.0, 1.0),
+    Quantity("swing_angle", "rad", "angle about which the lifted foot is held", 1.28, 0.5, 2.5),
+    Quantity("hold_stiffness", "N m/rad", "torque wanted per angle from it", 3.7, 0.0, 1.0e3),
+    Quantity("hold_damping", "N m s/rad", "torque wanted against the angle's rate", 0.35, 0.0, 1.0e3),
+    Quantity("angle_rate_filter", "s", "time constant of the filter on the angle's rate", 0.006, 0.0, 1.0),
 )
 
 PUSH_OFF_QUANTITIES = (
@@ -46,15 +46,15 @@ PUSH_OFF_QUANTITIES = (
 
 ASSISTANCE_QUANTITIES = (
     *HOLD_QUANTITIES,
-    Quantity("landing_peak_torque", "N m", "peak of the torque in dorsiflexion while landing", 2.9, 0.0, 1.0e3),
-    Quantity("landing_peak_time", "1", "phase of that peak", 0.032, 0.0, 0.9),
-    Quantity("landing_rise_time", "1", "share of the stride time from zero to that peak", 0.05, 0.01, 0.8),
-    Quantity("landing_fall_time", "1", "share of the stride time from that peak to zero", 0.15, 0.01, 0.8),
+    Quantity("landing_peak_torque", "N m", "peak of the torque in dorsiflexion while landing", 5.0, 0.0, 1.0e3),
+    Quantity("landing_peak_time", "1", "phase of that peak", 0.046, 0.0, 0.9),
+    Quantity("landing_rise_time", "1", "share of the stride time from zero to that peak", 0.09, 0.01, 0.8),
+    Quantity("landing_fall_time", "1", "share of the stride time from that peak to zero", 0.078, 0.01, 0.8),
     *PUSH_OFF_QUANTITIES,
     Quantity("swing_peak_torque", "N m", "peak of the torque in dorsiflexion in the swing", 2.7, 0.0, 1.0e3),
-    Quantity("swing_peak_time", "1", "phase of that peak", 0.75, 0.1, 1.0),
-    Quantity("swing_rise_time", "1", "share of the stride time from zero to that peak", 0.1, 0.01, 0.8),
-    Quantity("swing_fall_time", "1", "share of the stride time from that peak to zero", 0.23, 0.01, 0.8),
+    Quantity("swing_peak_time", "1", "phase of that peak", 0.805, 0.1, 1.0),
+    Quantity("swing_rise_time", "1", "share of the stride time from zero to that peak", 0.24, 0.01, 0.8),
+    Quantity("swing_fall_time", "1", "share of the stride time from that peak to zero", 0.14, 0.01, 0.8),
     Quantity("largest_torque", "N m", "no more is wanted either way; about what 50 psi_g can hold", 5.0, 0.0, 1.0e3),
 )
 """Fields of ``Assistance`` in order."""

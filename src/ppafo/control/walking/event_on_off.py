@@ -62,11 +62,11 @@ KIND = ControllerKind(
     summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
     quantities=(
-        Quantity("swing_angle", "rad", "angle at which the foot is held in the swing", 1.64, 0.5, 2.5),
+        Quantity("swing_angle", "rad", "angle at which the foot is held in the swing", 1.68, 0.5, 2.5),
         Quantity(
-            "band", "rad", "the foot is lifted above the angle plus this, let go below it less this", 0.097, 0.0, 0.5
+            "band", "rad", "the foot is lifted above the angle plus this, let go below it less this", 0.145, 0.0, 0.5
         ),
-        Quantity("push_off_end", "1", "share of the stride time at which the push-off is over", 0.58, 0.1, 1.0),
+        Quantity("push_off_end", "1", "share of the stride time at which the push-off is over", 0.565, 0.1, 1.0),
         *PHASE_QUANTITIES,
         *SAFETY_QUANTITIES,
     ),

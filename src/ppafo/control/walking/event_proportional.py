@@ -59,8 +59,8 @@ KIND = ControllerKind(
     summary="Event-based torque profiles for each phase, followed by proportional and integral action.",
     source="the paper, figures 1A and 6; profile of four parameters as in J. Zhang et al., Science 356 (2017) 1280",
     quantities=(
-        Quantity("torque_gain", "1/(N m)", "opening per torque error", 1.2, 0.0, 1.0e3),
-        Quantity("torque_integral_gain", "1/(N m s)", "opening per integral of the torque error", 1.2, 0.0, 1.0e3),
+        Quantity("torque_gain", "1/(N m)", "opening per torque error", 1.3, 0.0, 1.0e3),
+        Quantity("torque_integral_gain", "1/(N m s)", "opening per integral of the torque error", 0.2, 0.0, 1.0e3),
         *ASSISTING_QUANTITIES,
     ),
     parameters=EventProportionalParameters,

@@ -40,7 +40,8 @@ class WalkState(NamedTuple):
     """Where the foot stands, the gait and the foot's direction now, what the wearer gets, and totals since the start.
 
     ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
-    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``slap_rate`` of the toes at the last landing
+    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``toes_first`` 1 in a
+    stride that began with the toes; ``slap_rate`` of the toes at the last landing
     [rad/s]; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, landings of
     the toes after the heel, strikes with the toes first, sums of slap rates [rad/s] and clearances [m], work of T_ex
     while the foot rolls over the toes [J].
@@ -53,6 +54,7 @@ class WalkState(NamedTuple):
     external_torque: float
     heel_force: float
     toe_force: float
+    toes_first: float
     slap_rate: float
     clearance: float
     strides: float
@@ -228,13 +230,14 @@ def counted(
 
     ``height`` of the toes [m] against the healthy gait at the same instant, ``turned`` [rad] in this step.
     """
-    heel, toe = ground.ground_forces(landed.contact, timing, now)
+    strikes = landed.strikes > 0.5
+    touches_first = ground.foot_angle(now.shank, state.angle) < timing.ground_angle
+    toes_first = (1.0 if touches_first else 0.0) if strikes else walk.toes_first
+    heel, toe = ground.ground_forces(landed.contact, timing, now, toes_first)
     share = follow_rate * step / (1.0 + follow_rate * step)
     foot_rate = now.shank_rate - state.angular_velocity
-    touches_first = ground.foot_angle(now.shank, state.angle) < timing.ground_angle
     watched = now.phase >= timing.clearance_from and now.phase <= timing.clearance_to
     lowest = min(walk.clearance, height if watched else walk.clearance)
-    strikes = landed.strikes > 0.5
     on_toes = walk.contact == ground.TOE
     # A foot that met the ground with its toes brings its heel down: that is no slap.
     slaps = landed.slaps > 0.5 and foot_rate < 0.0
@@ -246,6 +249,7 @@ def counted(
         given,
         walk.heel_force + (heel - walk.heel_force) * share,
         walk.toe_force + (toe - walk.toe_force) * share,
+        toes_first,
         foot_rate if slaps else walk.slap_rate,
         NO_CLEARANCE if strikes else lowest,
         walk.strides + landed.strikes,

@@ -1,10 +1,11 @@
-"""Acceleration of the knee: size, mean and sign."""
+"""Acceleration of the knee: turning about the ankle, size, mean and sign."""
 
 import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.gait import KNEE
 from ppafo.gait.plausible.checked import Checked
+from ppafo.gait.plausible.turning import check_turning
 
 KNEE_TRAVEL = (0.5, 80.0)
 KNEE_MEAN = 1.5
@@ -19,11 +20,13 @@ def check_knee(walk: Checked) -> None:
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
         raise DataError(f"{walk.file[there[0]]}: {there[0]} is there without {missing}; give both, or none")
+    check_turning(walk)
     for name in there:
-        _check_knee(name, walk)
+        _check_size(name, walk)
+        _check_sign(name, walk)
 
 
-def _check_knee(name: str, walk: Checked) -> None:
+def _check_size(name: str, walk: Checked) -> None:
     values, place = walk.curves[name], f"{walk.file[name]}: {name}"
     travel, mean, (low, high) = float(np.ptp(values)), float(np.mean(values[:-1])), KNEE_TRAVEL
     if abs(mean) > KNEE_MEAN:
@@ -36,6 +39,10 @@ def _check_knee(name: str, walk: Checked) -> None:
             f"{place} moves over {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
             "is the unit right (m/s^2, or m for a position)?"
         )
+
+
+def _check_sign(name: str, walk: Checked) -> None:
+    values, place = walk.curves[name], f"{walk.file[name]}: {name}"
     swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
     driven, held = (float(np.mean(values[(swung >= low) & (swung <= high)])) for low, high in _PARTS[name])
     if driven < held:

@@ -1,4 +1,4 @@
-"""Ankle moment and vertical force: size and sign."""
+"""Ankle moment and vertical force: size, sign and time."""
 
 import numpy as np
 
@@ -9,6 +9,15 @@ from ppafo.signals.recording import Floats
 MOMENT_PEAK = (0.05, 3.5)
 FORCE_PEAK = (0.5, 2.5)
 FORCE_MEAN = (0.25, 0.75)
+USUAL_FORCE_MEAN = (0.42, 0.58)
+"""Body weights: over steady strides both legs carry 1 together, half each in a symmetric walk."""
+
+_AFTER_TOE_OFF = 0.03
+"""Of the stride; a toe-off found in the shank is no nearer than this."""
+_LEFT_IN_SWING = 0.25
+"""Of the peak; the swinging foot needs a few hundredths."""
+_FOOT_ALONE = 0.05
+"""N m/kg that a swinging foot may need, however weak the push-off."""
 
 
 def check_force_scale(file: str, force: Floats, given: Given) -> None:
@@ -44,6 +53,31 @@ def check_moment(walk: Checked) -> None:
             f"{place} reaches {peak:.3g} N m/kg, plausible is {low:g} to {high:g} N m/kg; is the unit right "
             "(N m, N m/kg, N mm/kg) and the body mass?"
         )
+    _check_moment_time(walk)
+
+
+def _check_moment_time(walk: Checked) -> None:
+    """Refuse a moment that works while the foot is off the ground."""
+    moment, share = walk.curves["ankle_moment"], walk.stance_share
+    phase = np.linspace(0.0, 1.0, moment.size)
+    peak, at = float(np.max(moment)), float(phase[np.argmax(moment)])
+    swing = float(np.max(moment[phase > share + _AFTER_TOE_OFF]))
+    if at < share and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
+        return
+    where = f"peaks at {100.0 * at:.0f} % of the stride" + (
+        "" if at >= share else f" and is {swing:.2g} N m/kg in swing"
+    )
+    raise DataError(
+        f"{walk.file['ankle_moment']}: ankle_moment {where}, but the foot is off the ground from {100.0 * share:.0f} % "
+        f"on; {_OTHER_TIME[walk.given]}"
+    )
+
+
+_OTHER_TIME: dict[Given, str] = {
+    "map": "it is of the other foot or on another clock: choose the other side, or the column of this foot",
+    "columns": "it is of the other foot or on another clock: choose the other side, or the column of this foot",
+    "gait_file": "write the moment of this foot, counted from its heel strike",
+}
 
 
 def check_force(walk: Checked) -> None:
@@ -59,3 +93,15 @@ def check_force(walk: Checked) -> None:
             f"{FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g} and {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}; "
             "is the body mass right, and the unit (N, '-')?"
         )
+
+
+def force_remarks(force: Floats) -> list[str]:
+    """Return what is odd about the mean of a vertical force [body weights] over a stride, both ends counted."""
+    mean, (low, high) = float(np.mean(force[:-1])), USUAL_FORCE_MEAN
+    if low <= mean <= high:
+        return []
+    return [
+        f"the vertical force is {mean:.3g} body weights on average, and one leg of a steady walk carries about 0.5 "
+        f"(usually {low:g} to {high:g}): check the body mass, {2.0 * mean:.2g} times as much would make it 0.5, and "
+        "the scale of the force"
+    ]

@@ -10,11 +10,13 @@ from ppafo.errors import DataError
 from ppafo.gait.fourier import HARMONICS, FitError, fit_curve
 from ppafo.gait.gait import REQUIRED, Curve, Gait, Origin
 from ppafo.gait.plausible.checked import Checked, Given
-from ppafo.gait.plausible.loads import check_force_scale
+from ppafo.gait.plausible.loads import check_force_scale, force_remarks
 from ppafo.gait.plausible.stride import check_plausible
 from ppafo.gait.recorded.events import Stride, strides_from_force, strides_from_shank
+from ppafo.gait.recorded.held import check_held
 from ppafo.gait.recorded.knee import check_way, knee_remarks
 from ppafo.gait.recorded.mapping import CONVENTIONS, GaitMap, Side
+from ppafo.gait.recorded.noise import check_scatter, scatter_remarks
 from ppafo.gait.recorded.settings import ImportSettings, check_settings
 from ppafo.gait.recorded.signal import Signal, low_passed
 from ppafo.gait.recorded.strides import CurveStatistics, covered, mean_curve, without_outliers
@@ -62,15 +64,18 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     usable = [item for item in found if all(covered(walk[name], [item]) for name in REQUIRED)]
     strides, left_out = without_outliers(usable, LARGEST_STRIDE_CHANGE)
     _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events)}, settings.least_strides)
+    check_held(walk, tables, strides, left_out)
     curves = {name: mean_curve(name, signal, strides) for name, signal in smooth.items()}
     share, time = _mean([item.stance_share for item in strides]), _mean([item.time for item in strides])
     means = {name: item.mean for name, item in curves.items()}
+    fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
+    errors = {name: error for name, (_, error) in fitted.items()}
+    check_scatter(curves, errors, walk)
     check_plausible(Checked({name: signal.file for name, signal in walk.items()}, means, share, time, given))
     check_way(walk, given)
-    fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     gait = _gait(settings, tables, strides, {name: curve for name, (curve, _) in fitted.items()}, events)
-    errors = {name: error for name, (_, error) in fitted.items()}
-    remarks = (*_remarks(curves, strides, left_out, walk), *knee_remarks(columns.knee, walk, settings.stature))
+    remarks = (*_remarks(curves, strides, left_out), *knee_remarks(columns.knee, walk, settings.stature))
+    remarks += tuple(scatter_remarks(curves, errors))
     names = tuple(str(path) for path in files)
     return ImportedGait(gait, tuple(strides), tuple(left_out), curves, errors, events, names, remarks)
 
@@ -152,7 +157,6 @@ def _remarks(
     curves: Mapping[str, CurveStatistics],
     strides: Sequence[Stride],
     left_out: Sequence[Stride],
-    walk: Mapping[str, Signal],
 ) -> list[str]:
     remarks = [
         f"stride from {item.start:.4g} to {item.end:.4g} s left out: {item.time:.3g} s long, the others are about "
@@ -164,6 +168,6 @@ def _remarks(
         for name, item in curves.items()
         if len(item.strides) < len(strides)
     ]
-    if "vertical_force" not in walk:
-        remarks.append("no vertical force: heel strikes and toe-offs come from the shank and are less exact")
-    return remarks
+    if "vertical_force" not in curves:
+        return [*remarks, "no vertical force: heel strikes and toe-offs come from the shank and are less exact"]
+    return remarks + force_remarks(curves["vertical_force"].mean)

@@ -51,9 +51,10 @@ def knee_signals(
         _check_hip_moves(mapped, found.table.file, forward, up)
         forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))
     file, time = found.table.file, found.table.time
+    columns = tuple(dict.fromkeys(name for _, name in found.terms))
     return {
-        "knee_forward": Signal(file, time, forward, is_position=unit == "m"),
-        "knee_up": Signal(file, time, up, is_position=other == "m"),
+        "knee_forward": Signal(file, time, forward, unit == "m", columns),
+        "knee_up": Signal(file, time, up, other == "m", columns),
     }
 
 

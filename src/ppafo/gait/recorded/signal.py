@@ -18,12 +18,14 @@ class Signal:
     """Values over time [s], evenly enough sampled, of one file.
 
     ``is_position``: a position [m], of which the gait has the acceleration.
+    ``columns`` are those of the file behind it.
     """
 
     file: str
     time: Floats
     values: Floats
     is_position: bool = False
+    columns: tuple[str, ...] = ()
 
     @property
     def rate(self) -> float:

@@ -1,7 +1,7 @@
 """A recorded walk: the curves of a gait over time, in SI units and in the signs of the package."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,7 +49,8 @@ def recorded_walk(
             continue
         found = found_columns(name, _column_names(mapped), tables, optional=is_default and name not in REQUIRED)
         if found is not None:
-            walk[name] = read(found, mapped, person.body_mass)
+            signal = read(found, mapped, person.body_mass)
+            walk[name] = replace(signal, columns=tuple(column for _, column in found.terms))
     if columns.knee is not None:
         walk |= knee_signals(columns.knee, tables, person.stature, is_default)
     return walk
