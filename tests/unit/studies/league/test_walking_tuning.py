@@ -44,7 +44,8 @@ def test_candidates_walk_as_each_alone_and_as_a_walk_of_the_command_line() -> No
     alone = judged(configuration, defaults(KIND), 1)
     assert np.ptp(many.error) > 0.1
     for name in ("error", "gas", "toe_height", "slap_rate"):
-        assert getattr(many, name)[1] == getattr(alone, name)[0]
+        # The engine gives the same bits; the means over the samples add up in another order.
+        assert getattr(many, name)[1] == pytest.approx(getattr(alone, name)[0], rel=1e-12)
     metrics = walk(configuration, walking_tuning.SECONDS / 60.0).metrics
     assert alone.error[0] == pytest.approx(metrics["push_off_error"].value, rel=0.05)
     assert alone.gas[0] == pytest.approx(metrics["gas"].value, rel=0.1)
