@@ -71,7 +71,7 @@ def _bounds(
         reached = {
             standing.entrant.name: _reached(standing.measures)
             for standing in standings
-            if standing.entrant.valve == valve and standing.measures["toe_strikes"] == 0.0
+            if standing.entrant.valve == valve and _is_bounded(standing)
         }
         try:
             bound = walking_bound(task, valve, reached, say)
@@ -82,3 +82,8 @@ def _bounds(
         optima = (bound.least_error, *bound.curve)
         bounds[valve] = WalkingBounded(bound, tuple(played(task, valve, optimum) for optimum in optima))
     return bounds, "; ".join(reasons)
+
+
+def _is_bounded(standing: WalkingStanding) -> bool:
+    """A stride of the bound strikes with the heel; a walk that takes no gas has none to save."""
+    return standing.measures["toe_strikes"] == 0.0 and standing.measures["gas"] > 0.0
