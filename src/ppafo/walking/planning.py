@@ -110,7 +110,7 @@ def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
     foot = foot_direction(start.shank, start.ankle)
     return Walk(
         leg=leg,
-        share=DeviceShare(bare.inertia, bare.viscous_damping, bare.gravity_torque),
+        share=DeviceShare(bare.inertia, bare.viscous_damping, bare.gravity_torque / leg.gravity),
         gait=gait,
         timing=timing,
         sensors=plan.gait_sensors,

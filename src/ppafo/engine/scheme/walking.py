@@ -18,15 +18,16 @@ from ppafo.model.vane import actuator_torque
 
 
 class DeviceShare(NamedTuple):
-    """What the foot plate and the vane add to the leg: inertia [kg m^2], damping [N m s/rad], largest gravity [N m].
+    """What the foot plate and the vane add to the leg: inertia [kg m^2], damping [N m s/rad], mass moment [kg m].
 
-    They turn with the foot, so the shank's motion moves them too: equation (1) holds for a shank at rest. The plant of
-    a walking leg carries the sums of leg and device, and no gravity of its own.
+    The last is mass times distance from the ankle. They turn with the foot, so the shank's motion moves them too:
+    equation (1) holds for a shank at rest. The plant of a walking leg carries the sums of leg and device, and no
+    gravity of its own.
     """
 
     inertia: float
     viscous_damping: float
-    gravity_torque: float
+    mass_moment: float
 
 
 class Direction(NamedTuple):
@@ -111,7 +112,7 @@ def leg_torque(
 def plate_torque(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> float:
     """Torque [N m] of foot plate and vane by their weight and the shank's motion, positive in plantarflexion."""
     return -torque_of_shank_on(
-        share.gravity_torque / leg.gravity,
+        share.mass_moment,
         share.inertia,
         leg.shank_length,
         leg.gravity,
