@@ -6,11 +6,12 @@ from typing import NamedTuple, get_type_hints
 from ppafo.control.controllers import constant as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import constant
+from ppafo.engine.scheme.ankle_torque import DeviceShare
 from ppafo.engine.scheme.motion import FreeStep, LedStep
 from ppafo.engine.scheme.pneumatics import MovingGas, StillGas
 from ppafo.engine.scheme.supply_lines import FedGas
 from ppafo.engine.scheme.thermal_gas import ThermalGas
-from ppafo.engine.scheme.walking import DeviceShare, WalkState, WalkStep
+from ppafo.engine.scheme.walking import WalkState, WalkStep
 from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters

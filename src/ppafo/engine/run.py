@@ -11,7 +11,8 @@ from ppafo.engine.lanes import Batch, BatchResult, Clock, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.rows import table
-from ppafo.engine.scheme.walking import DeviceShare, WalkState
+from ppafo.engine.scheme.ankle_torque import DeviceShare
+from ppafo.engine.scheme.walking import WalkState
 from ppafo.model.columns import larger, whole
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import NOTHING_SEEN, GaitSensors

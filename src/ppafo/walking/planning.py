@@ -8,7 +8,8 @@ from ppafo.control.kind import ControllerKind
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.refinement import filling_time
 from ppafo.engine.run import Lines, Run, Walk, whole_and_rest
-from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState, foot_direction
+from ppafo.engine.scheme.ankle_torque import DeviceShare, foot_direction
+from ppafo.engine.scheme.walking import NO_CLEARANCE, WalkState
 from ppafo.gait import Gait
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.contact import HEEL

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
-from ppafo.engine.scheme.walking import DeviceShare, foot_direction, leg_torque
+from ppafo.engine.scheme.ankle_torque import DeviceShare, foot_direction, leg_torque
 from ppafo.gait import Gait
 from ppafo.model import contact as ground
 from ppafo.model.gait import gait_at

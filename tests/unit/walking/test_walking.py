@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from ppafo.model import contact as ground
-from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import Fault
 from ppafo.walking.planning import plan_walk
 
@@ -87,47 +86,6 @@ def test_metrics_at_one_kilohertz_are_within_two_per_cent(walk_plan: Callable[[s
             names = ("walk.slap_rates", "walk.push_off_work", "state.supplied_mass")
             found.append([states[rows[item]] for item in names])
         np.testing.assert_allclose(found[0], found[1], rtol=0.02)
-
-
-FAULTS = {
-    "lost": Fault(3.3, 0.0, 0.0),
-    "stuck high": Fault(3.3, 0.0, 900.0),
-    "out of range": Fault(3.3, 0.0, 9000.0),
-    "frozen while loaded": Fault(2.0 * STRIDE + 0.35, 1.0, 0.0),
-}
-LONGEST = 3.5 * STRIDE
-"""Time [s] within which every fault of a force sensor vents both chambers; a lost heel takes three strides to show."""
-
-
-@pytest.mark.parametrize("name", ["event_on_off", "event_proportional"])
-@pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("sensor", ["heel", "toe"])
-def test_a_faulty_force_sensor_vents_both_chambers(
-    walked_with_fault: Callable[..., Any], name: str, sensor: str, fault: str
-) -> None:
-    walk = walked_with_fault(name, sensor, FAULTS[fault])
-    command = walk["result.command"]
-    after = walk.time > FAULTS[fault].time + LONGEST
-    assert (command[after] == VENT).all()
-    assert (command[walk.time < 2.0] != VENT).any(), "the device worked before"
-
-
-@pytest.mark.parametrize("name", ["event_on_off", "event_proportional"])
-@pytest.mark.parametrize(
-    "fault", [Fault(3.3, 0.0, 0.0), Fault(3.3, 0.0, 9.0), Fault(3.3, 1.0, 0.0)], ids=["zero", "nine", "frozen"]
-)
-def test_a_faulty_angle_sensor_vents_both_chambers(
-    walked_with_fault: Callable[..., Any], name: str, fault: Fault
-) -> None:
-    walk = walked_with_fault(name, "angle", fault)
-    after = walk.time > fault.time + STRIDE
-    assert (walk["result.command"][after] == VENT).all()
-
-
-@pytest.mark.parametrize("name", ["event_on_off", "event_proportional"])
-def test_a_device_without_fault_is_not_vented_for_good(walked_with_fault: Callable[..., Any], name: str) -> None:
-    walk = walked_with_fault(name, "heel", Fault(1.0e9, 0.0, 0.0))
-    assert walk["controller_state.safety.vented"][-1] == 0.0
 
 
 def test_a_dead_time_of_the_valve_delays_the_pressure(walk_plan: Callable[[str], Any]) -> None:

@@ -2,50 +2,26 @@
 
 from typing import NamedTuple
 
+from ppafo.engine.scheme.ankle_torque import DeviceShare, Direction, foot_direction, leg_torque, plate_torque
 from ppafo.engine.scheme.motion import FreeStep, begin_free, bounded, end_free, with_motion
 from ppafo.model import contact as ground
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import (
     LegParameters,
     foot_inertia_about_ankle,
-    passive_torque,
-    torque_of_shank,
-    torque_of_shank_on,
 )
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures
-from ppafo.model.turns import TURN, sine_and_cosine
 from ppafo.model.vane import actuator_torque
-
-
-class DeviceShare(NamedTuple):
-    """What the foot plate and the vane add to the leg: inertia [kg m^2], damping [N m s/rad], mass moment [kg m].
-
-    The last is mass times distance from the ankle. They turn with the foot, so the shank's motion moves them too:
-    equation (1) holds for a shank at rest. The plant of a walking leg carries the sums of leg and device, and no
-    gravity of its own.
-    """
-
-    inertia: float
-    viscous_damping: float
-    mass_moment: float
-
-
-class Direction(NamedTuple):
-    """Sine and cosine of the angle of the foot over the horizontal."""
-
-    sine: float
-    cosine: float
 
 
 class WalkState(NamedTuple):
     """Where the foot stands, the gait and the foot's direction now, what the wearer gets, and totals since the start.
 
     ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
-    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``toes_first`` 1 in a
-    stride that began with the toes; ``slap_rate`` of the toes at the last landing
-    [rad/s]; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, landings of
-    the toes after the heel, strikes with the toes first, sums of slap rates [rad/s] and clearances [m], work of T_ex
-    while the foot rolls over the toes [J].
+    ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``toes_first`` 1 in a stride that began with the
+    toes; ``slap_rate`` of the toes at the last landing [rad/s]; ``clearance`` lowest of the toes in this swing against
+    the healthy gait [m]. Totals: strikes, landings of the toes after the heel, strikes with the toes first, sums of
+    slap rates [rad/s] and clearances [m], work of T_ex while the foot rolls over the toes [J].
     """
 
     contact: float
@@ -75,56 +51,6 @@ class WalkStep(NamedTuple):
 
 
 NO_CLEARANCE = 1.0e3
-
-
-def foot_direction(shank: float, angle: float) -> Direction:
-    """Direction of the foot at a shank angle and an ankle angle [rad]."""
-    sine, cosine = sine_and_cosine(ground.foot_angle(shank, angle) / TURN)
-    return Direction(sine, cosine)
-
-
-def leg_torque(
-    leg: LegParameters, share: DeviceShare, contact: float, now: GaitNow, angle: float, foot: Direction
-) -> float:
-    """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
-
-    The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the foot plate, and the ground
-    under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles,
-    so that a wearer who has all of them and no device walks the measured gait.
-    """
-    heel = ground.heel_torque(contact, now, leg.heel_lever)
-    muscles = now.healthy_torque - heel - passive_torque(leg, now.ankle)
-    wearer = leg.residual_share * muscles + passive_torque(leg, angle)
-    carried = torque_of_shank(
-        leg,
-        now.sine_shank,
-        now.cosine_shank,
-        foot.sine,
-        foot.cosine,
-        now.shank_rate,
-        now.shank_acceleration,
-        now.knee_forward,
-        now.knee_up,
-    )
-    return wearer + heel + plate_torque(leg, share, now, foot) - carried
-
-
-def plate_torque(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> float:
-    """Torque [N m] of foot plate and vane by their weight and the shank's motion, positive in plantarflexion."""
-    return -torque_of_shank_on(
-        share.mass_moment,
-        share.inertia,
-        leg.shank_length,
-        leg.gravity,
-        now.sine_shank,
-        now.cosine_shank,
-        foot.sine,
-        foot.cosine,
-        now.shank_rate,
-        now.shank_acceleration,
-        now.knee_forward,
-        now.knee_up,
-    )
 
 
 def begin_walk(

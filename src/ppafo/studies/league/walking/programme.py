@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run, Walk
-from ppafo.engine.scheme.walking import Direction, leg_torque
+from ppafo.engine.scheme.ankle_torque import Direction, leg_torque
 from ppafo.model.contact import QUARTER_TURN, foot_angle
 from ppafo.model.gait import GaitNow
 from ppafo.model.plant import PlantParameters, chamber_volumes
