@@ -1,5 +1,8 @@
 """Everything that ``ppafo league`` writes, as file contents by name."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import ppafo
 from ppafo.documents.json_text import json_text
 from ppafo.reporting.league_figure import league_figure
@@ -16,15 +19,19 @@ TEMPLATE = "league.html.jinja"
 
 def league_files(league: League) -> dict[str, bytes]:
     """Return every file: the table, the numbers, the figure, and the report with all of them."""
-    table = "\n".join(league_table(league))
     drawn = rendered(league_figure(league), FORMATS)
-    contents = {
-        "league.txt": f"{table}\n".encode(),
-        "league.json": f"{json_text(league_document(league))}\n".encode(),
-    }
+    report = league_report(league, drawn["svg"])
+    return contents_by_name(league_table(league), league_document(league), drawn, report)
+
+
+def contents_by_name(
+    table: Sequence[str], document: Mapping[str, Any], drawn: Mapping[str, bytes], report: str
+) -> dict[str, bytes]:
+    """Return the files of a league; ``drawn`` is its figure by format."""
+    text = "\n".join(table)
+    contents = {"league.txt": f"{text}\n".encode(), "league.json": f"{json_text(document)}\n".encode()}
     contents |= {f"league.{file_format}": content for file_format, content in drawn.items()}
-    contents[REPORT] = league_report(league, drawn["svg"]).encode()
-    return contents
+    return contents | {REPORT: report.encode()}
 
 
 INTRODUCTION = """Every controller was simulated on the device. Errors are in N m, gas in g. "Above least" is the

@@ -1,8 +1,7 @@
 """Everything that ``ppafo league --walk`` writes, as file contents by name."""
 
 import ppafo
-from ppafo.documents.json_text import json_text
-from ppafo.reporting.league_files import FORMATS, REPORT, TEMPLATE
+from ppafo.reporting.league_files import FORMATS, TEMPLATE, contents_by_name
 from ppafo.reporting.page import inline_figure, rendered_page
 from ppafo.reporting.style import rendered
 from ppafo.reporting.walking_league_document import walking_league_document
@@ -28,15 +27,9 @@ ground, by valve. The lines are for the wearer and device that are not drawn."""
 
 def walking_league_files(league: WalkingLeague) -> dict[str, bytes]:
     """Return every file: the table, the numbers, the figure, and the report with all of them."""
-    table = "\n".join(walking_league_table(league))
     drawn = rendered(walking_league_figure(league), FORMATS)
-    contents = {
-        "league.txt": f"{table}\n".encode(),
-        "league.json": f"{json_text(walking_league_document(league))}\n".encode(),
-    }
-    contents |= {f"league.{file_format}": content for file_format, content in drawn.items()}
-    contents[REPORT] = walking_league_report(league, drawn["svg"]).encode()
-    return contents
+    report = walking_league_report(league, drawn["svg"])
+    return contents_by_name(walking_league_table(league), walking_league_document(league), drawn, report)
 
 
 def walking_league_report(league: WalkingLeague, figure: bytes) -> str:
