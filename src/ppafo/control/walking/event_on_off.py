@@ -1,8 +1,8 @@
 """Event-based control of a pair of solenoid valves: each phase of the gait has its valve configuration.
 
-Landing and swing: the dorsiflexion side holds the foot up, at an angle within a band. Mid-stance: both chambers vented,
-free motion. Push-off: the plantarflexion side, vented again before the toes leave the ground, so that its gas does not
-hold the foot down in the swing. The functional tasks of figure 1A of the paper.
+Landing: the dorsiflexion side, against the slap. Swing: the same side holds the foot up, at an angle within a band.
+Mid-stance: both chambers vented, free motion. Push-off: the plantarflexion side, vented again before the toes leave
+the ground, so that its gas does not hold the foot down in the swing. The functional tasks of figure 1A of the paper.
 """
 
 from typing import NamedTuple
@@ -28,7 +28,7 @@ class EventOnOffParameters(NamedTuple):
 
 
 class EventOnOffState(NamedTuple):
-    """Phase, safety, and whether the dorsiflexion side is on (1)."""
+    """Phase, safety, and whether the foot is to be lifted (1)."""
 
     phase: PhaseState
     safety: SafetyState
@@ -49,7 +49,7 @@ def update(
     below = measurement.angle < parameters.swing_angle - parameters.band
     lifting = 0.0 if below else (1.0 if above else state.lifting)
     held = phases.lifts(phase.phase)
-    command = -1.0 if lifting > 0.5 else VENT
+    command = -1.0 if lifting > 0.5 or phase.phase == phases.LANDING else VENT
     command = command if held else VENT
     in_time = phase.since_strike < parameters.push_off_end * phase.stride_time
     command = 1.0 if phase.phase == phases.PUSH_OFF and in_time else command
