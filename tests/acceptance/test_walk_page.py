@@ -23,9 +23,11 @@ def test_the_commands_and_the_python_of_the_page_run(
     monkeypatch.chdir(tmp_path)
     commands = [line for block in blocks("sh") for line in block.splitlines()]
     assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 9
+    table = PAGE.partition("| In the folder |")[2].partition("\n\n")[0]
     listed = {
-        name for cell in re.findall(r"^\| (`.*?`) \|", PAGE, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)
+        name for cell in re.findall(r"^\| (`.*?`) \|", table, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)
     }
+    assert len(listed) > 6
     assert {name for name in listed if not (tmp_path / "out" / "walk" / name).is_file()} == set()
     capsys.readouterr()
     names: dict[str, Any] = {}
