@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from ppafo.model import contact as ground
 from ppafo.model.gait import GaitNow
-from ppafo.model.leg import LegParameters, passive_torque, torque_of_shank, torque_of_shank_on
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
 from ppafo.model.turns import TURN, sine_and_cosine
 
 
@@ -46,25 +46,20 @@ def leg_torque(
     heel = ground.heel_torque(contact, now, leg.heel_lever)
     muscles = now.healthy_torque - heel - passive_torque(leg, now.ankle)
     wearer = leg.residual_share * muscles + passive_torque(leg, angle)
-    carried = torque_of_shank(
-        leg,
-        now.sine_shank,
-        now.cosine_shank,
-        foot.sine,
-        foot.cosine,
-        now.shank_rate,
-        now.shank_acceleration,
-        now.knee_forward,
-        now.knee_up,
-    )
+    carried = carried_torque(leg, leg.foot_mass * leg.foot_mass_centre, foot_inertia_about_ankle(leg), now, foot)
     return wearer + heel + plate_torque(leg, share, now, foot) - carried
 
 
 def plate_torque(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> float:
     """Torque [N m] of foot plate and vane by their weight and the shank's motion, positive in plantarflexion."""
-    return -torque_of_shank_on(
-        share.mass_moment,
-        share.inertia,
+    return -carried_torque(leg, share.mass_moment, share.inertia, now, foot)
+
+
+def carried_torque(leg: LegParameters, mass_moment: float, inertia: float, now: GaitNow, foot: Direction) -> float:
+    """Torque [N m] that shank, knee and weight ask of the ankle for a body on the foot: see ``torque_of_shank_on``."""
+    return torque_of_shank_on(
+        mass_moment,
+        inertia,
         leg.shank_length,
         leg.gravity,
         now.sine_shank,
