@@ -16,7 +16,7 @@ def course_lines(rows: LaneRows) -> list[str]:
     given = [rows.load("timing"), rows.load("reference")]
     ends = [
         *given,
-        f"{cell['last']} = {_value(rows, 'steps_in_all')}",
+        f"{cell['last']} = {_value(rows, 'last_record')}",
         f"{cell['largest']} = max(abs({_value(rows, '0')}), abs({cell['last']}))",
         f"{cell['hold_start']} = 0.0",
     ]
@@ -24,13 +24,13 @@ def course_lines(rows: LaneRows) -> list[str]:
     if rows.program.reference.is_monotone:
         return [*over_lanes(ends), *tolerance]
     away = f"{rows.add(is_away)}({_value(rows, 'index')}, {cell['last']}, {cell['tolerance']})"
-    found = f"index / measure_every + 1.0 if {cell['hold_start']} == 0.0 and {away} else {cell['hold_start']}"
+    found = f"index + 1.0 if {cell['hold_start']} == 0.0 and {away} else {cell['hold_start']}"
     return [
         *over_lanes(ends),
-        "for index in range(0, steps_in_all, measure_every):",
+        "for index in range(last_record):",
         *indented(over_lanes([*given, f"{cell['largest']} = max({cell['largest']}, abs({_value(rows, 'index')}))"])),
         *tolerance,
-        "for index in range(steps_in_all - measure_every, -1, -measure_every):",
+        "for index in range(last_record - 1, -1, -1):",
         *indented(over_lanes([*given, f"{cell['hold_start']} = {found}"])),
         "    earliest = 1.0",
         *indented(over_lanes([f"earliest = min(earliest, {cell['hold_start']})"])),
@@ -52,5 +52,5 @@ def follow_lines(rows: LaneRows) -> list[str]:
     ]
 
 
-def _value(rows: LaneRows, step: str) -> str:
-    return f"{rows.add(rows.program.reference.value)}(reference, {step} * timing.step)[0]"
+def _value(rows: LaneRows, number: str) -> str:
+    return f"{rows.add(rows.program.reference.value)}(reference, {number} * interval * timing.step)[0]"

@@ -1,6 +1,6 @@
 """What the lanes do at a recorded sample where nothing is recorded: meters, and traces of some channels.
 
-Samples are the ones that a recording would have: step 0, every ``measure_every`` steps, and the end of the run.
+Samples are the ones that a recording would have.
 """
 
 from ppafo.engine.lane_course import course_lines, follow_lines
@@ -16,12 +16,12 @@ TRACED: dict[str, str] = {
 """Channels that can be traced, and where a sample has them."""
 
 
-def measure_loop(rows: LaneRows) -> list[str]:
-    """Meters and traces at every sample."""
-    return [*_meter_lines(rows), *_trace_lines(rows)]
+def measure_sample(rows: LaneRows, moment: str) -> list[str]:
+    """Meters and traces of sample ``next_record`` at ``moment``, counted in steps."""
+    return [*_meter_lines(rows, moment), *_trace_lines(rows, moment)]
 
 
-def _meter_lines(rows: LaneRows) -> list[str]:
+def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
     program, add = rows.program, rows.add
     if not program.meters:
         return []
@@ -32,38 +32,36 @@ def _meter_lines(rows: LaneRows) -> list[str]:
     update = [rows.load(group) for group in moving]
     update += [f"{group} = {add(kind.update)}({group}, course, sample)" for group, kind in moving.items()]
     update += [line for group in moving for line in rows.store(group)]
-    follow = follow_lines(rows)
+    lines = [*sample_lines(rows, moment), *follow_lines(rows)]
     return [
-        "if step_index % measure_every == 0:",
-        "    if step_index == 0:",
-        *indented(course_lines(rows), 2),
-        *indented(over_lanes([*sample_lines(rows), *follow, *begin]), 2),
-        "    else:",
-        *indented(over_lanes([*sample_lines(rows), *follow, *update]), 2),
+        "if next_record == 0:",
+        *indented([*course_lines(rows), *over_lanes([*lines, *begin])]),
+        "else:",
+        *indented(over_lanes([*lines, *update])),
     ]
 
 
-def sample_lines(rows: LaneRows) -> list[str]:
+def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     """Lines that make the sample of a lane."""
     add, program = rows.add, rows.program
     pressures = add(chamber_pressures_in_one_division)
-    wanted = f"{add(program.reference.value)}(reference, step_index * timing.step)[0]"
+    wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]"
     return [
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference")],
         f"pressure_1, pressure_2 = {pressures}(plant, state.angle, state.mass_1, state.mass_2)",
         f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
         f"wanted = {wanted if program.has_reference else '0.0'}",
-        f"sample = {add(Sample)}(step_index / measure_every, state.angle, state.angular_velocity, pressure_1, "
+        f"sample = {add(Sample)}(float(next_record), state.angle, state.angular_velocity, pressure_1, "
         "pressure_2, torque, result.command, wanted)",
     ]
 
 
-def _trace_lines(rows: LaneRows) -> list[str]:
+def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
     traced = rows.program.traced
     if not traced:
         return []
-    keep = [f"trace[step_index // trace_every, {row}, lane] = {TRACED[name]}" for row, name in enumerate(traced)]
+    keep = [f"trace[next_record // trace_every, {row}, lane] = {TRACED[name]}" for row, name in enumerate(traced)]
     return [
-        "if step_index % trace_every == 0:",
-        *indented(over_lanes([*sample_lines(rows), *keep])),
+        "if next_record % trace_every == 0:",
+        *indented(over_lanes([*sample_lines(rows, moment), *keep])),
     ]

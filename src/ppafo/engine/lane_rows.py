@@ -15,6 +15,10 @@ FIRST_CACHE = 48 * 1024
 """Bytes of the first-level data cache of a core; a block that does not fit takes half as many runs."""
 
 
+OWN_ROWS = 4
+"""Rows of the parts of a step: length of a part, time before it and after its begin [s], error of its gas [-]."""
+
+
 @lru_cache(maxsize=64)
 def lanes_of(program: Program) -> int:
     """Runs of one block of a program."""
@@ -25,7 +29,7 @@ def lanes_of(program: Program) -> int:
 
 @final
 class LaneRows:
-    """Where each number of a program lies in the rows of ``x``: state, parameters, what a step hands on, part lengths.
+    """Where each number of a program lies in the rows of ``x``: state, parameters, what a step hands on, its parts.
 
     One array for all of them lets the compiler see that no two rows overlap.
     """
@@ -38,9 +42,10 @@ class LaneRows:
         self.step_at = _row_numbers(program.step_rows(), len(self.state_at) + len(self.parameter_at))
         numbered = self.state_at | self.parameter_at | self.step_at
         self.cells = {path: f"x[{row}, lane]" for path, row in numbered.items()}
-        self.length = f"x[{len(numbered)}, lane]"
-        self.before = f"x[{len(numbered) + 1}, lane]"
-        self.count = len(numbered) + 2
+        self.length, self.before, self.remaining, self.error = (
+            f"x[{len(numbered) + place}, lane]" for place in range(OWN_ROWS)
+        )
+        self.count = len(numbered) + OWN_ROWS
 
     def load(self, group: str) -> str:
         """Line that makes the NamedTuple ``group`` from its rows."""
@@ -48,19 +53,22 @@ class LaneRows:
         row = groups[group]
         return f"{group} = {row_expression(row, group, self.cells, self.add)}"
 
-    def store(self, group: str) -> list[str]:
-        """Lines that write the NamedTuple ``group`` back to its rows."""
-        paths = leaf_paths(self.program.state_rows()[group], group)
-        return [f"x[{self.state_at[path]}, lane] = {path}" for path in paths]
+    def store(self, group: str, name: str = "", flag: str = "") -> list[str]:
+        """Lines that write the NamedTuple ``name`` (or ``group``) to the rows of ``group``; a flag may forbid it."""
+        lines = []
+        for path in leaf_paths(self.program.state_rows()[group], group):
+            value = (name or group) + path.removeprefix(group)
+            lines.append(f"x[{self.state_at[path]}, lane] = {value}" + (f" if {flag} else {path}" if flag else ""))
+        return lines
 
     def keep(self, *names: str) -> list[str]:
         """Lines that keep what a phase hands on to the next ones of the step, by group."""
         groups = self.program.step_rows()
         return [f"{self.cells[path]} = {path}" for name in names for path in leaf_paths(groups[name], name)]
 
-    def load_step(self) -> list[str]:
-        """Lines that load all that earlier phases of the step handed on."""
-        return [self.load(name) for name in self.program.step_rows()]
+    def load_first_stage(self) -> list[str]:
+        """Lines that load what the first stage of the gas handed on."""
+        return [self.load(name) for name in ("begun", "gas", "shown")]
 
 
 def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:

@@ -1,8 +1,8 @@
 """Writes the source of the lane loop of one program: loads, calls and stores, with the rows as literals."""
 
 from ppafo.engine.lane_control import control_loop, remember_commands, remember_signals
-from ppafo.engine.lane_meters import measure_loop
-from ppafo.engine.lane_rows import LaneRows, indented, lanes_of
+from ppafo.engine.lane_meters import measure_sample
+from ppafo.engine.lane_rows import LaneRows, indented, lanes_of, over_lanes
 from ppafo.engine.lane_step import plant_loop
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
@@ -20,12 +20,14 @@ FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}
 INLINE = '@njit(forceinline=True, fastmath=FAST, error_model="numpy")'
 SIGNATURE = (
     '"void(float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], '
-    'float64[:, :, ::1], int64, int64, int64, int64, int64, int64, int64, int64, int64)"'
+    'float64[:, :, ::1], int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)"'
 )
 COMPILED = f'@njit({SIGNATURE}, cache=True, nogil=True, fastmath=FAST, error_model="numpy")'
+SAME_MOMENT = 1.0e-9
+"""Shares of a step that are taken to be one instant."""
 ARGUMENTS = (
     "states, parameters, signal_history, command_history, record, trace, "
-    "first_step, step_count, steps_in_all, steps_per_sample, record_every, measure_every, trace_every, "
+    "first_step, step_count, steps_in_all, steps_per_sample, interval, last_record, next_record, trace_every, "
     "signal_delay, command_delay"
 )
 
@@ -34,7 +36,6 @@ def lane_source(program: Program) -> str:
     """Source text of the module whose ``advance`` runs one block of this program."""
     collector = SourceCollector(INLINE)
     rows = LaneRows(program, collector)
-    loop = measured_steps(rows) if program.is_metered else plain_steps(rows)
     body = [
         COMPILED,
         f"def advance({ARGUMENTS}):",
@@ -44,7 +45,7 @@ def lane_source(program: Program) -> str:
                 "width = states.shape[1]",
                 *_copy("x", 0, "states", 0, len(rows.state_at)),
                 *_copy("x", len(rows.state_at), "parameters", 0, len(rows.parameter_at)),
-                *loop,
+                *all_steps(rows),
                 *_copy("states", 0, "x", 0, len(rows.state_at)),
             ]
         ),
@@ -52,37 +53,53 @@ def lane_source(program: Program) -> str:
     return f"{HEADER}\n\n{collector.text()}\n\n\n" + "\n".join(body) + "\n"
 
 
-def plain_steps(rows: LaneRows) -> list[str]:
-    """The loop over steps."""
+def all_steps(rows: LaneRows) -> list[str]:
+    """The loop over steps, and the sample at the end of the run.
+
+    Samples are ``interval`` steps apart, the first at 0 and the last with number ``last_record``. Most programs meet
+    them at the beginning of a step; where they lie between, a step is done from one to the next.
+    """
+    whole = [*at_sample(rows, "step_index"), *plant_loop(rows)]
+    step = between_samples(rows) if rows.program.samples_inside else whole
+    start = over_lanes([f"{rows.before} = 0.0"]) if rows.program.is_parted else []
     return [
+        "due = next_record * interval",
+        "goal = 1.0",
         "for step_index in range(first_step, first_step + step_count):",
-        *indented([*begin_step(rows), *plant_loop(rows)]),
+        *indented([*remember_signals(rows), *control_loop(rows), *remember_commands(rows), *start, *step]),
+        "if first_step + step_count == steps_in_all:",
+        "    step_index = steps_in_all",
+        *indented(at_sample(rows, "step_index")),
     ]
 
 
-def measured_steps(rows: LaneRows) -> list[str]:
-    """The loop over steps with meters; the last call goes round once more, for the sample at the end of the run."""
+def between_samples(rows: LaneRows) -> list[str]:
+    """A step in which samples are due anywhere."""
     return [
-        "last_step = first_step + step_count",
-        "for step_index in range(first_step, last_step + 1 if last_step == steps_in_all else last_step):",
-        "    if step_index < steps_in_all:",
-        *indented(begin_step(rows), 2),
-        *indented(measure_loop(rows)),
-        "    if step_index < steps_in_all:",
-        *indented(plant_loop(rows), 2),
+        "reached = 0.0",
+        "while reached < 1.0:",
+        *indented(at_sample(rows, "(step_index + reached)")),
+        f"    goal = due - step_index if due < step_index + {1.0 - SAME_MOMENT!r} else 1.0",
+        *indented(plant_loop(rows)),
+        "    reached = goal",
     ]
 
 
-def begin_step(rows: LaneRows) -> list[str]:
-    """What happens at the beginning of a step, before time goes on."""
-    return [*remember_signals(rows), *control_loop(rows), *RECORD, *remember_commands(rows)]
+def at_sample(rows: LaneRows, moment: str) -> list[str]:
+    """What is done at a sample, if one is due at ``moment``, counted in steps."""
+    take = measure_sample(rows, moment) if rows.program.is_metered else RECORD
+    return [
+        f"if next_record <= last_record and due <= {moment} + {SAME_MOMENT!r}:",
+        *indented(take),
+        "    next_record += 1",
+        "    due = next_record * interval",
+    ]
 
 
 RECORD = [
-    "if record_every > 0 and step_index % record_every == 0:",
-    "    for row in range(record.shape[1]):",
-    "        for lane in range(record.shape[2]):",
-    "            record[step_index // record_every, row, lane] = x[row, lane]",
+    "for row in range(record.shape[1]):",
+    "    for lane in range(record.shape[2]):",
+    "        record[next_record, row, lane] = x[row, lane]",
 ]
 
 

@@ -1,4 +1,10 @@
-"""What the lanes do in a step: valve, gas and vane, whole or in parts where something changes abruptly inside it."""
+"""What the lanes do between two samples: valve, gas and vane, over a whole step or in parts of it.
+
+A step is whole where nothing changes abruptly inside it and its error is known to be small: the gas of a held vane
+behind a valve that follows at once. Otherwise each lane goes through it in parts of its own. A part ends where a coil
+switches, a late command arrives, the vane meets a stop, a sample is due, or its error would become too large. Lanes
+that are through wait, masked, and no lane sees another.
+"""
 
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
 from ppafo.engine.scheme import motion, parts, pneumatics, supply_lines, thermal_gas, walking
@@ -6,29 +12,19 @@ from ppafo.model.gait import gait_at
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
-
-MOST_PARTS = 16
-"""More parts than a step may sensibly have: two coils, each with an order and a change, several times over."""
-
-
-def skip_empty(rows: LaneRows) -> list[str]:
-    """Lines that end the parts of a step where no lane has anything left."""
-    return [
-        "longest = 0.0",
-        "for lane in range(width):",
-        f"    longest = max(longest, {rows.length})",
-        "if longest == 0.0:",
-        "    break",
-    ]
+MOST_PARTS = 100_000
 
 
 def plant_loop(rows: LaneRows) -> list[str]:
-    """Valve, gas and vane, one step: whole, or in parts where something changes abruptly inside it."""
-    if rows.program.late_commands:
-        return late_loop(rows)
-    if rows.program.valve.jumps:
-        return jump_loop(rows)
-    return part(rows, [*opening(rows), "length = timing.step"])
+    """Valve, gas and vane up to ``goal`` [-], a share of the step; 1 for programs that are not parted."""
+    if rows.program.is_parted:
+        return parted_step(rows)
+    return over_phases([*opening(rows), "length = timing.step"], phases(rows))
+
+
+def over_phases(prelude: list[str], all_phases: list[list[str]]) -> list[str]:
+    """Each phase in a loop of its own: loops this short let the processor work on several lanes at once."""
+    return [line for phase in all_phases for line in over_lanes([*prelude, *phase])]
 
 
 def opening(rows: LaneRows) -> list[str]:
@@ -40,83 +36,77 @@ def opening(rows: LaneRows) -> list[str]:
     return [*[rows.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
 
 
-def jump_loop(rows: LaneRows) -> list[str]:
-    """As many parts as the valve's jumps ask for; a part that no lane needs ends the step.
-
-    Two rows keep the length of a part and the time before it, from the beginning of the step.
-    """
-    valve = rows.program.valve
-    functions = f"{rows.add(valve.next_event)}, {rows.add(valve.settle)}"
-    measure = [
-        *opening(rows),
-        f"before = {rows.before}",
-        "remaining = timing.step - before",
-        f"until = {rows.add(parts.part_length)}(valve, valve_state, command, time + before, remaining, {functions})",
-        f"{rows.length} = remaining if part == {MOST_PARTS - 1} else until",
-    ]
-    begin = [f"length = {rows.length}", f"time += {rows.before}"]
-    # The end of the last part is the end of the step to the last bit, so that no sliver is left over.
-    add_up = [
-        f"step = {rows.cells['timing.step']}",
-        f"whole = {rows.length} >= step - {rows.before}",
-        f"{rows.before} = step if whole else {rows.before} + {rows.length}",
-    ]
-    return [
-        *over_lanes([f"{rows.before} = 0.0"]),
-        f"for part in range({MOST_PARTS}):",
-        *indented(over_lanes(measure)),
-        *indented(skip_empty(rows)),
-        *indented(part(rows, [*opening(rows), *begin])),
-        *indented(over_lanes(add_up)),
-    ]
-
-
-def late_loop(rows: LaneRows) -> list[str]:
-    """Two parts, before and after a late command arrives; the first is passed over where no lane has it."""
-    lag = f"{rows.cells['timing.command_lag']} * {rows.cells['timing.step']}"
-    before = [
-        *opening(rows),
-        rows.load("early_valve"),
-        "valve = early_valve",
-        f"length = {rows.length}",
-        "command = command_history[place_before, lane]",
-    ]
-    after = [
-        *opening(rows),
-        "time += timing.command_lag * timing.step",
-        "length = timing.step - timing.command_lag * timing.step",
-        "command = command_history[place_after, lane]",
-    ]
-    return [
+def parted_step(rows: LaneRows) -> list[str]:
+    """As many parts as the lane with the most of them needs; places of late commands are the same for all lanes."""
+    places = [
         "place_before = (step_index - command_delay - 1) % command_history.shape[0]",
         "place_after = (step_index - command_delay) % command_history.shape[0]",
-        "for lane in range(width):",
-        f"    {rows.length} = {lag}",
-        "for part in range(1):",
-        *indented(skip_empty(rows)),
-        *indented(part(rows, before)),
-        *part(rows, after),
+    ]
+    inside = [*part_opening(rows), f"length = {rows.length}"]
+    return [
+        *(places if rows.program.late_commands else []),
+        f"for part in range({MOST_PARTS}):",
+        *indented(over_lanes([*part_opening(rows), *measure(rows)])),
+        *indented(over_phases(inside, phases(rows))),
+        "    longest = 0.0",
+        "    for lane in range(width):",
+        f"        longest = max(longest, {rows.remaining})",
+        "    if longest == 0.0:",
+        "        break",
     ]
 
 
-def part(rows: LaneRows, prelude: list[str]) -> list[str]:
-    """Valve, gas and vane over ``length`` [s] from ``time`` [s], both set by ``prelude``.
+def part_opening(rows: LaneRows) -> list[str]:
+    """Lines that load what a part needs, and the command that the valve has in it."""
+    lines = [*opening(rows), rows.load("pace"), f"before = {rows.before}", "time += before"]
+    if rows.program.late_commands:
+        lines += [
+            f"until_command = timing.command_lag * timing.step - before - {parts.SAME_INSTANT!r}",
+            "early = command_history[place_before, lane]",
+            "command = early if until_command > 0.0 else command_history[place_after, lane]",
+        ]
+    return lines
 
-    Each phase is a loop of its own: loops this short let the processor work on several lanes at once.
-    """
-    kept = rows.keep("gas", "shown") if rows.program.walks else rows.keep(*rows.program.step_rows())
-    phases = [*lead_walk(rows), [*begin(rows), *kept, *rows.store("valve_state")], [*feed(rows), *rows.store("state")]]
-    if rows.program.angle is None:
-        phases.append([*rows.load_step(), *end_free(rows), *rows.store("state")])
-    phases[-1] += judge(rows)
-    return [line for phase in phases for line in over_lanes([*prelude, *phase])]
+
+def measure(rows: LaneRows) -> list[str]:
+    """Lines that find the length of a part; where the vane is free, until it meets a stop."""
+    program, add = rows.program, rows.add
+    lines = ["remaining = max(goal * timing.step - before, 0.0)", "until = remaining"]
+    if program.late_commands:
+        arrival = f"until_command + {parts.SAME_INSTANT!r}"
+        lines.append(f"until = min(until, {arrival}) if until_command > 0.0 else until")
+    if program.valve.jumps:
+        functions = f"{add(program.valve.next_event)}, {add(program.valve.settle)}"
+        lines.append(f"until = {add(parts.until_jump)}(valve, valve_state, command, time, until, {functions})")
+    if program.is_adaptive:
+        hurries = "remaining == 0.0 or result.failure_time <= time"
+        lines.append(f"until = remaining if {hurries} else {add(parts.paced)}(pace, until)")
+        if program.angle is None:
+            lines.append(f"begun, until = {add(motion.begin_part)}(plant, state, until)")
+            lines += rows.keep("begun")
+    return [*lines, f"{rows.length} = until", f"{rows.remaining} = remaining"]
+
+
+def phases(rows: LaneRows) -> list[list[str]]:
+    """Both stages of the gas over ``length`` [s] from ``time`` [s], what leads to them, and the state at the end."""
+    program = rows.program
+    is_free = program.angle is None
+    kept = rows.keep("gas", "shown") if is_free else rows.keep("begun", "gas", "shown")
+    valve_state = rows.keep("next_valve") if program.is_adaptive else rows.store("valve_state")
+    before = [*lead_walk(rows), [*begin(rows), *kept, *valve_state]]
+    if not is_free:
+        return [*before, [*feed(rows), *finish(rows)]]
+    error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
+    loaded = [rows.load("begun"), rows.load("change"), f"gas_error = {rows.error}"]
+    return [*before, [*feed(rows), *rows.keep("change"), *error], [*loaded, *finish(rows)]]
 
 
 def begin(rows: LaneRows) -> list[str]:
     """The valve, and the first stage of the step."""
     valve, add = rows.program.valve, rows.add
+    after = "next_valve" if rows.program.is_adaptive else "valve_state"
     return [
-        f"shown, valve_state = {add(valve.advance)}(valve, valve_state, command, time, length)",
+        f"shown, {after} = {add(valve.advance)}(valve, valve_state, command, time, length)",
         connect(rows, "line_state"),
         *lead(rows),
         begin_gas(rows),
@@ -149,12 +139,9 @@ def lead(rows: LaneRows) -> list[str]:
     if program.walks:
         return [rows.load("begun"), f"next_angle = {add(walking.next_angle)}(plant, walk, begun)"]
     if program.angle is None:
-        return [
-            f"begun = {add(motion.begin_free)}(plant, state, 0.0, length)",
-            f"next_angle = {add(motion.bounded)}(plant, begun.free_angle)",
-        ]
+        return [rows.load("begun"), "next_angle = begun.next_angle"]
     if program.is_held:
-        return ["next_angle = state.angle"]
+        return ["next_angle = state.angle", "begun = ()"]
     return [
         rows.load("path"),
         f"next_angle, next_rate, _ = {add(program.angle.value)}(path, time + length)",
@@ -176,52 +163,124 @@ def begin_gas(rows: LaneRows) -> str:
 
 
 def feed(rows: LaneRows) -> list[str]:
-    """The second stage: the gas of the step, and where a led vane is at its end."""
-    add = rows.add
-    lines = [*rows.load_step(), connect(rows, "gas.lines.after"), *end_gas(rows)]
-    if rows.program.angle is not None and not rows.program.is_held:
-        lines.append(f"state = {add(motion.with_motion)}(state, begun.next_angle, begun.next_rate)")
-    return lines
-
-
-def end_gas(rows: LaneRows) -> list[str]:
-    """The second stage of the gas, and the state with it."""
+    """The second stage: the gas of the step, and in parts that may be refused the error of the gas."""
     program, add = rows.program, rows.add
+    lines = [*rows.load_first_stage(), connect(rows, "gas.lines.after")]
     given = f"port_1, port_2, length, {add(program.valve.port_flow)}"
-    if program.is_thermal:
-        return [
-            f"change = {add(thermal_gas.end_thermal_gas)}(plant, thermal, gas, {given})",
-            f"state, masses = {add(thermal_gas.with_thermal_gas)}(state, masses, change)",
-            *rows.store("masses"),
-        ]
     if program.has_lines:
         given_2 = f"port_2, length, {add(program.valve.port_flow)}"
         return [
+            *lines,
             f"change = {add(pneumatics.end_moving_gas)}(plant, gas.chambers, {given})",
             f"line_state = {add(supply_lines.end_lines)}(plant, lines, line_state, gas, change, {given_2})",
-            f"state = {add(motion.with_gas)}(state, change)",
             *rows.store("line_state"),
         ]
-    end = pneumatics.end_still_gas if program.is_held else pneumatics.end_moving_gas
-    return [f"change = {add(end)}(plant, gas, {given})", f"state = {add(motion.with_gas)}(state, change)"]
+    if program.is_thermal:
+        lines += [f"second = {add(thermal_gas.second_thermal_stage)}(plant, thermal, gas, {given})"]
+        lines += [f"change = {add(thermal_gas.both_thermal_stages)}(gas.first, second, length)"]
+        error = f"{add(thermal_gas.thermal_error)}(plant, gas, second, length)"
+        shifted = f"{add(thermal_gas.thermal_opening_error)}(plant, gas, shift, length)"
+    else:
+        still = "gas" if program.is_held else "gas.still"
+        stage = pneumatics.second_still_stage if program.is_held else pneumatics.second_moving_stage
+        flow = add(program.valve.port_flow)
+        next_angle = "state.angle" if program.is_held else "begun.next_angle"
+        lines += [f"second = {add(stage)}(plant, gas, port_1, port_2, {flow})"]
+        lines += [f"change = {add(pneumatics.both_stages)}({still}.first, second, length)"]
+        error = f"{add(pneumatics.gas_error)}(plant, {still}, second, {next_angle}, length)"
+        shifted = f"{add(pneumatics.opening_error)}(plant, {still}, shift, {next_angle}, length)"
+    if not program.is_adaptive:
+        return lines
+    moves = program.valve.shift
+    if moves is not None:
+        lines += [rows.load("next_valve"), f"shift = {add(moves)}(valve_state, next_valve)"]
+    return [*lines, f"gas_error = {error}" + (f" + {shifted}" if moves else "")]
 
 
-def end_free(rows: LaneRows) -> list[str]:
-    """Where a free vane is at the end."""
-    if not rows.program.walks:
-        return [f"state = {rows.add(motion.end_free)}(plant, state, begun, 0.0, length)"]
-    follow = rows.cells["gait_sensors.follow_rate"]
-    given = f"plant, leg, share, gait_timing, {follow}, state, walk, begun, next_gait, length"
-    return [f"state, walk = {rows.add(walking.end_walk)}({given})", *rows.store("walk")]
-
-
-def judge(rows: LaneRows) -> list[str]:
-    """The first time at which a run left what is possible."""
-    counted = ["state.mass_1", "state.mass_2"]
-    counted += ["masses.mass_1", "masses.mass_2"] if rows.program.is_thermal else []
-    gas = ", ".join(counted)
+def finish(rows: LaneRows) -> list[str]:
+    """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
+    program, add = rows.program, rows.add
+    lines = [*with_gas(rows), *end_motion(rows)]
+    if not program.is_adaptive:
+        lines += store_all(rows, "")
+        lines += [*judge(rows), *(add_up(rows) if program.is_parted else [])]
+        return lines
     return [
-        f"possible = (abs(state.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
+        *lines,
+        rows.load("next_valve"),
+        "error = max(error, gas_error) / timing.tolerance",
+        f"error = error if {positive(rows)} else {parts.MOST_ERROR!r}",
+        f"refused = {add(parts.is_refused)}(error, length) and not result.failure_time <= time",
+        f"next_length = {add(parts.next_pace)}(pace, error, length, refused, timing.step).length",
+        f"active = {rows.remaining} > 0.0",
+        f"{rows.cells['pace.length']} = next_length if active else pace.length",
+        "taken = active and not refused",
+        *store_all(rows, "taken"),
+        *judge(rows, "taken"),
+        *add_up(rows, "taken"),
+    ]
+
+
+def with_gas(rows: LaneRows) -> list[str]:
+    """Lines that add the gas of the step: ``fed``, and ``warmed`` for the true masses."""
+    if rows.program.is_thermal:
+        return [f"fed, warmed = {rows.add(thermal_gas.with_thermal_gas)}(state, masses, change)"]
+    return [f"fed = {rows.add(motion.with_gas)}(state, change)"]
+
+
+def end_motion(rows: LaneRows) -> list[str]:
+    """Lines that lead to the state ``after`` the step, and in parts to the ``error`` of the motion."""
+    program, add = rows.program, rows.add
+    if program.walks:
+        follow = rows.cells["gait_sensors.follow_rate"]
+        given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, next_gait, length"
+        return [rows.load("next_gait"), f"after, walk = {add(walking.end_walk)}({given})", *rows.store("walk")]
+    if program.angle is None:
+        lines = [f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, length)"]
+        if program.is_thermal:
+            lines.append(f"fed = {add(thermal_gas.after_motion)}(plant, thermal, fed, begun.next_angle, angle)")
+        return [*lines, f"after = {add(motion.with_motion)}(fed, angle, rate)"]
+    if program.is_held:
+        return ["after = fed", "error = 0.0"]
+    return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]
+
+
+def store_all(rows: LaneRows, flag: str) -> list[str]:
+    """Lines that write the new state, where ``flag`` names a condition only under it."""
+    lines = rows.store("state", "after", flag)
+    if rows.program.is_thermal:
+        lines += rows.store("masses", "warmed", flag)
+    if rows.program.is_adaptive:
+        lines += rows.store("valve_state", "next_valve", flag)
+    return lines
+
+
+def positive(rows: LaneRows) -> str:
+    """Condition that no mass is lost; false for what is no number."""
+    names = ["after.mass_1", "after.mass_2"]
+    names += ["warmed.mass_1", "warmed.mass_2"] if rows.program.is_thermal else []
+    return " and ".join(f"{name} > 0.0" for name in names)
+
+
+def add_up(rows: LaneRows, flag: str = "") -> list[str]:
+    """Lines that count the time of a part; the end of the last one is the goal to the last bit."""
+    arrives = f"length >= {rows.remaining}" + (f" and {flag}" if flag else "")
+    moved = f"length if {flag} else 0.0" if flag else "length"
+    return [
+        f"arrives = {arrives} or {rows.remaining} == 0.0",
+        f"{rows.before} = goal * timing.step if arrives else before + ({moved})",
+        f"{rows.remaining} = 0.0 if arrives else {rows.remaining}",
+    ]
+
+
+def judge(rows: LaneRows, flag: str = "") -> list[str]:
+    """The first time at which a run left what is possible."""
+    counted = ["after.mass_1", "after.mass_2"]
+    counted += ["warmed.mass_1", "warmed.mass_2"] if rows.program.is_thermal else []
+    gas = ", ".join(counted)
+    waits = f"not {flag} or " if flag else ""
+    return [
+        f"possible = {waits}(abs(after.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
         f"and max({gas}) < {IMPOSSIBLE_MASS})",
         "failed = result.failure_time if possible else min(result.failure_time, time + length)",
         f"{rows.cells['result.failure_time']} = failed",

@@ -4,6 +4,7 @@ A run's result does not depend on its block, its place in it or the number of th
 through the same instructions and no lane sees another.
 """
 
+import math
 import os
 import threading
 from collections.abc import Callable, Sequence
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from ppafo.engine.cache import load_generated
 from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lane_source import lane_source
+from ppafo.engine.lane_source import SAME_MOMENT, lane_source
 from ppafo.engine.program import Program
 
 Floats = NDArray[np.float64]
@@ -31,19 +32,31 @@ VECTOR = 8
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Whole numbers that all runs of a batch share; delays are in steps, ``record_every`` 0 records nothing.
+    """Numbers that all runs of a batch share; delays are in steps, ``record_every`` 0 records nothing.
 
-    ``measure_every`` is the number of steps between two samples of the meters; every ``trace_every`` steps, a multiple
-    of it, the traced channels are kept, 0 for never. Both are for programs that are metered, which record nothing.
+    ``record_every`` is the number of steps between two recorded samples, whole unless the program has samples inside
+    its steps. Programs that are metered record nothing: ``measure_every`` is the same for their meters, and every
+    ``trace_every`` samples the traced channels are kept, 0 for never.
     """
 
     step_count: int
     steps_per_sample: int
-    record_every: int
+    record_every: float
     signal_delay: int
     command_delay: int
-    measure_every: int = 1
+    measure_every: float = 0.0
     trace_every: int = 0
+
+    @property
+    def samples(self) -> int:
+        """Number of recorded or measured samples, the first and the last among them."""
+        interval = self.record_every or self.measure_every
+        return samples_in(self.step_count, interval) if interval else 0
+
+
+def samples_in(steps: int, interval: float) -> int:
+    """Number of samples every ``interval`` steps from step 0 to a number of steps, both among them."""
+    return math.floor((steps + SAME_MOMENT) / interval) + 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,9 +155,9 @@ class LaneBlock:
         self._next_step = 0
         self._parameters = _filled(parameters)
         self.states = _filled(states)
-        records = clock.step_count // clock.record_every + 1 if clock.record_every else 0
+        records = clock.samples if clock.record_every else 0
         self._record = np.empty((records, states.shape[0], self._width))
-        traces = clock.step_count // clock.trace_every + 1 if clock.trace_every else 0
+        traces = (clock.samples - 1) // clock.trace_every + 1 if clock.trace_every else 0
         self._trace = np.empty((traces, traced, self.states.shape[1]))
         self._signals = np.zeros((3, clock.signal_delay + 2, self.states.shape[1]))
         self._commands = np.zeros((clock.command_delay + 2, self.states.shape[1]))
@@ -152,6 +165,8 @@ class LaneBlock:
     def advance(self, step_count: int) -> None:
         """Go ``step_count`` steps on."""
         clock = self._clock
+        interval = float(clock.record_every or clock.measure_every)
+        taken = math.ceil((self._next_step - SAME_MOMENT) / interval) if interval else 0
         self._module.advance(
             self.states,
             self._parameters,
@@ -163,8 +178,9 @@ class LaneBlock:
             step_count,
             clock.step_count,
             clock.steps_per_sample,
-            clock.record_every,
-            clock.measure_every,
+            interval,
+            clock.samples - 1,
+            max(0, taken),
             clock.trace_every,
             clock.signal_delay,
             clock.command_delay,
@@ -175,17 +191,9 @@ class LaneBlock:
         """Change some parameters of all runs from the next step on; ``rows`` as ``Program.parameter_rows`` has them."""
         self._parameters[rows] = values[:, None]
 
-    def past(self, step: int) -> Floats:
-        """States (rows, runs) at the beginning of an earlier step; every step must be recorded. Step 0 before that."""
-        step = max(0, step)
-        return self.states[:, : self._width] if step >= self._next_step else self._record[step]
-
     def result(self) -> BatchResult:
-        """States and record so far; the last record is the present state where it is due."""
-        clock = self._clock
-        if clock.record_every and self._next_step % clock.record_every == 0:
-            self._record[self._next_step // clock.record_every] = self.states[:, : self._width]
-        record = self._trace[:, :, : self._width] if clock.trace_every else self._record
+        """States and record so far."""
+        record = self._trace[:, :, : self._width] if self._clock.trace_every else self._record
         return BatchResult(self.states[:, : self._width].copy(), record)
 
 

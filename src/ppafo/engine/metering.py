@@ -16,7 +16,7 @@ def metered(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (
     """The batch with meters at every sample that it would record, and traces of channels every so many samples."""
     program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
     clock, interval = batch.clock, batch.clock.record_every
-    clock = replace(clock, record_every=0, measure_every=interval, trace_every=trace_every * interval)
+    clock = replace(clock, record_every=0, measure_every=interval, trace_every=trace_every)
     rows = sum(len(leaf_paths(row, name)) for name, row in program.state_rows().items())
     states = np.zeros((rows, batch.states.shape[1]))
     states[: batch.states.shape[0]] = batch.states

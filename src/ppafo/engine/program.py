@@ -7,10 +7,11 @@ from ppafo.control.controllers import constant as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import constant
 from ppafo.engine.scheme.ankle_torque import DeviceShare
-from ppafo.engine.scheme.motion import FreeStep, LedStep
-from ppafo.engine.scheme.pneumatics import MovingGas, StillGas
+from ppafo.engine.scheme.motion import FreePart, LedStep
+from ppafo.engine.scheme.parts import Pace
+from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, StillGas
 from ppafo.engine.scheme.supply_lines import FedGas
-from ppafo.engine.scheme.thermal_gas import ThermalGas
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
 from ppafo.engine.scheme.walking import WalkState, WalkStep
 from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
@@ -23,12 +24,15 @@ from ppafo.signals.meter import Course, MeterKind
 
 
 class LaneTiming(NamedTuple):
-    """Step and sample period [s]; parts of a step by which commands and signals are late beyond whole steps [-]."""
+    """Longest step and sample period [s]; parts of a step by which commands and signals are late beyond whole steps [-];
+    error over the one that a run is allowed by default [-].
+    """
 
     step: float
     period: float
     command_lag: float
     signal_lag: float
+    tolerance: float
 
 
 class LaneResult(NamedTuple):
@@ -48,11 +52,11 @@ class Program:
 
     ``angle`` None leaves the vane free, otherwise it is led along that profile. ``controller`` None leaves the command
     to the caller, sample by sample. ``ideal_sensors`` False adds noise, quantisation and delay of the signals.
-    ``late_commands`` True adds a dead time before the valve; a step is then done in two parts, before and after the
-    instant at which a command arrives, each with valve parameters of its own length. ``is_thermal`` True gives the
-    gas an energy balance instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose
+    ``late_commands`` True adds a dead time before the valve. ``is_thermal`` True gives the gas an energy balance
+    instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose
     foot is free or where the ground and a gait lead it (``angle`` is None then). ``has_lines`` True feeds a walking
-    device from lines behind regulators instead of constant pressures. ``meters`` are updated at every sample that a
+    device from lines behind regulators instead of constant pressures. ``is_adaptive`` True divides each step as its
+    error asks, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated at every sample that a
     recording would have, ``traced`` names channels that are kept at some of them.
     """
 
@@ -65,6 +69,8 @@ class Program:
     is_thermal: bool = False
     walks: bool = False
     has_lines: bool = False
+    is_adaptive: bool = False
+    samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
     traced: tuple[str, ...] = ()
 
@@ -75,7 +81,6 @@ class Program:
             "plant": PlantParameters,
             "thermal": ThermalParameters if self.is_thermal else NoParameters,
             "valve": self.valve.parameters,
-            "early_valve": self.valve.parameters if self.late_commands else NoParameters,
             "controller": NoParameters if self.controller is None else self.controller.parameters,
             "reference": self.reference.parameters,
             "path": NoParameters if self.angle is None else self.angle.parameters,
@@ -89,6 +94,7 @@ class Program:
         """Groups of state rows of this program, in order."""
         return {
             "result": LaneResult,
+            "pace": Pace,
             "state": PlantState,
             "masses": ThermalState if self.is_thermal else NoParameters,
             "valve_state": self.valve.state,
@@ -120,15 +126,27 @@ class Program:
         return any(kind.needs_course for kind in self.meters)
 
     @property
+    def is_parted(self) -> bool:
+        """True where a step is done in parts."""
+        return self.is_adaptive or self.samples_inside or self.late_commands or self.valve.jumps
+
+    @property
     def is_held(self) -> bool:
         """True where the vane is led along a profile that never changes."""
         return self.angle is constant.KIND
 
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that the first stage of a step hands to the later phases, in order."""
-        free = WalkStep if self.walks else FreeStep
+        free = WalkStep if self.walks else FreePart
         begun = free if self.angle is None else (NoParameters if self.is_held else LedStep)
         isothermal = StillGas if self.is_held else (FedGas if self.has_lines else MovingGas)
         _, shown, _ = get_type_hints(self.valve.connect).values()
-        gait = {"next_gait": GaitNow} if self.walks else {}
-        return {**gait, "begun": begun, "gas": ThermalGas if self.is_thermal else isothermal, "shown": shown}
+        gas, change = (ThermalGas, ThermalFlows) if self.is_thermal else (isothermal, GasChange)
+        return {
+            **({"next_gait": GaitNow} if self.walks else {}),
+            "begun": begun,
+            "gas": gas,
+            "shown": shown,
+            **({"change": change} if self.angle is None else {}),
+            **({"next_valve": self.valve.state} if self.is_adaptive else {}),
+        }

@@ -1,7 +1,7 @@
 """One run as values: what both the lanes and the reference solver are given."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.rows import table
 from ppafo.engine.scheme.ankle_torque import DeviceShare
+from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.scheme.walking import WalkState
 from ppafo.model.columns import larger, whole
 from ppafo.model.gait import GaitSeries, GaitTiming
@@ -22,6 +23,7 @@ from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
 
 Members = NDArray[np.intp]
+Floats = NDArray[np.float64]
 
 NEVER_FAILED = 1.0e300
 WHOLE = 1.0e-9
@@ -52,9 +54,10 @@ class Run:
     """A device in one experiment, SI units.
 
     ``step`` divides ``period`` (of the controller). ``valve``, ``controller``, ``reference`` and ``path`` are the
-    parameters of the program's pieces, () where it has none; ``early_valve`` are those of the valve for the part of a
-    step before a late command arrives, and ``valve`` those for the part after it. Delays are in seconds. Where one
-    ``Run`` stands for an ensemble, any number in it, whole ones too, may be an array (runs,).
+    parameters of the program's pieces, () where it has none. Delays are in seconds. ``tolerance`` is the error over
+    the one that a run is allowed by default. Where one ``Run`` stands for an ensemble, any number in it, whole ones
+    and truth values too, may be an array (runs,); ``needs_parts`` and ``record_every`` then say which of the runs have
+    a program that is adaptive, or that has samples inside its steps, whatever ``program`` says.
     """
 
     program: Program
@@ -64,7 +67,6 @@ class Run:
     leak_orifice: ExactOrifice
     initial: PlantState
     valve: Any
-    early_valve: Any
     controller: Any
     reference: Any
     path: Any
@@ -72,9 +74,11 @@ class Run:
     step: float
     step_count: int
     steps_per_sample: int
-    record_every: int
+    record_every: float
     signal_delay: float
     command_delay: float
+    needs_parts: bool = False
+    tolerance: float = 1.0
     walk: Walk | None = None
     lines: Lines | None = None
 
@@ -104,8 +108,8 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     program = run.program
     command_steps, command_lag = whole_and_rest(run.command_delay, run.step)
     signal_steps, signal_lag = whole_and_rest(run.signal_delay, run.step)
-    timing = LaneTiming(run.step, run.period, command_lag, signal_lag)
-    plant, valve = [run.plant, run.thermal], [run.valve, run.early_valve]
+    timing = LaneTiming(run.step, run.period, command_lag, signal_lag, run.tolerance)
+    plant, valve = [run.plant, run.thermal], [run.valve]
     walk, walk_states = _walk_groups(run.walk)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines]
@@ -115,18 +119,26 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     masses = ThermalState(run.initial.mass_1, run.initial.mass_2) if program.is_thermal else NoParameters()
     result = LaneResult(0.0, NEVER_FAILED)
     further = [*walk_states, *line_states]
-    states = table([result, run.initial, masses, program.valve.initial(), controller_state, *further], runs)
-    counts = np.empty((runs, 5), dtype=np.int64)
-    wholes = (run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
-    for column, count in enumerate(wholes):
+    states = table([result, Pace(run.step), run.initial, masses, program.valve.initial(), controller_state, *further], runs)
+    counts = np.empty((runs, 6))
+    numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
+    for column, count in enumerate(numbers):
         counts[:, column] = count
     if (counts == counts[0]).all():
-        return [(np.arange(runs), Batch(program, Clock(*counts[0].tolist()), parameters, states))]
+        return [(np.arange(runs), Batch(*_program_and_clock(program, counts[0]), parameters, states))]
     clocks, group = np.unique(counts, axis=0, return_inverse=True)
     return [
-        (members, Batch(program, Clock(*clock.tolist()), parameters[:, members], states[:, members]))
+        (members, Batch(*_program_and_clock(program, clock), parameters[:, members], states[:, members]))
         for clock, members in zip(clocks, _members(group.reshape(-1), len(clocks)), strict=True)
     ]
+
+
+def _program_and_clock(program: Program, counts: Floats) -> tuple[Program, Clock]:
+    """The program and clock of runs with the same numbers, as ``batches_of`` lists them."""
+    needs_parts, step_count, steps_per_sample, record_every, signal_delay, command_delay = counts.tolist()
+    own = replace(program, is_adaptive=bool(needs_parts), samples_inside=not record_every.is_integer())
+    every = record_every if own.samples_inside else int(record_every)
+    return own, Clock(int(step_count), int(steps_per_sample), every, int(signal_delay), int(command_delay))
 
 
 def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:

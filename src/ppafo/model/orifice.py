@@ -68,7 +68,10 @@ def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
 
 
 def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:
-    """Flow function [-] and its derivative with respect to the pressure ratio [-], at most 0, from a fitted curve."""
+    """Flow function [-] and a slope with respect to the pressure ratio [-], at most 0, from a fitted curve.
+
+    The slope is the derivative, and within twice the linear region that of the chord to equal pressures.
+    """
     gap = 1.0 - pressure_ratio
     linear_gap = 1.0 - curve.linear_ratio
     choked_gap = 1.0 - curve.critical_ratio
@@ -88,9 +91,9 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
     polynomial = polynomial * inside + curve.c0
     root = math.sqrt(inside)
     value = root * polynomial
-    line = value * curve.linear_slope
-    curved = (0.5 * polynomial + inside * derivative) / root
-    slope = line if gap < linear_gap else curved
+    # Near equal pressures the chord from there: with the slope of the curve a settled chamber would ring at the kink.
+    is_near = gap < 2.0 * linear_gap
+    slope = (polynomial if is_near else 0.5 * polynomial + inside * derivative) / root
     slope = 0.0 if gap > choked_gap else slope
     return value * min(gap * curve.linear_slope, 1.0), -slope
 

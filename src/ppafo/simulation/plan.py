@@ -9,9 +9,9 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
-from ppafo.engine.refinement import MOST_DIVISIONS, divisions
+from ppafo.engine.refinement import is_slow
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import Run, whole_and_rest
+from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.columns import at, first, larger, over_runs, smaller, whole
@@ -22,7 +22,7 @@ from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, ProfileChoice, Scenario
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, LedMotion, ProfileChoice, Scenario
 
 MOST_STEPS = 1.0e9
 WHOLE = 1.0e-9
@@ -52,6 +52,10 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     delay = valve.command_delay(settings)
     in_lanes = control.kind != PYTHON_CONTROLLER
     controller = CONTROLLERS[control.kind] if in_lanes else None
+    steps_per_sample = larger(1, whole(np.ceil(scenario.control.period / scenario.time_step - WHOLE)))
+    step = scenario.control.period / steps_per_sample
+    needs_parts = is_adaptive(scenario, plant, step)
+    record_every = nearly_whole(scenario.output_interval / step)
     program = Program(
         valve=valve,
         reference=PROFILES[scenario.reference.kind],
@@ -60,11 +64,10 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         ideal_sensors=has_ideal_sensors(scenario),
         late_commands=first(delay) > 0.0,
         is_thermal=scenario.thermal is not None,
+        is_adaptive=bool(first(needs_parts)),
+        samples_inside=bool(first(record_every % 1.0)),
     )
-    steps_per_sample, step, undivided = divided_step(scenario, plant)
-    lag = whole_and_rest(delay, step)[1] * step
-    record_every = larger(1, whole(np.rint(scenario.output_interval / step))) if in_lanes else 1
-    step_count = whole(np.ceil(scenario.duration / (step * record_every) - WHOLE)) * record_every
+    step_count = whole(np.ceil(scenario.duration / step - WHOLE))
     run = Run(
         program=program,
         plant=plant,
@@ -72,8 +75,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         valve_orifice=exact_orifice(device.valve.orifice, device),
         leak_orifice=exact_orifice(device.actuator.leak, device),
         initial=initial_state(scenario, plant),
-        valve=prepared_valve(valve, settings, step - lag),
-        early_valve=prepared_valve(valve, settings, lag) if program.late_commands else (),
+        valve=prepared_valve(valve, settings),
         controller=() if controller is None else controller_parameters(controller, control.settings),
         reference=profile_parameters(scenario.reference),
         path=() if isinstance(motion, FreeMotion) else profile_parameters(motion.profile),
@@ -84,17 +86,18 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         record_every=record_every,
         signal_delay=scenario.sensors.delay,
         command_delay=delay,
+        needs_parts=needs_parts,
     )
-    return run, (undivided, _too_many_steps(scenario, step, step_count))
+    return run, (_too_many_steps(scenario, step, step_count),)
 
 
-def prepared_valve(valve: ValveModel, settings: Mapping[str, float], step: float) -> Any:
-    """Parameters of a valve for steps of ``step`` [s]; settings and step may be arrays (runs,)."""
+def prepared_valve(valve: ValveModel, settings: Mapping[str, float]) -> Any:
+    """Parameters of a valve; settings may be arrays (runs,)."""
 
     def prepare(*values: float) -> Any:
-        return valve.prepare(dict(zip(settings, values[:-1], strict=True)), values[-1])
+        return valve.prepare(dict(zip(settings, values, strict=True)))
 
-    return over_runs(prepare, *settings.values(), step)
+    return over_runs(prepare, *settings.values())
 
 
 def _too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
@@ -154,28 +157,20 @@ def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtyp
     return np.array([kind.value(parameters, float(time)) for time in times]).T
 
 
-def divided_step(scenario: Scenario, plant: PlantParameters) -> tuple[int, float, Problem]:
-    """Steps in a sample period and their length [s]: a whole number, fine enough for the fastest chamber.
-
-    The last is what is wrong where the step would have to be divided too often.
-    """
-    period = scenario.control.period
-    coarse = larger(1, whole(np.ceil(period / scenario.time_step - WHOLE)))
+def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> bool:
+    """True where the error decides about the parts of a step [s]; not where a held vane's chambers are slow enough."""
+    if not isinstance(scenario.motion, LedMotion) or scenario.motion.profile.kind != "constant":
+        return True
     lowest, highest = angle_range(scenario, plant)
-    is_free = isinstance(scenario.motion, FreeMotion)
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
-    parts = divisions(plant, period / coarse, lowest, highest, is_free, stiffness)
+    return np.logical_not(is_slow(plant, step, lowest, highest, stiffness))  # type: ignore[no-any-return]
 
-    def line(run: int) -> str:
-        step, count = at(scenario.time_step, run), int(at(parts, run))
-        finest = MOST_DIVISIONS * at(period, run) / (at(coarse, run) * count)
-        return (
-            f"run.step = {step:.3g} s would have to be divided into {count} parts (at most {MOST_DIVISIONS}), because "
-            f"a chamber fills that fast: look at the dead volumes and the valve's area, or give run.step = "
-            f"{finest:.1g} s or less"
-        )
 
-    return coarse * parts, period / (coarse * parts), (parts > MOST_DIVISIONS, line)
+def nearly_whole(steps: float) -> float:
+    """A number of steps, to the whole number where it is one to rounding; may be an array (runs,)."""
+    counted = np.rint(steps)
+    count = np.where(np.abs(steps - counted) <= WHOLE * steps, counted, steps)
+    return count if isinstance(steps, np.ndarray) else float(count)  # type: ignore[return-value]
 
 
 def angle_range(scenario: Scenario, plant: PlantParameters) -> tuple[float, float]:

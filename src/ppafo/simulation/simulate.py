@@ -58,10 +58,9 @@ def _result(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)
-    thin = max(1, round(scenario.output_interval / (run.step * run.record_every)))
     kept = times < (np.inf if status.time is None else status.time)
     kept[0] = True
-    recording = _recording(scenario, run, times[kept][::thin], record[kept][::thin], rows)
+    recording = _recording(scenario, run, times[kept], record[kept], rows)
     return Result(
         scenario=scenario,
         recording=recording,

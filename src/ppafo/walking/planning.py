@@ -7,7 +7,7 @@ from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.refinement import filling_time
-from ppafo.engine.run import Lines, Run, Walk, whole_and_rest
+from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.ankle_torque import DeviceShare, foot_direction
 from ppafo.engine.scheme.walking import NO_CLEARANCE, WalkState
 from ppafo.gait import Gait
@@ -65,7 +65,6 @@ def plan_walk(plan: WalkPlan) -> Run:
     coarse = max(1, math.ceil(plan.period / plan.step - 1.0e-9))
     steps = coarse * _parts(plant, plan.supply_lines, plan.period / coarse)
     step = plan.period / steps
-    lag = whole_and_rest(delay, step)[1] * step
     record_every = max(1, round(plan.record_interval / step))
     return Run(
         program=_program(plan, valve, delay > 0.0),
@@ -74,8 +73,7 @@ def plan_walk(plan: WalkPlan) -> Run:
         valve_orifice=exact_orifice(plan.device.valve.orifice, plan.device),
         leak_orifice=exact_orifice(plan.device.actuator.leak, plan.device),
         initial=vented(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
-        valve=valve.prepare(settings, step - lag),
-        early_valve=valve.prepare(settings, lag) if delay > 0.0 else (),
+        valve=valve.prepare(settings),
         controller=controller_parameters(plan.controller, plan.settings),
         reference=PROFILES["constant"].parameters(0.0),
         path=(),

@@ -13,6 +13,7 @@ from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals
 from ppafo.engine.reference.segment import solve_segment
 from ppafo.engine.reference.source import PLANT_UNKNOWNS, gas_unknowns, right_hand_side_source
 from ppafo.engine.rows import numbers, rebuild
+from ppafo.engine.lanes import samples_in
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
 from ppafo.model.plant import chamber_pressures
@@ -73,7 +74,7 @@ class _Solution:
             self.way = float(np.sign(self.y[1]))
         self.time = 0.0
         self.control = SampledControl(run, self.present_signals())
-        count = run.step_count // run.record_every + 1
+        count = samples_in(run.step_count, run.record_every)
         times = np.arange(count, dtype=np.float64) * (run.step * run.record_every)
         self.result = ReferenceResult(times, np.empty((count, PLANT_UNKNOWNS)), np.zeros(count))
         self.records = 0
@@ -123,7 +124,7 @@ class _Solution:
     def solve(self) -> ReferenceResult:
         """Sample by sample from beginning to end."""
         run = self.run
-        end = run.step * run.step_count
+        end = float(self.result.times[-1])
         sample = 0
         while self.time < end - SAME_TIME:
             self.control.decide(sample, self.time, self.present_signals())

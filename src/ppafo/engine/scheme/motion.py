@@ -14,6 +14,14 @@ from ppafo.model.friction import holds_still
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, driving_torque
 
 
+ALLOWED_OF_ANGLE = 3.0e-6
+"""Error of one part over the range of the angle; with it a run keeps to 2e-4 of the range."""
+MISSED_SHARE = 0.2
+"""Share of the way between where the gas took the vane to be and where an event left it that counts as an error."""
+LOWEST_REBOUND = 1.0e-7
+"""Height over the range of the angle below which a rebound is none."""
+
+
 class Departure(NamedTuple):
     """Second part of a step: where it begins (share of the step), angle [rad], angular velocity [rad/s]."""
 
@@ -28,6 +36,20 @@ class FreeStep(NamedTuple):
     free_angle: float
     acceleration: float
     torque: float
+
+
+class FreePart(NamedTuple):
+    """First stage of a part of a step, which ends at a stop at the latest.
+
+    Direction in which the vane slides (1, -1, 0 at rest), acceleration [rad/s^2], driving torque now [N m], where the
+    part would lead without reversal [rad], and 1 where it ends at a stop.
+    """
+
+    way: float
+    acceleration: float
+    torque: float
+    next_angle: float
+    meets_stop: float
 
 
 class LedStep(NamedTuple):
@@ -94,6 +116,72 @@ def depart(
     rate = next_rate if goes and not turned else 0.0
     hits = angle < plant.angle_min or angle > plant.angle_max
     return bounded(plant, angle), (0.0 if hits else rate)
+
+
+def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tuple[FreePart, float]:
+    """Where a part of a step of at most ``longest`` [s] leads a free vane, and its length [s]: until it meets a stop.
+
+    So the gas works against the motion that happens. A vane at rest whose torque is above static friction slides.
+    """
+    velocity = state.angular_velocity
+    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
+    torque = driving_torque(plant, state.angle, pressure_1, pressure_2)
+    stays = holds_still(torque, plant.static_torque, state.angle <= plant.angle_min, state.angle >= plant.angle_max)
+    leaving = 0.0 if stays else direction_of(torque)
+    way = direction_of(velocity) if velocity != 0.0 else leaving
+    sliding = (torque - way * plant.dynamic_torque - plant.viscous_damping * velocity) / plant.inertia
+    acceleration = sliding if way != 0.0 else 0.0
+    distance = plant.angle_max - state.angle if way > 0.0 else state.angle - plant.angle_min
+    gets_there = velocity * velocity + 2.0 * acceleration * way * distance >= 0.0
+    impact = time_to_stop(distance, abs(velocity), acceleration * way)
+    meets_stop = way != 0.0 and gets_there and impact <= longest
+    length = impact if meets_stop else longest
+    stop = plant.angle_max if way > 0.0 else plant.angle_min
+    free_angle = bounded(plant, state.angle + length * (velocity + 0.5 * length * acceleration))
+    next_angle = stop if meets_stop else free_angle
+    return FreePart(way, acceleration, torque, next_angle, 1.0 if meets_stop else 0.0), length
+
+
+def end_part(
+    plant: PlantParameters, state: PlantState, begun: FreePart, length: float
+) -> tuple[float, float, float]:
+    """Angle [rad] and angular velocity [rad/s] at the end of a part, and the error of the angle over what is allowed.
+
+    ``state`` has the new gas and the motion of the begin.
+    """
+    velocity, way = state.angular_velocity, begun.way
+    next_1, next_2 = chamber_pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
+    next_torque = driving_torque(plant, begun.next_angle, next_1, next_2)
+    sliding_torque = next_torque - way * plant.dynamic_torque
+    full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, length)
+    slides = way != 0.0 and full_velocity * way > 0.0
+
+    fall = velocity - full_velocity
+    turns = way != 0.0 and not slides
+    share = velocity / (fall if fall != 0.0 else 1.0) if turns else 0.0
+    turning_angle = bounded(plant, state.angle + 0.5 * share * length * velocity)
+    left_torque = begun.torque + share * (next_torque - begun.torque)
+    left_angle, left_velocity = depart(
+        plant, Departure(share, turning_angle, 0.0), left_torque, next_torque, length
+    )
+    rebound = rebound_velocity(plant, full_velocity, next_torque)
+    slid_velocity = rebound if begun.meets_stop > 0.5 else full_velocity
+    angle = begun.next_angle if slides else left_angle
+    rate = slid_velocity if slides else left_velocity
+
+    last = (sliding_torque - plant.viscous_damping * full_velocity) / plant.inertia
+    bent = abs(last - begun.acceleration) * length * length / 6.0 if way != 0.0 else 0.0
+    missed = MISSED_SHARE * abs(angle - begun.next_angle)
+    allowed = ALLOWED_OF_ANGLE * (plant.angle_max - plant.angle_min)
+    return angle, rate, (bent + missed) / allowed
+
+
+def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: float) -> float:
+    """Angular velocity [rad/s] after an impact; a vane that the torque [N m] would not let rise from the stop rests."""
+    after = -plant.restitution * angular_velocity
+    pressing = max(torque * direction_of(angular_velocity), 0.0)
+    lowest = LOWEST_REBOUND * (plant.angle_max - plant.angle_min)
+    return after if 0.5 * plant.inertia * after * after > pressing * lowest else 0.0
 
 
 def first_event(

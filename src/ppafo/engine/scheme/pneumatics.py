@@ -3,7 +3,8 @@
 The method is ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), gamma = 1 - 1/sqrt(2), with
 the exact Jacobian and the time derivative that comes from the moving volumes, which run linearly through the step.
 Gas totals are integrated by the same method as further unknowns, so that mass is conserved to rounding. A step is two
-functions, one for each stage, because the lanes take each stage in a loop of its own.
+functions, one for each stage, because the lanes take each stage in a loop of its own. The first stage alone is a step
+of first order, and what the second adds to it is the estimate of the error.
 """
 
 from collections.abc import Callable
@@ -14,6 +15,10 @@ from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, ch
 
 GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
+ALLOWED_OF_PRESSURE = 3.0e-5
+"""Error of one step over the pressure that matters; with it a run keeps to 1e-3 of the pressure range."""
+LEAST_PRESSURE = 0.02
+"""The least pressure that matters, as a share of the atmosphere's."""
 
 
 class GasChange(NamedTuple):
@@ -203,26 +208,78 @@ def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
     )
 
 
-def end_still_gas(
-    plant: PlantParameters, begun: StillGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
-) -> GasChange:
-    """Changes of mass [kg] in one step [s] in which the vane stands still, from its first stage."""
+def second_still_stage(
+    plant: PlantParameters, begun: StillGas, port_1: Any, port_2: Any, port_flow: Callable[..., Any]
+) -> Flows:
+    """Second stage [kg/s] of a step in which the vane stands still."""
     right = second_right_sides(plant, begun, port_1, port_2, port_flow)
-    second = solve_stage(begun.linear, right.mass_1, right.mass_2, right.supplied, right.leaked)
-    return both_stages(begun.first, second, step)
+    return solve_stage(begun.linear, right.mass_1, right.mass_2, right.supplied, right.leaked)
 
 
-def end_moving_gas(
-    plant: PlantParameters, begun: MovingGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
-) -> GasChange:
-    """Changes of mass [kg] in one step [s] with moving volumes, from its first stage."""
+def second_moving_stage(
+    plant: PlantParameters, begun: MovingGas, port_1: Any, port_2: Any, port_flow: Callable[..., Any]
+) -> Flows:
+    """Second stage [kg/s] of a step with moving volumes."""
     right = second_right_sides(plant, begun.still, port_1, port_2, port_flow)
     drift = begun.drift
-    second = solve_stage(
+    return solve_stage(
         begun.still.linear,
         right.mass_1 - drift.mass_1,
         right.mass_2 - drift.mass_2,
         right.supplied - drift.supplied,
         right.leaked - drift.leaked,
     )
-    return both_stages(begun.still.first, second, step)
+
+
+def end_still_gas(
+    plant: PlantParameters, begun: StillGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
+) -> GasChange:
+    """Changes of mass [kg] in one step [s] in which the vane stands still, from its first stage."""
+    return both_stages(begun.first, second_still_stage(plant, begun, port_1, port_2, port_flow), step)
+
+
+def end_moving_gas(
+    plant: PlantParameters, begun: MovingGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
+) -> GasChange:
+    """Changes of mass [kg] in one step [s] with moving volumes, from its first stage."""
+    return both_stages(begun.still.first, second_moving_stage(plant, begun, port_1, port_2, port_flow), step)
+
+
+def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle: float, step: float) -> float:
+    """Estimated error of both pressures at the end of a step [s] over what is allowed [-].
+
+    What the second stage adds to the first, damped once by the matrix of the step, so that a chamber that has settled
+    asks for no short step.
+    """
+    linear = begun.linear
+    added_1 = linear.d * (begun.first.mass_1 + second.mass_1) - linear.b * (begun.first.mass_2 + second.mass_2)
+    added_2 = linear.a * (begun.first.mass_2 + second.mass_2) - linear.c * (begun.first.mass_1 + second.mass_1)
+    volume_1, volume_2 = chamber_volumes(plant, next_angle)
+    weight = 0.5 * step * linear.scale * plant.gas_product / ALLOWED_OF_PRESSURE
+    return max(
+        abs(added_1) / (volume_1 * pressure_that_matters(plant, begun.end_1)),
+        abs(added_2) / (volume_2 * pressure_that_matters(plant, begun.end_2)),
+    ) * abs(weight)
+
+
+def opening_error(plant: PlantParameters, begun: StillGas, shift: float, next_angle: float, step: float) -> float:
+    """Error of taking a valve's mean opening in a step [s] over what is allowed [-].
+
+    ``shift`` [-] is the relative change of the opening. Opening and flow change together, and a twelfth of the product
+    of both changes is missed; the matrix of the step says how the flow answers to what flows.
+    """
+    volume_1, volume_2 = chamber_volumes(plant, next_angle)
+    answer_1 = abs(begun.linear.a - 1.0) * abs(begun.first.mass_1)
+    answer_2 = abs(begun.linear.d - 1.0) * abs(begun.first.mass_2)
+    weight = shift * step * plant.gas_product / (12.0 * GAMMA * ALLOWED_OF_PRESSURE)
+    return weight * max(
+        answer_1 / (volume_1 * pressure_that_matters(plant, begun.end_1)),
+        answer_2 / (volume_2 * pressure_that_matters(plant, begun.end_2)),
+    )
+
+
+def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:
+    """Pressure [Pa] against which an error is seen: of the supplies or of the chamber, over the atmosphere."""
+    supplied = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
+    least = LEAST_PRESSURE * plant.atmospheric_pressure
+    return max(max(supplied, abs(pressure - plant.atmospheric_pressure)), least)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ppafo.engine.scheme.pneumatics import GAMMA, SHORTEST
+from ppafo.engine.scheme.pneumatics import ALLOWED_OF_PRESSURE, GAMMA, SHORTEST, pressure_that_matters
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_volumes
 from ppafo.model.ports import PortFlow
@@ -275,7 +275,7 @@ def begin_thermal_gas(
     return ThermalGas(matrix, first, drift, end, end_masses, next_1, next_2, growth)
 
 
-def end_thermal_gas(
+def second_thermal_stage(
     plant: PlantParameters,
     thermal: ThermalParameters,
     begun: ThermalGas,
@@ -284,7 +284,7 @@ def end_thermal_gas(
     step: float,
     port_flow: Callable[..., Any],
 ) -> ThermalFlows:
-    """Changes [kg] in one step [s], from its first stage."""
+    """Second stage [kg/s] of one step [s]."""
     pressure_1 = begun.end.mass_1 * plant.gas_product / begun.volume_1
     pressure_2 = begun.end.mass_2 * plant.gas_product / begun.volume_2
     in_1 = port_flow(pressure_1, port_1, plant.valve_curve)
@@ -294,8 +294,57 @@ def end_thermal_gas(
         thermal, begun.end, begun.end_masses, begun.volume_1, begun.volume_2, begun.growth, in_1, in_2, leak
     )
     right = combined(combined(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
-    second = solve_thermal_stage(begun.matrix, right)
-    return combined(begun.first, 1.5 * step, second, 0.5 * step)
+    return solve_thermal_stage(begun.matrix, right)
+
+
+def both_thermal_stages(first: ThermalFlows, second: ThermalFlows, step: float) -> ThermalFlows:
+    """Changes [kg] in one step [s]."""
+    return combined(first, 1.5 * step, second, 0.5 * step)
+
+
+def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlows, step: float) -> float:
+    """Estimated error of both pressures at the end of a step [s] over what is allowed [-], as ``gas_error``."""
+    added = solve_thermal_stage(begun.matrix, combined(begun.first, 1.0, second, 1.0))
+    return 0.5 * over_allowed(plant, begun, added.content_1, added.content_2, step)
+
+
+def thermal_opening_error(plant: PlantParameters, begun: ThermalGas, shift: float, step: float) -> float:
+    """Error of taking a valve's mean opening in a step [s] over what is allowed [-], as ``opening_error``."""
+    answer_1 = (begun.matrix.a - 1.0) * begun.first.content_1
+    answer_2 = (begun.matrix.d - 1.0) * begun.first.content_2
+    return shift / (12.0 * GAMMA) * over_allowed(plant, begun, answer_1, answer_2, step)
+
+
+def over_allowed(plant: PlantParameters, begun: ThermalGas, rate_1: float, rate_2: float, step: float) -> float:
+    """Errors of both contents [kg/s] over a step [s], as the larger of both pressures' over what is allowed [-]."""
+    end_1 = begun.end.mass_1 * plant.gas_product / begun.volume_1
+    end_2 = begun.end.mass_2 * plant.gas_product / begun.volume_2
+    larger = max(
+        abs(rate_1) / (begun.volume_1 * pressure_that_matters(plant, end_1)),
+        abs(rate_2) / (begun.volume_2 * pressure_that_matters(plant, end_2)),
+    )
+    return larger * step * plant.gas_product / ALLOWED_OF_PRESSURE
+
+
+def after_motion(
+    plant: PlantParameters, thermal: ThermalParameters, state: PlantState, assumed_angle: float, angle: float
+) -> PlantState:
+    """State whose gas did its work up to the angle [rad] that the vane reached, where the stages assumed another."""
+    assumed_1, assumed_2 = chamber_volumes(plant, assumed_angle)
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    half = 0.5 * (thermal.heat_capacity_ratio - 1.0)
+    mean_1, mean_2 = 0.5 * (volume_1 + assumed_1), 0.5 * (volume_2 + assumed_2)
+    work_1, work_2 = half * (volume_1 - assumed_1), half * (volume_2 - assumed_2)
+    # The isentrope between two near volumes, to third order in their difference.
+    return PlantState(
+        state.angle,
+        state.angular_velocity,
+        state.mass_1 * (mean_1 - work_1) / (mean_1 + work_1),
+        state.mass_2 * (mean_2 - work_2) / (mean_2 + work_2),
+        state.supplied_mass,
+        state.vented_mass,
+        state.leaked_mass,
+    )
 
 
 def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlows) -> tuple[PlantState, ThermalState]:

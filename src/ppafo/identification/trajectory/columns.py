@@ -60,7 +60,6 @@ def run_with(prepared: Prepared, numbers: Mapping[str, float]) -> Run:
             f"experiment '{prepared.label}': a setting of the valve went to or from 0, which is another "
             f"model of the valve; start above 0 and give a lower bound above 0"
         )
-    lag = whole_and_rest(delay, base.step)[1] * base.step
     plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     return replace(
         base,
@@ -69,8 +68,7 @@ def run_with(prepared: Prepared, numbers: Mapping[str, float]) -> Run:
         valve_orifice=exact_orifice(device.valve.orifice, device),
         leak_orifice=exact_orifice(device.actuator.leak, device),
         initial=initial_state(scenario, plant),
-        valve=valve.prepare(device.valve.settings, base.step - lag),
-        early_valve=valve.prepare(device.valve.settings, lag) if base.program.late_commands else (),
+        valve=valve.prepare(device.valve.settings),
         command_delay=delay,
     )
 

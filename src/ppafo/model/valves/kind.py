@@ -11,13 +11,15 @@ from ppafo.model.declaration import Quantity
 class ValveModel:
     """Compiled side of a valve.
 
-    ``parameters`` and ``state`` are NamedTuple classes of floats; ``prepare(settings, step)`` makes the first from
-    the declared settings and the step [s]; ``initial()`` the second. ``advance(parameters, state, command, time,
+    ``parameters`` and ``state`` are NamedTuple classes of floats; ``prepare(settings)`` makes the first from
+    the declared settings; ``initial()`` the second. ``advance(parameters, state, command, time,
     step)`` returns what the valve shows the plant during the step, and the next state. ``connect(plant, shown)``
     turns that into ports (the engine reads its annotation of ``shown``, a float or a NamedTuple); ``port_flow`` and
     ``port_flow_slopes`` are the functions of that kind of port.
     ``jumps`` is True for a valve that changes abruptly by itself inside a step, as ``next_event`` and ``settle`` say:
-    the step is then done in parts between those changes. ``command_delay(settings)`` is the dead time [s] before a
+    the step is then done in parts between those changes. ``shift(state, next_state)`` is the relative
+    change of the opening of a valve that moves inside a step, None for one that stands still between two changes.
+    ``command_delay(settings)`` is the dead time [s] before a
     command reaches the valve.
 
     The reference solver sees the same valve in continuous time: ``instant(parameters, state, command)`` returns the
@@ -28,13 +30,14 @@ class ValveModel:
 
     parameters: type
     state: type
-    prepare: Callable[[Mapping[str, float], float], Any]
+    prepare: Callable[[Mapping[str, float]], Any]
     initial: Callable[[], Any]
     advance: Callable[..., Any]
     connect: Callable[..., Any]
     port_flow: Callable[..., Any]
     port_flow_slopes: Callable[..., Any]
     jumps: bool
+    shift: Callable[..., float] | None
     command_delay: Callable[[Mapping[str, float]], float]
     instant: Callable[..., Any]
     rates: Callable[..., Any]

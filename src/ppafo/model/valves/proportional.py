@@ -1,8 +1,8 @@
 """Proportional spool valve: ideal, or with dead band, dead time, slew limit and second-order spool, in that order.
 
 The opening that is asked for runs at most at the slew limit towards the command; the spool follows it with
-x'' = w^2 (r - x) - 2 d w x'. A step of the spool is exact for the mean of r over the step: a constant matrix, worked
-out once for each length of a step.
+x'' = w^2 (r - x) - 2 d w x'. A step of the spool, of any length, is exact; it ends
+where the opening that is asked for arrives.
 """
 
 import math
@@ -22,6 +22,9 @@ from ppafo.model.valves.kind import ValveKind, ValveModel
 NO_SLEW_LIMIT = 1.0e12
 SAME_INSTANT = 1.0e-11
 TINY = 1.0e-300
+DOUBLINGS = 12
+SMALLEST_STEP = 0.5**DOUBLINGS
+TERMS = 9
 
 
 class IdealProportional(NamedTuple):
@@ -38,15 +41,17 @@ class NoValveState(NamedTuple):
 
 
 class MovingProportional(NamedTuple):
-    """Dead band [-], slew limit [1/s], undamped frequency [Hz] and damping ratio [-] of the spool, and its exact step.
-
-    The step gives next x, next x' and mean x from x and x', x as an offset from the mean of what is asked for.
-    """
+    """Dead band [-], slew limit [1/s], undamped frequency [Hz] and damping ratio [-] of the spool."""
 
     dead_band: float
     slew_limit: float
     frequency: float
     damping_ratio: float
+
+
+class SpoolStep(NamedTuple):
+    """Next x, next x' and mean x of a free spool, by x and by x'; x is an offset from what is asked for."""
+
     next_by_opening: float
     next_by_rate: float
     rate_by_opening: float
@@ -79,14 +84,12 @@ def advance_ideal(
 
 
 def slewed(asked: float, target: float, slew_limit: float, step: float) -> tuple[float, float]:
-    """Opening asked for after a step [s], and its mean, on the way to a target at the slew limit [1/s]; exact."""
+    """Opening asked for after a step [s], and its rate [1/s], on the way to a target at the slew limit [1/s]."""
     distance = target - asked
-    reach = slew_limit * step
-    arrives = abs(distance) <= reach
-    moved = distance if arrives else (reach if distance > 0.0 else -reach)
-    # The way is a ramp of this share of the step, then a rest at the target.
-    share = abs(distance) / max(reach, TINY) if arrives else 1.0
-    return asked + moved, asked + moved * (1.0 - 0.5 * share)
+    way = (1.0 if distance > 0.0 else 0.0) - (1.0 if distance < 0.0 else 0.0)
+    arrives = abs(distance) <= slew_limit * step
+    rate = way * slew_limit
+    return (target if arrives else asked + rate * step), rate
 
 
 def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float:
@@ -101,18 +104,24 @@ def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float
 def advance_moving(
     valve: MovingProportional, state: SpoolState, command: float, time: float, step: float
 ) -> tuple[Openings, SpoolState]:
-    """Mean openings during the step and the spool at its end."""
+    """Mean openings during the step and the spool at its end; what is asked for changes its rate at the begin only."""
+    settled = settle_moving(valve, state, command, time)
     target = opening_of_command(command, valve.dead_band)
-    asked, asked_mean = slewed(state.asked, target, valve.slew_limit, step)
-    away = state.opening - asked_mean
+    asked, slew = slewed(settled.asked, target, valve.slew_limit, step)
+    asked_mean = 0.5 * (settled.asked + asked)
     has_spool = valve.frequency > 0.0
-    spool = asked_mean + valve.next_by_opening * away + valve.next_by_rate * state.rate
-    spool_mean = asked_mean + valve.mean_by_opening * away + valve.mean_by_rate * state.rate
-    rate = valve.rate_by_opening * away + valve.rate_by_rate * state.rate
+    angular = 2.0 * math.pi * valve.frequency
+    by = spool_step(angular, valve.damping_ratio, step)
+    # A spool that follows a ramp stays behind it by this much, and moves freely about that.
+    behind = 2.0 * valve.damping_ratio * slew / angular if has_spool else 0.0
+    away, rate_away = settled.opening - settled.asked + behind, settled.rate - slew
+    spool = asked - behind + by.next_by_opening * away + by.next_by_rate * rate_away
+    spool_mean = asked_mean - behind + by.mean_by_opening * away + by.mean_by_rate * rate_away
+    rate = slew + by.rate_by_opening * away + by.rate_by_rate * rate_away
     opening = spool if has_spool else asked
     mean = max(-1.0, min(1.0, spool_mean if has_spool else asked_mean))
-    towards_1 = towards_chamber_1(state.opening, opening, mean)
-    towards_2 = towards_chamber_1(-state.opening, -opening, -mean)
+    towards_1 = towards_chamber_1(settled.opening, opening, mean)
+    towards_2 = towards_chamber_1(-settled.opening, -opening, -mean)
     return Openings(towards_1, towards_2, towards_2, towards_1), SpoolState(asked, opening, rate)
 
 
@@ -120,6 +129,12 @@ def spool_acceleration(opening: float, rate: float, target: float, frequency: fl
     """Second derivative of the opening [1/s^2] of a spool with undamped frequency [Hz] towards a target opening."""
     angular = 2.0 * math.pi * frequency
     return angular * angular * (target - opening) - 2.0 * damping_ratio * angular * rate
+
+
+def shift_of_spool(state: SpoolState, next_state: SpoolState) -> float:
+    """Change of the opening in a step over the larger opening [-]."""
+    larger = max(abs(next_state.opening), abs(state.opening))
+    return abs(next_state.opening - state.opening) / max(larger, TINY)
 
 
 def openings_of(opening: float) -> Openings:
@@ -179,42 +194,53 @@ def settle_moving(valve: MovingProportional, state: SpoolState, command: float, 
     return SpoolState(target, target if valve.frequency == 0.0 else state.opening, state.rate)
 
 
-def prepare_ideal(settings: Mapping[str, float], step: float) -> IdealProportional:
+def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
+    """Exact step [s] of a free spool with an undamped angular frequency [rad/s], to rounding.
+
+    Series of exp and of its mean at a small share of the step, doubled until they are those of the whole. A function
+    of the matrix A of x and x'/w is ``p + q A``, so all of it is on pairs of numbers, without a library function.
+    """
+    small = angular * step * SMALLEST_STEP
+    trace, determinant = -2.0 * damping_ratio * small, small * small
+    # A^n = p + q A, term by term: the next is A times this one.
+    p, q, exp_p, exp_q, mean_p, mean_q = 1.0, 0.0, 1.0, 0.0, 1.0, 0.0
+    for order in range(1, TERMS):
+        p, q = -determinant * q / order, (p + trace * q) / order
+        exp_p, exp_q = exp_p + p, exp_q + q
+        mean_p, mean_q = mean_p + p / (order + 1), mean_q + q / (order + 1)
+    for _ in range(DOUBLINGS):
+        # The mean over twice the step is half of (1 + exp) times the mean over the step.
+        both = exp_q * mean_q
+        mean_p, mean_q = (
+            0.5 * (mean_p + exp_p * mean_p - determinant * both),
+            0.5 * (mean_q + exp_p * mean_q + exp_q * mean_p + trace * both),
+        )
+        squared = exp_q * exp_q
+        exp_p, exp_q = exp_p * exp_p - determinant * squared, 2.0 * exp_p * exp_q + trace * squared
+    # A is small times ((0, 1), (-1, -2 d)) for x and x'/w.
+    per_rate = step * SMALLEST_STEP
+    faster = angular * small
+    return SpoolStep(
+        exp_p,
+        exp_q * per_rate,
+        -exp_q * faster,
+        exp_p + exp_q * trace,
+        mean_p,
+        mean_q * per_rate,
+    )
+
+
+def prepare_ideal(settings: Mapping[str, float]) -> IdealProportional:
     """Parameters of the ideal valve."""
     return IdealProportional(settings["dead_band"], 1.0 / (1.0 - settings["dead_band"]))
 
 
-def prepare_moving(settings: Mapping[str, float], step: float) -> MovingProportional:
-    """Parameters of the moving valve for steps of ``step`` [s]: the exact transition of the spool."""
+def prepare_moving(settings: Mapping[str, float]) -> MovingProportional:
+    """Parameters of the moving valve."""
     limit = settings["slew_limit"] or NO_SLEW_LIMIT
-    if settings["spool_frequency"] == 0.0 or step <= 0.0:
-        still = (1.0, 0.0, 0.0, 1.0, 1.0, 0.0)
-        return MovingProportional(settings["dead_band"], limit, settings["spool_frequency"], 1.0, *still)
-    frequency, damping_ratio = settings["spool_frequency"], settings["spool_damping_ratio"]
-    transition = _spool_transition(2.0 * math.pi * frequency, damping_ratio, step)
-    return MovingProportional(settings["dead_band"], limit, frequency, damping_ratio, *transition)
-
-
-def _spool_transition(angular: float, damping_ratio: float, step: float) -> tuple[float, ...]:
-    """Exact next offset, next rate and mean offset of a free second-order spool, by offset and by rate."""
-    decay = damping_ratio * angular
-    squared = angular * angular - decay * decay
-    root = math.sqrt(abs(squared))
-    if root * step < 1.0e-6:
-        cosine, sine = 1.0, step
-    elif squared > 0.0:
-        cosine, sine = math.cos(root * step), math.sin(root * step) / root
-    else:
-        cosine, sine = math.cosh(root * step), math.sinh(root * step) / root
-    fade = math.exp(-decay * step)
-    next_by_opening = fade * (cosine + decay * sine)
-    next_by_rate = fade * sine
-    rate_by_opening = -angular * angular * next_by_rate
-    rate_by_rate = fade * (cosine - decay * sine)
-    # The mean offset follows from integrating x'' + 2 d w x' + w^2 x = 0 once.
-    mean_by_opening = (2.0 * decay * (1.0 - next_by_opening) - rate_by_opening) / (angular**2 * step)
-    mean_by_rate = (1.0 - rate_by_rate - 2.0 * decay * next_by_rate) / (angular**2 * step)
-    return next_by_opening, next_by_rate, rate_by_opening, rate_by_rate, mean_by_opening, mean_by_rate
+    return MovingProportional(
+        settings["dead_band"], limit, settings["spool_frequency"], settings["spool_damping_ratio"]
+    )
 
 
 def closed_at_rest() -> SpoolState:
@@ -242,6 +268,7 @@ IDEAL = ValveModel(
     port_flow=single_port_flow,
     port_flow_slopes=single_port_flow_slopes,
     jumps=False,
+    shift=None,
     command_delay=dead_time,
     instant=instant_ideal,
     rates=rates_ideal,
@@ -258,7 +285,8 @@ MOVING = ValveModel(
     connect=blended_ports,
     port_flow=blended_port_flow,
     port_flow_slopes=blended_port_flow_slopes,
-    jumps=False,
+    jumps=True,
+    shift=shift_of_spool,
     command_delay=dead_time,
     instant=instant_moving,
     rates=rates_moving,

@@ -168,12 +168,12 @@ def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairS
     return PairState(still, still)
 
 
-def prepare_ideal(settings: Mapping[str, float], step: float) -> IdealSolenoid:
+def prepare_ideal(settings: Mapping[str, float]) -> IdealSolenoid:
     """Parameters of the ideal pair."""
     return IdealSolenoid()
 
 
-def prepare_timed(settings: Mapping[str, float], step: float) -> TimedSolenoid:
+def prepare_timed(settings: Mapping[str, float]) -> TimedSolenoid:
     """Parameters of the pair with delays."""
     return TimedSolenoid(settings["opening_delay"], settings["closing_delay"], settings["switching_interval"])
 
@@ -204,6 +204,7 @@ IDEAL = ValveModel(
     port_flow=single_port_flow,
     port_flow_slopes=single_port_flow_slopes,
     jumps=False,
+    shift=None,
     command_delay=no_dead_time,
     instant=instant_ideal,
     rates=rates_ideal,
@@ -221,6 +222,7 @@ TIMED = ValveModel(
     port_flow=single_port_flow,
     port_flow_slopes=single_port_flow_slopes,
     jumps=True,
+    shift=None,
     command_delay=no_dead_time,
     instant=instant_timed,
     rates=rates_timed,

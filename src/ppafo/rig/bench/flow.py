@@ -114,7 +114,7 @@ def _steady_openings(valve: Valve) -> Callable[[float], Openings]:
     kind = VALVES[valve.kind]
     still = {item.name: 0.0 if item.unit else valve.settings[item.name] for item in kind.quantities}
     model = kind.choose(still)
-    parameters = model.prepare(still, _QUASI_STATIC_STEP)
+    parameters = model.prepare(still)
 
     def openings(command: float) -> Openings:
         state = model.settle(parameters, model.initial(), command, 0.0)

@@ -135,7 +135,7 @@ def intervals(batch: Batch) -> Floats:
 
 def samples_of(batch: Batch) -> int:
     """Number of samples of each run of a batch that is not metered yet, the first and the last among them."""
-    return batch.clock.step_count // batch.clock.record_every + 1
+    return batch.clock.samples
 
 
 def _stride(interval: Floats, request: Request) -> int:

@@ -101,7 +101,7 @@ def _with_devices(run: Run, batch: Batch, plants: list[PlantParameters]) -> Batc
 
 def _groups(batch: Batch) -> Iterator[slice]:
     """Draws that are recorded together."""
-    samples = batch.clock.step_count // batch.clock.record_every + 1
+    samples = batch.clock.samples
     draws = batch.states.shape[1]
     size = max(1, int(NUMBERS_AT_ONCE / samples / batch.states.shape[0]))
     for first in range(0, draws, size):
