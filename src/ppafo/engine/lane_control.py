@@ -2,9 +2,13 @@
 
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
 from ppafo.model.gait_sensors import GaitMeasurement, measure_gait
+from ppafo.engine.scheme.parts import SAME_INSTANT
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
 from ppafo.model.vane import actuator_torque
+
+
+SIGNALS = ("angle", "pressure_1", "pressure_2")
 
 
 def control_loop(rows: LaneRows) -> list[str]:
@@ -27,33 +31,32 @@ def control_loop(rows: LaneRows) -> list[str]:
 
 def places(rows: LaneRows) -> list[str]:
     """Lines that find the number of the sample and where late signals lie, once for all lanes."""
-    if rows.program.ideal_sensors:
-        return []
-    return [
-        "sample_index = step_index // steps_per_sample",
-        "late = (step_index - signal_delay) % signal_history.shape[1]",
-        "later = (step_index - signal_delay - 1) % signal_history.shape[1]",
-    ]
+    program = rows.program
+    late = ["late = (step_index - signal_delay) % signal_history.shape[1]"] if program.late_signals else []
+    return [*late, *([] if program.ideal_sensors else ["sample_index = step_index // steps_per_sample"])]
 
 
 def sense(rows: LaneRows) -> list[str]:
     """Lines that make the measurement ``seen``."""
+    add = rows.add
+    if rows.program.late_signals:
+        signals = [f"{name} = signal_history[{row}, late, lane]" for row, name in enumerate(SIGNALS)]
+    else:
+        signals = ["angle = state.angle", pressures_of(rows, "state")]
     if not rows.program.ideal_sensors:
-        measuring = rows.add(measure)
-        return [
-            rows.load("sensors"),
-            *[
-                f"{name} = signal_history[{row}, late, lane] + timing.signal_lag * "
-                f"(signal_history[{row}, later, lane] - signal_history[{row}, late, lane])"
-                for row, name in enumerate(("angle", "pressure_1", "pressure_2"))
-            ],
-            f"seen = {measuring}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample_index)",
-        ]
+        seen = f"{add(measure)}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample_index)"
+        return [rows.load("sensors"), *signals, f"seen = {seen}"]
     return [
-        f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}(plant, state.angle, state.mass_1, state.mass_2)",
-        f"torque = {rows.add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
-        f"seen = {rows.add(Measurement)}(state.angle, pressure_1, pressure_2, torque)",
+        *signals,
+        f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
+        f"seen = {add(Measurement)}(angle, pressure_1, pressure_2, torque)",
     ]
+
+
+def pressures_of(rows: LaneRows, state: str) -> str:
+    """Line that makes the pressures of a state."""
+    given = f"plant, {state}.angle, {state}.mass_1, {state}.mass_2"
+    return f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}({given})"
 
 
 def sense_gait(rows: LaneRows) -> list[str]:
@@ -79,24 +82,35 @@ def sense_gait(rows: LaneRows) -> list[str]:
     ]
 
 
-def remember_signals(rows: LaneRows) -> list[str]:
-    """Keeps the signals of every step, where they are seen late."""
-    if rows.program.ideal_sensors or rows.program.controller is None or rows.program.walks:
+def signals_before_start(rows: LaneRows) -> list[str]:
+    """Fills the late signals with those at the start, which sensors show until the first have come."""
+    if not rows.program.late_signals:
         return []
-    lines = [
-        rows.load("plant"),
-        rows.load("state"),
-        f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}(plant, state.angle, state.mass_1, state.mass_2)",
-        "signal_history[0, place, lane] = state.angle",
-        "signal_history[1, place, lane] = pressure_1",
-        "signal_history[2, place, lane] = pressure_2",
-    ]
-    before_start = [
+    lines = [rows.load("plant"), rows.load("state"), "angle = state.angle", pressures_of(rows, "state")]
+    lines += [f"signal_history[{row}, slot, lane] = {name}" for row, name in enumerate(SIGNALS)]
+    return [
         "if step_index == 0:",
-        "    for slot in range(1, signal_history.shape[1]):",
-        "        signal_history[:, slot, :] = signal_history[:, 0, :]",
+        "    for slot in range(signal_history.shape[1]):",
+        *indented(over_lanes(lines), 2),
     ]
-    return ["place = step_index % signal_history.shape[1]", *over_lanes(lines), *before_start]
+
+
+def remember_signals(rows: LaneRows) -> list[str]:
+    """Keeps what late sensors look at, for a lane that has just reached the instant before ``look_at`` [s] of a step.
+
+    A signal that is late by a share of a step is looked at that share before a step's end.
+    """
+    if not rows.program.late_signals:
+        return []
+    return [
+        pressures_of(rows, "after"),
+        "angle = after.angle",
+        f"looks = taken and abs(before + length - look_at) <= {SAME_INSTANT!r}",
+        *[
+            f"signal_history[{row}, next_place, lane] = {name} if looks else signal_history[{row}, next_place, lane]"
+            for row, name in enumerate(SIGNALS)
+        ],
+    ]
 
 
 def remember_commands(rows: LaneRows) -> list[str]:

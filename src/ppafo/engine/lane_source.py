@@ -1,6 +1,6 @@
 """Writes the source of the lane loop of one program: loads, calls and stores, with the rows as literals."""
 
-from ppafo.engine.lane_control import control_loop, remember_commands, remember_signals
+from ppafo.engine.lane_control import control_loop, remember_commands, signals_before_start
 from ppafo.engine.lane_meters import measure_sample
 from ppafo.engine.lane_rows import LaneRows, indented, lanes_of, over_lanes
 from ppafo.engine.lane_step import plant_loop
@@ -66,7 +66,7 @@ def all_steps(rows: LaneRows) -> list[str]:
         "due = next_record * interval",
         "goal = 1.0",
         "for step_index in range(first_step, first_step + step_count):",
-        *indented([*remember_signals(rows), *control_loop(rows), *remember_commands(rows), *start, *step]),
+        *indented([*signals_before_start(rows), *control_loop(rows), *remember_commands(rows), *start, *step]),
         "if first_step + step_count == steps_in_all:",
         "    step_index = steps_in_all",
         *indented(at_sample(rows, "step_index")),

@@ -6,6 +6,7 @@ switches, a late command arrives, the vane meets a stop, a sample is due, or its
 that are through wait, masked, and no lane sees another.
 """
 
+from ppafo.engine.lane_control import remember_signals
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
 from ppafo.engine.scheme import motion, parts, pneumatics, supply_lines, thermal_gas, walking
 from ppafo.model.gait import gait_at
@@ -38,13 +39,15 @@ def opening(rows: LaneRows) -> list[str]:
 
 def parted_step(rows: LaneRows) -> list[str]:
     """As many parts as the lane with the most of them needs; places of late commands are the same for all lanes."""
-    places = [
-        "place_before = (step_index - command_delay - 1) % command_history.shape[0]",
-        "place_after = (step_index - command_delay) % command_history.shape[0]",
-    ]
+    places = []
+    if rows.program.late_commands:
+        places.append("place_before = (step_index - command_delay - 1) % command_history.shape[0]")
+        places.append("place_after = (step_index - command_delay) % command_history.shape[0]")
+    if rows.program.late_signals:
+        places.append("next_place = (step_index + 1) % signal_history.shape[1]")
     inside = [*part_opening(rows), f"length = {rows.length}"]
     return [
-        *(places if rows.program.late_commands else []),
+        *places,
         f"for part in range({MOST_PARTS}):",
         *indented(over_lanes([*part_opening(rows), *measure(rows)])),
         *indented(over_phases(inside, phases(rows))),
@@ -65,6 +68,8 @@ def part_opening(rows: LaneRows) -> list[str]:
             "early = command_history[place_before, lane]",
             "command = early if until_command > 0.0 else command_history[place_after, lane]",
         ]
+    if rows.program.late_signals:
+        lines.append("look_at = (1.0 - timing.signal_lag) * timing.step")
     return lines
 
 
@@ -75,6 +80,9 @@ def measure(rows: LaneRows) -> list[str]:
     if program.late_commands:
         arrival = f"until_command + {parts.SAME_INSTANT!r}"
         lines.append(f"until = min(until, {arrival}) if until_command > 0.0 else until")
+    if program.late_signals:
+        soon = f"look_at - before > {parts.SAME_INSTANT!r}"
+        lines.append(f"until = min(until, look_at - before) if {soon} else until")
     if program.valve.jumps:
         functions = f"{add(program.valve.next_event)}, {add(program.valve.settle)}"
         lines.append(f"until = {add(parts.until_jump)}(valve, valve_state, command, time, until, {functions})")
@@ -202,9 +210,8 @@ def finish(rows: LaneRows) -> list[str]:
     program, add = rows.program, rows.add
     lines = [*with_gas(rows), *end_motion(rows)]
     if not program.is_adaptive:
-        lines += store_all(rows, "")
-        lines += [*judge(rows), *(add_up(rows) if program.is_parted else [])]
-        return lines
+        taken = [f"taken = {rows.remaining} > 0.0", *remember_signals(rows), *add_up(rows)] if program.is_parted else []
+        return [*lines, *store_all(rows, ""), *judge(rows), *taken]
     return [
         *lines,
         rows.load("next_valve"),
@@ -217,7 +224,8 @@ def finish(rows: LaneRows) -> list[str]:
         "taken = active and not refused",
         *store_all(rows, "taken"),
         *judge(rows, "taken"),
-        *add_up(rows, "taken"),
+        *remember_signals(rows),
+        *add_up(rows),
     ]
 
 
@@ -262,13 +270,11 @@ def positive(rows: LaneRows) -> str:
     return " and ".join(f"{name} > 0.0" for name in names)
 
 
-def add_up(rows: LaneRows, flag: str = "") -> list[str]:
-    """Lines that count the time of a part; the end of the last one is the goal to the last bit."""
-    arrives = f"length >= {rows.remaining}" + (f" and {flag}" if flag else "")
-    moved = f"length if {flag} else 0.0" if flag else "length"
+def add_up(rows: LaneRows) -> list[str]:
+    """Lines that count the time of a part that is taken; the end of the last one is the goal to the last bit."""
     return [
-        f"arrives = {arrives} or {rows.remaining} == 0.0",
-        f"{rows.before} = goal * timing.step if arrives else before + ({moved})",
+        f"arrives = length >= {rows.remaining} and taken or {rows.remaining} == 0.0",
+        f"{rows.before} = goal * timing.step if arrives else before + (length if taken else 0.0)",
         f"{rows.remaining} = 0.0 if arrives else {rows.remaining}",
     ]
 

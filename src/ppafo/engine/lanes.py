@@ -191,6 +191,10 @@ class LaneBlock:
         """Change some parameters of all runs from the next step on; ``rows`` as ``Program.parameter_rows`` has them."""
         self._parameters[rows] = values[:, None]
 
+    def late_signals(self, step: int) -> Floats:
+        """Angle [rad] and pressures [Pa] (3, runs) that late sensors show at ``step``, the next one, but the first."""
+        return self._signals[:, (step - self._clock.signal_delay) % self._signals.shape[1]]
+
     def result(self) -> BatchResult:
         """States and record so far."""
         record = self._trace[:, :, : self._width] if self._clock.trace_every else self._record

@@ -51,7 +51,7 @@ class Program:
     """One combination of pieces; each combination is compiled once.
 
     ``angle`` None leaves the vane free, otherwise it is led along that profile. ``controller`` None leaves the command
-    to the caller, sample by sample. ``ideal_sensors`` False adds noise, quantisation and delay of the signals.
+    to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals, ``late_signals`` True their delay.
     ``late_commands`` True adds a dead time before the valve. ``is_thermal`` True gives the gas an energy balance
     instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose
     foot is free or where the ground and a gait lead it (``angle`` is None then). ``has_lines`` True feeds a walking
@@ -66,6 +66,7 @@ class Program:
     angle: ProfileKind | None
     ideal_sensors: bool
     late_commands: bool
+    late_signals: bool = False
     is_thermal: bool = False
     walks: bool = False
     has_lines: bool = False
@@ -128,7 +129,7 @@ class Program:
     @property
     def is_parted(self) -> bool:
         """True where a step is done in parts."""
-        return self.is_adaptive or self.samples_inside or self.late_commands or self.valve.jumps
+        return self.is_adaptive or self.samples_inside or self.late_commands or self.late_signals or self.valve.jumps
 
     @property
     def is_held(self) -> bool:

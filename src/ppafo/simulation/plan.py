@@ -63,6 +63,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         angle=None if isinstance(motion, FreeMotion) else PROFILES[motion.profile.kind],
         ideal_sensors=has_ideal_sensors(scenario),
         late_commands=first(delay) > 0.0,
+        late_signals=first(scenario.sensors.delay) > 0.0,
         is_thermal=scenario.thermal is not None,
         is_adaptive=bool(first(needs_parts)),
         samples_inside=bool(first(record_every % 1.0)),
@@ -123,8 +124,8 @@ def thermal_parameters(scenario: Scenario) -> ThermalParameters | NoParameters:
 
 
 def has_ideal_sensors(scenario: Scenario) -> bool:
-    """True where the controller sees the present without noise or rounding."""
-    return not any(first(flaw) for flaw in scenario.sensors.flaws)
+    """True where the controller sees what is there, without noise or rounding."""
+    return not any(first(flaw) for flaw in scenario.sensors.flaws[1:])
 
 
 def sensor_parameters(scenario: Scenario) -> SensorParameters:
