@@ -18,10 +18,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tests.judge.comparison import Verdict, verdict  # noqa: E402
-from tests.judge.draws import FAMILIES, Document, draw  # noqa: E402
+from tests.judge.comparison import Verdict, verdict
+from tests.judge.draws import FAMILIES, Document, draw
 
-from ppafo import load_scenario, scenario_from_dict  # noqa: E402
+from ppafo import load_scenario, scenario_from_dict
 
 COLUMNS = ("draws", "determined", "above", "failed", "worst", "median", "not determined", "of these above", "seconds")
 

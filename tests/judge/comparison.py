@@ -17,8 +17,10 @@ FRACTION = 0.1
 """Share of a limit by which the judge may disagree with itself on a determined run."""
 MOVED = 1.0e-7
 BIAS = 1.0e-5
-"""Share of the pressure range by which what the controller measures is moved, one chamber up and one down: a hundredth of
-the limit. A loop that turns this into more than the whole limit hangs on decisions that nobody can follow."""
+"""Share of the pressure range by which what the controller measures is moved, one chamber up and the other down.
+
+A hundredth of the limit: a loop that makes more than the whole limit of it hangs on decisions that nobody can follow.
+"""
 
 
 class Verdict(NamedTuple):

@@ -1,7 +1,7 @@
 """Random devices and experiments as scenario documents, by family; the same number gives the same document.
 
-A family is written for one thing that is hard; ``mixed`` draws everything at once. The documents are the package's public
-form, so that the package and the judge are given the same thing.
+A family is written for one thing that is hard; ``mixed`` draws everything at once. The documents are in the package's
+public form, so that the package and the judge are given the same thing.
 """
 
 import math
@@ -70,7 +70,10 @@ def orifice(chance: Chance, where: str, area: float) -> list[str]:
     if chance.random() < 0.7:
         return [f"{where}.area={area} mm^2"]
     conductance = area * 1e-6 * 0.113 * 0.0024
-    return [f"{where}.sonic_conductance={conductance} m^3/(s Pa)", f"{where}.critical_ratio={chance.uniform(0.15, 0.5)}"]
+    return [
+        f"{where}.sonic_conductance={conductance} m^3/(s Pa)",
+        f"{where}.critical_ratio={chance.uniform(0.15, 0.5)}",
+    ]
 
 
 def leak(chance: Chance, none: float = 0.0) -> list[str]:

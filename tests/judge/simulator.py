@@ -1,9 +1,9 @@
-"""An independent simulator: the equations of docs/equations.md in continuous time, and nothing of the package's stepping.
+"""An independent simulator: the equations of docs/equations.md in continuous time, none of the package's stepping.
 
-It reads the numbers of a scenario and knows no engine, no fitted curve and no step of the package. Dormand and Prince's
-explicit method of order five with an error control far below what is to be judged; whatever happens at once (breakaway,
-reversal, a stop) is found by bisection, and every instant that is known ahead (a sample, a late command, a coil, a corner
-of a profile) is met exactly.
+It reads the numbers of a scenario and knows no engine, no fitted curve and no step of the package. The method is that
+of Dormand and Prince, explicit and of order five, with an error control far below what is to be judged. What happens at
+once (breakaway, reversal, a stop) is found by bisection; every instant known ahead (a sample, a late command, a coil, a
+corner of a profile) is met exactly.
 """
 
 import math
@@ -19,6 +19,7 @@ REFERENCE_DENSITY = 1.185
 REFERENCE_TEMPERATURE = 293.15
 REFERENCE_PRESSURE = 1.0e5
 
+MEASURED, DECIDED, ARRIVED = range(3)
 ANGLE, VELOCITY, MASS_1, MASS_2, ENERGY_1, ENERGY_2, SPOOL, SPOOL_RATE, ASKED, TAKEN = range(10)
 REST, LED = 0.0, 9.0
 """Ways of the vane, beside 1 and -1 for a vane that moves."""
@@ -26,6 +27,7 @@ NEVER = 1.0e300
 SAME_INSTANT = 1.0e-12
 LONGEST_STEP = 2.0e-4
 SLOWEST_REBOUND = 1.0e-7
+MOST_STEPS = 20_000_000
 TIMES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
 WEIGHTS = np.array(
     [
@@ -78,7 +80,7 @@ class Valve(NamedTuple):
 
 
 class Law(NamedTuple):
-    """A controller with its sensors; ``bias`` [Pa] is added to what is measured in chamber 1, and taken from chamber 2."""
+    """A controller with its sensors; ``bias`` [Pa] is added to what is measured in chamber 1, taken from chamber 2."""
 
     kind: float
     period: float
@@ -89,7 +91,6 @@ class Law(NamedTuple):
     filter: float
     anti_windup: float
     delay: float
-    angle_quantum: float
     pressure_quantum: float
     bias: float
 
@@ -131,7 +132,7 @@ class Rig(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Times [s], angle [rad], angular velocity [rad/s], both pressures [Pa], gas drawn [kg], and times of impacts [s]."""
+    """Times [s], angle [rad], angular velocity [rad/s], both pressures [Pa], gas drawn [kg]; times of impacts [s]."""
 
     time: Any
     angle: Any
@@ -175,7 +176,7 @@ def flow_function(ratio: float, hole: Restriction) -> float:
 
 @njit(cache=True)
 def flow(up: float, down: float, warmth: float, hole: Restriction, linear: float) -> float:
-    """Mass flow [kg/s] where ``up`` is not below ``down``; ``warmth`` is the temperature upstream over that of the device."""
+    """Mass flow [kg/s], ``up`` not below ``down``; ``warmth`` is the temperature upstream over that of the device."""
     ratio = down / up
     value = flow_function(min(ratio, linear), hole)
     if ratio > linear:
@@ -211,7 +212,7 @@ def gas_of(rig: Rig, angle: float, y: Any) -> tuple[float, float, float, float]:
 
 @njit(cache=True)
 def exchange(rig: Rig, inside: float, warmth: float, outside: float, share: float, oneway: bool) -> tuple[float, float]:
-    """Flow into a chamber through a part of the valve's area [kg/s], and the same times its temperature over the device's."""
+    """Flow into a chamber through a share of the valve's area [kg/s]; the same times its warmth."""
     if share <= 0.0:
         return 0.0, 0.0
     if outside >= inside:
@@ -246,7 +247,7 @@ def rates(rig: Rig, time: float, y: Any, way: float, coils: Any, target: float, 
     angle, velocity = place_of(rig, time, y)
     pressure_1, pressure_2, warmth_1, warmth_2 = gas_of(rig, angle, y)
     slope[:] = 0.0
-    if way == 1.0 or way == -1.0:
+    if abs(way) == 1.0:
         torque = net_torque(rig, angle, pressure_1, pressure_2) - rig.viscous * velocity - way * rig.dynamic
         slope[ANGLE] = velocity
         slope[VELOCITY] = torque / rig.inertia
@@ -360,8 +361,8 @@ def decide(rig: Rig, time: float, seen: Any, memory: Any) -> float:
     law = rig.law
     if law.kind == 0.0:
         return law.command
-    measured_1 = rounded(seen[1] + law.bias, law.pressure_quantum)
-    measured_2 = rounded(seen[2] - law.bias, law.pressure_quantum)
+    measured_1 = rounded(seen[0] + law.bias, law.pressure_quantum)
+    measured_2 = rounded(seen[1] - law.bias, law.pressure_quantum)
     wish, _ = follow(rig.wish, time)
     error = wish - rig.torque_constant * (measured_1 - measured_2)
     if law.kind == 1.0:
@@ -385,7 +386,7 @@ def opening_asked(valve: Valve, command: float) -> float:
 
 @njit(cache=True)
 def settle_coils(valve: Valve, coils: Any, command: float, time: float) -> float:
-    """Let both coils do what is due; the next time at which one does something. A coil: position, told, taken, changes."""
+    """Let both coils do what is due; when one acts next. A coil: position, order, when taken, when followed."""
     soonest = NEVER
     for n in range(2):
         coil = coils[n]
@@ -430,7 +431,7 @@ def advance(
     impacts: Any,
     counts: Any,
 ) -> tuple[float, float]:
-    """From one known instant to the next over all that the vane does meanwhile: its way, and the length of the next step."""
+    """From one known instant to the next over all that the vane does: its way then, and the length of the next step."""
     sizes = np.empty(y.size)
     while time < end:
         sizes[:] = 1.0
@@ -475,69 +476,84 @@ def advance(
 
 
 @njit(cache=True)
+def settle_loop(rig: Rig, time: float, y: Any, due: Any, seen: Any, commands: Any, memory: Any) -> float:
+    """Measure, decide and pass on what is due; the command that the valve has now, none before the first."""
+    law = rig.law
+    while due[MEASURED] < commands.size and due[MEASURED] * law.period - law.delay <= time + SAME_INSTANT:
+        angle, _ = place_of(rig, time, y)
+        pressure_1, pressure_2, _, _ = gas_of(rig, angle, y)
+        seen[due[MEASURED], 0], seen[due[MEASURED], 1] = pressure_1, pressure_2
+        due[MEASURED] += 1
+    while due[DECIDED] < commands.size and due[DECIDED] * law.period <= time + SAME_INSTANT:
+        commands[due[DECIDED]] = decide(rig, time, seen[due[DECIDED]], memory)
+        due[DECIDED] += 1
+    while due[ARRIVED] < commands.size and due[ARRIVED] * law.period + rig.valve.delay <= time + SAME_INSTANT:
+        due[ARRIVED] += 1
+    return commands[due[ARRIVED] - 1] if due[ARRIVED] > 0 else 0.0
+
+
+@njit(cache=True)
+def settle_valve(valve: Valve, y: Any, coils: Any, command: float, time: float) -> tuple[float, float]:
+    """Where the spool is asked to go, and the next time at which the valve does something abrupt by itself."""
+    if valve.solenoid > 0.0:
+        return 0.0, settle_coils(valve, coils, command, time)
+    target = opening_asked(valve, command)
+    arrival = time + abs(target - y[ASKED]) / valve.slew if valve.slew > 0.0 else time
+    if arrival > time + SAME_INSTANT:
+        return target, arrival
+    y[ASKED] = target
+    return target, NEVER
+
+
+@njit(cache=True)
+def next_known(rig: Rig, time: float, due: Any, samples: int, record: float) -> float:
+    """The next instant known ahead: a record, a measurement, a decision, a late command, a corner of the path."""
+    law = rig.law
+    soonest = min(record, corner_after(rig.path, time))
+    if due[MEASURED] < samples:
+        soonest = min(soonest, due[MEASURED] * law.period - law.delay)
+    if due[DECIDED] < samples:
+        soonest = min(soonest, due[DECIDED] * law.period)
+    if due[ARRIVED] < samples:
+        soonest = min(soonest, due[ARRIVED] * law.period + rig.valve.delay)
+    return soonest
+
+
+@njit(cache=True)
+def first_way(rig: Rig, y: Any) -> float:
+    """The way of the vane at the start; one that is thrown at the stop it stands on rebounds at once."""
+    if rig.led > 0.0:
+        return LED
+    if y[VELOCITY] == 0.0:
+        return leaves(rig, y)
+    way = math.copysign(1.0, y[VELOCITY])
+    return what_follows(rig, y, way)[0] if happened(rig, y, way) else way
+
+
+@njit(cache=True)
 def solve(rig: Rig, y: Any, interval: float, records: Any, impacts: Any, tolerance: float) -> Any:
     """Fill the records, a row every ``interval`` [s]; steps, impacts and events counted."""
-    counts = np.zeros(3, np.int64)
-    work = np.zeros((8, y.size))
-    coils = np.zeros((2, 4))
+    counts, due = np.zeros(3, np.int64), np.zeros(3, np.int64)
+    work, coils, memory = np.zeros((8, y.size)), np.zeros((2, 4)), np.zeros(4)
     coils[:, 2] = -1.0e9
-    memory = np.zeros(4)
-    law, valve = rig.law, rig.valve
-    end = interval * (records.shape[0] - 1)
-    samples = int(end / law.period + 1.0e-9) + 1
-    seen = np.zeros((samples, 3))
-    commands = np.zeros(samples)
-    recorded, measured, sampled, arrived = 0, 0, 0, 0
-    target, command, coil_time = 0.0, 0.0, NEVER
-    h = 1.0e-6
-    if rig.led > 0.0:
-        way = LED
-    elif y[VELOCITY] == 0.0:
-        way = leaves(rig, y)
-    else:
-        way = math.copysign(1.0, y[VELOCITY])
-        if happened(rig, y, way):
-            way, _ = what_follows(rig, y, way)
-    time = 0.0
+    samples = int(interval * (records.shape[0] - 1) / rig.law.period + 1.0e-9) + 1
+    seen, commands = np.zeros((samples, 2)), np.zeros(samples)
+    way = first_way(rig, y)
+    time, recorded, h = 0.0, 0, 1.0e-6
     while True:
-        angle, velocity = place_of(rig, time, y)
-        pressure_1, pressure_2, _, _ = gas_of(rig, angle, y)
-        while measured < samples and measured * law.period - law.delay <= time + SAME_INSTANT:
-            seen[measured, 0], seen[measured, 1], seen[measured, 2] = angle, pressure_1, pressure_2
-            measured += 1
-        while sampled < samples and sampled * law.period <= time + SAME_INSTANT:
-            commands[sampled] = decide(rig, time, seen[sampled], memory)
-            sampled += 1
-        while arrived < samples and arrived * law.period + valve.delay <= time + SAME_INSTANT:
-            command = commands[arrived]
-            arrived += 1
-        if valve.solenoid > 0.0:
-            coil_time = settle_coils(valve, coils, command, time)
-        else:
-            target = opening_asked(valve, command)
-            coil_time = NEVER
-            if valve.slew > 0.0:
-                coil_time = time + abs(target - y[ASKED]) / valve.slew
-            if coil_time <= time + SAME_INSTANT or valve.slew == 0.0:
-                y[ASKED] = target
-                coil_time = NEVER
+        command = settle_loop(rig, time, y, due, seen, commands, memory)
+        target, change = settle_valve(rig.valve, y, coils, command, time)
         if interval * recorded <= time + SAME_INSTANT:
+            angle, velocity = place_of(rig, time, y)
+            pressure_1, pressure_2, _, _ = gas_of(rig, angle, y)
             records[recorded, 0], records[recorded, 1], records[recorded, 2] = time, angle, velocity
             records[recorded, 3], records[recorded, 4], records[recorded, 5] = pressure_1, pressure_2, y[TAKEN]
             recorded += 1
-        if recorded >= records.shape[0] or counts[0] > 20_000_000:
-            break
-        until = min(interval * recorded, coil_time)
-        if measured < samples:
-            until = min(until, measured * law.period - law.delay)
-        if sampled < samples:
-            until = min(until, sampled * law.period)
-        if arrived < samples:
-            until = min(until, arrived * law.period + valve.delay)
-        until = min(until, corner_after(rig.path, time))
+        if recorded >= records.shape[0] or counts[0] > MOST_STEPS:
+            return counts
+        until = min(change, next_known(rig, time, due, samples, interval * recorded))
         way, h = advance(rig, time, until, y, way, coils, target, work, h, tolerance, impacts, counts)
         time = until
-    return counts
 
 
 def restriction(orifice: Any, scenario: Scenario) -> Restriction:
@@ -580,7 +596,7 @@ def law_of(scenario: Scenario, bias: float) -> Law:
         raise ValueError("the judge knows no noise")
     names = ("proportional_gain", "integral_gain", "derivative_gain", "derivative_filter", "anti_windup")
     gains = (s.get(name, 0.0) for name in names)
-    seen = (sensors.delay, sensors.angle_quantum, sensors.pressure_quantum, bias)
+    seen = (sensors.delay, sensors.pressure_quantum, bias)
     return Law(CONTROLLERS[scenario.control.kind], scenario.control.period, s.get("command", 0.0), *gains, *seen)
 
 

@@ -11,12 +11,13 @@ from tests.judge.comparison import away_from_impacts, columns, differences, verd
 from tests.judge.draws import FAMILIES, draw
 from tests.judge.simulator import judge
 
+from ppafo.engine.reference.agreement import chamber_pressures_of
 from ppafo.engine.reference.solver import solve_reference
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 
-SEED = 0
+SEED = 1
 DRAWS = 9
 
 
@@ -43,13 +44,29 @@ def test_the_judge_would_see_a_device_that_is_wrong_by_two_in_a_thousand(flaw: s
     assert max(differences(step_response, answer, columns(judge(step_response, 1e-11)), keep)) < 1e-3
 
 
-@pytest.mark.parametrize("family", ["gases", "slow valves", "thermal rebounds", "solenoid loops", "led"])
+def reference_gap(scenario: Scenario) -> float:
+    """Largest difference between reference solver and judge away from impacts, over the limits."""
+    run = plan_run(scenario)
+    answer, reference = judge(scenario), solve_reference(run)
+    keep = away_from_impacts(answer.time, answer.impacts, reference.impacts)
+    seen = (reference.states[:, 0], *chamber_pressures_of(run, reference.states))
+    return max(differences(scenario, answer, seen, keep))
+
+
+@pytest.mark.parametrize(
+    "family", ["gases", "slow valves", "thermal rebounds", "late coarse sensors", "solenoid loops", "led"]
+)
 def test_judge_and_reference_solver_agree(family: str) -> None:
-    for number in range(2):
-        scenario = scenario_from_dict(draw(family, SEED, number))
-        run = plan_run(scenario)
-        answer, states = judge(scenario), solve_reference(run)
-        assert answer.drawn[-1] == pytest.approx(states.states[-1, 4], rel=1e-6, abs=1e-9), (family, number)
+    assert {n: gap for n in range(3) if (gap := reference_gap(scenario_from_dict(draw(family, SEED, n)))) > 1e-2} == {}
+
+
+@pytest.mark.parametrize(("angle", "speed"), [("20 deg", "-100 deg/s"), ("130 deg", "100 deg/s")])
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_vane_thrown_at_the_stop_it_starts_on_rebounds_at_once(angle: str, speed: str, restitution: float) -> None:
+    lines = (f"motion.angle={angle}", f"motion.angular_velocity={speed}", f"actuator.restitution={restitution}")
+    scenario = load_scenario("step-response", (*lines, "initial.pressure_1=supply", "run.duration=0.1 s"))
+    assert verdict(scenario).worst <= 1.0
+    assert reference_gap(scenario) <= 1e-2
 
 
 def test_a_supply_that_does_not_relieve_lets_gas_in_only(step_response: Scenario) -> None:
