@@ -351,8 +351,8 @@ def what_follows(rig: Rig, y: Any, way: float) -> tuple[float, bool]:
 
 @njit(cache=True)
 def rounded(value: float, quantum: float) -> float:
-    """The nearest whole number of quanta."""
-    return math.floor(value / quantum + 0.5) * quantum if quantum > 0.0 else value
+    """The nearest whole number of quanta, a half away from 0."""
+    return math.copysign(math.floor(abs(value) / quantum + 0.5) * quantum, value) if quantum > 0.0 else value
 
 
 @njit(cache=True)
