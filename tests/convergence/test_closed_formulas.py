@@ -6,20 +6,16 @@ What the energy balance says of fillings, emptyings and led compressions as a wh
 
 import dataclasses
 import math
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.judge.simulator import judge
 
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
-from tests.judge.simulator import judge
 
 K = 1.3
 PRODUCT = 8.314 * 298.0 / 0.044

@@ -9,13 +9,18 @@ import random
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ppafo.parameters.device import Supply
+
 Document = dict[str, Any]
 Chance = random.Random
 
 GASES = (("CO2", 44.0, 1.3), ("air", 28.965, 1.4), ("N2", 28.013, 1.401), ("He", 4.0026, 1.667))
 SUPPLY_LINES = ("supply.pressure", "supply.dorsiflexion_pressure")
+MAY_RELIEVE = "relieving" in Supply.__dataclass_fields__
+"""Whether a set can say that its supplies take gas back."""
 PERIODS_MS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
 """10 kHz to 1 Hz."""
+ODD_RATES_HZ = (997.0, 333.0, 61.0, 7.0)
 
 
 def logarithmic(chance: Chance, low: float, high: float) -> float:
@@ -63,6 +68,12 @@ def friction(chance: Chance) -> list[str]:
 def supplies(chance: Chance, low: float = 30.0, high: float = 80.0) -> list[str]:
     """Pressures of both supplies, in psi_g."""
     return [f"{line}={chance.uniform(low, high)} psi_g" for line in SUPPLY_LINES]
+
+
+def relief(chance: Chance) -> list[str]:
+    """Supplies that take gas back, in half of the draws."""
+    takes_back = chance.random() < 0.5
+    return ["supply.relieving=true"] if MAY_RELIEVE and takes_back else []
 
 
 def orifice(chance: Chance, where: str, area: float) -> list[str]:
@@ -161,7 +172,9 @@ def open_loop(chance: Chance) -> Document:
 
 
 def sampled(chance: Chance, law: Document) -> Document:
-    """A law with some sample period."""
+    """A law with some sample period; some rates have nothing in common with the times of the record."""
+    if chance.random() < 0.1:
+        return law | {"rate": f"{chance.choice(ODD_RATES_HZ)} Hz"}
     return law | {"period": f"{chance.choice(PERIODS_MS)} ms"}
 
 
@@ -204,7 +217,7 @@ def nothing_lost(chance: Chance) -> Document:
 def backflow(chance: Chance) -> Document:
     """Chambers above their supply, by the start or by a torque from outside."""
     lines = gas(chance) + actuator(chance) + friction(chance) + supplies(chance, 5.0, 40.0) + leak(chance)
-    lines += orifice(chance, "valve", logarithmic(chance, 2.0, 40.0))
+    lines += orifice(chance, "valve", logarithmic(chance, 2.0, 40.0)) + relief(chance)
     return document(lines, free(chance, 200.0, 10.0), open_loop(chance), initial=start(chance, 90.0))
 
 
@@ -292,7 +305,7 @@ def mixed(chance: Chance) -> Document:
     valve = chance.choice(["proportional", "solenoid"])
     lines = gas(chance) + actuator(chance, (0.05, 30.0), chance.choice([0.0, chance.random()])) + friction(chance)
     lines += supplies(chance, 5.0, 80.0) + leak(chance, none=0.2)
-    lines += orifice(chance, "valve", logarithmic(chance, 0.1, 40.0))
+    lines += orifice(chance, "valve", logarithmic(chance, 0.1, 40.0)) + relief(chance)
     if chance.random() < 0.5:
         lines += spool(chance) if valve == "proportional" else coils(chance)
     law = chance.choice([open_loop(chance), {"kind": "on_off"}, pid(chance)])
