@@ -35,9 +35,14 @@ class Verdict(NamedTuple):
     failure: str
 
     @property
+    def is_repeatable(self) -> bool:
+        """True where neither the start nor the judge's own step changes the result."""
+        return self.compared > 0 and max(self.moved, self.own) <= FRACTION
+
+    @property
     def is_determined(self) -> bool:
-        """True where neither the start, the judge's own step nor a hair's breadth at a decision changes the result."""
-        return self.compared > 0 and max(self.moved, self.own) <= FRACTION and self.biased <= 1.0
+        """True where, besides, no decision of the controller hangs by a hair."""
+        return self.is_repeatable and self.biased <= 1.0
 
     @property
     def worst(self) -> float:
