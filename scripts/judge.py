@@ -2,9 +2,10 @@
 
     python scripts/judge.py --draws 3000 --seed 1 --out out/judge
 
-Prints a table: draws of each family, how many are determined, how many of these are above the limits or failed, worst and
-median error over the limit; then those in which a decision of the controller hangs by a hair (they change where a sensor
-is moved by 1e-5 of the pressure range), and those that change where the start is moved by 1e-7. Every case above the limits is written as a scenario file into the folder, to be run again by
+Prints a table: draws of each family, how many are determined, how many of these are above the limits or failed, worst
+and median error over the limit; then those in which a decision of the controller hangs by a hair (they change where a
+sensor is moved by 1e-5 of the pressure range), and those that change where the start is moved by 1e-7. Every determined
+case above the limits is written as a scenario file into the folder, to be run again by
 
     ppafo simulate out/judge/slow-valves-1-17.toml
     python scripts/judge.py --again out/judge/slow-valves-1-17.toml
