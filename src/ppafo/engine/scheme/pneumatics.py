@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
+from ppafo.model.ports import admitted_flow
 
 GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
@@ -203,13 +204,28 @@ def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
     )
 
 
+def without_return(plant: PlantParameters, linear: Linearisation, change: GasChange) -> GasChange:
+    """The change [kg] of a step with a draw of at least nothing, where the supplies take no gas back.
+
+    A chamber that rises above its source inside a step has slopes from below it, which would push the gas out again:
+    that gas stays in the chamber that is fed.
+    """
+    supplied = admitted_flow(change.supplied, plant.relieving)
+    kept = supplied - change.supplied
+    to_1 = kept if linear.supplied_by_1 < linear.supplied_by_2 else 0.0
+    return GasChange(change.mass_1 + to_1, change.mass_2 + (kept - to_1), supplied, change.leaked)
+
+
 def end_still_gas(
     plant: PlantParameters, begun: StillGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
 ) -> GasChange:
     """Changes of mass [kg] in one step [s] in which the vane stands still, from its first stage."""
     right = second_right_sides(plant, begun, port_1, port_2, port_flow)
     second = solve_stage(begun.linear, right.mass_1, right.mass_2, right.supplied, right.leaked)
-    return both_stages(begun.first, second, step)
+    change = both_stages(begun.first, second, step)
+    # Only a leak can push gas towards the source here, hardly any: what would go back counts as vented.
+    supplied = admitted_flow(change.supplied, plant.relieving)
+    return GasChange(change.mass_1, change.mass_2, supplied, change.leaked)
 
 
 def end_moving_gas(
@@ -225,4 +241,4 @@ def end_moving_gas(
         right.supplied - drift.supplied,
         right.leaked - drift.leaked,
     )
-    return both_stages(begun.still.first, second, step)
+    return without_return(plant, begun.still.linear, both_stages(begun.still.first, second, step))

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from ppafo.engine.scheme.pneumatics import GAMMA, SHORTEST
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_volumes
-from ppafo.model.ports import PortFlow
+from ppafo.model.ports import PortFlow, admitted_flow
 from ppafo.model.thermal import carried_energy, carried_mass
 
 
@@ -295,7 +295,27 @@ def end_thermal_gas(
     )
     right = combined(combined(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
     second = solve_thermal_stage(begun.matrix, right)
-    return combined(begun.first, 1.5 * step, second, 0.5 * step)
+    change = combined(begun.first, 1.5 * step, second, 0.5 * step)
+    return without_thermal_return(plant, thermal, begun.matrix.slopes, change)
+
+
+def without_thermal_return(
+    plant: PlantParameters, thermal: ThermalParameters, slopes: FlowSlopes, change: ThermalFlows
+) -> ThermalFlows:
+    """The change [kg] of a step with a draw of at least nothing, as ``pneumatics.without_return``."""
+    supplied = admitted_flow(change.supplied, plant.relieving)
+    kept = supplied - change.supplied
+    to_1 = kept if slopes.supplied_by_1 < slopes.supplied_by_2 else 0.0
+    to_2 = kept - to_1
+    carries = carried_energy(1.0, thermal.heat_capacity_ratio)
+    return ThermalFlows(
+        change.content_1 + to_1 * carries,
+        change.content_2 + to_2 * carries,
+        change.mass_1 + to_1,
+        change.mass_2 + to_2,
+        supplied,
+        change.leaked,
+    )
 
 
 def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlows) -> tuple[PlantState, ThermalState]:
