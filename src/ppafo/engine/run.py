@@ -1,7 +1,7 @@
 """One run as values: what both the lanes and the reference solver are given."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,9 @@ from ppafo.model.columns import larger, whole
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import NOTHING_SEEN, GaitSensors
 from ppafo.model.leg import LegParameters
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_pressures
 from ppafo.model.regulator import LineState, SupplyLines
-from ppafo.model.sensors import SensorParameters
+from ppafo.model.sensors import SensorLag, SensorParameters, SensorState
 
 Members = NDArray[np.intp]
 
@@ -77,6 +77,7 @@ class Run:
     command_delay: float
     walk: Walk | None = None
     lines: Lines | None = None
+    sensor_lag: SensorLag | NoParameters = field(default_factory=NoParameters)
 
     @property
     def period(self) -> float:
@@ -108,13 +109,13 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     plant, valve = [run.plant, run.thermal], [run.valve, run.early_valve]
     walk, walk_states = _walk_groups(run.walk)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
-    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines]
+    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, run.sensor_lag]
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
     masses = ThermalState(run.initial.mass_1, run.initial.mass_2) if program.is_thermal else NoParameters()
     result = LaneResult(0.0, NEVER_FAILED)
-    further = [*walk_states, *line_states]
+    further = [*walk_states, *line_states, settled_sensors(run)]
     states = table([result, run.initial, masses, program.valve.initial(), controller_state, *further], runs)
     counts = np.empty((runs, 5), dtype=np.int64)
     wholes = (run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
@@ -127,6 +128,15 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         (members, Batch(program, Clock(*clock.tolist()), parameters[:, members], states[:, members]))
         for clock, members in zip(clocks, _members(group.reshape(-1), len(clocks)), strict=True)
     ]
+
+
+def settled_sensors(run: Run) -> SensorState | NoParameters:
+    """Slow sensors that show what is true at the start of a run; nothing where there are none."""
+    if not run.program.slow_sensors:
+        return NoParameters()
+    initial = run.initial
+    signals = initial.angle, *chamber_pressures(run.plant, initial.angle, initial.mass_1, initial.mass_2)
+    return SensorState(*signals, *signals)
 
 
 def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:

@@ -1,9 +1,10 @@
-"""What a controller sees of the plant: ideal, or with noise and quantisation.
+"""What a controller sees of the plant: ideal, or with a bandwidth, noise and quantisation.
 
 Noise is a pure function of seed, sample number and channel, so that a run gives the same noise alone, in any block
 and on any number of threads.
 """
 
+import math
 from typing import NamedTuple
 
 MASK = 0xFFFFFFFF
@@ -26,6 +27,64 @@ class SensorParameters(NamedTuple):
     angle_quantum: float
     pressure_quantum: float
     seed: float
+
+
+class FollowWeights(NamedTuple):
+    """A first-order sensor: its rate [1/s] (0: it follows at once), and its exact step as three weights [-].
+
+    After a step it shows so much of what it showed, of what was true before, and of what is true now.
+    """
+
+    rate: float
+    shown: float
+    before: float
+    now: float
+
+
+class SensorLag(NamedTuple):
+    """How the angle sensor and the pressure sensors follow."""
+
+    angle: FollowWeights
+    pressure: FollowWeights
+
+
+class SensorState(NamedTuple):
+    """Angle [rad] and absolute pressures [Pa] as the sensors show them, and as they truly are."""
+
+    angle: float
+    pressure_1: float
+    pressure_2: float
+    true_angle: float
+    true_pressure_1: float
+    true_pressure_2: float
+
+
+def follow_weights(bandwidth: float, step: float) -> FollowWeights:
+    """Weights of a sensor of a bandwidth [Hz] for a step [s] in which the truth runs straight; 0 Hz follows at once."""
+    rate = 2.0 * math.pi * bandwidth
+    if rate == 0.0:
+        return FollowWeights(0.0, 0.0, 0.0, 1.0)
+    kept, mean = math.exp(-rate * step), -math.expm1(-rate * step) / (rate * step)
+    return FollowWeights(rate, kept, mean - kept, 1.0 - mean)
+
+
+def follow(weights: FollowWeights, shown: float, before: float, now: float) -> float:
+    """What a first-order sensor shows after a step, in the unit of what it measures."""
+    return weights.shown * shown + weights.before * before + weights.now * now
+
+
+def follow_signals(
+    lag: SensorLag, sensed: SensorState, angle: float, pressure_1: float, pressure_2: float
+) -> SensorState:
+    """What the sensors show after a step that leads to an angle [rad] and two absolute pressures [Pa]."""
+    return SensorState(
+        follow(lag.angle, sensed.angle, sensed.true_angle, angle),
+        follow(lag.pressure, sensed.pressure_1, sensed.true_pressure_1, pressure_1),
+        follow(lag.pressure, sensed.pressure_2, sensed.true_pressure_2, pressure_2),
+        angle,
+        pressure_1,
+        pressure_2,
+    )
 
 
 def mixed(value: int) -> int:

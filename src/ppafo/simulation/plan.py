@@ -16,7 +16,7 @@ from ppafo.errors import ScenarioError
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.columns import at, first, larger, over_runs, smaller, whole
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_volumes
-from ppafo.model.sensors import SensorParameters
+from ppafo.model.sensors import SensorLag, SensorParameters, follow_weights
 from ppafo.model.thermal import wall_exchange
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
@@ -60,6 +60,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         ideal_sensors=has_ideal_sensors(scenario),
         late_commands=first(delay) > 0.0,
         is_thermal=scenario.thermal is not None,
+        slow_sensors=any(first(bandwidth) > 0.0 for bandwidth in scenario.sensors.bandwidths),
     )
     steps_per_sample, step, undivided = divided_step(scenario, plant)
     lag = whole_and_rest(delay, step)[1] * step
@@ -84,6 +85,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         record_every=record_every,
         signal_delay=scenario.sensors.delay,
         command_delay=delay,
+        sensor_lag=sensor_lag(scenario, step) if program.slow_sensors else NoParameters(),
     )
     return run, (undivided, _too_many_steps(scenario, step, step_count))
 
@@ -136,6 +138,11 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
     )
 
 
+def sensor_lag(scenario: Scenario, step: float) -> SensorLag:
+    """How the sensors follow in steps of ``step`` [s]; bandwidths and step may be arrays (runs,)."""
+    return SensorLag(*(over_runs(follow_weights, bandwidth, step) for bandwidth in scenario.sensors.bandwidths))
+
+
 def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> Any:
     """The NamedTuple of a controller, nested ones filled in the order of its quantities; settings may be arrays."""
     return rebuilt(kind.parameters, [settings[item.name] for item in kind.quantities])
@@ -165,14 +172,21 @@ def divided_step(scenario: Scenario, plant: PlantParameters) -> tuple[int, float
     is_free = isinstance(scenario.motion, FreeMotion)
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
     parts = divisions(plant, period / coarse, lowest, highest, is_free, stiffness)
+    filling_parts = divisions(plant, period / coarse, lowest, highest, False, stiffness)
 
     def line(run: int) -> str:
         step, count = at(scenario.time_step, run), int(at(parts, run))
         finest = MOST_DIVISIONS * at(period, run) / (at(coarse, run) * count)
+        cause = "a chamber fills that fast: look at the dead volumes and the valve's area"
+        if at(filling_parts, run) < count:
+            inertia = at(plant.inertia, run)
+            cause = (
+                f"foot_plate.inertia = {inertia:.3g} kg m^2 swings that fast on the gas of a chamber: look at it and "
+                f"at the dead volumes"
+            )
         return (
             f"run.step = {step:.3g} s would have to be divided into {count} parts (at most {MOST_DIVISIONS}), because "
-            f"a chamber fills that fast: look at the dead volumes and the valve's area, or give run.step = "
-            f"{finest:.1g} s or less"
+            f"{cause}, or give run.step = {finest:.1g} s or less"
         )
 
     return coarse * parts, period / (coarse * parts), (parts > MOST_DIVISIONS, line)

@@ -66,6 +66,8 @@ def _seen(run: Run, block: LaneBlock, rows: dict[str, int], sample: int) -> Meas
 
 
 def _signals(run: Run, state: Floats, rows: dict[str, int]) -> tuple[float, ...]:
+    if run.program.slow_sensors:
+        return tuple(float(state[rows[f"sensor_state.{name}"]]) for name in ("angle", "pressure_1", "pressure_2"))
     angle = float(state[rows["state.angle"]])
     masses = float(state[rows["state.mass_1"]]), float(state[rows["state.mass_2"]])
     return angle, *chamber_pressures(run.plant, angle, *masses)
