@@ -103,7 +103,7 @@ def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve
 def checked_flow(
     pressure_a: float, pressure_b: float, conductance: float, takes_back: float, curve: FlowCurve
 ) -> float:
-    """As ``orifice_flow``, with a check valve that lets nothing back into a where ``takes_back`` is 0, not 1."""
+    """As ``orifice_flow`` [kg/s], with nothing back into a where ``takes_back`` is 0, not 1. Equations (6) to (8)."""
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
     flow = conductance * upstream * fitted_flow_function(ratio, curve)
