@@ -58,7 +58,7 @@ def _show(parsed: argparse.Namespace) -> None:
 
 def _document(parameter_set: "ParameterSet") -> dict[str, Any]:
     citation = parameter_set.citation
-    entries = sorted({**parameter_set.texts, **parameter_set.numbers}.items(), key=_section_order)
+    entries = sorted(parameter_set.entries().items(), key=_section_order)
     return {
         "name": parameter_set.name,
         "title": parameter_set.title,
@@ -110,7 +110,8 @@ def _table(values: list[dict[str, Any]]) -> list[str]:
 
 def _cells(value: dict[str, Any]) -> tuple[str, ...]:
     number = value["value"]
-    written = number if isinstance(number, str) else f"{number:.6g}"
+    is_number = not isinstance(number, str | bool)
+    written = f"{number:.6g}" if is_number else str(number).lower() if isinstance(number, bool) else number
     if value.get("uncertainty") is not None:
         written += f" +- {value['uncertainty']:.3g}"
     return (value["path"], written, value.get("unit", ""), value["origin"], value["source"])

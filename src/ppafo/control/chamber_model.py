@@ -72,8 +72,8 @@ def torque_rates(
 ) -> TorqueRates:
     """Believed rates of K (P_1 - P_2) [N m/s] at an angle [rad], its rate [rad/s] and absolute pressures [Pa].
 
-    Equations (2) to (9). Opening the valve raises or lowers the torque as it should where both pressures lie between
-    atmosphere and supply.
+    Equations (2) to (9). Opening the valve raises or lowers the torque as it should where both pressures are above the
+    atmosphere: the believed supplies let gas in only.
     """
     least = min(nominal.dead_volume_1, nominal.dead_volume_2)
     volume_1 = chamber_1_volume(angle, nominal.angle_min, nominal.volume_per_angle, nominal.dead_volume_1)
@@ -81,9 +81,9 @@ def torque_rates(
     volume_1, volume_2 = max(volume_1, least), max(volume_2, least)
     ratio, valve = nominal.critical_ratio, nominal.valve_conductance
     leak = ellipse_flow(pressure_1, pressure_2, nominal.leak_conductance, ratio)
-    feed_1 = ellipse_flow(nominal.supply_pressure, pressure_1, valve, ratio)
+    feed_1 = max(ellipse_flow(nominal.supply_pressure, pressure_1, valve, ratio), 0.0)
     vent_2 = ellipse_flow(pressure_2, nominal.atmospheric_pressure, valve, ratio)
-    feed_2 = ellipse_flow(nominal.dorsiflexion_pressure, pressure_2, valve, ratio)
+    feed_2 = max(ellipse_flow(nominal.dorsiflexion_pressure, pressure_2, valve, ratio), 0.0)
     vent_1 = ellipse_flow(pressure_1, nominal.atmospheric_pressure, valve, ratio)
     per_flow = nominal.torque_constant * nominal.gas_product
     swept = nominal.torque_constant * nominal.volume_per_angle * angular_velocity

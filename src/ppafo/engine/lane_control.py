@@ -4,7 +4,7 @@ from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
 from ppafo.model.gait_sensors import GaitMeasurement, measure_gait
 from ppafo.engine.scheme.parts import SAME_INSTANT
 from ppafo.model.plant import chamber_pressures
-from ppafo.model.sensors import Measurement, measure
+from ppafo.model.sensors import Measurement, follow_signals, measure
 from ppafo.model.vane import actuator_torque
 
 
@@ -42,7 +42,7 @@ def sense(rows: LaneRows) -> list[str]:
     if rows.program.late_signals:
         signals = [f"{name} = signal_history[{row}, late, lane]" for row, name in enumerate(SIGNALS)]
     else:
-        signals = ["angle = state.angle", pressures_of(rows, "state")]
+        signals = shown_now(rows)
     if not rows.program.ideal_sensors:
         seen = f"{add(measure)}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample_index)"
         return [rows.load("sensors"), *signals, f"seen = {seen}"]
@@ -51,6 +51,13 @@ def sense(rows: LaneRows) -> list[str]:
         f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
         f"seen = {add(Measurement)}(angle, pressure_1, pressure_2, torque)",
     ]
+
+
+def shown_now(rows: LaneRows) -> list[str]:
+    """Lines that make what the sensors show at the present."""
+    if not rows.program.slow_sensors:
+        return ["angle = state.angle", pressures_of(rows, "state")]
+    return [rows.load("sensor_state"), *[f"{name} = sensor_state.{name}" for name in SIGNALS]]
 
 
 def pressures_of(rows: LaneRows, state: str) -> str:
@@ -86,7 +93,7 @@ def signals_before_start(rows: LaneRows) -> list[str]:
     """Fills the late signals with those at the start, which sensors show until the first have come."""
     if not rows.program.late_signals:
         return []
-    lines = [rows.load("plant"), rows.load("state"), "angle = state.angle", pressures_of(rows, "state")]
+    lines = [rows.load("plant"), rows.load("state"), *shown_now(rows)]
     lines += [f"signal_history[{row}, slot, lane] = {name}" for row, name in enumerate(SIGNALS)]
     return [
         "if step_index == 0:",
@@ -95,16 +102,27 @@ def signals_before_start(rows: LaneRows) -> list[str]:
     ]
 
 
-def remember_signals(rows: LaneRows) -> list[str]:
-    """Keeps what late sensors look at, for a lane that has just reached the instant before ``look_at`` [s] of a step.
+def sense_end(rows: LaneRows, flag: str = "") -> list[str]:
+    """What slow sensors show at the end of a step or part, and what late ones look at in it.
 
-    A signal that is late by a share of a step is looked at that share before a step's end.
+    A signal that is late by a share of a step is looked at that share before the end of the step, at ``look_at`` [s].
     """
+    program = rows.program
+    if not (program.slow_sensors or program.late_signals) or program.walks:
+        return []
+    lines = [pressures_of(rows, "after"), "angle = after.angle"]
+    if program.slow_sensors:
+        following = f"{rows.add(follow_signals)}(sensor_rates, sensor_state, angle, pressure_1, pressure_2, length)"
+        lines += [rows.load("sensor_rates"), rows.load("sensor_state"), f"sensed = {following}"]
+        lines += [*rows.store("sensor_state", "sensed", flag), *[f"{name} = sensed.{name}" for name in SIGNALS]]
+    return [*lines, *look(rows)]
+
+
+def look(rows: LaneRows) -> list[str]:
+    """Lines that keep what late sensors look at."""
     if not rows.program.late_signals:
         return []
     return [
-        pressures_of(rows, "after"),
-        "angle = after.angle",
         f"looks = taken and abs(before + length - look_at) <= {SAME_INSTANT!r}",
         *[
             f"signal_history[{row}, next_place, lane] = {name} if looks else signal_history[{row}, next_place, lane]"

@@ -6,7 +6,7 @@ switches, a late command arrives, the vane meets a stop, a sample is due, or its
 that are through wait, masked, and no lane sees another.
 """
 
-from ppafo.engine.lane_control import remember_signals
+from ppafo.engine.lane_control import sense_end
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
 from ppafo.engine.scheme import motion, parts, pneumatics, supply_lines, thermal_gas, walking
 from ppafo.model.gait import gait_at
@@ -185,7 +185,7 @@ def feed(rows: LaneRows) -> list[str]:
         ]
     if program.is_thermal:
         lines += [f"second = {add(thermal_gas.second_thermal_stage)}(plant, thermal, gas, {given})"]
-        lines += [f"change = {add(thermal_gas.both_thermal_stages)}(gas.first, second, length)"]
+        lines += [f"change = {add(thermal_gas.thermal_change)}(plant, thermal, gas, second, length)"]
         error = f"{add(thermal_gas.thermal_error)}(plant, gas, second, length)"
         shifted = f"{add(thermal_gas.thermal_opening_error)}(plant, gas, shift, length)"
     else:
@@ -194,7 +194,8 @@ def feed(rows: LaneRows) -> list[str]:
         flow = add(program.valve.port_flow)
         next_angle = "state.angle" if program.is_held else "begun.next_angle"
         lines += [f"second = {add(stage)}(plant, gas, port_1, port_2, {flow})"]
-        lines += [f"change = {add(pneumatics.both_stages)}({still}.first, second, length)"]
+        change = pneumatics.still_change if program.is_held else pneumatics.moving_change
+        lines += [f"change = {add(change)}(plant, {still}, second, length)"]
         error = f"{add(pneumatics.gas_error)}(plant, {still}, second, {next_angle}, length)"
         shifted = f"{add(pneumatics.opening_error)}(plant, {still}, shift, {next_angle}, length)"
     if not program.is_adaptive:
@@ -210,8 +211,10 @@ def finish(rows: LaneRows) -> list[str]:
     program, add = rows.program, rows.add
     lines = [*with_gas(rows), *end_motion(rows)]
     if not program.is_adaptive:
-        taken = [f"taken = {rows.remaining} > 0.0", *remember_signals(rows), *add_up(rows)] if program.is_parted else []
-        return [*lines, *store_all(rows, ""), *judge(rows), *taken]
+        lines += [*store_all(rows, ""), *judge(rows)]
+        if not program.is_parted:
+            return [*lines, *sense_end(rows)]
+        return [*lines, f"taken = {rows.remaining} > 0.0", *sense_end(rows, "taken"), *add_up(rows)]
     return [
         *lines,
         rows.load("next_valve"),
@@ -224,7 +227,7 @@ def finish(rows: LaneRows) -> list[str]:
         "taken = active and not refused",
         *store_all(rows, "taken"),
         *judge(rows, "taken"),
-        *remember_signals(rows),
+        *sense_end(rows, "taken"),
         *add_up(rows),
     ]
 

@@ -18,7 +18,7 @@ from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.regulator import LineState, SupplyLines
-from ppafo.model.sensors import SensorParameters
+from ppafo.model.sensors import SensorParameters, SensorRates, SensorState
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import Course, MeterKind
 
@@ -55,7 +55,8 @@ class Program:
     ``late_commands`` True adds a dead time before the valve. ``is_thermal`` True gives the gas an energy balance
     instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose
     foot is free or where the ground and a gait lead it (``angle`` is None then). ``has_lines`` True feeds a walking
-    device from lines behind regulators instead of constant pressures. ``is_adaptive`` True divides each step as its
+    device from lines behind regulators instead of constant pressures. ``slow_sensors`` True lets
+    sensors follow with a bandwidth (those of a walking leg have their own). ``is_adaptive`` True divides each step as its
     error asks, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated at every sample that a
     recording would have, ``traced`` names channels that are kept at some of them.
     """
@@ -70,6 +71,7 @@ class Program:
     is_thermal: bool = False
     walks: bool = False
     has_lines: bool = False
+    slow_sensors: bool = False
     is_adaptive: bool = False
     samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
@@ -89,6 +91,7 @@ class Program:
             **({"leg": LegParameters, "share": DeviceShare, "gait": GaitSeries} if self.walks else {}),
             **({"gait_timing": GaitTiming, "gait_sensors": GaitSensors} if self.walks else {}),
             **({"lines": SupplyLines} if self.has_lines else {}),
+            **({"sensor_rates": SensorRates} if self.slow_sensors else {}),
         }
 
     def state_rows(self) -> dict[str, type]:
@@ -102,6 +105,7 @@ class Program:
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
             **({"walk": WalkState, "gait_seen": GaitSeen} if self.walks else {}),
             **({"line_state": LineState} if self.has_lines else {}),
+            **({"sensor_state": SensorState} if self.slow_sensors else {}),
             "course": Course if self.follows_reference else NoParameters,
             **{group: kind.state for group, kind in self.meter_groups.items()},
         }

@@ -1,7 +1,7 @@
 """One run as values: what both the lanes and the reference solver are given."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,9 @@ from ppafo.model.columns import larger, whole
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import NOTHING_SEEN, GaitSensors
 from ppafo.model.leg import LegParameters
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_pressures
 from ppafo.model.regulator import LineState, SupplyLines
-from ppafo.model.sensors import SensorParameters
+from ppafo.model.sensors import SensorParameters, SensorRates, SensorState
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -81,6 +81,7 @@ class Run:
     tolerance: float = 1.0
     walk: Walk | None = None
     lines: Lines | None = None
+    sensor_rates: SensorRates | NoParameters = field(default_factory=NoParameters)
 
     @property
     def period(self) -> float:
@@ -112,14 +113,16 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     plant, valve = [run.plant, run.thermal], [run.valve]
     walk, walk_states = _walk_groups(run.walk)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
-    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines]
+    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, run.sensor_rates]
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
     masses = ThermalState(run.initial.mass_1, run.initial.mass_2) if program.is_thermal else NoParameters()
     result = LaneResult(0.0, NEVER_FAILED)
-    further = [*walk_states, *line_states]
-    states = table([result, Pace(run.step), run.initial, masses, program.valve.initial(), controller_state, *further], runs)
+    further = [*walk_states, *line_states, settled_sensors(run)]
+    states = table(
+        [result, Pace(run.step), run.initial, masses, program.valve.initial(), controller_state, *further], runs
+    )
     counts = np.empty((runs, 6))
     numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     for column, count in enumerate(numbers):
@@ -139,6 +142,15 @@ def _program_and_clock(program: Program, counts: Floats) -> tuple[Program, Clock
     own = replace(program, is_adaptive=bool(needs_parts), samples_inside=not record_every.is_integer())
     every = record_every if own.samples_inside else int(record_every)
     return own, Clock(int(step_count), int(steps_per_sample), every, int(signal_delay), int(command_delay))
+
+
+def settled_sensors(run: Run) -> SensorState | NoParameters:
+    """Slow sensors that show what is true at the start of a run; nothing where there are none."""
+    if not run.program.slow_sensors:
+        return NoParameters()
+    initial = run.initial
+    signals = initial.angle, *chamber_pressures(run.plant, initial.angle, initial.mass_1, initial.mass_2)
+    return SensorState(*signals, *signals)
 
 
 def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:

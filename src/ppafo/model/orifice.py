@@ -100,16 +100,30 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
 
 def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve) -> float:
     """Mass flow from a to b [kg/s], positive from a to b, antisymmetric under exchange. Eqs (6), (7)."""
+    return checked_flow(pressure_a, pressure_b, conductance, 1.0, curve)
+
+
+def checked_flow(
+    pressure_a: float, pressure_b: float, conductance: float, takes_back: float, curve: FlowCurve
+) -> float:
+    """As ``orifice_flow`` [kg/s], with nothing back into a where ``takes_back`` is 0, not 1. Equations (6) to (8)."""
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
     flow = conductance * upstream * fitted_flow_function(ratio, curve)
-    return flow if pressure_a >= pressure_b else -flow
+    return flow if pressure_a >= pressure_b else -takes_back * flow
 
 
 def orifice_flow_slopes(
     pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve
 ) -> tuple[float, float, float]:
     """Mass flow from a to b [kg/s] and its derivatives with respect to both pressures [kg/(s Pa)]. Eqs (6), (7)."""
+    return checked_flow_slopes(pressure_a, pressure_b, conductance, 1.0, curve)
+
+
+def checked_flow_slopes(
+    pressure_a: float, pressure_b: float, conductance: float, takes_back: float, curve: FlowCurve
+) -> tuple[float, float, float]:
+    """As ``checked_flow``, with its derivatives with respect to both pressures [kg/(s Pa)]."""
     forward = pressure_a >= pressure_b
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
@@ -117,7 +131,7 @@ def orifice_flow_slopes(
     flow = conductance * upstream * value
     by_upstream = conductance * (value - ratio * slope)
     by_downstream = conductance * slope
-    signed = flow if forward else -flow
-    by_a = by_upstream if forward else -by_downstream
-    by_b = by_downstream if forward else -by_upstream
+    signed = flow if forward else -takes_back * flow
+    by_a = by_upstream if forward else -takes_back * by_downstream
+    by_b = by_downstream if forward else -takes_back * by_upstream
     return signed, by_a, by_b

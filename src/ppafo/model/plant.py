@@ -9,7 +9,10 @@ from ppafo.model.vane import actuator_torque, gravity_torque, net_driving_torque
 
 
 class PlantParameters(NamedTuple):
-    """Everything fixed about a device and the bench it stands on, SI units; conductances are Cd A C1 [kg/(s Pa)]."""
+    """Everything fixed about a device and the bench it stands on, SI units; conductances are Cd A C1 [kg/(s Pa)].
+
+    ``relieving`` is 1 where the supplies take gas back, 0 where they let it in only.
+    """
 
     gas_product: float
     torque_constant: float
@@ -32,6 +35,7 @@ class PlantParameters(NamedTuple):
     leak_conductance: float
     valve_curve: FlowCurve
     leak_curve: FlowCurve
+    relieving: float
 
 
 class PlantState(NamedTuple):
@@ -113,13 +117,15 @@ def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, Si
     node_1 = plant.supply_pressure if feeds_1 else plant.atmospheric_pressure
     node_2 = plant.atmospheric_pressure if feeds_1 else plant.dorsiflexion_pressure
     share_1 = 1.0 if feeds_1 else 0.0
-    return SinglePort(conductance, node_1, share_1), SinglePort(conductance, node_2, 1.0 - share_1)
+    back_1 = plant.relieving if feeds_1 else 1.0
+    back_2 = 1.0 if feeds_1 else plant.relieving
+    return SinglePort(conductance, node_1, share_1, back_1), SinglePort(conductance, node_2, 1.0 - share_1, back_2)
 
 
 def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPort, BlendedPort]:
     """Ports of both chambers for four openings, which may be means over a step. Equation (8)."""
-    full = plant.valve_conductance
+    full, back = plant.valve_conductance, plant.relieving
     ambient = plant.atmospheric_pressure
-    port_1 = BlendedPort(openings.source_1 * full, plant.supply_pressure, openings.vent_1 * full, ambient)
-    port_2 = BlendedPort(openings.source_2 * full, plant.dorsiflexion_pressure, openings.vent_2 * full, ambient)
+    port_1 = BlendedPort(openings.source_1 * full, plant.supply_pressure, openings.vent_1 * full, ambient, back)
+    port_2 = BlendedPort(openings.source_2 * full, plant.dorsiflexion_pressure, openings.vent_2 * full, ambient, back)
     return port_1, port_2

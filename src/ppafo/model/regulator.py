@@ -6,7 +6,8 @@ takes its gas from that line and fills the dorsiflexion line. Each lets through
     mass flow = clip((set pressure - line pressure) / droop, 0, largest flow),
 
 where the second one cannot regulate to more than its inlet has. A line is a volume of isothermal gas, equation (3);
-no gas flows back through a regulator. The lines are stepped with the outflow of the step spread evenly over it: the
+gas that a chamber pushes back stays in its line, as no gas flows back through a regulator, unless it is a relieving
+one: that lets as much back as through. The lines are stepped with the outflow of the step spread evenly over it: the
 regulator's linear part is solved in closed form, so that a small droop asks for no small step.
 """
 
@@ -17,6 +18,7 @@ class SupplyLines(NamedTuple):
     """Droop [Pa s/kg] and largest flow [kg/s] of both regulators, volumes [m^3] of both lines.
 
     1 is the plantarflexion line behind the bottle's regulator, 2 the dorsiflexion line behind the device's.
+    ``relieving`` is 1 where gas flows back through both regulators, else 0.
     """
 
     droop_1: float
@@ -25,6 +27,7 @@ class SupplyLines(NamedTuple):
     droop_2: float
     largest_flow_2: float
     volume_2: float
+    relieving: float
 
 
 class LineState(NamedTuple):
@@ -48,9 +51,9 @@ def line_pressures(lines: SupplyLines, gas_product: float, state: LineState) -> 
 
 
 def regulated_mass(
-    lacking: float, loss: float, stiffness: float, droop: float, largest_flow: float, step: float
+    lacking: float, loss: float, stiffness: float, droop: float, largest_flow: float, relieving: float, step: float
 ) -> float:
-    """Mass [kg] that a regulator lets through in a step [s].
+    """Mass [kg] that a regulator lets through in a step [s]; below 0 what a relieving one (1, else 0) takes back.
 
     ``lacking`` [Pa] is the set pressure less the line's at the beginning; it would grow by ``loss`` [Pa], evenly over
     the step, if nothing came through, and shrinks by ``stiffness`` [Pa/kg] for what does.
@@ -59,7 +62,8 @@ def regulated_mass(
     # 1 / (1 + x + x^2/2) stands for exp(-x): of second order, between 0 and 1, and the lanes keep it in vector code.
     scale = 1.0 / (1.0 + steps + 0.5 * steps * steps)
     regained = lacking * steps * (1.0 + 0.5 * steps) + loss * 0.5 * steps * (1.0 + steps)
-    return min(max(regained * scale / stiffness, 0.0), largest_flow * step)
+    most = largest_flow * step
+    return min(max(regained * scale / stiffness, -most * relieving), most)
 
 
 def step_lines(
@@ -87,11 +91,18 @@ def step_lines(
         per_mass_2 + (per_mass_1 if stands_open else 0.0),
         lines.droop_2,
         lines.largest_flow_2,
+        lines.relieving,
         step,
     )
     left = taken_1 + passed_2
     passed_1 = regulated_mass(
-        set_1 - pressure_1, left * per_mass_1, per_mass_1, lines.droop_1, lines.largest_flow_1, step
+        set_1 - pressure_1,
+        left * per_mass_1,
+        per_mass_1,
+        lines.droop_1,
+        lines.largest_flow_1,
+        lines.relieving,
+        step,
     )
     after = LineState(
         state.mass_1 + passed_1 - left, state.mass_2 + passed_2 - taken_2, state.regulated_mass + passed_1

@@ -1,4 +1,4 @@
-"""What a controller sees of the plant: ideal, or with noise and quantisation.
+"""What a controller sees of the plant: ideal, or with a bandwidth, noise and quantisation.
 
 Noise is a pure function of seed, sample number and channel, so that a run gives the same noise alone, in any block
 and on any number of threads.
@@ -7,6 +7,9 @@ and on any number of threads.
 from typing import NamedTuple
 
 MASK = 0xFFFFFFFF
+DOUBLINGS = 12
+SMALLEST_SHARE = 0.5**DOUBLINGS
+TERMS = 9
 
 
 class Measurement(NamedTuple):
@@ -26,6 +29,58 @@ class SensorParameters(NamedTuple):
     angle_quantum: float
     pressure_quantum: float
     seed: float
+
+
+class SensorRates(NamedTuple):
+    """Rates [1/s] at which the angle sensor and the pressure sensors follow, 2 pi times the bandwidth; 0: at once."""
+
+    angle: float
+    pressure: float
+
+
+class SensorState(NamedTuple):
+    """Angle [rad] and absolute pressures [Pa] as the sensors show them, and as they truly are."""
+
+    angle: float
+    pressure_1: float
+    pressure_2: float
+    true_angle: float
+    true_pressure_1: float
+    true_pressure_2: float
+
+
+def faded(rate: float, step: float) -> tuple[float, float]:
+    """exp(-rate step) and its mean over the step [-], by series at a small share of it, doubled up to the whole."""
+    small = -rate * step * SMALLEST_SHARE
+    term, kept, mean = 1.0, 1.0, 1.0
+    for order in range(1, TERMS):
+        term *= small / order
+        kept += term
+        mean += term / (order + 1)
+    for _ in range(DOUBLINGS):
+        mean *= 0.5 * (1.0 + kept)
+        kept *= kept
+    return kept, mean
+
+
+def follow(rate: float, step: float, shown: float, before: float, now: float) -> float:
+    """What a first-order sensor shows after a step [s] in which the truth runs straight, in its own unit; exact."""
+    kept, mean = faded(rate, step)
+    return kept * shown + (mean - kept) * before + (1.0 - mean) * now if rate > 0.0 else now
+
+
+def follow_signals(
+    rates: SensorRates, sensed: SensorState, angle: float, pressure_1: float, pressure_2: float, step: float
+) -> SensorState:
+    """What the sensors show after a step [s] that leads to an angle [rad] and two absolute pressures [Pa]."""
+    return SensorState(
+        follow(rates.angle, step, sensed.angle, sensed.true_angle, angle),
+        follow(rates.pressure, step, sensed.pressure_1, sensed.true_pressure_1, pressure_1),
+        follow(rates.pressure, step, sensed.pressure_2, sensed.true_pressure_2, pressure_2),
+        angle,
+        pressure_1,
+        pressure_2,
+    )
 
 
 def mixed(value: int) -> int:

@@ -45,7 +45,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Devic
         ),
         friction=Friction(**_section(reader, "friction", declaration.FRICTION)),
         foot_plate=FootPlate(**_section(reader, "foot_plate", declaration.FOOT_PLATE)),
-        supply=Supply(**_section(reader, "supply", declaration.SUPPLY)),
+        supply=Supply(**_section(reader, "supply", declaration.SUPPLY), relieving=_is_relieving(parameter_set)),
         valve=_valve(parameter_set, reader, name),
         flow=Flow(**_section(reader, "flow", declaration.FLOW)),
         valve_name=name,
@@ -92,6 +92,11 @@ def _species(parameter_set: ParameterSet) -> str:
         known = ", ".join(SPECIES)
         raise ParameterError(f"{parameter_set.file}: gas.species = '{name}' is unknown{hint}; known are {known}")
     return name
+
+
+def _is_relieving(parameter_set: ParameterSet) -> bool:
+    entry = parameter_set.flags.get(declaration.RELIEVING_PATH)
+    return entry is not None and entry.value
 
 
 def _orifice(parameter_set: ParameterSet, read: Callable[[str], float], section: str) -> Orifice | SonicOrifice:
@@ -152,7 +157,7 @@ def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
             "friction.static_torque",
             friction.dynamic_torque <= friction.static_torque,
         ),
-        ("supply.pressure", "above", ATMOSPHERE_PATH, supply.pressure > atmosphere),
+        ("supply.pressure", "at least", ATMOSPHERE_PATH, supply.pressure >= atmosphere),
         ("supply.dorsiflexion_pressure", "at least", ATMOSPHERE_PATH, supply.dorsiflexion_pressure >= atmosphere),
     )
 

@@ -13,6 +13,8 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
 
 SPECIES_PATH = "gas.species"
+RELIEVING_PATH = "supply.relieving"
+RELIEVING = "true where the regulators take gas back from a chamber above their pressure; false unless given"
 
 GAS = (
     Quantity("molar_mass", "kg/mol", "molar mass", minimum=1e-3, maximum=0.5),

@@ -75,11 +75,15 @@ class FootPlate:
 
 @dataclass(frozen=True, slots=True)
 class Supply:
-    """Regulated pressures [Pa absolute]: to chamber 1, to chamber 2 (dorsiflexion), and the atmosphere."""
+    """Regulated pressures [Pa absolute]: to chamber 1, to chamber 2 (dorsiflexion), and the atmosphere.
+
+    ``relieving`` is True where the regulators take gas back from a chamber above their pressure.
+    """
 
     pressure: float
     dorsiflexion_pressure: float
     atmospheric_pressure: float
+    relieving: bool = False
 
 
 @dataclass(frozen=True, slots=True)

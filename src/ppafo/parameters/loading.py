@@ -14,7 +14,7 @@ from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import apply_overrides
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve
-from ppafo.parameters.provenance import Entry, TextEntry
+from ppafo.parameters.provenance import Entry, FlagEntry, TextEntry
 from ppafo.parameters.schema import PARAMETER_FILE
 from ppafo.units import check_unit
 
@@ -66,13 +66,14 @@ def _flattened(parsed: Any, file: str) -> ParameterSet:
         valve_kinds={name: valve.kind for name, valve in parsed.valves.items()},
         numbers={path: leaf for path, leaf in leaves.items() if isinstance(leaf, Entry)},
         texts={path: leaf for path, leaf in leaves.items() if isinstance(leaf, TextEntry)},
+        flags={path: leaf for path, leaf in leaves.items() if isinstance(leaf, FlagEntry)},
         accepted={item.finding: item.reason for item in parsed.accepted},
     )
 
 
 def _leaves(node: object, path: str) -> Iterator[tuple[str, object]]:
     """Yield every entry below a node with its dotted path."""
-    if isinstance(node, Entry | TextEntry):
+    if isinstance(node, Entry | TextEntry | FlagEntry):
         yield path, node
         return
     children = dict(node) if isinstance(node, BaseModel | dict) else {}

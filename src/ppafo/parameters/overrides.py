@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.gas import SPECIES
-from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, SPECIES_PATH
-from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, entry_in_si, shown
-from ppafo.parameters.provenance import Entry, TextEntry
+from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, entry_in_si, written
+from ppafo.parameters.provenance import Entry, FlagEntry, TextEntry
 from ppafo.units import split_quantity
 
 SOURCE = "override"
@@ -55,21 +55,20 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
         path, separator, text = (part.strip() for part in on_one_line.partition("="))
         if not separator or not path or not text:
             raise ParameterError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
-        change = _with_species if path == SPECIES_PATH else _with_number
+        change = _CHANGES.get(path, _with_number)
         parameter_set = change(parameter_set, _Order(path, chosen, text))
     return parameter_set
 
 
 def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
     """Return the paths whose values come from overrides."""
-    entries: dict[str, Entry | TextEntry] = {**parameter_set.numbers, **parameter_set.texts}
-    return frozenset(path for path, entry in entries.items() if entry.source == SOURCE)
+    return frozenset(path for path, entry in parameter_set.entries().items() if entry.source == SOURCE)
 
 
 def _with_number(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
     declared, path = parameter_set.declared(), order.path
     if path not in declared:
-        allowed = [order.named(known) for known in (*declared, SPECIES_PATH)]
+        allowed = [order.named(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
         hint = nearest_name(order.typed, allowed) or f"; for example {', '.join(_neighbours(order.typed, allowed))}"
         raise order.refusal(f"{parameter_set.file} has no value '{order.typed}'{hint}")
     try:
@@ -102,12 +101,22 @@ def _with_species(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
     )
 
 
+def _with_relieving(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
+    if order.text not in _FLAGS:
+        raise order.refusal(f"must be {' or '.join(_FLAGS)}")
+    note = _before(parameter_set, order.path)
+    entry = FlagEntry(value=_FLAGS[order.text], origin="assumed", source=SOURCE, note=note)
+    return replace(parameter_set, flags={**parameter_set.flags, order.path: entry})
+
+
+_FLAGS = {"true": True, "false": False}
+_CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}
+
+
 def _before(parameter_set: ParameterSet, path: str) -> str:
     """Return what stood at the path, so that an override never hides the value it replaces."""
-    number, text = parameter_set.numbers.get(path), parameter_set.texts.get(path)
-    if number is not None:
-        return f"the set has {shown(number)} ({number.origin}: {number.source})"
-    return f"the set has {text.value} ({text.origin}: {text.source})" if text is not None else "the set has no value"
+    entry = parameter_set.entries().get(path)
+    return f"the set has {written(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"
 
 
 def _other_form(path: str) -> frozenset[str]:

@@ -7,7 +7,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import alternatives, quantities
-from ppafo.parameters.provenance import Citation, Entry, TextEntry
+from ppafo.parameters.provenance import Citation, Entry, FlagEntry, TextEntry
 from ppafo.units import base_value, format_quantity, to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
@@ -17,8 +17,8 @@ ATMOSPHERE_PATH = "supply.atmospheric_pressure"
 class ParameterSet:
     """Values as given, with their provenance; conflicts and gaps allowed. ``build_device`` asks for more.
 
-    ``file`` is what messages call the set; ``numbers`` and ``texts`` are keyed by paths such as ``actuator.leak.area``
-    or ``valves.solenoid.area``; ``valve_kinds`` gives each valve's kind in the catalogue.
+    ``file`` is what messages call the set; ``numbers``, ``texts`` and ``flags`` are keyed by paths such as
+    ``actuator.leak.area`` or ``valves.solenoid.area``; ``valve_kinds`` gives each valve's kind in the catalogue.
     """
 
     file: str
@@ -31,13 +31,17 @@ class ParameterSet:
     valve_kinds: Mapping[str, str]
     numbers: Mapping[str, Entry]
     texts: Mapping[str, TextEntry]
+    flags: Mapping[str, FlagEntry]
     accepted: Mapping[str, str]
 
     def __repr__(self) -> str:
         """Return name, title, how many values there are, and the valves; ``ppafo sets show`` lists every value."""
         valves = ", ".join(f"{name} ({kind})" for name, kind in self.valve_kinds.items())
-        count = len(self.numbers) + len(self.texts)
-        return f"ParameterSet '{self.name}': {self.title}\n  {count} values; valves: {valves}"
+        return f"ParameterSet '{self.name}': {self.title}\n  {len(self.entries())} values; valves: {valves}"
+
+    def entries(self) -> dict[str, Entry | TextEntry | FlagEntry]:
+        """Return every value of the set by path, as it was given: texts, then flags, then numbers."""
+        return {**self.texts, **self.flags, **self.numbers}
 
     def declared(self) -> Mapping[str, Quantity]:
         """Return the declaration of every number that this set may hold, by path."""
@@ -94,3 +98,10 @@ def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
 def shown(entry: Entry) -> str:
     """Return an entry's value and unit as a person would write them."""
     return format_quantity(entry.value, entry.unit)
+
+
+def written(entry: Entry | TextEntry | FlagEntry) -> str:
+    """Return any entry's value as a person would write it: a number with its unit, a text, true or false."""
+    if isinstance(entry, Entry):
+        return shown(entry)
+    return str(entry.value).lower() if isinstance(entry, FlagEntry) else entry.value

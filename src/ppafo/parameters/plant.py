@@ -48,4 +48,5 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
         leak_conductance=orifice_conductance(actuator.leak, gas),
         valve_curve=orifice_curve(device.valve.orifice, gas, device.flow.linear_ratio),
         leak_curve=orifice_curve(actuator.leak, gas, device.flow.linear_ratio),
+        relieving=float(supply.relieving),
     )

@@ -34,6 +34,17 @@ class TextEntry(BaseModel):
     note: Annotated[str, Field(description="reason, conflict or remark")] = ""
 
 
+class FlagEntry(BaseModel):
+    """A yes or no as it was given."""
+
+    model_config = _STRICT
+
+    value: Annotated[bool, Field(description="true or false")]
+    origin: Annotated[Origin, Field(description="how the value came to be known")]
+    source: Annotated[_Text, Field(description="where to look it up")]
+    note: Annotated[str, Field(description="reason, conflict or remark")] = ""
+
+
 class Citation(BaseModel):
     """The publication or report that the set comes from; what is not known is left out."""
 

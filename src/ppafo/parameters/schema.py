@@ -9,7 +9,7 @@ from ppafo.documents.models import NAME, one_of, optional, published_schema, tab
 from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
-from ppafo.parameters.provenance import Accepted, Citation, Entry, TextEntry
+from ppafo.parameters.provenance import Accepted, Citation, Entry, FlagEntry, TextEntry
 
 
 def _by_name(model: Any) -> Any:
@@ -45,7 +45,7 @@ def _sections() -> dict[str, Any]:
         "actuator": _section("Actuator", declaration.ACTUATOR, {"leak": optional(leak, "leak across the vane")}),
         "friction": _section("Friction", declaration.FRICTION),
         "foot_plate": _section("FootPlate", declaration.FOOT_PLATE),
-        "supply": _section("Supply", declaration.SUPPLY),
+        "supply": _section("Supply", declaration.SUPPLY, {"relieving": optional(FlagEntry, declaration.RELIEVING)}),
         "flow": _section("Flow", declaration.FLOW),
         "reported": _section("Reported", declaration.REPORTED, reported),
     }

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.parameters.provenance import Citation, Entry, TextEntry
+from ppafo.parameters.provenance import Citation, Entry, FlagEntry, TextEntry
 
 
 def parameter_set_toml(parameter_set: ParameterSet) -> str:
@@ -45,17 +45,19 @@ def _first_path(parameter_set: ParameterSet, valve: str) -> str | None:
     return next((path for path in paths if path.startswith(f"valves.{valve}.")), None)
 
 
-def _sorted_entries(parameter_set: ParameterSet) -> list[tuple[str, Entry | TextEntry]]:
+def _sorted_entries(parameter_set: ParameterSet) -> list[tuple[str, Entry | TextEntry | FlagEntry]]:
     """Return the values section by section, in the order in which the sections first occur."""
-    entries: dict[str, Entry | TextEntry] = {**parameter_set.texts, **parameter_set.numbers}
+    entries = parameter_set.entries()
     sections = list(dict.fromkeys(path.rpartition(".")[0] for path in entries))
     return sorted(entries.items(), key=lambda item: sections.index(item[0].rpartition(".")[0]))
 
 
-def _entry(entry: Entry | TextEntry) -> Iterator[str]:
+def _entry(entry: Entry | TextEntry | FlagEntry) -> Iterator[str]:
     if isinstance(entry, Entry):
         yield f"value = {float(entry.value)!r}"
         yield f"unit = {_text(entry.unit)}"
+    elif isinstance(entry, FlagEntry):
+        yield f"value = {_flag(entry.value)}"
     else:
         yield f"value = {_text(entry.value)}"
     yield f"origin = {_text(entry.origin)}"
@@ -73,6 +75,10 @@ def _citation(citation: Citation) -> Iterator[str]:
     if citation.year is not None:
         yield f"year = {citation.year}"
     yield from (f"{key} = {_text(value)}" for key, value in (("doi", citation.doi), ("note", citation.note)) if value)
+
+
+def _flag(value: bool) -> str:
+    return "true" if value else "false"
 
 
 def _text(text: str) -> str:

@@ -8,6 +8,7 @@ import math
 
 from ppafo.engine.reference.derivative import ExactOrifice, exact_flow
 from ppafo.model.plant import Openings, PlantParameters, chamber_volumes, driving_torque
+from ppafo.model.ports import admitted_flow
 from ppafo.model.thermal import (
     energy_rate,
     gas_enthalpy,
@@ -39,9 +40,12 @@ def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> Node:
     return Node(pressure, temperature, enthalpy)
 
 
-def passed(rig: RigPhysics, a: Node, b: Node, share: float, orifice: ExactOrifice) -> Exchange:
-    """What passes a share of an orifice, positive from a to b, with the upstream gas's temperature. Eqs (6), (7)."""
-    flow = exact_flow(a.pressure, b.pressure, share, orifice)
+def passed(rig: RigPhysics, a: Node, b: Node, share: float, orifice: ExactOrifice, takes_back: float) -> Exchange:
+    """What passes a share of an orifice, positive from a to b, with the upstream gas's temperature. Eqs (6) to (8).
+
+    ``takes_back`` is 1 where gas may flow back into a, else 0.
+    """
+    flow = admitted_flow(exact_flow(a.pressure, b.pressure, share, orifice), takes_back)
     upstream_temperature = a.temperature if flow >= 0.0 else b.temperature
     enthalpy = a.enthalpy if flow >= 0.0 else b.enthalpy
     flow = flow * temperature_flow_factor(rig.reference_temperature, upstream_temperature)
@@ -50,7 +54,7 @@ def passed(rig: RigPhysics, a: Node, b: Node, share: float, orifice: ExactOrific
 
 def leaked(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> Exchange:
     """What leaks across the vane, positive from a to b: an orifice, and a laminar gap if there is one."""
-    through_orifice = passed(rig, a, b, 1.0, orifice)
+    through_orifice = passed(rig, a, b, 1.0, orifice, 1.0)
     laminar = rig.laminar_conductance * (a.pressure * a.pressure - b.pressure * b.pressure)
     enthalpy = a.enthalpy if laminar >= 0.0 else b.enthalpy
     return Exchange(through_orifice.mass + laminar, through_orifice.energy + laminar * enthalpy)
@@ -117,14 +121,15 @@ def side(
     vent_share: float,
     valve_orifice: ExactOrifice,
     line_orifice: ExactOrifice,
+    takes_back: float,
 ) -> Side:
     """All that happens between the valve and one chamber; without a line the port is the chamber itself."""
-    supplied = passed(rig, source, port, rig.ports_open * source_share, valve_orifice)
-    vented = passed(rig, port, room, rig.ports_open * vent_share, valve_orifice)
+    supplied = passed(rig, source, port, rig.ports_open * source_share, valve_orifice, takes_back)
+    vented = passed(rig, port, room, rig.ports_open * vent_share, valve_orifice, 1.0)
     mass, energy = supplied.mass - vented.mass, supplied.energy - vented.energy
     if rig.line_volume <= 0.0:
         return Side(supplied.mass, vented.mass, energy, mass, energy, 0.0, 0.0, 0.0)
-    through = passed(rig, port, node, 1.0, line_orifice)
+    through = passed(rig, port, node, 1.0, line_orifice, 1.0)
     heat = wall_heat(rig, port, rig.line_volume)
     line_energy = energy_rate(energy - through.energy, port.pressure, 0.0, heat)
     return Side(
@@ -156,8 +161,10 @@ def sides(
     source_1 = ambient_node(rig, plant.supply_pressure - state.supply_drop_1, rig.supply_temperature)
     source_2 = ambient_node(rig, plant.dorsiflexion_pressure - state.supply_drop_2, rig.supply_temperature)
     room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
-    side_1 = side(rig, node_1, port_1, source_1, room, openings.source_1, openings.vent_1, valve_orifice, line_orifice)
-    side_2 = side(rig, node_2, port_2, source_2, room, openings.source_2, openings.vent_2, valve_orifice, line_orifice)
+    open_1, open_2 = (openings.source_1, openings.vent_1), (openings.source_2, openings.vent_2)
+    back = plant.relieving
+    side_1 = side(rig, node_1, port_1, source_1, room, open_1[0], open_1[1], valve_orifice, line_orifice, back)
+    side_2 = side(rig, node_2, port_2, source_2, room, open_2[0], open_2[1], valve_orifice, line_orifice, back)
     return side_1, side_2
 
 

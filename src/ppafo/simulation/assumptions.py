@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet
-from ppafo.parameters.declaration import SPECIES_PATH
-from ppafo.parameters.parameter_set import shown as shown_entry
+from ppafo.parameters.declaration import RELIEVING_PATH
+from ppafo.parameters.parameter_set import written as written_entry
 from ppafo.simulation.declaration import quantities, value_at
 from ppafo.simulation.overriding import device_paths, scenario_paths, split_override
 from ppafo.simulation.reading import Reading, written
@@ -59,12 +59,12 @@ def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
 
 def _device_value(hardware: Hardware, path: str) -> str | None:
     full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
-    if path == SPECIES_PATH:
-        return hardware.parameter_set.texts[path].value
-    entry = hardware.parameter_set.numbers.get(full)
+    entry = hardware.parameter_set.entries().get(full)
     quantity = hardware.parameter_set.declared().get(full)
     if entry is not None:
-        return shown_entry(entry)
+        return written_entry(entry)
+    if path == RELIEVING_PATH:
+        return "false"
     return None if quantity is None else _default(quantity)
 
 

@@ -147,4 +147,6 @@ def _sensors(reading: Reading, clock: Clock) -> Sensors:
         angle_quantum=values["angle_resolution"],
         pressure_quantum=values["pressure_resolution"],
         seed=int(reading.number("sensors.seed", SEED)),
+        angle_bandwidth=values["angle_bandwidth"],
+        pressure_bandwidth=values["pressure_bandwidth"],
     )

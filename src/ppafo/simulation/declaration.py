@@ -40,6 +40,8 @@ AT_REST = "atmosphere"
 
 SENSORS = (
     Quantity("delay", "s", "age of a measurement when the controller uses it", 0.0, 0.0, 1.0e6),
+    Quantity("angle_bandwidth", "Hz", "up to which the angle sensor follows; 0: it follows at once", 0.0, 0.0, 1.0e6),
+    Quantity("pressure_bandwidth", "Hz", "up to which the pressure sensors follow; 0: at once", 0.0, 0.0, 1.0e6),
     Quantity("angle_noise", "rad", "standard deviation of the measured angle", 0.0, 0.0, 10.0),
     Quantity("pressure_noise", "Pa_d", "standard deviation of the measured pressures", 0.0, 0.0, 1.0e8),
     Quantity("angle_resolution", "rad", "step of the measured angle", 0.0, 0.0, 10.0),

@@ -8,7 +8,7 @@ from typing import Any
 
 from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.valves.catalog import VALVES
-from ppafo.parameters.declaration import ORIFICE, SPECIES_PATH
+from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
 from ppafo.simulation import declaration
 
@@ -67,7 +67,7 @@ def device_paths() -> tuple[str, ...]:
     """Return every path of the device that an override can set, with ``valve`` for the one that is chosen."""
     sections = [path for path in device_quantities({}) if not path.startswith("reported.")]
     valve = [*ORIFICE, *(item for kind in VALVES.values() for item in kind.quantities)]
-    return (*sections, SPECIES_PATH, *(f"valve.{item.name}" for item in valve))
+    return (*sections, SPECIES_PATH, RELIEVING_PATH, *(f"valve.{item.name}" for item in valve))
 
 
 def is_of_device(path: str) -> bool:

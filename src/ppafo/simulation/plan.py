@@ -1,5 +1,6 @@
 """From a scenario to a run: step sizes, rows of parameters, initial gas."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -16,7 +17,7 @@ from ppafo.errors import ScenarioError
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.columns import at, first, larger, over_runs, smaller, whole
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_volumes
-from ppafo.model.sensors import SensorParameters
+from ppafo.model.sensors import SensorParameters, SensorRates
 from ppafo.model.thermal import wall_exchange
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
@@ -65,6 +66,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         late_commands=first(delay) > 0.0,
         late_signals=first(scenario.sensors.delay) > 0.0,
         is_thermal=scenario.thermal is not None,
+        slow_sensors=any(first(bandwidth) > 0.0 for bandwidth in scenario.sensors.bandwidths),
         is_adaptive=bool(first(needs_parts)),
         samples_inside=bool(first(record_every % 1.0)),
     )
@@ -88,6 +90,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         signal_delay=scenario.sensors.delay,
         command_delay=delay,
         needs_parts=needs_parts,
+        sensor_rates=sensor_rates(scenario) if program.slow_sensors else NoParameters(),
     )
     return run, (_too_many_steps(scenario, step, step_count),)
 
@@ -138,6 +141,11 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
         sensors.pressure_quantum,
         sensors.seed,
     )
+
+
+def sensor_rates(scenario: Scenario) -> SensorRates:
+    """How fast the sensors follow; bandwidths may be arrays (runs,)."""
+    return SensorRates(*(2.0 * math.pi * bandwidth for bandwidth in scenario.sensors.bandwidths))
 
 
 def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> Any:

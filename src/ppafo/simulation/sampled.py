@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from ppafo.control.kind import PythonController
+from ppafo.engine.lane_control import SIGNALS
 from ppafo.engine.lanes import BatchResult, LaneBlock, load_program
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
@@ -12,6 +13,7 @@ from ppafo.errors import SimulationError
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
 from ppafo.model.vane import actuator_torque
+
 
 def run_sampled(run: Run, controller: PythonController) -> BatchResult:
     """Run with a Python controller; SimulationError where it returns no finite number."""
@@ -46,6 +48,9 @@ def _seen(run: Run, block: LaneBlock, rows: dict[str, int], sample: int) -> Meas
     """What the controller sees: the present, or what late sensors looked at."""
     if run.program.late_signals and sample > 0:
         angle, pressure_1, pressure_2 = block.late_signals(sample * run.steps_per_sample)[:, 0]
+    elif run.program.slow_sensors:
+        shown = block.states[:, 0]
+        angle, pressure_1, pressure_2 = (float(shown[rows[f"sensor_state.{name}"]]) for name in SIGNALS)
     else:
         state = block.states[:, 0]
         angle = float(state[rows["state.angle"]])

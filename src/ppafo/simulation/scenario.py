@@ -73,8 +73,8 @@ class Thermal:
 class Sensors:
     """What the controller sees, ideal by default.
 
-    Age of a measurement when it is used [s], standard deviations [rad], [Pa], steps of quantisation [rad], [Pa], and
-    the seed of the noise.
+    Age of a measurement when it is used [s], standard deviations [rad], [Pa], steps of quantisation [rad], [Pa], the
+    seed of the noise, and first-order bandwidths of the angle sensor and the pressure sensors [Hz], 0 for none.
     """
 
     delay: float = 0.0
@@ -83,11 +83,19 @@ class Sensors:
     angle_quantum: float = 0.0
     pressure_quantum: float = 0.0
     seed: int = 1
+    angle_bandwidth: float = 0.0
+    pressure_bandwidth: float = 0.0
 
     @property
     def flaws(self) -> tuple[float, ...]:
         """What makes these sensors worse than ideal ones, each 0 where it does not."""
-        return self.delay, self.angle_noise, self.pressure_noise, self.angle_quantum, self.pressure_quantum
+        noise, steps = (self.angle_noise, self.pressure_noise), (self.angle_quantum, self.pressure_quantum)
+        return self.delay, *noise, *steps, self.angle_bandwidth, self.pressure_bandwidth
+
+    @property
+    def bandwidths(self) -> tuple[float, float]:
+        """Bandwidths of the angle sensor and the pressure sensors [Hz], 0 for one that follows at once."""
+        return self.angle_bandwidth, self.pressure_bandwidth
 
 
 @dataclass(frozen=True, slots=True)

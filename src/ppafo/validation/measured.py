@@ -134,8 +134,21 @@ def _above_supply(file: str, name: str, level: float, supply: float, device: Dev
     return f"{file}: '{name}' stands at {shown[0]}, above {owner}, {shown[1]}: {remedy}"
 
 
+def supply_gauge(recording: Recording, device: Device) -> float:
+    """Gauge pressure of the supply [Pa]: the median of the recorded one, else the higher one of the set."""
+    supply = device.supply
+    if SUPPLY in recording:
+        return float(np.median(recording[SUPPLY])) - supply.atmospheric_pressure
+    return max(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
+
+
 def _check_change(recording: Recording, device: Device, file: str) -> None:
-    gauge = max(device.supply.pressure, device.supply.dorsiflexion_pressure) - device.supply.atmospheric_pressure
+    gauge = supply_gauge(recording, device)
+    if gauge <= 0.0:
+        owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
+        raise DataError(
+            f"{file}: {owner} is not above the atmosphere, so that there is no full range to compare pressures with"
+        )
     compared = [name for name in COMPARED if name in recording]
     shares = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
     if max(shares) < _LEAST_CHANGE:

@@ -16,7 +16,7 @@ from ppafo.storage.column_map import ColumnMap
 from ppafo.validation.agreement import ChannelAgreement, Comparison, RecordingAgreement, channel_agreement, common_delay
 from ppafo.validation.alignment import DEFAULT_LIMIT, Curve, Delay
 from ppafo.validation.compared import ANGLE, COMPARED, PRESSURE_1, PRESSURE_2, PRESSURE_DIFFERENCE
-from ppafo.validation.measured import Measured, read_measured
+from ppafo.validation.measured import Measured, read_measured, supply_gauge
 from ppafo.validation.replay import Motion, Replayed, replay_recording
 from ppafo.validation.start import start_of
 from ppafo.validation.thresholds import Thresholds, parse_thresholds
@@ -141,7 +141,7 @@ def _check_angle(measured: Measured, motion: Motion) -> None:
 
 def _comparisons(measured: Measured, replayed: Replayed, device: Device, settings: ReplaySettings) -> list[Comparison]:
     """The channels that the recording has and that the model was not given."""
-    gauge = _supply_gauge(measured, device)
+    gauge = supply_gauge(measured.recording, device)
     items = []
     for name, kind in COMPARED.items():
         values = measured_values(measured.recording, name)
@@ -156,20 +156,13 @@ def _comparisons(measured: Measured, replayed: Replayed, device: Device, setting
     return items
 
 
-def _supply_gauge(measured: Measured, device: Device) -> float:
-    """Gauge pressure of the supply [Pa]: the median of the recorded one, else the higher one of the set."""
-    supply = device.supply
-    if measured.has(SUPPLY):
-        return float(np.median(measured.recording[SUPPLY])) - supply.atmospheric_pressure
-    return max(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
-
-
 def _remarks(measured: Measured, device: Device, motion: str) -> tuple[str, ...]:
     remarks = []
     own = device.supply.pressure - device.supply.atmospheric_pressure
-    if measured.has(SUPPLY) and abs(_supply_gauge(measured, device) - own) > _OTHER_SUPPLY * own:
-        ratio = _supply_gauge(measured, device) / own
-        remarks.append(f"the recorded supply has {ratio:.3g} times the gauge pressure of the set; it was followed")
+    followed = supply_gauge(measured.recording, device)
+    if measured.has(SUPPLY) and abs(followed - own) > _OTHER_SUPPLY * own:
+        other = f"{followed / own:.3g} times the gauge pressure of the set" if own > 0.0 else "pressure, the set's none"
+        remarks.append(f"the recorded supply has {other}; it was followed")
     if not measured.has(SUPPLY):
         remarks.append("the supply pressure was not recorded; that of the set was taken")
     if regular_interval(measured.recording.time) is None:

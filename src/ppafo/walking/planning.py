@@ -57,7 +57,7 @@ class WalkPlan:
 def plan_walk(plan: WalkPlan) -> Run:
     """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
     leg = plan.wearer.leg()._replace(heel_lever=heel_lever(plan.gait, plan.wearer))
-    bare = plant_parameters(plan.device)
+    bare = _fed_plant(plan)
     plant = with_leg(bare, leg)
     walk = _walk(plan, leg, bare)
     valve, settings = walking_valve(plan.device.valve), plan.device.valve.settings
@@ -87,6 +87,12 @@ def plan_walk(plan: WalkPlan) -> Run:
         walk=walk,
         lines=None if plan.supply_lines is None else Lines(plan.supply_lines, full_lines(plant, plan.supply_lines)),
     )
+
+
+def _fed_plant(plan: WalkPlan) -> PlantParameters:
+    """The device; the lines between regulator and valve, where there are any, take back what a chamber pushes out."""
+    plant = plant_parameters(plan.device)
+    return plant if plan.supply_lines is None else plant._replace(relieving=1.0)
 
 
 def _program(plan: WalkPlan, valve: ValveModel, late_commands: bool) -> Program:

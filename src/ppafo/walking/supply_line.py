@@ -59,7 +59,8 @@ def supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
             f"supply.dorsiflexion_pressure, {second}, cannot be above supply.pressure, {first}"
         )
     first_line, second_line = (reading.section(f"{SECTION}.{line}", line_quantities(line)) for line in LINES)
-    return SupplyLines(*(values[item.name] for values in (first_line, second_line) for item in _REGULATED))
+    numbers = [values[item.name] for values in (first_line, second_line) for item in _REGULATED]
+    return SupplyLines(*[*numbers, float(supply.relieving)])
 
 
 def assumed_lines(reading: Reading) -> dict[str, str]:

@@ -26,13 +26,14 @@ from ppafo.walking.walk import plan_of
 
 ANGLE = 1.7
 DURATION = 0.06
-LINES = SupplyLines(3.0e6, 10.0e-3, 10.0e-6, 30.0e6, 0.8e-3, 4.0e-6)
+RELIEVING = ("supply.relieving=true",)
+LINES = SupplyLines(3.0e6, 10.0e-3, 10.0e-6, 30.0e6, 0.8e-3, 4.0e-6, 0.0)
 
 
 def device(dorsiflexion: float = 0.7) -> PlantParameters:
     """The paper's device; dorsiflexion has its own, lower pressure."""
     plant = plant_parameters(load_device("ppafo2011"))
-    return plant._replace(dorsiflexion_pressure=dorsiflexion * plant.supply_pressure)
+    return plant._replace(dorsiflexion_pressure=dorsiflexion * plant.supply_pressure, relieving=1.0)
 
 
 class Filled(NamedTuple):
@@ -44,8 +45,8 @@ class Filled(NamedTuple):
 
 def open_ports(plant: PlantParameters) -> tuple[SinglePort, SinglePort]:
     """Both chambers joined to their supplies."""
-    port_1 = SinglePort(plant.valve_conductance, plant.supply_pressure, 1.0)
-    return port_1, SinglePort(plant.valve_conductance, plant.dorsiflexion_pressure, 1.0)
+    port_1 = SinglePort(plant.valve_conductance, plant.supply_pressure, 1.0, 1.0)
+    return port_1, SinglePort(plant.valve_conductance, plant.dorsiflexion_pressure, 1.0, 1.0)
 
 
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
@@ -144,9 +145,9 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
     assert away[-1] < 2.0e-4, away
 
 
-def short_walk(name: str, lines: SupplyLines | None = None) -> Run:
-    """A few strides of a walk that comes with the package, perhaps with other lines."""
-    plan = plan_of(load_walk(name), 5.0)
+def short_walk(name: str, lines: SupplyLines | None = None, overrides: tuple[str, ...] = ()) -> Run:
+    """A few strides of a walk that comes with the package, perhaps with other lines or values."""
+    plan = plan_of(load_walk(name, overrides), 5.0)
     return plan_walk(plan if lines is None else replace(plan, supply_lines=lines))
 
 
@@ -169,9 +170,23 @@ def test_a_walk_keeps_its_gas_and_its_lines_between_zero_and_their_setting(name:
     assert np.min(line_1) < run.plant.supply_pressure - 1.0e3
 
 
-def test_a_walk_with_hardly_any_droop_is_the_walk_with_a_constant_supply() -> None:
-    wide = SupplyLines(1.0e3, 1.0, 1.0e-3, 1.0e3, 1.0, 1.0e-3)
-    held, ideal = short_walk("solenoid", wide), short_walk("solenoid")
+@pytest.mark.parametrize("name", ["solenoid", "proportional"])
+def test_a_walk_with_short_lines_and_hardly_any_droop_is_the_walk_with_a_constant_supply(name: str) -> None:
+    short = SupplyLines(1.0e3, 1.0, 2.0e-7, 1.0e3, 1.0, 2.0e-7, 0.0)
+    second = ("supply.dorsiflexion_pressure=45 psi_g",)
+    held, ideal = short_walk(name, short, second), short_walk(name, None, second)
+    relieving = short_walk(name, None, (*second, *RELIEVING))
+    ends = [
+        run_batch(batch_of(run)).states[state_row_numbers(run)["state.supplied_mass"], 0]
+        for run in (held, ideal, relieving)
+    ]
+    assert ends[0] == pytest.approx(ends[1], rel=5.0e-3)
+    assert ends[2] < 0.98 * ends[1]
+
+
+def test_a_walk_with_wide_lines_and_hardly_any_droop_is_the_walk_with_a_constant_relieving_supply() -> None:
+    wide = SupplyLines(1.0e3, 1.0, 1.0e-3, 1.0e3, 1.0, 1.0e-3, 0.0)
+    held, ideal = short_walk("solenoid", wide), short_walk("solenoid", None, RELIEVING)
     ends = [run_batch(batch_of(run)).states[state_row_numbers(run)["state.supplied_mass"], 0] for run in (held, ideal)]
     drooping = run_batch(batch_of(short_walk("solenoid", wide._replace(droop_1=3.0e8, volume_1=1.0e-5))))
     away = drooping.states[state_row_numbers(held)["state.supplied_mass"], 0]

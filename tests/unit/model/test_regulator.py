@@ -9,7 +9,7 @@ from ppafo.model.regulator import LineState, SupplyLines, line_pressures, regula
 
 GAS_PRODUCT = 56308.0
 SET_1, SET_2 = 446.0e3, 300.0e3
-LINES = SupplyLines(3.0e6, 10.0e-3, 10.0e-6, 30.0e6, 1.5e-3, 2.0e-6)
+LINES = SupplyLines(3.0e6, 10.0e-3, 10.0e-6, 30.0e6, 1.5e-3, 2.0e-6, 0.0)
 
 
 def full(lines: SupplyLines, set_1: float = SET_1, set_2: float = SET_2) -> LineState:
@@ -52,7 +52,7 @@ def test_no_more_than_the_largest_flow_comes_through() -> None:
 )
 def test_the_flow_is_the_fall_over_the_droop_between_nothing_and_the_largest(fall: float, flow: float) -> None:
     # A short step passes what the flow at its beginning says.
-    mass = regulated_mass(fall, 0.0, GAS_PRODUCT / 10.0e-6, 3.0e6, 10.0e-3, 1.0e-9)
+    mass = regulated_mass(fall, 0.0, GAS_PRODUCT / 10.0e-6, 3.0e6, 10.0e-3, 0.0, 1.0e-9)
     assert mass == pytest.approx(flow * 1.0e-9, rel=1e-5)
 
 
@@ -60,6 +60,17 @@ def test_nothing_flows_back_through_a_regulator() -> None:
     state = LineState(1.2 * full(LINES).mass_1, 1.2 * full(LINES).mass_2, 0.0)
     after = step_lines(LINES, SET_1, SET_2, GAS_PRODUCT, state, -1.0e-7, -1.0e-8, 0.0, 1.0e-3).after
     assert after == LineState(state.mass_1 + 1.0e-7, state.mass_2 + 1.0e-8, 0.0)
+
+
+def test_a_relieving_regulator_lets_gas_flow_back_at_its_droop_and_no_faster_than_forwards() -> None:
+    given = (GAS_PRODUCT / 10.0e-6, 3.0e6, 10.0e-3, 1.0, 1.0e-9)
+    for fall, flow in ((-3.0e3, -1.0e-3), (-2.0e5, -10.0e-3), (3.0e3, 1.0e-3)):
+        assert regulated_mass(fall, 0.0, *given) == pytest.approx(flow * 1.0e-9, rel=1e-5)
+    relieving, state = LINES._replace(relieving=1.0), full(LINES)
+    for _ in range(400):
+        state = step_lines(relieving, SET_1, SET_2, GAS_PRODUCT, state, -1.0e-6, -1.0e-7, 0.0, 1.0e-3).after
+    assert state.regulated_mass == pytest.approx(-400 * 1.1e-6, rel=1e-2)
+    assert line_pressures(LINES, GAS_PRODUCT, state)[0] == pytest.approx(SET_1 + 3.0e6 * 1.1e-3, rel=1e-3)
 
 
 def test_a_step_of_no_length_changes_nothing() -> None:

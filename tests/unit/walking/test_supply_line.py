@@ -32,7 +32,7 @@ def test_a_walk_without_the_section_has_constant_pressures(name: str) -> None:
 @pytest.mark.parametrize("name", REGULATED)
 def test_what_is_not_given_has_value_origin_and_source(name: str) -> None:
     configuration = load_walk(name)
-    assert configuration.supply_lines == SupplyLines(3.0e6, 0.01, 1.0e-5, 6.7e7, 1.5e-3, 2.0e-6)
+    assert configuration.supply_lines == SupplyLines(3.0e6, 0.01, 1.0e-5, 6.7e7, 1.5e-3, 2.0e-6, 0.0)
     assert len(entries()) == 6
     for path, entry in entries().items():
         assert entry.origin in configuration.assumed[f"supply_line.{path}"]
@@ -41,7 +41,7 @@ def test_what_is_not_given_has_value_origin_and_source(name: str) -> None:
 
 def test_one_value_is_enough_for_the_lines_and_is_not_called_assumed() -> None:
     configuration = load_walk("solenoid", ["supply_line.dorsiflexion.droop=2e7 Pa s/kg"])
-    assert configuration.supply_lines == SupplyLines(3.0e6, 0.01, 1.0e-5, 2.0e7, 1.5e-3, 2.0e-6)
+    assert configuration.supply_lines == SupplyLines(3.0e6, 0.01, 1.0e-5, 2.0e7, 1.5e-3, 2.0e-6, 0.0)
     assert "supply_line.dorsiflexion.droop" not in configuration.assumed
     assert "supply_line.dorsiflexion.volume" in configuration.assumed
 

@@ -17,7 +17,8 @@ IMPACT_WINDOW = 5.0e-3
 class Agreement:
     """Largest and root-mean-square differences as shares of the angle range and of the supply's gauge pressure [-].
 
-    Instants within 5 ms of an impact on a stop are left out. ``supplied`` is relative, ``impacts`` in seconds.
+    Where the supply is at the pressure of the atmosphere, that pressure stands for the gauge pressure. Instants within
+    5 ms of an impact on a stop are left out. ``supplied`` is relative, ``impacts`` in seconds.
     """
 
     angle: float
@@ -53,7 +54,8 @@ def measure_agreement(run: Run, outcome: BatchResult, reference: ReferenceResult
     away = np.ones(reference.times.size, dtype=bool)
     for impact in reference.impacts:
         away &= np.abs(reference.times - impact) > IMPACT_WINDOW
-    pressure_range = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
+    gauge = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
+    pressure_range = gauge if gauge > 0.0 else plant.atmospheric_pressure
     ours, theirs = chamber_pressures_of(run, states), chamber_pressures_of(run, reference.states)
     differences = [
         (states[:, 0] - reference.states[:, 0]) / (plant.angle_max - plant.angle_min),

@@ -12,6 +12,7 @@ from ppafo.model.plant import (
     chamber_volumes,
     driving_torque,
 )
+from ppafo.model.ports import admitted_flow
 from ppafo.model.vane import vane_acceleration
 
 
@@ -85,6 +86,8 @@ def gas_rates(
     """All mass flows [kg/s] at two chamber pressures [Pa absolute]. Equations (8), (9)."""
     source_1 = exact_flow(plant.supply_pressure, pressure_1, openings.source_1, valve_orifice)
     source_2 = exact_flow(plant.dorsiflexion_pressure, pressure_2, openings.source_2, valve_orifice)
+    source_1 = admitted_flow(source_1, plant.relieving)
+    source_2 = admitted_flow(source_2, plant.relieving)
     vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, openings.vent_1, valve_orifice)
     vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, openings.vent_2, valve_orifice)
     leak = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
@@ -122,6 +125,7 @@ def thermal_gas_rates(
     warmth_1, warmth_2 = contents[0] / masses[0], contents[1] / masses[1]
     supply_1 = exact_flow(source_pressure_1, pressure_1, openings.source_1, valve_orifice)
     supply_2 = exact_flow(source_pressure_2, pressure_2, openings.source_2, valve_orifice)
+    supply_1, supply_2 = admitted_flow(supply_1, plant.relieving), admitted_flow(supply_2, plant.relieving)
     outlet_1 = exact_flow(pressure_1, room, openings.vent_1, valve_orifice)
     outlet_2 = exact_flow(pressure_2, room, openings.vent_2, valve_orifice)
     across = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)

@@ -8,13 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.cache import load_generated
+from ppafo.engine.lanes import samples_in
+from ppafo.engine.program import NoParameters
 from ppafo.engine.reference import vane_mode
 from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals
 from ppafo.engine.reference.segment import solve_segment
-from ppafo.engine.reference.source import PLANT_UNKNOWNS, gas_unknowns, right_hand_side_source
+from ppafo.engine.reference.source import (
+    PLANT_UNKNOWNS,
+    gas_unknowns,
+    right_hand_side_source,
+    unknowns_before_valve,
+)
 from ppafo.engine.rows import numbers, rebuild
-from ppafo.engine.lanes import samples_in
-from ppafo.engine.run import Run
+from ppafo.engine.run import Run, settled_sensors
 from ppafo.errors import SimulationError
 from ppafo.model.plant import chamber_pressures
 
@@ -23,6 +29,7 @@ Floats = NDArray[np.float64]
 MASS_TOLERANCE = 1e-15
 TOLERANCES = (1e-11, 1e-10, *(MASS_TOLERANCE,) * 5)
 VALVE_TOLERANCE = 1e-11
+SIGNAL_TOLERANCES = (1e-10, 1e-4, 1e-4)
 MOST_STEPS = 200_000
 
 
@@ -46,7 +53,7 @@ def load_right_hand_side(run: Run) -> Callable[..., None]:
 
 def right_hand_side_parameters(run: Run) -> Floats:
     """The numbers that ``fill`` needs, in its order."""
-    groups = (run.plant, run.thermal, run.valve_orifice, run.leak_orifice, run.valve, run.path)
+    groups = (run.plant, run.thermal, run.valve_orifice, run.leak_orifice, run.valve, run.path, run.sensor_rates)
     return np.array([number for group in groups for number in numbers(group)])
 
 
@@ -66,8 +73,9 @@ class _Solution:
         self.fill = load_right_hand_side(run)
         self.parameters = right_hand_side_parameters(run)
         masses = [run.initial.mass_1, run.initial.mass_2] if run.program.is_thermal else []
-        self.y = np.array([*numbers(run.initial), *masses, *numbers(run.program.valve.initial())])
-        self.valve_from = gas_unknowns(run.program)
+        shown = numbers(settled_sensors(run))[:3]
+        self.y = np.array([*numbers(run.initial), *masses, *shown, *numbers(run.program.valve.initial())])
+        self.valve_from = unknowns_before_valve(run.program)
         self.command = 0.0
         self.way = self.rest_mode() if run.program.angle is None else 0.0
         if self.y[1] != 0.0 and run.program.angle is None:
@@ -96,13 +104,14 @@ class _Solution:
 
         roots.terminal = [True, True]  # type: ignore[attr-defined]
         roots.direction = [-1, -1]  # type: ignore[attr-defined]
-        gas_count = self.valve_from - PLANT_UNKNOWNS
+        gas_count = gas_unknowns(self.run.program) - PLANT_UNKNOWNS
+        shown = SIGNAL_TOLERANCES if self.run.program.slow_sensors else ()
         valve_count = self.y.size - self.valve_from
         free = self.run.program.angle is None
         return CVODE(
             slopes,
             rtol=tolerance,
-            atol=np.array(TOLERANCES + (MASS_TOLERANCE,) * gas_count + (VALVE_TOLERANCE,) * valve_count),
+            atol=np.array(TOLERANCES + (MASS_TOLERANCE,) * gas_count + shown + (VALVE_TOLERANCE,) * valve_count),
             eventsfn=roots if free else None,
             num_events=2 if free else 0,
             max_num_steps=MOST_STEPS,
@@ -134,11 +143,17 @@ class _Solution:
         return self.result
 
     def present_signals(self) -> Signals:
-        """Angle and pressures now."""
+        """Angle and pressures now, as the sensors show them."""
         run = self.run
         angle = self.y[0] if run.program.angle is None else run.program.angle.value(run.path, self.time)[0]
         pressure_1, pressure_2 = chamber_pressures(run.plant, angle, self.y[2], self.y[3])
-        return float(angle), float(pressure_1), float(pressure_2)
+        signals = float(angle), float(pressure_1), float(pressure_2)
+        rates = run.sensor_rates
+        if isinstance(rates, NoParameters):
+            return signals
+        shown: Signals = tuple(self.y[self.valve_from - 3 : self.valve_from].tolist())
+        seen_angle = shown[0] if rates.angle > 0.0 else signals[0]
+        return (seen_angle, *(shown if rates.pressure > 0.0 else signals)[1:])
 
     def advance_to(self, end: float, next_sample: int) -> None:
         """Integrate to the next sample over all that happens on the way."""

@@ -7,13 +7,19 @@ from ppafo.engine.reference.derivative import ExactOrifice, free_motion, gas_rat
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector
 from ppafo.model.plant import PlantParameters, ThermalParameters, chamber_pressures
+from ppafo.model.sensors import SensorRates
 
 PLANT_UNKNOWNS = 7
 
 
 def gas_unknowns(program: Program) -> int:
-    """Unknowns before those of the valve: the plant's, and the true masses of gas with an energy balance."""
+    """Unknowns of plant and gas: the plant's, and the true masses of gas with an energy balance."""
     return PLANT_UNKNOWNS + (2 if program.is_thermal else 0)
+
+
+def unknowns_before_valve(program: Program) -> int:
+    """Unknowns before those of the valve: those of plant and gas, and what slow sensors show."""
+    return gas_unknowns(program) + (3 if program.slow_sensors else 0)
 
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
@@ -37,6 +43,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
         "leak_orifice": ExactOrifice,
         "valve": program.valve.parameters,
         "path": NoParameters if program.angle is None else program.angle.parameters,
+        "sensor_rates": SensorRates if program.slow_sensors else NoParameters,
     }
 
 
@@ -44,7 +51,7 @@ def right_hand_side_source(program: Program) -> str:
     """Source of the module whose ``fill(t, y, slopes, parameters, command, way)`` writes the slopes of all unknowns.
 
     The unknowns are angle, angular velocity, both masses, the three gas totals, the true masses of gas with an energy
-    balance, and the state of the valve.
+    balance, what slow sensors show of angle and pressures, and the state of the valve.
     """
     collector = SourceCollector(INLINE)
     add = collector.add
@@ -53,7 +60,7 @@ def right_hand_side_source(program: Program) -> str:
         for path in leaf_paths(row, name):
             cells[path] = f"parameters[{len(cells)}]"
     valve_paths = leaf_paths(program.valve.state, "valve_state")
-    cells |= {path: f"y[{gas_unknowns(program) + number}]" for number, path in enumerate(valve_paths)}
+    cells |= {path: f"y[{unknowns_before_valve(program) + number}]" for number, path in enumerate(valve_paths)}
     groups = parameter_groups(program) | {"valve_state": program.valve.state}
     lines = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in groups.items()]
     lines += [f"openings = {add(program.valve.instant)}(valve, valve_state, command)"]
@@ -74,9 +81,15 @@ def right_hand_side_source(program: Program) -> str:
         lines += ["slopes[0] = 0.0", "slopes[1] = 0.0"]
     lines += [f"moves = {add(program.valve.rates)}(valve, valve_state, command)"]
     lines += [
-        f"slopes[{gas_unknowns(program) + number}] = {path.replace('valve_state', 'moves', 1)}"
+        f"slopes[{unknowns_before_valve(program) + number}] = {path.replace('valve_state', 'moves', 1)}"
         for number, path in enumerate(valve_paths)
     ]
+    if program.slow_sensors:
+        truths = (("angle", "angle"), ("pressure", "pressure_1"), ("pressure", "pressure_2"))
+        lines += [
+            f"slopes[{place}] = sensor_rates.{sensor} * ({truth} - y[{place}])"
+            for place, (sensor, truth) in enumerate(truths, gas_unknowns(program))
+        ]
     body = "\n".join(f"    {line}" for line in lines)
     function = f"{COMPILED}\ndef fill(t, y, slopes, parameters, command, way):\n{body}\n"
     return f"{HEADER}\n\n{collector.text()}\n\n\n{function}"

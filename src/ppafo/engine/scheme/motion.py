@@ -142,9 +142,7 @@ def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tup
     return FreePart(way, acceleration, torque, next_angle, 1.0 if meets_stop else 0.0), length
 
 
-def end_part(
-    plant: PlantParameters, state: PlantState, begun: FreePart, length: float
-) -> tuple[float, float, float]:
+def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length: float) -> tuple[float, float, float]:
     """Angle [rad] and angular velocity [rad/s] at the end of a part, and the error of the angle over what is allowed.
 
     ``state`` has the new gas and the motion of the begin.
@@ -161,9 +159,7 @@ def end_part(
     share = velocity / (fall if fall != 0.0 else 1.0) if turns else 0.0
     turning_angle = bounded(plant, state.angle + 0.5 * share * length * velocity)
     left_torque = begun.torque + share * (next_torque - begun.torque)
-    left_angle, left_velocity = depart(
-        plant, Departure(share, turning_angle, 0.0), left_torque, next_torque, length
-    )
+    left_angle, left_velocity = depart(plant, Departure(share, turning_angle, 0.0), left_torque, next_torque, length)
     rebound = rebound_velocity(plant, full_velocity, next_torque)
     slid_velocity = rebound if begun.meets_stop > 0.5 else full_velocity
     angle = begun.next_angle if slides else left_angle

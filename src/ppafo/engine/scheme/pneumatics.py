@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
+from ppafo.model.ports import admitted_flow
 
 GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
@@ -231,18 +232,33 @@ def second_moving_stage(
     )
 
 
-def end_still_gas(
-    plant: PlantParameters, begun: StillGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
-) -> GasChange:
-    """Changes of mass [kg] in one step [s] in which the vane stands still, from its first stage."""
-    return both_stages(begun.first, second_still_stage(plant, begun, port_1, port_2, port_flow), step)
+def still_change(plant: PlantParameters, begun: StillGas, second: Flows, step: float) -> GasChange:
+    """Changes of mass [kg] in one step [s] in which the vane stands still, from both stages."""
+    change = both_stages(begun.first, second, step)
+    # Only a leak can push gas towards the source here, hardly any: what would go back counts as vented.
+    supplied = admitted_flow(change.supplied, plant.relieving)
+    return GasChange(change.mass_1, change.mass_2, supplied, change.leaked)
+
+
+def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: float) -> GasChange:
+    """Changes of mass [kg] in one step [s] with moving volumes, from both stages.
+
+    Where the supplies take no gas back, the draw is at least nothing: a chamber that rises above its source inside a
+    step has slopes from below it, which would push the gas out again. That gas stays in the chamber that is fed.
+    """
+    change = both_stages(begun.first, second, step)
+    supplied = admitted_flow(change.supplied, plant.relieving)
+    kept = supplied - change.supplied
+    to_1 = kept if begun.linear.supplied_by_1 < begun.linear.supplied_by_2 else 0.0
+    return GasChange(change.mass_1 + to_1, change.mass_2 + (kept - to_1), supplied, change.leaked)
 
 
 def end_moving_gas(
     plant: PlantParameters, begun: MovingGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
 ) -> GasChange:
     """Changes of mass [kg] in one step [s] with moving volumes, from its first stage."""
-    return both_stages(begun.still.first, second_moving_stage(plant, begun, port_1, port_2, port_flow), step)
+    second = second_moving_stage(plant, begun, port_1, port_2, port_flow)
+    return moving_change(plant, begun.still, second, step)
 
 
 def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle: float, step: float) -> float:

@@ -54,6 +54,7 @@ def fed_plant(plant: PlantParameters, lines: SupplyLines, state: LineState) -> P
         plant.leak_conductance,
         plant.valve_curve,
         plant.leak_curve,
+        plant.relieving,
     )
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from ppafo.engine.scheme.pneumatics import ALLOWED_OF_PRESSURE, GAMMA, SHORTEST, pressure_that_matters
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_volumes
-from ppafo.model.ports import PortFlow
+from ppafo.model.ports import PortFlow, admitted_flow
 from ppafo.model.thermal import carried_energy, carried_mass
 
 
@@ -297,9 +297,24 @@ def second_thermal_stage(
     return solve_thermal_stage(begun.matrix, right)
 
 
-def both_thermal_stages(first: ThermalFlows, second: ThermalFlows, step: float) -> ThermalFlows:
-    """Changes [kg] in one step [s]."""
-    return combined(first, 1.5 * step, second, 0.5 * step)
+def thermal_change(
+    plant: PlantParameters, thermal: ThermalParameters, begun: ThermalGas, second: ThermalFlows, step: float
+) -> ThermalFlows:
+    """Changes [kg] in one step [s] from both stages; supplies that take no gas back are as in ``moving_change``."""
+    change = combined(begun.first, 1.5 * step, second, 0.5 * step)
+    supplied = admitted_flow(change.supplied, plant.relieving)
+    kept = supplied - change.supplied
+    to_1 = kept if begun.matrix.slopes.supplied_by_1 < begun.matrix.slopes.supplied_by_2 else 0.0
+    to_2 = kept - to_1
+    carries = carried_energy(1.0, thermal.heat_capacity_ratio)
+    return ThermalFlows(
+        change.content_1 + to_1 * carries,
+        change.content_2 + to_2 * carries,
+        change.mass_1 + to_1,
+        change.mass_2 + to_2,
+        supplied,
+        change.leaked,
+    )
 
 
 def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlows, step: float) -> float:

@@ -57,11 +57,13 @@ def connect_ideal(plant: PlantParameters, shown: DumpedOpening) -> tuple[SingleP
             full if vents else port_1.conductance,
             room if vents else port_1.node_pressure,
             0.0 if vents else port_1.source_share,
+            1.0 if vents else port_1.takes_back,
         ),
         SinglePort(
             full if vents else port_2.conductance,
             room if vents else port_2.node_pressure,
             0.0 if vents else port_2.source_share,
+            1.0 if vents else port_2.takes_back,
         ),
     )
 

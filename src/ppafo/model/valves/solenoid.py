@@ -75,8 +75,10 @@ def connect_positions(plant: PlantParameters, shown: PairPositions) -> tuple[Sin
     open_b = shown.position_b > 0.5
     node_1 = plant.supply_pressure if open_a else plant.atmospheric_pressure
     node_2 = plant.dorsiflexion_pressure if open_b else plant.atmospheric_pressure
-    port_1 = SinglePort(plant.valve_conductance, node_1, 1.0 if open_a else 0.0)
-    port_2 = SinglePort(plant.valve_conductance, node_2, 1.0 if open_b else 0.0)
+    back_1 = plant.relieving if open_a else 1.0
+    back_2 = plant.relieving if open_b else 1.0
+    port_1 = SinglePort(plant.valve_conductance, node_1, 1.0 if open_a else 0.0, back_1)
+    port_2 = SinglePort(plant.valve_conductance, node_2, 1.0 if open_b else 0.0, back_2)
     return port_1, port_2
 
 

@@ -100,7 +100,9 @@ def _bench(request: Request) -> tuple[Device, RigPhysics]:
 def _flow(physics: RigPhysics, upstream: float, downstream: float, share: float, orifice: ExactOrifice) -> float:
     """Mass flow [kg/s] of gas at the supply's temperature."""
     a = ambient_node(physics, float(upstream), physics.supply_temperature)
-    return passed(physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), share, orifice).mass
+    return passed(
+        physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), share, orifice, 1.0
+    ).mass
 
 
 def _across(physics: RigPhysics, upstream: float, downstream: float, orifice: ExactOrifice) -> Exchange:

@@ -16,7 +16,15 @@ from ppafo.simulation.overriding import apply_overrides
 from ppafo.simulation.reading import Reading
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 
-_TEXTS = (*declaration.TEXTS, "gas.species", "motion.kind", "controller.kind", "reference.kind", "motion.profile.kind")
+_TEXTS = (
+    *declaration.TEXTS,
+    "gas.species",
+    "supply.relieving",
+    "motion.kind",
+    "controller.kind",
+    "reference.kind",
+    "motion.profile.kind",
+)
 _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 

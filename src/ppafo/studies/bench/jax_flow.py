@@ -44,16 +44,18 @@ def flow_function_slope(ratio: Array, curve: Curve) -> tuple[Array, Array]:
     return value * jnp.minimum(gap / curve.linear_gap, 1.0), -slope
 
 
-def flow(pressure_a: Array, pressure_b: Array, conductance: Array, curve: Curve) -> Array:
-    """Mass flow from a to b [kg/s]."""
+def flow(pressure_a: Array, pressure_b: Array, conductance: Array, takes_back: Array, curve: Curve) -> Array:
+    """Mass flow from a to b [kg/s]; none flows back into a where ``takes_back`` is 0, not 1."""
     import jax.numpy as jnp
 
     upstream = jnp.maximum(pressure_a, pressure_b)
     size = conductance * upstream * flow_function(jnp.minimum(pressure_a, pressure_b) / upstream, curve)
-    return jnp.where(pressure_a >= pressure_b, size, -size)
+    return jnp.where(pressure_a >= pressure_b, size, -takes_back * size)
 
 
-def flow_slopes(pressure_a: Array, pressure_b: Array, conductance: Array, curve: Curve) -> tuple[Array, Array, Array]:
+def flow_slopes(
+    pressure_a: Array, pressure_b: Array, conductance: Array, takes_back: Array, curve: Curve
+) -> tuple[Array, Array, Array]:
     """As ``flow``, with the derivatives with respect to both pressures [kg/(s Pa)]."""
     import jax.numpy as jnp
 
@@ -65,7 +67,7 @@ def flow_slopes(pressure_a: Array, pressure_b: Array, conductance: Array, curve:
     by_upstream = conductance * (value - ratio * slope)
     by_downstream = conductance * slope
     return (
-        jnp.where(forward, size, -size),
-        jnp.where(forward, by_upstream, -by_downstream),
-        jnp.where(forward, by_downstream, -by_upstream),
+        jnp.where(forward, size, -takes_back * size),
+        jnp.where(forward, by_upstream, -takes_back * by_downstream),
+        jnp.where(forward, by_downstream, -takes_back * by_upstream),
     )

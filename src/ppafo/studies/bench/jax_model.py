@@ -29,6 +29,7 @@ class Task(NamedTuple):
     atmospheric_pressure: Array
     valve_conductance: Array
     leak_conductance: Array
+    relieving: Array
     dead_band: Array
     proportional_gain: Array
     integral_gain: Array
@@ -108,13 +109,18 @@ def control(task: Task, state: State, time: Array) -> State:
 
 
 class Connection(NamedTuple):
-    """Open area and the two nodes that a command joins to the chambers; the shares are 1 where that is the source."""
+    """Open area and the two nodes that a command joins to the chambers.
+
+    The shares are 1 where that is the source; ``back_1`` and ``back_2`` are 1 where gas may flow back into the node.
+    """
 
     conductance: Array
     node_1: Array
     node_2: Array
     share_1: Array
     share_2: Array
+    back_1: Array
+    back_2: Array
 
 
 def connect(task: Task, command: Array) -> Connection:
@@ -129,6 +135,8 @@ def connect(task: Task, command: Array) -> Connection:
         jnp.where(feeds_1, task.atmospheric_pressure, task.dorsiflexion_pressure),
         jnp.where(feeds_1, 1.0, 0.0),
         jnp.where(feeds_1, 0.0, 1.0),
+        jnp.where(feeds_1, task.relieving, 1.0),
+        jnp.where(feeds_1, 1.0, task.relieving),
     )
 
 
@@ -167,9 +175,9 @@ def first_stage(task: Task, state: State, port: Connection) -> tuple[Linear, Rat
     """Linearisation and first stage. Equations (3), (6) to (9)."""
     weight_1, weight_2 = GAMMA * task.step * task.per_mass_1, GAMMA * task.step * task.per_mass_2
     pressure_1, pressure_2 = state.mass_1 * task.per_mass_1, state.mass_2 * task.per_mass_2
-    in_1, _, slope_1 = flow_slopes(port.node_1, pressure_1, port.conductance, task.valve_curve)
-    in_2, _, slope_2 = flow_slopes(port.node_2, pressure_2, port.conductance, task.valve_curve)
-    leak, leak_by_1, leak_by_2 = flow_slopes(pressure_1, pressure_2, task.leak_conductance, task.leak_curve)
+    in_1, _, slope_1 = flow_slopes(port.node_1, pressure_1, port.conductance, port.back_1, task.valve_curve)
+    in_2, _, slope_2 = flow_slopes(port.node_2, pressure_2, port.conductance, port.back_2, task.valve_curve)
+    leak, leak_by_1, leak_by_2 = flow_slopes(pressure_1, pressure_2, task.leak_conductance, 1.0, task.leak_curve)
     a, b = 1.0 - weight_1 * (slope_1 - leak_by_1), weight_2 * leak_by_2
     c, d = -weight_1 * leak_by_1, 1.0 - weight_2 * (slope_2 + leak_by_2)
     source_1, source_2 = weight_1 * slope_1 * port.share_1, weight_2 * slope_2 * port.share_2
@@ -186,9 +194,9 @@ def advance_gas(task: Task, state: State) -> State:
     linear, first = first_stage(task, state, port)
     end_1 = (state.mass_1 + step * first.mass_1) * task.per_mass_1
     end_2 = (state.mass_2 + step * first.mass_2) * task.per_mass_2
-    in_1 = flow(port.node_1, end_1, port.conductance, task.valve_curve)
-    in_2 = flow(port.node_2, end_2, port.conductance, task.valve_curve)
-    leak = flow(end_1, end_2, task.leak_conductance, task.leak_curve)
+    in_1 = flow(port.node_1, end_1, port.conductance, port.back_1, task.valve_curve)
+    in_2 = flow(port.node_2, end_2, port.conductance, port.back_2, task.valve_curve)
+    leak = flow(end_1, end_2, task.leak_conductance, 1.0, task.leak_curve)
     right = Rates(
         in_1 - leak - 2.0 * first.mass_1,
         in_2 + leak - 2.0 * first.mass_2,
@@ -197,6 +205,7 @@ def advance_gas(task: Task, state: State) -> State:
     )
     second = solve_stage(linear, right)
     change = Rates(*(step * (1.5 * one + 0.5 * two) for one, two in zip(first, second, strict=True)))
+    change = change._replace(supplied=jnp.maximum(change.supplied, change.supplied * task.relieving))
     return state._replace(
         mass_1=state.mass_1 + change.mass_1,
         mass_2=state.mass_2 + change.mass_2,

@@ -1,8 +1,9 @@
 """The chambers as expressions of CasADi: the flow laws of the engine, smooth enough for an optimiser.
 
-Two differences to the engine: near equal pressures the straight line and the root meet in one smooth curve, and the
-two ways of the valve have an opening each, of which the sum is at most 1. Both open at once stands for a valve that
-switches between them infinitely fast, so that no control of the valve can do better.
+Three differences to the engine: near equal pressures the straight line and the root meet in one smooth curve, a
+supply that takes no gas back closes smoothly too, and the two ways of the valve have an opening each, of which the sum
+is at most 1. Both open at once stands for a valve that switches between them infinitely fast, so that no control of
+the valve can do better.
 """
 
 from collections.abc import Callable
@@ -14,6 +15,9 @@ from ppafo.model.plant import PlantParameters
 
 Openings = Callable[..., tuple[Any, Any, Any, Any]]
 """From the shares of time of a valve's ways, towards chamber 1 first, to source 1, vent 1, source 2 and vent 2."""
+
+CLOSING = 1.0e-3
+"""Share of the choked flow about which the flow from a supply that takes no gas back rounds off to nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +70,15 @@ def smooth_flow(pressure_a: Any, pressure_b: Any, conductance: float, curve: Flo
     return conductance * upstream * casadi.if_else(is_subsonic, subsonic, casadi.sign(gap))
 
 
+def supply_flow(source: float, pressure: Any, plant: PlantParameters) -> Any:
+    """Mass flow from a supply at ``source`` [Pa] through the whole valve [kg/s], none back unless it is relieving."""
+    import casadi
+
+    flow = smooth_flow(source, pressure, plant.valve_conductance, plant.valve_curve)
+    rounding = CLOSING * plant.valve_conductance * source
+    return flow if plant.relieving else 0.5 * (flow + casadi.sqrt(flow * flow + rounding * rounding))
+
+
 def chamber_rates(
     plant: PlantParameters,
     openings: Openings,
@@ -78,8 +91,8 @@ def chamber_rates(
     source_1, vent_1, source_2, vent_2 = openings(*ways)
     full, curve, ambient = plant.valve_conductance, plant.valve_curve, plant.atmospheric_pressure
     leak = smooth_flow(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
-    fed_1 = source_1 * smooth_flow(plant.supply_pressure, pressure_1, full, curve)
-    fed_2 = source_2 * smooth_flow(plant.dorsiflexion_pressure, pressure_2, full, curve)
+    fed_1 = source_1 * supply_flow(plant.supply_pressure, pressure_1, plant)
+    fed_2 = source_2 * supply_flow(plant.dorsiflexion_pressure, pressure_2, plant)
     gain_1 = fed_1 - vent_1 * smooth_flow(pressure_1, ambient, full, curve) - leak
     gain_2 = fed_2 - vent_2 * smooth_flow(pressure_2, ambient, full, curve) + leak
     return ChamberRates(

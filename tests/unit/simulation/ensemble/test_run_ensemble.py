@@ -168,7 +168,7 @@ def test_runs_that_cannot_be_are_refused_with_a_line_and_the_others_go_on() -> N
     result = run_ensemble(base, columns, METERS)
     assert result.status.tolist() == [COMPLETED, *[REFUSED] * 6]
     assert np.isfinite(result.metrics["rms_error"]).tolist() == [True, *[False] * 6]
-    parts = ("regulated pressure", "above supply.atmospheric", "not a finite", "stops", "run.", "divided")
+    parts = ("regulated pressure", "at least supply.atmospheric", "not a finite", "stops", "run.", "divided")
     for run, part in enumerate(parts, 1):
         assert part in result.reasons[run]
         assert "\n" not in result.reasons[run]

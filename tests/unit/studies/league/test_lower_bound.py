@@ -10,10 +10,12 @@ import pytest
 import ppafo
 from ppafo.errors import SimulationError
 from ppafo.model.orifice import orifice_flow
+from ppafo.model.plant import single_ports
+from ppafo.model.ports import single_port_flow
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.league import LowerBound, lower_bound, played
-from ppafo.studies.league.bound_model import smooth_flow
+from ppafo.studies.league.bound_model import smooth_flow, supply_flow
 from ppafo.studies.league.bound_solver import BoundSolver, Optimum
 from ppafo.studies.league.lower_bound import valve_command
 
@@ -47,6 +49,19 @@ def test_the_flow_is_that_of_the_engine_but_for_the_bend_near_equal_pressures() 
             exact = orifice_flow(*pair, 1e-8, plant.valve_curve)
             assert float(flow(list(pair))) == pytest.approx(exact, rel=0.002 if ratio <= 0.995 else 0.5)
     assert float(flow([4e5, 4e5])) == 0.0
+
+
+@pytest.mark.parametrize("relieving", [False, True])
+def test_the_supply_is_that_of_the_engine_also_above_its_pressure(relieving: bool) -> None:
+    device = ppafo.load_device("ppafo2011", overrides=[f"supply.relieving={str(relieving).lower()}"])
+    plant, pressure = plant_parameters(device), casadi.SX.sym("p")
+    fed = casadi.Function("fed", [pressure], [supply_flow(plant.supply_pressure, pressure, plant)])
+    choked = plant.valve_conductance * plant.supply_pressure
+    for ratio in (0.3, 0.7, 0.99, 1.0, 1.01, 1.2, 2.0):
+        port = single_ports(plant, 1.0)[0]
+        exact = single_port_flow(ratio * plant.supply_pressure, port, plant.valve_curve).from_source
+        assert float(fed(ratio * plant.supply_pressure)) == pytest.approx(exact, rel=0.002, abs=6e-4 * choked)
+    assert (float(fed(2.0 * plant.supply_pressure)) < 0.0) == relieving
 
 
 def test_the_curve_falls_from_the_least_error_on(bound: LowerBound, unreachable: LowerBound) -> None:

@@ -81,7 +81,8 @@ def drawn_plants(configuration: Configuration, run: Run, factors: Floats) -> lis
     """The plant of a configuration with each of the devices that rows of ``factors`` (draws, uncertainties) make."""
     assert run.walk is not None, "a league walks"
     devices = [drawn_device(configuration.device, row.tolist()) for row in factors]
-    return [with_leg(plant_parameters(device), run.walk.leg) for device in devices]
+    fed = run.plant.relieving
+    return [with_leg(plant_parameters(device)._replace(relieving=fed), run.walk.leg) for device in devices]
 
 
 def _with_devices(run: Run, batch: Batch, plants: list[PlantParameters]) -> Batch:

@@ -1,0 +1,108 @@
+"""Chambers pushed above the pressure of their supply: against the reference solver, with both kinds of supply."""
+
+import dataclasses
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.reference.agreement import measure_agreement, plant_states
+from ppafo.engine.reference.solver import solve_reference
+from ppafo.engine.run import Run, batch_of
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice, Scenario, Thermal
+
+LARGEST_ANGLE = 2.0e-4
+LARGEST_PRESSURE = 1.0e-3
+LARGEST_RMS = 1.0e-4
+PUMPED = 1.0e-4
+"""Gas [kg] that a swinging vane pushes back into a relieving supply at least."""
+SWING = {"level": 1.3, "amplitude": 0.6, "frequency": 2.0, "phase": 0.0}
+SPOOL = ("valve.spool_frequency=60 Hz",)
+
+
+def supplied_gas(run: Run) -> np.ndarray:
+    """Gas [kg] drawn from the supply at every record, of a run that agrees with the reference solver in everything."""
+    outcome, reference = run_batch(batch_of(run)), solve_reference(run)
+    agreement = measure_agreement(run, outcome, reference)
+    assert agreement.angle <= LARGEST_ANGLE, agreement
+    assert agreement.worst_pressure <= LARGEST_PRESSURE, agreement
+    assert agreement.worst_rms <= LARGEST_RMS, agreement
+    supplied = plant_states(run, outcome)[:, 4]
+    np.testing.assert_allclose(supplied, reference.states[:, 4], rtol=1.0e-3, atol=1.0e-8)
+    return supplied
+
+
+def swung(name: str, is_relieving: bool, command: float, overrides: tuple[str, ...] = ()) -> Scenario:
+    """A vane swung against an open valve: the chamber that is fed is squeezed above its supply twice a second."""
+    scenario = load_scenario(name, (f"supply.relieving={str(is_relieving).lower()}", *overrides))
+    open_loop = dataclasses.replace(scenario.control, kind="constant", settings={"command": command})
+    return dataclasses.replace(
+        scenario, motion=LedMotion(ProfileChoice("sine", SWING)), control=open_loop, duration=1.0
+    )
+
+
+@pytest.mark.parametrize("walls", [None, 100.0], ids=["isothermal", "thermal"])
+@pytest.mark.parametrize(
+    ("name", "command", "overrides"),
+    [
+        ("torque-task-proportional", 1.0, ()),
+        ("torque-task-proportional", -0.3, SPOOL),
+        ("torque-task-solenoid", 1.0, ()),
+    ],
+    ids=["proportional", "moving spool", "solenoid"],
+)
+def test_a_squeezed_chamber_gives_gas_back_to_a_relieving_supply_only(
+    name: str, command: float, overrides: tuple[str, ...], walls: float | None
+) -> None:
+    drawn = []
+    for is_relieving in (False, True):
+        scenario = swung(name, is_relieving, command, overrides)
+        thermal = None if walls is None else Thermal(walls, 300.0)
+        drawn.append(supplied_gas(plan_run(dataclasses.replace(scenario, thermal=thermal))))
+    one_way, relieved = (np.diff(gas) for gas in drawn)
+    assert one_way.min() >= 0.0
+    assert -np.minimum(relieved, 0.0).sum() > PUMPED
+    assert drawn[0][-1] > drawn[1][-1] + 0.5 * PUMPED
+
+
+@pytest.mark.parametrize("is_relieving", [False, True])
+def test_a_vane_that_is_pushed_back_is_held_by_the_gas_that_cannot_leave(is_relieving: bool) -> None:
+    pushed = ("motion.external_torque=12 N m", "motion.angle=100 deg")
+    filled = ("initial.pressure_1=supply", "initial.pressure_2=atmosphere")
+    overrides = (*pushed, *filled, f"supply.relieving={str(is_relieving).lower()}")
+    run = plan_run(load_scenario("step-response", overrides))
+    gas = supplied_gas(run)
+    angle = plant_states(run, run_batch(batch_of(run)))[-1, 0]
+    assert (gas.min() < -PUMPED) == is_relieving
+    assert (angle == run.plant.angle_min) == is_relieving
+
+
+def pushed_about(scenario: Scenario, seed: int) -> Scenario:
+    """A random scenario whose vane is pushed against its supplies: thrown and loaded when free, else swung."""
+    chance = np.random.default_rng(seed)
+    device = scenario.device
+    if isinstance(scenario.motion, FreeMotion):
+        angle = chance.uniform(device.actuator.angle_min, device.actuator.angle_max)
+        motion = FreeMotion(float(angle), float(chance.uniform(-8.0, 8.0)), float(chance.uniform(-25.0, 25.0)))
+        return dataclasses.replace(scenario, motion=motion, initial_pressure_1=device.supply.pressure)
+    swing = SWING | {"frequency": float(chance.uniform(0.5, 4.0)), "phase": float(chance.uniform(-1.0, 1.0))}
+    return dataclasses.replace(scenario, motion=LedMotion(ProfileChoice("sine", swing)))
+
+
+@pytest.mark.parametrize("first", [0, 10])
+def test_drawn_gas_never_falls_with_random_devices_that_are_pushed_about(draws: ModuleType, first: int) -> None:
+    fallen = 0
+    for seed in range(first, first + 10):
+        scenario = pushed_about(draws.random_scenario(seed), seed)
+        thermal = Thermal(200.0, 300.0) if seed % 3 == 0 else None
+        relieving = dataclasses.replace(scenario.device.supply, relieving=True)
+        device = dataclasses.replace(scenario.device, supply=relieving)
+        for given in (scenario, dataclasses.replace(scenario, device=device)):
+            run = plan_run(dataclasses.replace(given, thermal=thermal))
+            falls = float(np.diff(plant_states(run, run_batch(batch_of(run)))[:, 4]).min()) < 0.0
+            assert given is not scenario or not falls, f"seed {seed}"
+            fallen += falls
+    assert fallen >= 5, "too few of the relieving supplies were pushed back"
