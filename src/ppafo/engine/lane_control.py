@@ -1,12 +1,11 @@
 """What the lanes do at a sample: sense, control, and keep what sensors and valve get late."""
 
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
-from ppafo.model.gait_sensors import GaitMeasurement, measure_gait
 from ppafo.engine.scheme.parts import SAME_INSTANT
+from ppafo.model.gait_sensors import GaitMeasurement, measure_gait
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, follow_signals, measure
 from ppafo.model.vane import actuator_torque
-
 
 SIGNALS = ("angle", "pressure_1", "pressure_2")
 

@@ -174,9 +174,10 @@ def feed(rows: LaneRows) -> list[str]:
     """The second stage: the gas of the step, and in parts that may be refused the error of the gas."""
     program, add = rows.program, rows.add
     lines = [*rows.load_first_stage(), connect(rows, "gas.lines.after")]
-    given = f"port_1, port_2, length, {add(program.valve.port_flow)}"
+    flow = add(program.valve.port_flow)
     if program.has_lines:
-        given_2 = f"port_2, length, {add(program.valve.port_flow)}"
+        given = f"port_1, port_2, length, {flow}"
+        given_2 = f"port_2, length, {flow}"
         return [
             *lines,
             f"change = {add(pneumatics.end_moving_gas)}(plant, gas.chambers, {given})",
@@ -184,14 +185,13 @@ def feed(rows: LaneRows) -> list[str]:
             *rows.store("line_state"),
         ]
     if program.is_thermal:
-        lines += [f"second = {add(thermal_gas.second_thermal_stage)}(plant, thermal, gas, {given})"]
+        lines += [f"second = {add(thermal_gas.second_thermal_stage)}(plant, thermal, gas, port_1, port_2, {flow})"]
         lines += [f"change = {add(thermal_gas.thermal_change)}(plant, thermal, gas, second, length)"]
         error = f"{add(thermal_gas.thermal_error)}(plant, gas, second, length)"
         shifted = f"{add(thermal_gas.thermal_opening_error)}(plant, gas, shift, length)"
     else:
         still = "gas" if program.is_held else "gas.still"
         stage = pneumatics.second_still_stage if program.is_held else pneumatics.second_moving_stage
-        flow = add(program.valve.port_flow)
         next_angle = "state.angle" if program.is_held else "begun.next_angle"
         lines += [f"second = {add(stage)}(plant, gas, port_1, port_2, {flow})"]
         change = pneumatics.still_change if program.is_held else pneumatics.moving_change

@@ -24,8 +24,9 @@ from ppafo.signals.meter import Course, MeterKind
 
 
 class LaneTiming(NamedTuple):
-    """Longest step and sample period [s]; parts of a step by which commands and signals are late beyond whole steps [-];
-    error over the one that a run is allowed by default [-].
+    """Longest step and sample period [s]; shares of a step by which commands and signals are late beyond whole steps.
+
+    ``tolerance`` is the error over the one that a run is allowed by default [-].
     """
 
     step: float
@@ -51,14 +52,14 @@ class Program:
     """One combination of pieces; each combination is compiled once.
 
     ``angle`` None leaves the vane free, otherwise it is led along that profile. ``controller`` None leaves the command
-    to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals, ``late_signals`` True their delay.
-    ``late_commands`` True adds a dead time before the valve. ``is_thermal`` True gives the gas an energy balance
-    instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose
-    foot is free or where the ground and a gait lead it (``angle`` is None then). ``has_lines`` True feeds a walking
-    device from lines behind regulators instead of constant pressures. ``slow_sensors`` True lets
-    sensors follow with a bandwidth (those of a walking leg have their own). ``is_adaptive`` True divides each step as its
-    error asks, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated at every sample that a
-    recording would have, ``traced`` names channels that are kept at some of them.
+    to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
+    ``slow_sensors`` True a bandwidth and ``late_signals`` True a delay. ``late_commands`` True adds a dead time before
+    the valve. ``is_thermal`` True gives the gas an energy balance instead of a constant temperature. ``walks`` True
+    puts the device on a walking leg, whose foot is free or where the ground and a gait lead it (``angle`` is None then;
+    its sensors are its own). ``has_lines`` True feeds a walking device from lines behind regulators instead of constant
+    pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded samples
+    lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names channels
+    that are kept at some of them.
     """
 
     valve: ValveModel

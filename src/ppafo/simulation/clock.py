@@ -28,9 +28,9 @@ class Clock:
 
 
 def read_clock(reading: Reading) -> Clock:
-    """Return the times of a run; the step is the longest one that divides the sample period and is not above the given.
+    """Return the times of a run; the step is the longest one, up to what is given, that divides the sample period.
 
-    Without an output interval every step is recorded, or about every step where the duration is no whole number of them.
+    Without an output interval every step is recorded, or about every one where they do not divide the duration.
     """
     duration = reading.number(_DURATION_PATH, _DURATION)
     period = _read_period(reading)

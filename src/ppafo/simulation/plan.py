@@ -166,20 +166,23 @@ def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtyp
     return np.array([kind.value(parameters, float(time)) for time in times]).T
 
 
-def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> bool:
-    """True where the error decides about the parts of a step [s]; not where a held vane's chambers are slow enough."""
+def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
+    """True where the error decides about the parts of a step [s]; not where a held vane's chambers are slow enough.
+
+    For arrays (runs,) in the scenario an array of truth values.
+    """
     if not isinstance(scenario.motion, LedMotion) or scenario.motion.profile.kind != "constant":
         return True
     lowest, highest = angle_range(scenario, plant)
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
-    return np.logical_not(is_slow(plant, step, lowest, highest, stiffness))  # type: ignore[no-any-return]
+    return np.logical_not(is_slow(plant, step, lowest, highest, stiffness))
 
 
-def nearly_whole(steps: float) -> float:
-    """A number of steps, to the whole number where it is one to rounding; may be an array (runs,)."""
+def nearly_whole(steps: Any) -> Any:
+    """A number of steps, or an array (runs,) of them, to the whole number where it is one to rounding."""
     counted = np.rint(steps)
     count = np.where(np.abs(steps - counted) <= WHOLE * steps, counted, steps)
-    return count if isinstance(steps, np.ndarray) else float(count)  # type: ignore[return-value]
+    return count if isinstance(steps, np.ndarray) else float(count)
 
 
 def angle_range(scenario: Scenario, plant: PlantParameters) -> tuple[float, float]:

@@ -13,7 +13,6 @@ from ppafo.engine.scheme.pneumatics import GasChange
 from ppafo.model.friction import holds_still
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, driving_torque
 
-
 ALLOWED_OF_ANGLE = 3.0e-6
 """Error of one part over the range of the angle; with it a run keeps to 2e-4 of the range."""
 MISSED_SHARE = 0.2

@@ -49,7 +49,7 @@ def is_refused(error: float, length: float) -> bool:
 
 
 def next_pace(pace: Pace, error: float, length: float, refused: bool, longest: float) -> Pace:
-    """Length of the next part after one of ``length`` [s] with an error [-]; an event that cut it short is no reason."""
+    """Length of the next part after one of ``length`` [s] with an error [-]; one that an event cut says little."""
     factor = math.sqrt(SAFETY / max(LEAST_ERROR, min(MOST_ERROR, error)))
     wanted = length * factor
     kept = max(pace.length, wanted) if factor >= 1.0 and not refused else wanted

@@ -298,4 +298,4 @@ def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:
     """Pressure [Pa] against which an error is seen: of the supplies or of the chamber, over the atmosphere."""
     supplied = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
     least = LEAST_PRESSURE * plant.atmospheric_pressure
-    return max(max(supplied, abs(pressure - plant.atmospheric_pressure)), least)
+    return max(supplied, abs(pressure - plant.atmospheric_pressure), least)

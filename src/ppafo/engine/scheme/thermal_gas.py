@@ -281,10 +281,9 @@ def second_thermal_stage(
     begun: ThermalGas,
     port_1: Any,
     port_2: Any,
-    step: float,
     port_flow: Callable[..., Any],
 ) -> ThermalFlows:
-    """Second stage [kg/s] of one step [s]."""
+    """Second stage [kg/s] of a step."""
     pressure_1 = begun.end.mass_1 * plant.gas_product / begun.volume_1
     pressure_2 = begun.end.mass_2 * plant.gas_product / begun.volume_2
     in_1 = port_flow(pressure_1, port_1, plant.valve_curve)

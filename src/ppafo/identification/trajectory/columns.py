@@ -10,7 +10,7 @@ import numpy as np
 
 from ppafo.engine.lanes import Batch, BatchResult, run_batch
 from ppafo.engine.replay import StepInputs, replay
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of, whole_and_rest
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.paths import TIME_OFFSET, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, Prepared
