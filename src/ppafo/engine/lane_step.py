@@ -209,7 +209,7 @@ def feed(rows: LaneRows) -> list[str]:
 def finish(rows: LaneRows) -> list[str]:
     """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
     program, add = rows.program, rows.add
-    lines = [*with_gas(rows), *end_motion(rows)]
+    lines = [*with_gas(rows), *end_motion(rows), *with_work(rows)]
     if not program.is_adaptive:
         lines += [*store_all(rows, ""), *judge(rows)]
         if not program.is_parted:
@@ -237,6 +237,13 @@ def with_gas(rows: LaneRows) -> list[str]:
     if rows.program.is_thermal:
         return [f"fed, warmed = {rows.add(thermal_gas.with_thermal_gas)}(state, masses, change)"]
     return [f"fed = {rows.add(motion.with_gas)}(state, change)"]
+
+
+def with_work(rows: LaneRows) -> list[str]:
+    """Lines that count the work of gas with an energy balance; a held vane takes none."""
+    if not rows.program.is_thermal or rows.program.is_held:
+        return []
+    return [f"warmed = {rows.add(thermal_gas.with_work)}(plant, warmed, state, after)"]
 
 
 def end_motion(rows: LaneRows) -> list[str]:

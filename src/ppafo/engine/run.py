@@ -26,6 +26,7 @@ Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
 
 NEVER_FAILED = 1.0e300
+NO_ENERGY = (0.0, 0.0, 0.0, 0.0)
 WHOLE = 1.0e-9
 
 
@@ -117,7 +118,7 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
-    masses = ThermalState(run.initial.mass_1, run.initial.mass_2) if program.is_thermal else NoParameters()
+    masses = ThermalState(run.initial.mass_1, run.initial.mass_2, *NO_ENERGY) if program.is_thermal else NoParameters()
     result = LaneResult(0.0, NEVER_FAILED)
     further = [*walk_states, *line_states, settled_sensors(run)]
     states = table(

@@ -35,6 +35,12 @@ def gas_imbalance(recording: Recording) -> float:
     return gas_supplied(recording) - gas_vented(recording) - stored
 
 
+def energy_imbalance(recording: Recording) -> float:
+    """Enthalpy supplied less vented, and heat, less work and stored energy [J]; what a simulation loses or invents."""
+    taken = _gain(recording, "supplied_enthalpy") - _gain(recording, "vented_enthalpy") + _gain(recording, "wall_heat")
+    return taken - _gain(recording, "gas_work") - _gain(recording, "gas_energy")
+
+
 def largest_pressure(recording: Recording) -> float:
     """Largest pressure in either chamber [Pa absolute]."""
     return float(max(np.max(recording["pressure_1"]), np.max(recording["pressure_2"])))
@@ -107,6 +113,14 @@ def read_gas_imbalance(readings: Readings) -> Floats:
     return readings.gains["supplied_mass"] - readings.gains["vented_mass"] - stored
 
 
+def read_energy_imbalance(readings: Readings) -> Floats:
+    """``energy_imbalance`` [J]; nan for gas without an energy balance."""
+    if not set(ENERGIES) <= set(readings.gains):
+        return np.full_like(readings.gains["supplied_mass"], np.nan)
+    supplied, vented, heat, work, stored = (readings.gains[name] for name in ENERGIES)
+    return supplied - vented + heat - work - stored
+
+
 def read_largest_pressure(readings: Readings) -> Floats:
     """``largest_pressure`` [Pa absolute]."""
     pressure: Floats = readings.meters[LARGEST_PRESSURE.name].pressure
@@ -135,6 +149,7 @@ def _ratio(above: Floats, below: Floats) -> Floats:
 
 
 _BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
+ENERGIES = ("supplied_enthalpy", "vented_enthalpy", "wall_heat", "gas_work", "gas_energy")
 _MOTION = ("torque", "angle")
 _EFFORT = ("torque", "angle", "supplied_mass")
 _PRESSURES = ("pressure_1", "pressure_2")
@@ -166,6 +181,14 @@ METRICS = (
     ),
     MetricKind(
         "gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance, read_gas_imbalance
+    ),
+    MetricKind(
+        "energy_imbalance",
+        "J",
+        "enthalpy supplied less vented, and heat, less work and stored energy of the gas",
+        ENERGIES,
+        energy_imbalance,
+        read_energy_imbalance,
     ),
     MetricKind(
         "largest_pressure",

@@ -64,10 +64,18 @@ class ThermalParameters(NamedTuple):
 
 
 class ThermalState(NamedTuple):
-    """True masses of the gas in both chambers [kg], where ``PlantState`` counts it at the reference temperature."""
+    """True masses of the gas in both chambers [kg], where ``PlantState`` counts it at the reference temperature.
+
+    Totals since the start of the run: energy from the supplies, to the atmosphere and from the walls, counted as
+    contents of chambers are [kg], and work of the gas on the vane [J].
+    """
 
     mass_1: float
     mass_2: float
+    supplied_content: float
+    vented_content: float
+    heat_content: float
+    gas_work: float
 
 
 class Openings(NamedTuple):

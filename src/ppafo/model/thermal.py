@@ -76,6 +76,14 @@ def carried_energy(root: float, heat_capacity_ratio: float) -> float:
     return heat_capacity_ratio * root
 
 
+def energy_per_content(gas_product: float, heat_capacity_ratio: float) -> float:
+    """Internal energy over content [J/kg], ``R T_ref / (M (k - 1))``, from ``R T_ref / M`` [J/kg].
+
+    The content of a chamber is the mass that would give its pressure at the reference temperature.
+    """
+    return gas_product / (heat_capacity_ratio - 1.0)
+
+
 def temperature_flow_factor(reference_temperature: float, upstream_temperature: float) -> float:
     """Factor [-] on a conductance that holds at a reference temperature [K]: sqrt(T_ref/T_up), from equation (6)."""
     return math.sqrt(reference_temperature / upstream_temperature)

@@ -12,6 +12,7 @@ from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together
 from ppafo.metrics.catalog import evaluate
 from ppafo.model.friction import sliding_friction
 from ppafo.model.plant import chamber_pressures
+from ppafo.model.thermal import energy_per_content
 from ppafo.model.vane import gravity_torque
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -109,19 +110,27 @@ def _recording(scenario: Scenario, run: Run, times: Floats, record: Floats, rows
     if scenario.control.kind != OPEN_LOOP:
         channels["reference"] = (profile_values(scenario.reference, times)[0], "N m")
     if run.program.is_thermal:
-        channels |= _thermal_channels(scenario, record, rows)
+        channels |= _thermal_channels(scenario, run, record, rows)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(scenario.name, times, values, kind="simulated")
 
 
-def _thermal_channels(scenario: Scenario, record: Floats, rows: dict[str, int]) -> dict[str, tuple[Floats, str]]:
-    """True masses and temperatures of gas with an energy balance."""
+def _thermal_channels(
+    scenario: Scenario, run: Run, record: Floats, rows: dict[str, int]
+) -> dict[str, tuple[Floats, str]]:
+    """True masses, temperatures and energies of gas with an energy balance."""
     channels = {}
     for chamber in (1, 2):
         mass = record[:, rows[f"masses.mass_{chamber}"]]
         warmth = record[:, rows[f"state.mass_{chamber}"]] / mass
         channels[f"mass_{chamber}"] = (mass, "kg")
         channels[f"temperature_{chamber}"] = (scenario.device.gas.temperature * warmth, "K")
+    per_content = energy_per_content(run.plant.gas_product, scenario.device.gas.heat_capacity_ratio)
+    content = record[:, rows["state.mass_1"]] + record[:, rows["state.mass_2"]]
+    channels["gas_energy"] = (per_content * content, "J")
+    for name, row in (("supplied_enthalpy", "supplied"), ("vented_enthalpy", "vented"), ("wall_heat", "heat")):
+        channels[name] = (per_content * record[:, rows[f"masses.{row}_content"]], "J")
+    channels["gas_work"] = (record[:, rows["masses.gas_work"]], "J")
     return channels
 
 

@@ -13,13 +13,23 @@ from typing import Any, NamedTuple
 
 from ppafo.engine.scheme.pneumatics import ALLOWED_OF_PRESSURE, GAMMA, SHORTEST, pressure_that_matters
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_volumes
+from ppafo.model.plant import (
+    PlantParameters,
+    PlantState,
+    ThermalParameters,
+    ThermalState,
+    chamber_pressures,
+    chamber_volumes,
+)
 from ppafo.model.ports import PortFlow, admitted_flow
 from ppafo.model.thermal import carried_energy, carried_mass
 
 
 class ThermalFlows(NamedTuple):
-    """Rates of both contents and both masses, of the gas drawn from the source and of the vane leak (1 to 2) [kg/s]."""
+    """Rates of both contents and both masses, of the gas drawn from the source and of the vane leak (1 to 2) [kg/s].
+
+    Then the contents that come from the source, that pass both ports, and that the walls give [kg/s].
+    """
 
     content_1: float
     content_2: float
@@ -27,6 +37,9 @@ class ThermalFlows(NamedTuple):
     mass_2: float
     supplied: float
     leaked: float
+    source_content: float
+    port_content: float
+    heat: float
 
 
 class FlowSlopes(NamedTuple):
@@ -44,6 +57,8 @@ class FlowSlopes(NamedTuple):
     supplied_by_2: float
     leaked_by_1: float
     leaked_by_2: float
+    source_content_by_1: float
+    source_content_by_2: float
 
 
 class ThermalMatrix(NamedTuple):
@@ -57,6 +72,8 @@ class ThermalMatrix(NamedTuple):
     scale: float
     wall_1: float
     wall_2: float
+    cooling_1: float
+    cooling_2: float
 
 
 class ThermalGas(NamedTuple):
@@ -117,23 +134,24 @@ def thermal_flows(
     supplied_1 = in_1.from_source * source_1_carries.mass
     supplied_2 = in_2.from_source * source_2_carries.mass
     leaked = leak * leak_carries.mass
-    enthalpy_1 = in_1.from_source * source_1_carries.content + vent_1 * vent_1_carries.content
-    enthalpy_2 = in_2.from_source * source_2_carries.content + vent_2 * vent_2_carries.content
+    source_1 = in_1.from_source * source_1_carries.content
+    source_2 = in_2.from_source * source_2_carries.content
+    enthalpy_1 = source_1 + vent_1 * vent_1_carries.content
+    enthalpy_2 = source_2 + vent_2 * vent_2_carries.content
+    heat_1 = wall_rate(thermal, volume_1, state.mass_1, masses.mass_1)
+    heat_2 = wall_rate(thermal, volume_2, state.mass_2, masses.mass_2)
     leaked_enthalpy = leak * leak_carries.content
     work = (thermal.heat_capacity_ratio - 1.0) * growth
     return ThermalFlows(
-        enthalpy_1
-        - leaked_enthalpy
-        - work * state.mass_1 / volume_1
-        + wall_rate(thermal, volume_1, state.mass_1, masses.mass_1),
-        enthalpy_2
-        + leaked_enthalpy
-        + work * state.mass_2 / volume_2
-        + wall_rate(thermal, volume_2, state.mass_2, masses.mass_2),
+        enthalpy_1 - leaked_enthalpy - work * state.mass_1 / volume_1 + heat_1,
+        enthalpy_2 + leaked_enthalpy + work * state.mass_2 / volume_2 + heat_2,
         supplied_1 + vent_1 * vent_1_carries.mass - leaked,
         supplied_2 + vent_2 * vent_2_carries.mass + leaked,
         supplied_1 + supplied_2,
         leaked,
+        source_1 + source_2,
+        enthalpy_1 + enthalpy_2,
+        heat_1 + heat_2,
     )
 
 
@@ -170,6 +188,8 @@ def flow_slopes(
         in_2.source_slope * source_2.mass * weight_2,
         by_1 * leak_carries.mass,
         by_2 * leak_carries.mass,
+        in_1.source_slope * source_1.content * weight_1,
+        in_2.source_slope * source_2.content * weight_2,
     )
 
 
@@ -193,11 +213,11 @@ def thermal_matrix(
     b = -slopes.content_1_by_2 - wall_1 * slopes.mass_1_by_2
     c = -slopes.content_2_by_1 - wall_2 * slopes.mass_2_by_1
     d = 1.0 - slopes.content_2_by_2 - work / volume_2 + cooling_2 - wall_2 * slopes.mass_2_by_2
-    return ThermalMatrix(slopes, a, b, c, d, 1.0 / (a * d - b * c), wall_1, wall_2)
+    return ThermalMatrix(slopes, a, b, c, d, 1.0 / (a * d - b * c), wall_1, wall_2, cooling_1, cooling_2)
 
 
 def answered(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
-    """Gamma h times the change of all flows [kg/s] while both contents change at two rates [kg/s]."""
+    """Gamma h times the change of all flows but heat [kg/s] while both contents change at two rates [kg/s]."""
     return ThermalFlows(
         slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2,
         slopes.content_2_by_1 * content_1 + slopes.content_2_by_2 * content_2,
@@ -205,6 +225,10 @@ def answered(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalF
         slopes.mass_2_by_1 * content_1 + slopes.mass_2_by_2 * content_2,
         slopes.supplied_by_1 * content_1 + slopes.supplied_by_2 * content_2,
         slopes.leaked_by_1 * content_1 + slopes.leaked_by_2 * content_2,
+        slopes.source_content_by_1 * content_1 + slopes.source_content_by_2 * content_2,
+        (slopes.content_1_by_1 + slopes.content_2_by_1) * content_1
+        + (slopes.content_1_by_2 + slopes.content_2_by_2) * content_2,
+        0.0,
     )
 
 
@@ -215,13 +239,20 @@ def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFl
     content_1 = (matrix.d * right_1 - matrix.b * right_2) * matrix.scale
     content_2 = (matrix.a * right_2 - matrix.c * right_1) * matrix.scale
     by_contents = answered(matrix.slopes, content_1, content_2)
+    mass_1 = right.mass_1 + by_contents.mass_1
+    mass_2 = right.mass_2 + by_contents.mass_2
+    warmed_1 = matrix.wall_1 * mass_1 - matrix.cooling_1 * content_1
+    warmed_2 = matrix.wall_2 * mass_2 - matrix.cooling_2 * content_2
     return ThermalFlows(
         content_1,
         content_2,
-        right.mass_1 + by_contents.mass_1,
-        right.mass_2 + by_contents.mass_2,
+        mass_1,
+        mass_2,
         right.supplied + by_contents.supplied,
         right.leaked + by_contents.leaked,
+        right.source_content + by_contents.source_content,
+        right.port_content + by_contents.port_content,
+        right.heat + warmed_1 + warmed_2,
     )
 
 
@@ -234,6 +265,9 @@ def combined(one: ThermalFlows, factor_one: float, other: ThermalFlows, factor_o
         factor_one * one.mass_2 + factor_other * other.mass_2,
         factor_one * one.supplied + factor_other * other.supplied,
         factor_one * one.leaked + factor_other * other.leaked,
+        factor_one * one.source_content + factor_other * other.source_content,
+        factor_one * one.port_content + factor_other * other.port_content,
+        factor_one * one.heat + factor_other * other.heat,
     )
 
 
@@ -313,6 +347,9 @@ def thermal_change(
         change.mass_2 + to_2,
         supplied,
         change.leaked,
+        change.source_content + kept * carries,
+        change.port_content + kept * carries,
+        change.heat,
     )
 
 
@@ -362,7 +399,7 @@ def after_motion(
 
 
 def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlows) -> tuple[PlantState, ThermalState]:
-    """State and true masses with the changes [kg] of one step added."""
+    """State, true masses and totals with the changes [kg] of one step added; work comes later."""
     vented = change.supplied - change.mass_1 - change.mass_2
     return (
         PlantState(
@@ -374,5 +411,27 @@ def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlo
             state.vented_mass + vented,
             state.leaked_mass + abs(change.leaked),
         ),
-        ThermalState(masses.mass_1 + change.mass_1, masses.mass_2 + change.mass_2),
+        ThermalState(
+            masses.mass_1 + change.mass_1,
+            masses.mass_2 + change.mass_2,
+            masses.supplied_content + change.source_content,
+            masses.vented_content + change.source_content - change.port_content,
+            masses.heat_content + change.heat,
+            masses.gas_work,
+        ),
+    )
+
+
+def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, after: PlantState) -> ThermalState:
+    """True masses and totals with the work of the gas between two states, along the motion that happened."""
+    before_1, before_2 = chamber_pressures(plant, before.angle, before.mass_1, before.mass_2)
+    after_1, after_2 = chamber_pressures(plant, after.angle, after.mass_1, after.mass_2)
+    difference = 0.5 * (before_1 - before_2 + after_1 - after_2)
+    return ThermalState(
+        masses.mass_1,
+        masses.mass_2,
+        masses.supplied_content,
+        masses.vented_content,
+        masses.heat_content,
+        masses.gas_work + difference * plant.volume_per_angle * (after.angle - before.angle),
     )

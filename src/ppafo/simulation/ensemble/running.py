@@ -12,6 +12,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics.metric import MetricKind, Readings
+from ppafo.model.thermal import energy_per_content
 
 GAINED = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2")
 """Channels whose gain follows from the first and the last state."""
@@ -89,26 +90,38 @@ class _Asked:
         """The readings of some runs from their last states and, if there are, their traces."""
         program = self.batch.program
         groups = program.state_rows()
-        first, last = (_totals(program, rows) for rows in (self.batch.states[:, runs], states))
+        parameters = self.batch.parameters[:, runs]
+        first, last = (_totals(program, parameters, rows) for rows in (self.batch.states[:, runs], states))
         traces = {} if record is None else {name: record[:, row] for row, name in enumerate(program.traced)}
         return Readings(
             meters=meters_of(program, states),
             course=group_of("course", groups, states) if program.follows_reference else None,
             interval=self.interval[runs],
             samples=self.samples,
-            gains={name: last[name] - first[name] for name in GAINED},
+            gains={name: last[name] - first[name] for name in last},
             traces=traces,
         )
 
 
-def _totals(program: Program, states: Floats) -> dict[str, Floats]:
+def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, Floats]:
     """Gas in the chambers and totals of each run; gas with an energy balance keeps its true masses elsewhere."""
     groups = program.state_rows()
     state = group_of("state", groups, states)
     totals = {name: getattr(state, name) for name in GAINED}
     if program.is_thermal:
         masses = group_of("masses", groups, states)
-        totals |= {"mass_1": masses.mass_1, "mass_2": masses.mass_2}
+        groups = program.parameter_rows()
+        plant, thermal = (group_of(name, groups, parameters) for name in ("plant", "thermal"))
+        per_content = energy_per_content(plant.gas_product, thermal.heat_capacity_ratio)
+        totals |= {
+            "gas_energy": per_content * (state.mass_1 + state.mass_2),
+            "supplied_enthalpy": per_content * masses.supplied_content,
+            "vented_enthalpy": per_content * masses.vented_content,
+            "wall_heat": per_content * masses.heat_content,
+            "gas_work": masses.gas_work,
+            "mass_1": masses.mass_1,
+            "mass_2": masses.mass_2,
+        }
     return totals
 
 
