@@ -60,7 +60,7 @@ def test_the_folder_opens_as_it_is_with_units_in_the_columns(small_results: Stud
     table = pyarrow.dataset.dataset(f"{folder}/runs").to_table()
     assert table.num_rows == 32
     units = {field.name: (field.metadata or {}).get(b"unit") for field in table.schema}
-    assert units["supply.pressure"] == b"Pa"
+    assert units["supply.pressure"] == b"Pa_a"
     assert units["gas_supplied"] == b"kg"
     assert units["failure_time"] == b"s"
     frame = table.select(["configuration", "status", "rms_error"]).to_pylist()[0]
