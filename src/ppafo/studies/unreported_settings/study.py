@@ -15,7 +15,7 @@ from ppafo.errors import ScenarioError
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.uncertainty.draws import replicate_seed
-from ppafo.studies.unreported_settings.evidence import IMPROVEMENT, METRICS, Metrics, agreement
+from ppafo.studies.unreported_settings.evidence import GAS, IMPROVEMENT, METRICS, Metrics, agreement
 from ppafo.studies.unreported_settings.proposal import Proposal, effective, next_proposal
 from ppafo.studies.unreported_settings.settings import (
     CELLS,
@@ -45,8 +45,8 @@ class Family:
 
     Each (draws,). The first ``even`` are spread evenly over what is allowed, the others lie where the results agree.
     ``replicate`` is which search drew each; ``densities`` (draws, searches) is how densely each search draws there,
-    over the even spread, and ``sizes`` (searches,) how much it drew. ``drawn`` counts also those that no run can have
-    or that failed.
+    over the even spread, 1 from another search where a completion can have no weight; ``sizes`` (searches,) is how much
+    each drew. ``drawn`` counts also those that no run can have or that failed.
     """
 
     draws: Draws
@@ -186,9 +186,15 @@ def _family(searches: Sequence[_Search], seed: int) -> Family:
         replicate.append(np.full(len(search.points), number))
         is_even.append(np.arange(len(search.points)) < search.rounds[0])
         own = _mixed(search.known, search.rounds)
-        densities.append(
-            np.stack([own if other is search else other.density(search.points) for other in searches], axis=1)
-        )
+        # What contradicts the text has no weight, whatever its density.
+        counts = np.flatnonzero(agreement(search.ran.metrics, (IMPROVEMENT, *GAS)) > 0.0)
+        density = np.ones((len(search.points), len(searches)))
+        for column, other in enumerate(searches):
+            if other is search:
+                density[:, column] = own
+            else:
+                density[counts, column] = other.density(search.points[counts])
+        densities.append(density)
     whole, even = _joined(ran), np.concatenate(is_even)
     rows = np.flatnonzero(whole.completed)
     rows = rows[np.argsort(~even[rows], kind="stable")]
