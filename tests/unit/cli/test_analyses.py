@@ -157,7 +157,7 @@ def test_an_interruption_leaves_nothing(
         (["montecarlo", STUDY, "--metric", "rms_error"], "choose one: proportional, solenoid"),
         (["montecarlo", "pressure-and-area", "--metric", "rms_error"], "varied over a grid or list"),
         (["sensitivity", STUDY, "--method", "moris"], "there is no method 'moris', did you mean 'morris'"),
-        (["sensitivity", STUDY, "--configuration", "solenoid"], "--independent"),
+        (["sensitivity", STUDY, "--method", "sobol", "--configuration", "solenoid"], "--independent"),
         (["tune"], "no tuning was given"),
         (["tune", "pid-gain"], "there is no tuning 'pid-gain', did you mean 'pid-gains'"),
         (["tune", "pid-gains", "--seed", "-1"], "--seed"),
