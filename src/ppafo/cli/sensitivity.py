@@ -1,4 +1,4 @@
-"""``ppafo sensitivity STUDY``: which uncertain value matters, by Morris or Sobol."""
+"""``ppafo sensitivity STUDY``: which uncertain value matters, by Sobol, Shapley or Morris."""
 
 import argparse
 
@@ -12,12 +12,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("study", metavar="STUDY", help="a study with distributions: a name, or a .toml file")
     parser.add_argument(
-        "--method", metavar="sobol|morris", default="sobol", help="sobol (default), or morris to screen"
+        "--method",
+        metavar="sobol|shapley|morris",
+        help="sobol, or shapley where values are correlated; morris to screen; by the study unless given",
     )
     parser.add_argument(
         "--metric", dest="metrics", metavar="NAME", action="append", default=[], help="those of the study unless given"
     )
-    parser.add_argument("--samples", metavar="N", help="base points (1024 unless given) or trajectories (128)")
+    parser.add_argument(
+        "--samples", metavar="N", help="base points (8192 unless given), orders (2048) or trajectories (128)"
+    )
     parser.add_argument("--configuration", metavar="NAME", help="of the study, where it has several")
     parser.add_argument("--independent", action="store_true", help="leave the correlations of the study out")
     add_study_options(parser)

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Search, print and write; 1 where no gains between the bounds keep all constraints."""
+    """Search, print and write; 1 where the gains found do not keep all constraints, over fresh draws too."""
     if parsed.list:
         return _list(parsed)
     if parsed.tuning is None:

@@ -8,13 +8,14 @@ from ppafo.documents.json_text import json_text
 from ppafo.reporting.analysis_page import Section, analysis_page
 from ppafo.reporting.comparison_figure import change_figure, pareto_figure
 from ppafo.reporting.metric_numbers import metric_difference, metric_level, metric_title, metric_unit
+from ppafo.reporting.monte_carlo_report import shown_share
 from ppafo.reporting.style import rendered
 from ppafo.reporting.text_table import text_table
 from ppafo.simulation.document import plain
 from ppafo.studies.comparison.compared import COMPARED
 from ppafo.studies.comparison.paired import Paired, pareto_front
 from ppafo.studies.comparison.study import Case, Comparison
-from ppafo.studies.uncertainty.intervals import Interval
+from ppafo.studies.uncertainty.intervals import FEWEST_CARRYING, Interval
 
 JSON, TEXT, REPORT = "comparison.json", "comparison.txt", "report.html"
 FILES = ("pareto.png", "pareto.svg", "change.png", "change.svg", JSON, TEXT, REPORT)
@@ -34,6 +35,9 @@ _READING = (
 )
 
 
+_NOISE = "sensors are noisy: every draw has noise of its own, the same in all configurations; 'as said' is one of them"
+
+
 def comparison_text(comparison: Comparison) -> list[str]:
     """Return a table for each task, and the paired statistics below it where there are draws."""
     lines = [lead(comparison)]
@@ -42,7 +46,7 @@ def comparison_text(comparison: Comparison) -> list[str]:
         for name in _others(comparison):
             rows = paired_rows(comparison, task, name)
             if rows:
-                lines += ["", f"{name} against {comparison.baseline}", *text_table(_PAIRED_HEAD, rows)]
+                lines += ["", f"{name} against {comparison.baseline}", *text_table(paired_head(comparison), rows)]
         lines += [f"best: {text}" for text in best_sentences(comparison, task)]
     return [*lines, *all_remarks(comparison)]
 
@@ -50,7 +54,12 @@ def comparison_text(comparison: Comparison) -> list[str]:
 def all_remarks(comparison: Comparison) -> list[str]:
     """Return what is not as one would expect: runs that failed, and configurations that do not do the same."""
     unlike = [_unlike(comparison, task) for task in comparison.tasks]
-    return [*(text for text in unlike if text), *(text for case in comparison.cases for text in _remarks(case))]
+    return [
+        *(text for text in unlike if text),
+        *(text for case in comparison.cases for text in _remarks(case)),
+        *(text for task in comparison.tasks for text in _carried_by_few(comparison, task)),
+        *([_NOISE] if _has_noise(comparison) else []),
+    ]
 
 
 def lead(comparison: Comparison) -> str:
@@ -60,8 +69,11 @@ def lead(comparison: Comparison) -> str:
     words = f"{count} configurations on {tasks}, baseline {comparison.baseline}"
     if not comparison.draws:
         return f"{words}; the device as it is said to be, without uncertainty"
+    if not comparison.varied:
+        return f"{words}; the device as it is said to be, over {comparison.draws:,} draws of the noise of its sensors"
     return (
-        f"{words}; {comparison.draws:,} draws of {len(comparison.varied)} uncertain values, the same for all; "
+        f"{words}; {comparison.draws:,} draws of {len(comparison.varied)} uncertain values"
+        f"{' and of the noise of the sensors' if _has_noise(comparison) else ''}, the same for all; "
         f"each interval with {100.0 * comparison.confidence:g} % confidence"
     )
 
@@ -79,14 +91,21 @@ def table_rows(comparison: Comparison, task: str) -> list[list[str]]:
     ]
 
 
+def paired_head(comparison: Comparison) -> Sequence[str]:
+    """Return the head of the table of pairs: with the share of noise where a controller hears any."""
+    return (*_PAIRED_HEAD, "spread that is noise") if _has_noise(comparison) else _PAIRED_HEAD
+
+
 def paired_rows(comparison: Comparison, task: str, configuration: str) -> list[list[str]]:
     """Return a row for each metric: change without and with uncertainty, mean difference, probability to be better."""
     cases = {case.configuration: case for case in comparison.of_task(task)}
     nominal = [cases[name].metrics for name in (comparison.baseline, configuration)]
-    return [
-        _paired_row(item, *(metrics[item.metric].value if item.metric in metrics else math.nan for metrics in nominal))
-        for item in comparison.pairs(task, configuration)
-    ]
+    rows = []
+    for item in comparison.pairs(task, configuration):
+        said = [metrics[item.metric].value if item.metric in metrics else math.nan for metrics in nominal]
+        noise = [] if item.noise is None else [shown_share(item.noise)]
+        rows.append([*_paired_row(item, *said), *(noise or ["-"] * _has_noise(comparison))])
+    return rows
 
 
 def best_sentences(comparison: Comparison, task: str) -> list[str]:
@@ -154,7 +173,7 @@ def _task_sections(comparison: Comparison, task: str) -> list[Section]:
     return [
         table,
         *(
-            Section(f"{name} against {comparison.baseline}, {task}", (), _PAIRED_HEAD, rows)
+            Section(f"{name} against {comparison.baseline}, {task}", (), paired_head(comparison), rows)
             for name, rows in paired
             if rows
         ),
@@ -211,6 +230,21 @@ def _unlike(comparison: Comparison, task: str) -> str:
         f"task '{task}': {', '.join(others)} follow another reference, or for another time, than {comparison.baseline}"
         ": the differences are of the task too"
     )
+
+
+def _has_noise(comparison: Comparison) -> bool:
+    return any(case.renoised is not None for case in comparison.cases)
+
+
+def _carried_by_few(comparison: Comparison, task: str) -> list[str]:
+    """Return a warning for each mean difference that a few draws decide."""
+    return [
+        f"{name}, task '{task}': as few as {item.carrying:.3g} of {item.pairs:,} draws carry the mean difference of "
+        f"{item.metric}, so do not trust its interval; the probability to be better holds"
+        for name in _others(comparison)
+        for item in comparison.pairs(task, name)
+        if item.carrying < min(FEWEST_CARRYING, 0.5 * item.pairs)
+    ]
 
 
 def _task_document(comparison: Comparison, task: str) -> dict[str, Any]:

@@ -1,13 +1,16 @@
 """The league as lines of text and as a document; grams in the text, SI units in the document."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import ppafo
+from ppafo.reporting.monte_carlo_report import shown_share
+from ppafo.simulation.document import plain
 from ppafo.studies.league import League, Standing
 from ppafo.studies.league.draws import SEED, UNCERTAINTIES
 from ppafo.studies.league.lower_bound import LowerBound
 from ppafo.studies.league.standing import Bounded
+from ppafo.studies.uncertainty.intervals import Interval
 
 HEAD = (
     "controller",
@@ -54,9 +57,19 @@ def league_notes(league: League) -> list[str]:
     if league.draws:
         spread = ", ".join(f"{item.name} {100 * item.share:.0f} %" for item in UNCERTAINTIES)
         notes.append(f"median and 95 %: RMS errors on {league.draws} devices drawn, either way, within: {spread}")
+    robust = {item.entrant.name: item.robustness for item in league.standings if item.robustness is not None}
+    notes += noise_notes({name: item.noise for name, item in robust.items()})
     notes += [_learning_sentence(standing) for standing in league.standings if standing.learning is not None]
     notes += [_failed(standing) for standing in league.standings if standing.robustness and standing.robustness.failed]
     return [*notes, *(f"{name} is absent: {reason}" for name, reason in league.absent.items())]
+
+
+def noise_notes(shares: Mapping[str, Interval | None]) -> list[str]:
+    """Return what share of the spread of each entrant's error over the draws is noise; nothing without noise."""
+    known = [f"{name} {shown_share(share)}" for name, share in shares.items() if share is not None]
+    if not known:
+        return []
+    return [f"of the variance of the error over the draws, each with noise of its own, noise makes: {', '.join(known)}"]
 
 
 def bound_sentence(valve: str, bounded: Bounded) -> str:
@@ -174,6 +187,7 @@ def _standing_document(league: League, standing: Standing) -> dict[str, Any]:
             "quantile_95": _finite(robust.error(0.95)),
             "failed": robust.failed,
             "errors": [_finite(value) for value in robust.errors.tolist()],
+            "share_of_noise": None if robust.noise is None else plain(robust.noise),
         },
         "learning": None
         if learning is None

@@ -10,6 +10,7 @@ from ppafo.reporting.style import rendered
 from ppafo.reporting.text_table import text_table
 from ppafo.simulation.document import plain
 from ppafo.studies.monte_carlo.estimate import Look, MonteCarlo
+from ppafo.studies.uncertainty.intervals import Interval
 
 JSON, TEXT, REPORT = "monte-carlo.json", "monte-carlo.txt", "report.html"
 FILES = ("trace.png", "trace.svg", JSON, TEXT, REPORT)
@@ -18,19 +19,38 @@ _HEAD = ("draws", "without value", "estimate", "low", "high", "width", "")
 
 def monte_carlo_text(estimate: MonteCarlo) -> list[str]:
     """Return the verdict and the trace of looks."""
-    return [verdict(estimate), policy(estimate), "", *text_table(_HEAD, look_rows(estimate))]
+    return [verdict(estimate), *remarks(estimate), policy(estimate), "", *text_table(_HEAD, look_rows(estimate))]
 
 
 def verdict(estimate: MonteCarlo) -> str:
     """Return the result in a sentence."""
     interval, rule = estimate.last.interval, estimate.rule
     numbers = [_level(estimate, value) for value in (interval.value, interval.low, interval.high)]
-    ending = "" if estimate.is_met else f"; not narrow enough after all {rule.most:,} draws that were allowed"
+    ending = "" if rule.is_narrow(interval) else f"; not narrow enough after all {rule.most:,} draws that were allowed"
     what = "" if estimate.statistic.unit == "-" else f" {metric_unit(estimate.metric)}"
     return (
         f"{estimate.statistic.told} of {estimate.metric}: {numbers[0]} [{numbers[1]}, {numbers[2]}]{what} "
         f"after {estimate.last.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
     )
+
+
+def remarks(estimate: MonteCarlo) -> list[str]:
+    """Return what the number must not be read without: draws that decide alone, and noise."""
+    said = []
+    last = estimate.last
+    if not last.is_carried:
+        said.append(
+            f"do not trust this interval: as few as {last.carrying:.3g} of {last.draws - last.missing:,} draws carry "
+            "the mean, so that the truth is outside more often than it says; ask for a quantile or a probability"
+        )
+    if estimate.noise is not None:
+        said.append(f"noise of the sensors makes {shown_share(estimate.noise)} of the variance over the draws")
+    return said
+
+
+def shown_share(share: Interval) -> str:
+    """Return a share with its interval in percent."""
+    return f"{100.0 * share.value:.3g} % [{100.0 * share.low:.3g}, {100.0 * share.high:.3g}]"
 
 
 def policy(estimate: MonteCarlo) -> str:
@@ -59,6 +79,8 @@ def monte_carlo_document(estimate: MonteCarlo) -> dict[str, Any]:
         "draws": estimate.last.draws,
         "failed": estimate.outcomes.failures,
         "interval": plain(estimate.last.interval),
+        "remarks": remarks(estimate),
+        "share_of_noise": None if estimate.noise is None else plain(estimate.noise),
         "seed": estimate.seed,
         "rule": {**plain(estimate.rule), "looks": len(estimate.rule.sizes), "correction": "Bonferroni"},
         "looks": [plain(look) for look in estimate.looks],
@@ -78,13 +100,16 @@ def monte_carlo_files(estimate: MonteCarlo) -> dict[str, bytes]:
         **{f"trace.{kind}": content for kind, content in drawn.items()},
         JSON: f"{json_text(monte_carlo_document(estimate))}\n".encode(),
         TEXT: f"{text}\n".encode(),
-        REPORT: analysis_page("Monte Carlo", title[:1].upper() + title[1:], [verdict(estimate)], sections),
+        REPORT: analysis_page(
+            "Monte Carlo", title[:1].upper() + title[1:], [verdict(estimate), *remarks(estimate)], sections
+        ),
     }
 
 
 def _row(estimate: MonteCarlo, look: Look) -> list[str]:
     interval = look.interval
-    met = "narrow enough" if estimate.rule.is_met(interval) else ""
+    met = "narrow enough" if estimate.rule.is_narrow(interval) else ""
+    met = met if look.is_carried else f"{met}{', but ' if met else ''}few draws carry it"
     levels = [_level(estimate, value) for value in (interval.value, interval.low, interval.high)]
     return [f"{look.draws:,}", f"{look.missing:,}", *levels, _difference(estimate, interval.width), met]
 

@@ -12,13 +12,13 @@ from ppafo.reporting.metrics_table import in_shown_unit
 from ppafo.reporting.page import inline_figure, rendered_page
 from ppafo.reporting.synthetic_section import synthetic_values
 from ppafo.reporting.typesetting import printed_quantity, quantity, sentence
-from ppafo.reporting.unreported_table import conclusion_rows, setting_rows
+from ppafo.reporting.unreported_table import ERRORS, conclusion_rows, setting_rows
 from ppafo.simulation.result import Result
 from ppafo.studies.reproduction import Claim, Reproduction
 from ppafo.studies.reproduction.assumed import AssumedValue
 from ppafo.studies.reproduction.claim import VERDICTS, verdict_counts
 from ppafo.studies.reproduction.study import PROPORTIONAL, SOLENOID, STEP
-from ppafo.studies.unreported_settings.study import conclusions
+from ppafo.studies.unreported_settings.implications import conclusions
 
 TEMPLATE = "reproduction.html.jinja"
 
@@ -80,6 +80,7 @@ def _unsaid(reproduction: Reproduction, figure: bytes | None) -> dict[str, Any] 
         "drawn": family.drawn,
         "effective": f"{family.effective:.0f}",
         "few": not family.is_enough,
+        "errors": ERRORS,
         "settings": setting_rows(family),
         "conclusions": conclusion_rows(conclusions(family)),
     }

@@ -18,7 +18,13 @@ if TYPE_CHECKING:
 _WIDTH, _RIGHT_PANEL = 9.6, 1.0
 _LETTER, _LINE = 0.083, 0.27
 _MOST_LINES = 5
-_TITLES = {"total": "total", "first": "first order", "mean_effect": "mean effect", "spread": "spread"}
+_TITLES = {
+    "total": "total",
+    "first": "first order",
+    "mean_effect": "mean effect",
+    "spread": "spread",
+    "shapley": "Shapley effect",
+}
 
 
 def sensitivity_figure(found: Sensitivity) -> "Figure":
@@ -38,10 +44,10 @@ def sensitivity_figure(found: Sensitivity) -> "Figure":
 
 
 def _draw_indices(axes: "Axes", found: Sensitivity, metric: OfMetric) -> None:
-    first, second = found.method.shown
-    order = np.argsort(metric.indices.values[first])
+    shown = found.method.shown
+    order = np.argsort(metric.indices.values[shown[0]])
     places = np.arange(order.size)
-    for name, colour, shift in ((first, BLUE, 0.14), (second, ORANGE, -0.14)):
+    for name, colour, shift in zip(shown, (BLUE, ORANGE), (0.14, -0.14), strict=False):
         values = _shown(found, metric, metric.indices.values[name])[order]
         band = metric.indices.bands.get(name)
         reach = None if band is None else _shown(found, metric, band)[order]

@@ -20,6 +20,7 @@ _TITLES = {
     "first": "first order",
     "mean_effect": "mean effect",
     "spread": "spread of effect",
+    "shapley": "Shapley effect",
 }
 
 
@@ -119,7 +120,7 @@ def sensitivity_files(found: Sensitivity) -> dict[str, bytes]:
         for metric in found.metrics
     ]
     caption = (
-        "Left: the indices with their bootstrap bands. Right: the largest of them, in the colours of their names, from "
+        "Left: the indices with their bands. Right: the largest of them, in the colours of their names, from "
         "ever more of the sample: whether they have settled."
     )
     sections.append(Section("Indices, and how they settle", figure=drawn["svg"], caption=caption))

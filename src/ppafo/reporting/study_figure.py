@@ -8,6 +8,7 @@ from ppafo.reporting.study_bands import draw_bands
 from ppafo.reporting.study_grid import MOST_DRAWN, draw_map, is_map
 from ppafo.reporting.study_units import Floats, metric_label, shown_path, shown_values
 from ppafo.reporting.style import BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
+from ppafo.studies.sweep.noise import NOISE
 from ppafo.studies.sweep.results import StudyResults
 
 if TYPE_CHECKING:
@@ -54,11 +55,12 @@ def _layout() -> "ConstrainedLayoutEngine":
 
 
 def _draw_metrics(places: "list[Axes]", panels: list[tuple[str, str]], results: StudyResults, mapped: bool) -> None:
+    device = [path for path in results.varied if path != NOISE]
     for axes, (metric, name) in zip(places, panels, strict=False):
         if mapped:
             draw_map(axes, results, name, metric)
-        elif len(results.varied) == 1:
-            _draw_over(axes, results, results.varied[0], metric)
+        elif len(device) == 1:
+            _draw_over(axes, results, device[0], metric)
         else:
             _draw_histogram(axes, results, metric)
 

@@ -33,7 +33,7 @@ def shown_path(results: StudyResults, path: str, values: Floats) -> tuple[str, F
     """Return label and values of a varied path [SI] in the units of the field; psi counts from 101.325 kPa."""
     unit = results.document["varied"][path]["unit"]
     name = path.replace(".", " ").replace("_", " ")
-    if unit == "Pa":
+    if unit == "Pa_a":
         return f"{name} (psi gauge)", (values - STANDARD_ATMOSPHERE) / PASCALS_PER_PSI
     shown, scale = _PATH_UNITS.get(unit, (unit, 1.0))
     return _labelled(name, shown), scale * values

@@ -6,13 +6,15 @@ from typing import Any
 from ppafo.documents.json_text import json_text
 from ppafo.reporting.analysis_page import Section, analysis_page
 from ppafo.reporting.metric_numbers import metric_level, metric_unit
+from ppafo.reporting.monte_carlo_report import shown_share
 from ppafo.reporting.style import rendered
 from ppafo.reporting.text_table import text_table
 from ppafo.reporting.tuning_figure import search_figure, task_figure
 from ppafo.simulation.document import plain
+from ppafo.studies.tuning.judging import keeps
 from ppafo.studies.tuning.problem import Constraint
 from ppafo.studies.tuning.search import agreement
-from ppafo.studies.tuning.study import Setting, Tuning
+from ppafo.studies.tuning.study import FRESH_DRAWS, Setting, Tuning
 
 JSON, TEXT, OVERRIDES, REPORT = "tuning.json", "tuning.txt", "overrides.txt", "report.html"
 FILES = ("task.png", "task.svg", "search.png", "search.svg", JSON, TEXT, OVERRIDES, REPORT)
@@ -39,9 +41,14 @@ def tuning_text(tuning: Tuning) -> list[str]:
 def verdict(tuning: Tuning) -> str:
     """Return the result in a sentence."""
     before, after, name = tuning.before, tuning.after, tuning.problem.name
+    if not after.is_feasible_in_search:
+        broken = f"the best found break them by {100.0 * after.violation[0]:.3g} % of the limits"
+        return f"{name}: no gains between the bounds keep all constraints; {broken}{_by_ceiling(tuning)}"
     if not after.is_feasible:
-        broken = f"the best found break them by {100.0 * after.violation:.3g} % of the limits"
-        return f"{name}: no gains between the bounds keep all constraints; {broken}"
+        return (
+            f"{name}: the gains found keep all constraints over the draws of the search alone, not over "
+            f"{FRESH_DRAWS:,} fresh ones{_by_ceiling(tuning)}"
+        )
     if not before.is_feasible:
         return (
             f"{name}: the gains found keep all constraints, which those before did not; objective {after.objective:.4g}"
@@ -50,6 +57,18 @@ def verdict(tuning: Tuning) -> str:
         return f"{name}: nothing better than the gains before was found between the bounds"
     change = (after.objective - before.objective) / abs(before.objective) if before.objective else math.nan
     return f"{name}: objective {before.objective:.4g} before, {after.objective:.4g} after ({100.0 * change:+.3g} %)"
+
+
+def _by_ceiling(tuning: Tuning) -> str:
+    """Return that the torque ceiling is why, where the draws below it are what breaks the constraints."""
+    ceiling = tuning.after.ceiling
+    if not ceiling.explains:
+        return ""
+    where = "" if tuning.problem.spread is None else f" in {100.0 * ceiling.share:.2g} % of the draws"
+    return (
+        f"; the torque ceiling is the cause: the reference asks for more than the torque constant times the gauge "
+        f"pressure of the supply{where}, which no gains can change"
+    )
 
 
 def gain_rows(tuning: Tuning) -> list[list[str]]:
@@ -100,23 +119,28 @@ def remarks(tuning: Tuning) -> list[str]:
             f"starts that are as good to 1 % lie up to {100.0 * apart:.0f} % of the bounds apart: "
             "the goal leaves open which is best"
         )
-    if problem.spread is not None:
-        spread = problem.spread
+    spread = problem.spread
+    if spread is not None:
+        over = f"study '{spread.study}'" if spread.study else "the noise of the sensors"
         said.append(
-            f"every candidate ran over the same {spread.draws} draws of study '{spread.study}'; 'fresh' is over draws "
+            f"every candidate ran over the same {spread.draws} draws of {over}; 'fresh' is over {FRESH_DRAWS:,} draws "
             "that the search never saw"
         )
+    shares = ", ".join(f"{shown_share(share)} of that of {name}" for name, share in tuning.after.noise.items())
+    said += [f"noise of the sensors makes, of the variance over the fresh draws, {shares}"] if shares else []
     return [*said, *(f"broken on fresh draws: {text}" for text in broken_on_fresh(tuning))]
 
 
 def broken_on_fresh(tuning: Tuning) -> list[str]:
-    """Return the constraints that the result keeps in the search and breaks over fresh draws."""
-    values = tuning.after.fresh
-    return [
+    """Return what the result breaks over fresh draws: constraints, and runs that fail."""
+    after = tuning.after
+    values, lacking = after.fresh, after.without_value[1]
+    broken = [
         f"{item.metric} {_limit(item)}, it is {metric_level(item.metric, values[item.metric]):.4g}"
         for item in tuning.problem.constraints
-        if item.metric in values and not _keeps(item, values[item.metric])
+        if item.metric in values and not keeps(item, values[item.metric])
     ]
+    return [*broken, *([f"{100.0 * lacking:.2g} % of the runs fail or lack a metric"] if values and lacking else [])]
 
 
 def pasted(tuning: Tuning) -> str:
@@ -148,7 +172,9 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "scales": dict(tuning.scales),
         "goals": plain(list(problem.goals)),
         "constraints": plain(list(problem.constraints)),
-        "robust": None if problem.spread is None else {"study": problem.spread.study, "measure": problem.spread.told},
+        "robust": None
+        if problem.spread is None
+        else {"study": problem.spread.study or None, "measure": problem.spread.told},
         "effort": plain(problem.effort),
         "before": _setting_document(tuning.before),
         "after": _setting_document(tuning.after),
@@ -215,17 +241,17 @@ def _limit(item: Constraint) -> str:
     return f"at {'most' if item.is_most else 'least'} {item.text}"
 
 
-def _keeps(item: Constraint, value: float) -> bool:
-    return value <= item.limit if item.is_most else value >= item.limit
-
-
 def _setting_document(setting: Setting) -> dict[str, Any]:
     return {
         "gains": plain(setting.gains),
         "values": plain(setting.values),
         "fresh": plain(setting.fresh),
         "objective": setting.objective,
-        "violation": setting.violation,
-        "share_without_value": setting.without_value,
+        "violation": setting.violation[0],
+        "share_without_value": setting.without_value[0],
+        "fresh_violation": setting.violation[1],
+        "fresh_share_without_value": setting.without_value[1],
+        "torque_ceiling": plain(setting.ceiling),
+        "share_of_noise": {name: plain(share) for name, share in setting.noise.items()},
         "metrics": {name: plain(metric) for name, metric in setting.result.metrics.items()},
     }

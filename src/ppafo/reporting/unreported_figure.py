@@ -6,8 +6,9 @@ import numpy as np
 
 from ppafo.reporting.style import BLUE, GREY, VERMILION, house_style
 from ppafo.studies.unreported_settings.evidence import improvement, saving
+from ppafo.studies.unreported_settings.implications import Implied, implied
 from ppafo.studies.unreported_settings.settings import SETTINGS, Floats, Setting
-from ppafo.studies.unreported_settings.study import Family, Implied, implied
+from ppafo.studies.unreported_settings.study import Family
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,6 +3,7 @@
 from typing import Any
 
 import ppafo
+from ppafo.simulation.document import plain
 from ppafo.studies.league.draws import SEED, UNCERTAINTIES
 from ppafo.studies.league.walking.measures import MEASURES
 from ppafo.studies.league.walking.solver import StrideOptimum
@@ -53,6 +54,7 @@ def _standing_document(league: WalkingLeague, standing: WalkingStanding) -> dict
             "toes_clear": robust.clear,
             "safe_states": robust.safe_states,
             "failed": robust.failed,
+            "share_of_noise": None if robust.noise is None else plain(robust.noise),
             "drawn": [None if item is None else dict(item) for item in robust.drawn],
         },
     }

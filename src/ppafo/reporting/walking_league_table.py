@@ -1,6 +1,6 @@
 """The league on a leg that walks, as lines of text and as a document; SI units in the document."""
 
-from ppafo.reporting.league_table import aligned
+from ppafo.reporting.league_table import aligned, noise_notes
 from ppafo.studies.league.draws import UNCERTAINTIES
 from ppafo.studies.league.walking.standing import WalkingBounded, WalkingLeague, WalkingStanding
 from ppafo.units import from_si
@@ -61,6 +61,8 @@ def walking_league_notes(league: WalkingLeague) -> list[str]:
             f"error 95 %, clear (% of the draws with toes above the ground on every stride): {league.draws} "
             f"drawn wearers, each with a device that differs either way within: {spread}"
         )
+    robust = {item.entrant.name: item.robustness for item in league.standings if item.robustness is not None}
+    notes += noise_notes({name: item.noise for name, item in robust.items()})
     notes += [note for standing in league.standings for note in _remarks(standing)]
     if league.bounds:
         notes += [_not_compared(standing) for standing in league.standings if standing.measures["toe_strikes"] > 0.0]

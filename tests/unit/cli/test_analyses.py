@@ -97,6 +97,27 @@ def test_the_lines_of_a_tuning_can_be_pasted(tuning: Path, tmp_path: Path, capsy
     assert result["metrics"]["rms_error"]["value"] == pytest.approx(stored["after"]["values"]["rms_error"], rel=1e-9)
 
 
+def test_a_goal_that_no_gains_can_keep_is_exit_code_1_and_says_why(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "above.toml"
+    path.write_text(
+        """
+schema_version = 1
+name = "above"
+scenario = "torque-task-proportional"
+overrides = ["reference.level=5 N m", "run.duration=1 s", "reference.ramp_time=0.5 s"]
+search = [{ path = "controller.proportional_gain", minimum = "0.05 1/(N m)", maximum = "1 1/(N m)" }]
+objective = [{ metric = "rms_error" }]
+constraints = [{ metric = "rms_error_hold", at_most = "0.1 N m" }]
+robust = { study = "torque-task-uncertainty", measure = "quantile", share = 0.9, draws = 8 }
+effort = { starts = 1, generations = 1, candidates_per_gain = 4 }
+"""
+    )
+    assert main(["tune", str(path)]) == 1
+    assert "the torque ceiling is the cause" in capsys.readouterr().out.splitlines()[0]
+
+
 def test_an_interval_that_stays_too_wide_is_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["montecarlo", STUDY, "--metric", "rms_error", "--configuration", "proportional", *SHORT]
     assert main([*words, "--width", "0.001 %", "--first", "32", "--most", "64"]) == 1
@@ -136,7 +157,7 @@ def test_an_interruption_leaves_nothing(
         (["montecarlo", STUDY, "--metric", "rms_error"], "choose one: proportional, solenoid"),
         (["montecarlo", "pressure-and-area", "--metric", "rms_error"], "varied over a grid or list"),
         (["sensitivity", STUDY, "--method", "moris"], "there is no method 'moris', did you mean 'morris'"),
-        (["sensitivity", STUDY, "--configuration", "solenoid"], "--independent"),
+        (["sensitivity", STUDY, "--method", "sobol", "--configuration", "solenoid"], "--independent"),
         (["tune"], "no tuning was given"),
         (["tune", "pid-gain"], "there is no tuning 'pid-gain', did you mean 'pid-gains'"),
         (["tune", "pid-gains", "--seed", "-1"], "--seed"),

@@ -2,12 +2,24 @@
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
+from ppafo.reporting.unreported_table import unreported_table
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
+from ppafo.studies.uncertainty.draws import replicate_seed
+from ppafo.studies.uncertainty.intervals import jackknife_reach
 from ppafo.studies.unreported_settings.evidence import GAS, IMPROVEMENT, agreement, improvement, saving
+from ppafo.studies.unreported_settings.implications import (
+    TOO_FEW,
+    conclusions,
+    implied,
+    spread_of,
+    strongest_links,
+    weighted_quantiles,
+)
 from ppafo.studies.unreported_settings.proposal import Proposal, effective, next_proposal, tempered
 from ppafo.studies.unreported_settings.settings import (
     CELLS,
@@ -18,16 +30,7 @@ from ppafo.studies.unreported_settings.settings import (
     spread,
     values_of,
 )
-from ppafo.studies.unreported_settings.study import (
-    TOO_FEW,
-    Family,
-    conclusions,
-    implied,
-    infer_settings,
-    spread_of,
-    strongest_links,
-    weighted_quantiles,
-)
+from ppafo.studies.unreported_settings.study import REPLICATES, Family, infer_settings
 
 PAPER = {
     SOLENOID: {"rms_error": 1.0, "gas_supplied": 1.1e-3, "oscillations_ramp": 8.0, "oscillations_hold": 0.0},
@@ -136,6 +139,33 @@ def test_every_setting_gets_a_verdict(family: Family) -> None:
     ramp = found[1]
     assert ramp.low <= ramp.median <= ramp.high
     assert len(strongest_links(family)) == 4
+
+
+def test_every_share_has_the_error_between_searches_that_know_nothing_of_each_other(family: Family) -> None:
+    assert set(family.replicate) == set(range(REPLICATES))
+    others = family.without_each()
+    assert [set(other.replicate) for other in others] == [set(range(REPLICATES - 1))] * REPLICATES
+    shares = np.array([[item.of_all for item in conclusions(other)] for other in others])
+    reach = student(REPLICATES - 1).ppf(0.975) * np.sqrt((REPLICATES - 1) * np.var(shares, axis=0))
+    assert [item.error[0] for item in conclusions(family)] == pytest.approx(reach)
+    for item in implied(family):
+        errors = item.error["shares"] if item.setting.choices else item.error["median"]
+        assert max(errors) > 0.0
+    text = "\n".join(unreported_table(family))
+    assert text.count("±") > 20
+    assert "8 searches that know nothing of each other" in text
+
+
+def test_the_share_of_all_is_within_its_error_as_often_as_is_said() -> None:
+    """Against a large even sample of a stand-in whose truth is known: the share of a corner of the cube."""
+    held = []
+    for seed in range(60):
+        points = [spread(41, replicate_seed(seed, number))[:, 3] < 0.3 for number in range(REPLICATES)]
+        sums, sizes = np.array([part.sum() for part in points]), np.array([part.size for part in points])
+        left_out = (sums.sum() - sums) / (sizes.sum() - sizes)
+        reach = jackknife_reach(left_out, 0.95)
+        held.append(abs(sums.sum() / sizes.sum() - 0.3) <= reach)
+    assert np.mean(held) >= 0.9
 
 
 def test_weighted_quantiles_are_those_of_repeated_values() -> None:

@@ -7,7 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.studies.sweep.sampling.distributions import Floats
-from ppafo.studies.uncertainty.intervals import Interval, mean_interval, share_interval
+from ppafo.studies.uncertainty.draws import REPLICATES
+from ppafo.studies.uncertainty.intervals import (
+    Interval,
+    draws_that_carry,
+    noise_interval,
+    replicates_interval,
+    share_interval,
+)
 
 Masks = NDArray[np.bool_]
 
@@ -24,6 +31,8 @@ class Paired:
     5 and 95 % quantiles: how uncertain the change is, however many draws are made. ``better`` is the probability that
     the configuration is better in a draw, with its confidence interval: how well that is known from these draws; None
     where neither end of the metric is better. ``equal`` is the share of draws in which both are the same.
+    ``carrying`` is how many pairs carry the mean difference, ``noise`` the share of the variance of the difference that
+    the noise of the sensors makes, None where there is none.
     """
 
     metric: str
@@ -34,11 +43,21 @@ class Paired:
     change_high: float
     better: Interval | None
     equal: float
+    carrying: float
+    noise: Interval | None = None
 
 
-def paired(metric: str, baseline: Floats, other: Floats, better: int, confidence: float) -> Paired | None:
+def paired(
+    metric: str,
+    baseline: Floats,
+    other: Floats,
+    better: int,
+    confidence: float,
+    other_noise: tuple[Floats, Floats] | None = None,
+) -> Paired | None:
     """Return the statistics of values (draws,) [SI], nan where there is none; None without any pair.
 
+    The draws are dealt out to replicates in turn. ``other_noise`` are both again, for the first draws with other noise.
     ``better`` is -1 where less is better, 1 where more is, 0 where neither is. A draw in which both are the same counts
     for neither.
     """
@@ -48,16 +67,23 @@ def paired(metric: str, baseline: Floats, other: Floats, better: int, confidence
         return None
     change = (second - first)[first != 0.0] / np.abs(first[first != 0.0])
     low, middle, high = np.quantile(change, (OUTER_SHARES[0], 0.5, OUTER_SHARES[1])) if change.size else (np.nan,) * 3
+    difference = other - baseline
+    noise = None
+    if other_noise is not None:
+        again = other_noise[1] - other_noise[0]
+        noise = noise_interval(difference[: again.size], again, confidence)
     wins = int(np.count_nonzero(better * (second - first) > 0.0))
     return Paired(
         metric=metric,
         pairs=first.size,
-        difference=mean_interval(second - first, confidence),
+        difference=replicates_interval(difference, REPLICATES, confidence),
         change=float(middle),
         change_low=float(low),
         change_high=float(high),
         better=share_interval(wins, first.size, confidence) if better else None,
         equal=float(np.mean(first == second)),
+        carrying=draws_that_carry(second - first),
+        noise=noise,
     )
 
 

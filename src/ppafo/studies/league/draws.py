@@ -6,9 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.simulation.declaration import LARGEST_SEED
 from ppafo.simulation.scenario import Scenario
 
 SEED = 20110301
+NOISE_DRAWS = 512
+"""Draws that are run once more with other noise, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,3 +95,8 @@ def drawn_factors(draws: int, seed: int = SEED) -> "np.ndarray[tuple[int, int], 
     shares = np.array([item.share for item in UNCERTAINTIES])
     even = np.random.default_rng(seed).uniform(-1.0, 1.0, (draws, shares.size))
     return np.asarray(1.0 + shares * even)
+
+
+def drawn_seeds(draws: int, seed: int = SEED) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
+    """Seeds of the noise (draws,), the same for every controller."""
+    return np.random.default_rng([seed, 1]).integers(0, LARGEST_SEED + 1, draws).astype(np.float64)

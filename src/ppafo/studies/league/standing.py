@@ -10,14 +10,25 @@ from ppafo.simulation.result import Result
 from ppafo.studies.league.entrants import Entrant
 from ppafo.studies.league.learning import Learning
 from ppafo.studies.league.lower_bound import LowerBound, Played
+from ppafo.studies.uncertainty.intervals import Interval, noise_interval
 
 
 @dataclass(frozen=True, slots=True)
 class Robustness:
-    """RMS errors [N m] and gas [kg] on the drawn devices, each (draws,); inf where a run diverged."""
+    """RMS errors [N m] and gas [kg] on the drawn devices, each (draws,); inf where a run diverged.
+
+    ``renoised`` are the errors on the first of them with other noise; None where the controller hears none.
+    """
 
     errors: Floats
     gas: Floats
+    renoised: Floats | None = None
+
+    @property
+    def noise(self) -> Interval | None:
+        """Share of the variance of the errors over the draws that noise makes, with its 95 % interval."""
+        again = self.renoised
+        return None if again is None else noise_interval(self.errors[: again.size], again, 0.95)
 
     def error(self, share: float) -> float:
         """RMS error [N m] that this share of the draws does not exceed."""

@@ -2,20 +2,23 @@
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from ppafo.engine.lanes import Floats
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overriding import split_override
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate, simulate_many
-from ppafo.studies.league.draws import drawn_devices, drawn_factors
+from ppafo.studies.league.draws import NOISE_DRAWS, drawn_devices, drawn_factors, drawn_seeds
 from ppafo.studies.league.entrants import ENTRANTS, Entrant
 from ppafo.studies.league.learning import Learning, learn, table_of
 from ppafo.studies.league.lower_bound import lower_bound, played
 from ppafo.studies.league.standing import Bounded, League, Robustness, Standing
+from ppafo.studies.sweep.noise import is_noisy, other_noise
 
 TASK = "torque-task-proportional"
 DRAWS = 100
@@ -92,12 +95,30 @@ def _standing(entrant: Entrant, task: Scenario, scenario: str | Path, overrides:
 
 
 def _robustness(task: Scenario, draws: int) -> Robustness:
-    results = simulate_many(drawn_devices(task, drawn_factors(draws)))
+    """Return what the entrant makes of the drawn devices, each with noise of its own where it hears any."""
+    devices = drawn_devices(task, drawn_factors(draws))
+    if not is_noisy([task]):
+        return Robustness(*_played_on(devices))
+    seeds = drawn_seeds(draws)
+    errors, gas = _played_on(_heard(devices, seeds))
+    again, _ = _played_on(_heard(devices[:NOISE_DRAWS], other_noise(seeds)[:NOISE_DRAWS]))
+    return Robustness(errors, gas, again)
+
+
+def _played_on(devices: Sequence[Scenario]) -> tuple[Floats, Floats]:
+    """RMS errors [N m] and gas [kg] of scenarios; inf where a run diverged."""
+    results = simulate_many(devices)
     good = np.array([result.status.is_completed for result in results])
     errors, gas = (
         np.array([result.metrics[name].value for result in results]) for name in ("rms_error", "gas_supplied")
     )
-    return Robustness(np.where(good, errors, np.inf), np.where(good, gas, np.inf))
+    return np.where(good, errors, np.inf), np.where(good, gas, np.inf)
+
+
+def _heard(devices: Sequence[Scenario], seeds: Floats) -> list[Scenario]:
+    """Scenarios, each with a noise stream of its own."""
+    pairs = zip(devices, seeds.tolist(), strict=True)
+    return [replace(item, sensors=replace(item.sensors, seed=int(seed))) for item, seed in pairs]
 
 
 def _bounds(standings: Sequence[Standing], say: Callable[[str], None]) -> tuple[Mapping[str, Bounded], str]:

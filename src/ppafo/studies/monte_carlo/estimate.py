@@ -13,11 +13,13 @@ import numpy as np
 from ppafo.errors import StudyError
 from ppafo.studies.monte_carlo.statistic import Statistic
 from ppafo.studies.sweep.sampling.distributions import Floats
-from ppafo.studies.uncertainty.draws import MOST_DRAWS, Uncertainty
-from ppafo.studies.uncertainty.intervals import Interval
+from ppafo.studies.uncertainty.draws import MOST_DRAWS, Columns, Uncertainty, renoised
+from ppafo.studies.uncertainty.intervals import FEWEST_CARRYING, Interval, noise_interval
 from ppafo.studies.uncertainty.outcomes import Model, Outcomes, check_confidence, check_failures, check_share, joined
 
 FEWEST_DRAWS = 32
+NOISE_DRAWS = 512
+"""Draws that are run once more with other noise, at most: what they say of its share is known to a few percent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,23 +63,35 @@ class StoppingRule:
         """Confidence of each single look, so that all of them together keep ``confidence``."""
         return 1.0 - (1.0 - self.confidence) / len(self.sizes)
 
-    def is_met(self, interval: Interval) -> bool:
+    def is_narrow(self, interval: Interval) -> bool:
         """Tell whether an interval is narrow enough."""
         return interval.width <= self.width * (abs(interval.value) if self.is_relative else 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What was seen after some draws: how many, how many of them without a value, and the interval [SI]."""
+    """What was seen after some draws: how many, how many of them without a value, and the interval [SI].
+
+    ``carrying`` is how many of them carry the estimate: fewer than there are where a few large values decide.
+    """
 
     draws: int
     missing: int
     interval: Interval
+    carrying: float
+
+    @property
+    def is_carried(self) -> bool:
+        """Tell whether enough draws carry the estimate; an interval without width is carried by all."""
+        return self.carrying >= min(FEWEST_CARRYING, 0.5 * (self.draws - self.missing))
 
 
 @dataclass(frozen=True, slots=True)
 class MonteCarlo:
-    """The looks one after the other, whether the last one met the rule, and the values of the metric (draws,) [SI]."""
+    """The looks one after the other, whether the last one met the rule, and the values of the metric (draws,) [SI].
+
+    ``noise`` is the share of the variance that the noise of the sensors makes; None where there is none.
+    """
 
     metric: str
     statistic: Statistic
@@ -85,6 +99,7 @@ class MonteCarlo:
     seed: int
     looks: tuple[Look, ...]
     outcomes: Outcomes
+    noise: Interval | None
 
     @property
     def last(self) -> Look:
@@ -93,8 +108,8 @@ class MonteCarlo:
 
     @property
     def is_met(self) -> bool:
-        """Tell whether the interval became narrow enough."""
-        return self.rule.is_met(self.last.interval)
+        """Tell whether the interval became narrow enough, and can be believed."""
+        return self.rule.is_narrow(self.last.interval) and self.last.is_carried
 
     @property
     def values(self) -> Floats:
@@ -108,18 +123,27 @@ def draw_until(
 ) -> MonteCarlo:
     """Draw from one stream until the rule is met or there are no more looks.
 
+    An interval that few draws carry is not believed, however narrow it is: it is drawn on.
     Runs that fail have no value: up to the share that the rule allows they are left out and counted, above it
     StudyError.
     """
     looks: list[Look] = []
     pieces: list[Outcomes] = []
+    drawn: Columns = {}
     for size in rule.sizes:
         done = looks[-1].draws if looks else 0
-        pieces.append(model(uncertainty.random_columns(done, size - done, seed)))
+        columns = statistic.columns(uncertainty, done, size - done, seed)
+        drawn = drawn or columns
+        pieces.append(model(columns))
         looks.append(_look(joined(pieces), metric, statistic, rule))
-        if rule.is_met(looks[-1].interval):
+        if rule.is_narrow(looks[-1].interval) and looks[-1].is_carried:
             break
-    return MonteCarlo(metric, statistic, rule, seed, tuple(looks), joined(pieces))
+    outcomes = joined(pieces)
+    noise = None
+    if uncertainty.has_noise:
+        again = model(renoised(drawn, NOISE_DRAWS)).metrics[metric]
+        noise = noise_interval(outcomes.metrics[metric][: again.size], again, rule.confidence)
+    return MonteCarlo(metric, statistic, rule, seed, tuple(looks), outcomes, noise)
 
 
 def _look(outcomes: Outcomes, metric: str, statistic: Statistic, rule: StoppingRule) -> Look:
@@ -131,4 +155,5 @@ def _look(outcomes: Outcomes, metric: str, statistic: Statistic, rule: StoppingR
         raise StudyError(
             f"Monte Carlo: {missing:,} of {outcomes.runs:,} runs have no '{metric}'; choose another metric"
         )
-    return Look(outcomes.runs, missing, statistic.estimate(values, rule.confidence_of_look))
+    interval = statistic.estimate(found, rule.confidence_of_look)
+    return Look(outcomes.runs, missing, interval, statistic.carrying(found))

@@ -1,4 +1,8 @@
-"""What is estimated of a metric: its mean, a quantile, or the probability that it is above or below a value."""
+"""What is estimated of a metric: its mean, a quantile, or the probability that it is above or below a value.
+
+A mean is estimated from randomised Sobol replicates, which know that of a smooth function far better than as many
+independent draws. The intervals of quantiles and probabilities are exact for independent draws, and get those.
+"""
 
 import re
 from dataclasses import dataclass
@@ -9,7 +13,14 @@ import numpy as np
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.studies.sweep.sampling.distributions import Floats
-from ppafo.studies.uncertainty.intervals import Interval, mean_interval, quantile_interval, share_interval
+from ppafo.studies.uncertainty.draws import REPLICATES, Columns, Uncertainty
+from ppafo.studies.uncertainty.intervals import (
+    Interval,
+    draws_that_carry,
+    quantile_interval,
+    replicates_interval,
+    share_interval,
+)
 from ppafo.studies.uncertainty.metric_values import level_of
 
 GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
@@ -31,21 +42,37 @@ class Statistic(Protocol):
         """SI unit of the statistic, '-' for a plain number."""
         ...
 
+    def columns(self, uncertainty: Uncertainty, first: int, count: int, seed: int) -> Columns:
+        """Return the draws from number ``first`` on that its interval is made for."""
+        ...
+
     def estimate(self, values: Floats, confidence: float) -> Interval:
-        """Return estimate and interval from independent values (draws,) of the metric [SI]."""
+        """Return estimate and interval from the values (draws,) of the metric [SI] at these draws; nan has no value."""
+        ...
+
+    def carrying(self, values: Floats) -> float:
+        """Return how many of the values carry the estimate; all where its interval is exact."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Mean:
-    """The mean of a metric; its interval rests on the central limit theorem."""
+    """The mean of a metric; its interval comes of independent replicates and rests on the central limit theorem."""
 
     unit: str
     told: str = "mean"
 
+    def columns(self, uncertainty: Uncertainty, first: int, count: int, seed: int) -> Columns:
+        """Return draws of randomised Sobol replicates."""
+        return uncertainty.replicated_columns(first, count, seed)
+
     def estimate(self, values: Floats, confidence: float) -> Interval:
         """Return estimate and interval [SI]."""
-        return mean_interval(values, confidence)
+        return replicates_interval(values, REPLICATES, confidence)
+
+    def carrying(self, values: Floats) -> float:
+        """Return how many of the values carry the mean."""
+        return draws_that_carry(values[np.isfinite(values)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +87,17 @@ class Quantile:
         """The statistic in words."""
         return f"quantile {self.share:g}"
 
+    def columns(self, uncertainty: Uncertainty, first: int, count: int, seed: int) -> Columns:
+        """Return independent draws."""
+        return uncertainty.random_columns(first, count, seed)
+
     def estimate(self, values: Floats, confidence: float) -> Interval:
         """Return estimate and interval [SI]."""
-        return quantile_interval(values, self.share, confidence)
+        return quantile_interval(values[np.isfinite(values)], self.share, confidence)
+
+    def carrying(self, values: Floats) -> float:
+        """Return the number of values: the interval is exact."""
+        return float(np.count_nonzero(np.isfinite(values)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,10 +114,19 @@ class Probability:
         """The statistic in words."""
         return f"probability {'above' if self.is_above else 'below'} {self.text}"
 
+    def columns(self, uncertainty: Uncertainty, first: int, count: int, seed: int) -> Columns:
+        """Return independent draws."""
+        return uncertainty.random_columns(first, count, seed)
+
     def estimate(self, values: Floats, confidence: float) -> Interval:
         """Return estimate and interval, from 0 to 1."""
-        hits = values > self.threshold if self.is_above else values < self.threshold
-        return share_interval(int(np.count_nonzero(hits)), values.size, confidence)
+        known = values[np.isfinite(values)]
+        hits = known > self.threshold if self.is_above else known < self.threshold
+        return share_interval(int(np.count_nonzero(hits)), known.size, confidence)
+
+    def carrying(self, values: Floats) -> float:
+        """Return the number of values: the interval is exact."""
+        return float(np.count_nonzero(np.isfinite(values)))
 
 
 def parse_statistic(text: str, metric: str) -> Statistic:

@@ -37,12 +37,13 @@ def monte_carlo(
 
     ``statistic`` is ``mean``, ``quantile 0.95`` or ``probability above 3 N m``; ``width`` a share of its value
     (``1 %`` unless given) or a difference with its unit (``0.01 N m``; for a probability a number, 0.02). Draws are
-    independent whatever the study's sampling method, because the intervals need it; ``seed`` is the study's by default.
+    those that the interval needs, whatever the study's sampling method: randomised Sobol replicates for a mean, else
+    independent ones. ``seed`` is the study's by default.
     StudyError for bad input and where more than the share ``most_failed`` of the runs fails.
     """
     chosen = study_of(study, overrides)
     base = chosen_configuration(chosen, configuration)
-    uncertainty = uncertainty_in(chosen, base)
+    uncertainty = uncertainty_in(chosen, base).hearing([base.scenario])
     check_metrics([metric], base.scenario)
     what = parse_statistic(statistic, metric)
     asked = width or (PROBABILITY_WIDTH if isinstance(what, Probability) else DEFAULT_WIDTH)

@@ -1,4 +1,4 @@
-"""Which uncertain value matters? Morris screening and Sobol indices, through SALib."""
+"""Which uncertain value matters? Morris screening, Sobol indices and Shapley effects."""
 
 from ppafo.studies.sensitivity.analyse import Sensitivity, Settings, analyse
 from ppafo.studies.sensitivity.methods import METHODS, Indices

@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import StudyError
-from ppafo.studies.sensitivity.methods import Indices, Method
+from ppafo.studies.sensitivity.methods import TAIL, Evaluated, Indices, Method
+from ppafo.studies.sweep.noise import NOISE
 from ppafo.studies.sweep.sampling.distributions import Floats
 from ppafo.studies.uncertainty.draws import Uncertainty
 from ppafo.studies.uncertainty.outcomes import Model, Outcomes, check_confidence, check_failures, check_share
 
+_ENDS = (TAIL, 1.0 - TAIL)
 _NEGLIGIBLE = 0.01
 _FEWEST_WHOLE = 4
 _SIZES = 6
@@ -97,20 +99,27 @@ def analyse(
 ) -> Sensitivity:
     """Return the indices of a model's metrics; StudyError for bad settings, dependent values or too many failures."""
     _check(uncertainty, method, settings)
-    design = method.design(len(uncertainty.drawn), settings.samples, settings.seed)
-    outcomes = model(uncertainty.columns(design))
+    design = method.design(uncertainty, settings.samples, settings.seed)
+    columns = uncertainty.columns(design)
+    outcomes = model(columns)
     check_failures(outcomes, settings.most_failed, "sensitivity")
-    found = tuple(_of_metric(name, outcomes, design, method, settings) for name in metrics)
-    return Sensitivity(method, settings, uncertainty.paths, found, outcomes.runs, outcomes.failures)
+    ends = [np.array([item.distribution.values(np.array(share)) for item in uncertainty.drawn]) for share in _ENDS]
+    inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
+    rows = design.shape[0] // settings.samples
+    blocks = np.repeat(np.arange(settings.samples), rows)
+    whole = Evaluated(design, inputs, np.empty(0), blocks, ends[1] - ends[0], settings.seed)
+    found = tuple(_of_metric(name, outcomes, whole, method, settings) for name in metrics)
+    paths = tuple(path for path in uncertainty.paths if method.follows_noise or path != NOISE)
+    return Sensitivity(method, settings, paths, found, outcomes.runs, outcomes.failures)
 
 
 def _check(uncertainty: Uncertainty, method: Method, settings: Settings) -> None:
-    if uncertainty.scores is not None:
+    if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(
-            "sensitivity: these indices need values that are independent, and the study has [[correlations]]; "
-            "take them as independent (--independent), or remove them"
+            f"sensitivity: the indices of {method.name} need values that are independent, and the study has "
+            "[[correlations]]; take '--method shapley', or take the values as independent (--independent)"
         )
-    if len(uncertainty.drawn) < 2:
+    if len(uncertainty.drawn) - (uncertainty.has_noise and not method.follows_noise) < 2:
         raise StudyError("sensitivity: a single uncertain value has all the influence there is; vary two or more")
     if not method.fewest <= settings.samples <= method.most:
         raise StudyError(
@@ -122,7 +131,7 @@ def _check(uncertainty: Uncertainty, method: Method, settings: Settings) -> None
     check_share(settings.most_failed, "most_failed")
 
 
-def _of_metric(name: str, outcomes: Outcomes, design: Floats, method: Method, settings: Settings) -> OfMetric:
+def _of_metric(name: str, outcomes: Outcomes, design: Evaluated, method: Method, settings: Settings) -> OfMetric:
     values = outcomes.metrics[name]
     known = np.isfinite(values)
     missing = int(np.count_nonzero(~known))
@@ -132,7 +141,7 @@ def _of_metric(name: str, outcomes: Outcomes, design: Floats, method: Method, se
         raise StudyError(
             f"sensitivity: '{name}' is {values[known][0]:g} in every run, so nothing has an influence on it"
         )
-    rows = method.block_rows(design.shape[1])
+    rows = values.size // settings.samples
     whole = np.all(known.reshape(-1, rows), axis=1)
     sizes = [size for size in _sizes(whole.size, method.fewest) if _varies(values, whole, size, rows)]
     if whole.size not in sizes:
@@ -161,9 +170,9 @@ def _varies(values: Floats, whole: NDArray[np.bool_], size: int, rows: int) -> b
 
 
 def _settling(
-    design: Floats, values: Floats, whole: NDArray[np.bool_], size: int, method: Method, settings: Settings
+    design: Evaluated, values: Floats, whole: NDArray[np.bool_], size: int, method: Method, settings: Settings
 ) -> Settling:
-    kept = np.repeat(whole[:size], values.size // whole.size)
-    rows = np.flatnonzero(kept)
-    indices = method.indices(design[rows], values[rows], settings.confidence, settings.seed)
-    return Settling(size, int(np.count_nonzero(whole[:size])), indices)
+    kept = np.flatnonzero(whole[:size])
+    rows = np.flatnonzero(np.isin(design.blocks, kept))
+    found = Evaluated(design.shares[rows], design.inputs[rows], values[rows], kept, design.ranges, design.seed)
+    return Settling(size, kept.size, method.indices(found, settings.confidence))

@@ -147,6 +147,18 @@ class Choice(BaseModel):
     only: _Only = ()
 
 
+class WholeNumbers(BaseModel):
+    """Equally likely whole numbers, both bounds among them; for the seed of the noise."""
+
+    model_config = _STRICT
+
+    path: _Path
+    kind: Literal["whole_numbers"]
+    minimum: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
+    maximum: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = LARGEST_SEED
+    only: _Only = ()
+
+
 class Stated(BaseModel):
     """Normal, with value and uncertainty as the parameter set states them; a half width of 95 % is 1.96 deviations."""
 
@@ -190,8 +202,22 @@ class Outputs(BaseModel):
     )
 
 
-VARIED = (Grid, Listed, Uniform, LogUniform, Normal, TruncatedNormal, LogNormal, Triangular, Choice, Stated)
-Varied = Grid | Listed | Uniform | LogUniform | Normal | TruncatedNormal | LogNormal | Triangular | Choice | Stated
+VARIED = (
+    *(Grid, Listed, Uniform, LogUniform, Normal, TruncatedNormal, LogNormal, Triangular, Choice, WholeNumbers, Stated),
+)
+Varied = (
+    Grid
+    | Listed
+    | Uniform
+    | LogUniform
+    | Normal
+    | TruncatedNormal
+    | LogNormal
+    | Triangular
+    | Choice
+    | WholeNumbers
+    | Stated
+)
 
 
 class StudyFile(BaseModel):

@@ -16,6 +16,7 @@ from ppafo.metrics import METRICS
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.studies.sweep import declaration as declared
 from ppafo.studies.sweep.asking import checked_outputs
+from ppafo.studies.sweep.noise import with_noise
 from ppafo.studies.sweep.paths import VariedPath, varied_path
 from ppafo.studies.sweep.sampling.correlation import Factor, cholesky_factor, correlation_matrix
 from ppafo.studies.sweep.sampling.uniforms import MOST_SOBOL_DIMENSIONS
@@ -88,18 +89,23 @@ def _built(document: dict[str, Any], source: _Source) -> Study:
     _check_set_or_varied(parsed, source)
     places = {item.path: _place(item, configurations, source) for item in parsed.vary}
     varied = [_varied(item, places[item.path], configurations, source) for item in parsed.vary]
-    drawn = tuple(item for item in varied if isinstance(item, Drawn))
+    own = tuple(item for item in varied if isinstance(item, Drawn))
+    drawn, scores = own, _scores(parsed, own, source)
+    if own:
+        scenarios = [item.scenario for item in configurations]
+        drawn, scores = with_noise(own, scores, scenarios, [item.path for item in parsed.vary])
+    units = {path: place.quantity.unit or "-" for path, place in places.items()}
     return Study(
         name=parsed.name,
         description=" ".join(parsed.description.split()),
         configurations=configurations,
         axes=tuple(item for item in varied if isinstance(item, Axis)),
         drawn=drawn,
-        scores=_scores(parsed, drawn, source),
+        scores=scores,
         sample=_sample(parsed, drawn, source),
         outputs=checked_outputs(parsed.outputs, configurations, source.refusal),
         runs_of_chunk=parsed.runs_of_chunk,
-        units={path: place.quantity.unit.removesuffix("_a") or "-" for path, place in places.items()},
+        units=units | {item.path: "-" for item in drawn if item.path not in units},
         only={item.path: item.only for item in parsed.vary if item.only},
         document=document,
         text=source.text,

@@ -21,7 +21,7 @@ STUDY_COPY = "study.toml"
 FORMAT = "ppafo study results"
 SCHEMA_VERSION = 1
 _NAMED = 4
-_COMPARED = ("ppafo", "study", "scenarios")
+_COMPARED = ("ppafo", "study", "scenarios", "varied")
 
 BinsOf = Mapping[str, Mapping[str, Bins]]
 """Bins by configuration and channel."""

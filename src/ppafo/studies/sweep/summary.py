@@ -17,7 +17,7 @@ from ppafo.studies.sweep.manifest import BinsOf
 from ppafo.studies.sweep.results import Columns, StudyResults
 from ppafo.studies.sweep.statistics import QUANTILE_DEFINITION, described
 from ppafo.studies.sweep.study import Study
-from ppafo.studies.sweep.tables import STATUSES
+from ppafo.studies.sweep.tables import STATUSES, stored_unit
 
 _EXAMPLES = 5
 
@@ -87,7 +87,7 @@ def bands_file(study: Study, results: StudyResults, bins: BinsOf) -> tuple[bytes
 
 
 def _si_of_channel(study: Study) -> str:
-    units = {CHANNELS[name].unit for name in study.outputs.bands}
+    units = {stored_unit(CHANNELS[name].unit) for name in study.outputs.bands}
     return units.pop() if len(units) == 1 else "SI unit of the channel"
 
 

@@ -21,6 +21,14 @@ STATUSES = ("completed", "diverged", "refused")
 _PLAIN = "-"
 
 
+def stored_unit(unit: str) -> str:
+    """Return the unit as tables state it: a pressure is absolute (``Pa_a``) or a difference (``Pa_d``), never bare.
+
+    What metrics and channels call Pa is absolute.
+    """
+    return "Pa_a" if unit == "Pa" else unit
+
+
 def runs_table(study: Study, chunk: Chunk, values: Mapping[str, Floats], result: EnsembleResult) -> "pa.Table":
     """Return a row for every run: number, configuration, varied values, status, metrics; SI units, nan where none."""
     name = study.configurations[chunk.configuration].name
@@ -39,7 +47,7 @@ def runs_table(study: Study, chunk: Chunk, values: Mapping[str, Floats], result:
     columns["reason"] = TableColumn(texts_of_some(result.reasons, chunk.runs), _PLAIN, "why the run has no metrics")
     for metric in study.outputs.metrics:
         computed = result.metrics.get(metric, np.full(chunk.runs, np.nan))
-        columns[metric] = TableColumn(computed, METRICS[metric].unit, METRICS[metric].summary)
+        columns[metric] = TableColumn(computed, stored_unit(METRICS[metric].unit), METRICS[metric].summary)
     return table_of(columns, described(study, chunk))
 
 
@@ -49,7 +57,7 @@ def trajectories_table(study: Study, chunk: Chunk, result: EnsembleResult) -> "p
     for name in study.outputs.trajectories:
         lists = lists_of(result.traces[name].T.astype(np.float32))
         columns[name] = TableColumn(
-            lists, CHANNELS[name].unit, f"{CHANNELS[name].summary}, every {study.outputs.every:g} s"
+            lists, stored_unit(CHANNELS[name].unit), f"{CHANNELS[name].summary}, every {study.outputs.every:g} s"
         )
     return table_of(columns, described(study, chunk) | {"every": f"{study.outputs.every!r} s"})
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ppafo.errors import UnitError
 from ppafo.studies.sweep import declaration as declared
+from ppafo.studies.sweep.noise import NOISE
 from ppafo.studies.sweep.paths import VariedPath
 from ppafo.studies.sweep.sampling.distributions import (
     Distribution,
@@ -18,17 +19,36 @@ from ppafo.studies.sweep.sampling.distributions import (
     OneOf,
     TriangularBetween,
     UniformBetween,
+    WholeNumbersBetween,
 )
 from ppafo.studies.sweep.study import Axis, Drawn
 
 
 def axis_or_distribution(item: declared.Varied, place: VariedPath) -> Axis | Drawn:
     """Return what a table asks for; UnitError with the key where a value is not usable or contradicts another."""
+    _check_whole(item)
     if isinstance(item, declared.Grid):
-        return Axis(item.path, _grid(item, place))
+        return Axis(item.path, _all_whole(item.path, _grid(item, place)))
     if isinstance(item, declared.Listed):
-        return Axis(item.path, tuple(_level("values", value, place) for value in item.values))
+        levels = tuple(_level("values", value, place) for value in item.values)
+        return Axis(item.path, _all_whole(item.path, levels))
     return Drawn(item.path, _DISTRIBUTIONS[item.kind](item, place))
+
+
+def _check_whole(item: declared.Varied) -> None:
+    """Refuse kinds that give a seed no whole numbers, and whole numbers for what is not counted."""
+    is_seed, is_whole = item.path == NOISE, item.kind == "whole_numbers"
+    if is_whole and not is_seed:
+        raise UnitError(f"kind = 'whole_numbers' is for '{NOISE}' alone; use 'choice' or 'uniform'")
+    if is_seed and item.kind not in ("grid", "list", "choice", "whole_numbers"):
+        raise UnitError(f"kind = '{item.kind}' gives no whole numbers, and a seed is one; use 'whole_numbers'")
+
+
+def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
+    broken = [value for value in values if path == NOISE and value != math.floor(value)]
+    if broken:
+        raise UnitError(f"{broken[0]:g} must be a whole number")
+    return values
 
 
 def _grid(item: declared.Grid, place: VariedPath) -> tuple[float, ...]:
@@ -78,7 +98,7 @@ def _triangular(item: declared.Triangular, place: VariedPath) -> Distribution:
 
 
 def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
-    values = tuple(_level("values", value, place) for value in item.values)
+    values = _all_whole(item.path, tuple(_level("values", value, place) for value in item.values))
     weights = item.weights or (1.0,) * len(values)
     if len(weights) != len(values):
         raise UnitError(f"weights has {len(weights)} numbers, values has {len(values)}; there must be as many")
@@ -86,6 +106,10 @@ def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
         raise UnitError(f"weights = {list(weights)} must be at least 0, and not all of them 0")
     shares = np.cumsum(weights) / np.sum(weights)
     return OneOf(values, tuple(shares.tolist()))
+
+
+def _whole_numbers(item: declared.WholeNumbers, place: VariedPath) -> Distribution:
+    return WholeNumbersBetween(*_bounds(item, place))
 
 
 _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
@@ -96,6 +120,7 @@ _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
     "log_normal": _log_normal,
     "triangular": _triangular,
     "choice": _choice,
+    "whole_numbers": _whole_numbers,
 }
 """What builds each kind. To add one: a table in ``declaration``, a class in ``sampling.distributions``, a line here."""
 

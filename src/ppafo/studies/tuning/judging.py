@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.simulation.plan import profile_bounds
+from ppafo.simulation.scenario import Scenario
 from ppafo.studies.sweep.sampling.distributions import Floats
 from ppafo.studies.tuning.problem import Constraint, Goal, Problem, Spread
 
@@ -51,6 +53,24 @@ class Judged:
     def is_feasible(self) -> NDArray[np.bool_]:
         """Which candidates keep all constraints and never fail."""
         return np.asarray((self.violation == 0.0) & (self.without_value == 0.0))
+
+
+def keeps(item: Constraint, value: float) -> bool:
+    """Tell whether a value [SI] keeps a constraint."""
+    return value <= item.limit if item.is_most else value >= item.limit
+
+
+def shortfall(scenario: Scenario) -> Floats:
+    """Return what the supply lacks of the largest reference [N m] in each run (runs,); 0 for nothing.
+
+    With one chamber at its supply and the other at the atmosphere the vane holds at most the torque constant times the
+    difference of the two (equation (2)), whatever the controller does.
+    """
+    supply, constant = scenario.device.supply, scenario.device.actuator.torque_constant
+    lowest, highest = profile_bounds(scenario.reference)
+    above = highest - constant * (supply.pressure - supply.atmospheric_pressure)
+    below = -lowest - constant * (supply.dorsiflexion_pressure - supply.atmospheric_pressure)
+    return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))
 
 
 def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:

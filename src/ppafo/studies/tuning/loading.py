@@ -14,6 +14,7 @@ from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.sweep.loading import list_studies, load_study
+from ppafo.studies.sweep.noise import NOISE
 from ppafo.studies.sweep.paths import varied_path
 from ppafo.studies.tuning import declaration as declared
 from ppafo.studies.tuning.present import present_value
@@ -23,6 +24,9 @@ from ppafo.studies.uncertainty.metric_values import difference_of, level_of
 from ppafo.studies.uncertainty.outcomes import check_metrics
 
 _FILE = TomlKind("tuning", "tuning", resources.files("ppafo") / "studies" / "tuning" / "library", StudyError)
+
+NOISE_DRAWS = 16
+"""Noise streams over which every candidate is judged where nothing else is uncertain."""
 
 Refusal = Callable[[object], StudyError]
 
@@ -65,7 +69,7 @@ def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Seque
         searched=searched,
         goals=tuple(_goal(item, refusal) for item in parsed.objective),
         constraints=tuple(_constraint(item, refusal) for item in parsed.constraints),
-        spread=_spread(parsed, folder, [item.path for item in searched], refusal),
+        spread=_spread(parsed, folder, [item.path for item in searched], scenario, refusal),
         effort=Effort(**parsed.effort.model_dump()),
     )
 
@@ -94,6 +98,8 @@ def _one_searched(item: declared.Searched, scenario: Scenario, refusal: Refusal)
         before = present_value(item.path, scenario)
     except (UnitError, ScenarioError) as error:
         raise refusal(f"search '{item.path}': {error}") from error
+    if item.path == NOISE:
+        raise refusal(f"search '{item.path}': the noise is drawn for every candidate alike, so it cannot be searched")
     if minimum >= maximum:
         raise refusal(f"search '{item.path}': minimum = {item.minimum!r} must be less than maximum = {item.maximum!r}")
     is_logarithmic = item.spacing == "logarithmic"
@@ -129,13 +135,17 @@ def _constraint(item: declared.Constraint, refusal: Refusal) -> Constraint:
     return Constraint(item.metric, limit, item.at_most is not None, given[0])
 
 
-def _spread(parsed: declared.TuningFile, folder: Path, searched: Sequence[str], refusal: Refusal) -> Spread | None:
+def _spread(
+    parsed: declared.TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario, refusal: Refusal
+) -> Spread | None:
+    """Return what the candidates are judged over: draws of a study, of the noise, of both, or nothing."""
     robust = parsed.robust
     if robust is None:
-        return None
+        noise = Uncertainty(()).hearing([scenario])
+        return Spread(noise, "", NOISE_DRAWS, parsed.effort.seed, 0.0, None) if noise.drawn else None
     try:
         study = load_study(_placed(robust.study, list_studies(), folder))
-        uncertainty = _without_restriction(uncertainty_of(study), study.only)
+        uncertainty = _without_restriction(uncertainty_of(study), study.only).hearing([scenario])
     except StudyError as error:
         raise refusal(f"robust: {error}") from error
     both = next((path for path in uncertainty.paths if path in searched), None)

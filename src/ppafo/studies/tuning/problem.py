@@ -73,6 +73,7 @@ class Spread:
     """Draws over which a candidate is judged: distributions, how many, their seed, and the bad end of the result.
 
     The bad end is the quantile at ``share``, or where that is None the mean and ``deviations`` standard deviations.
+    ``study`` is empty where the noise of the sensors is all that is drawn.
     """
 
     uncertainty: Uncertainty
@@ -87,6 +88,8 @@ class Spread:
         """The measure in words."""
         if self.share is not None:
             return f"{100.0 * self.share:g} % quantile"
+        if self.deviations == 0.0:
+            return "mean"
         return f"mean and {self.deviations:g} standard deviation{'' if self.deviations == 1.0 else 's'}"
 
     def bad_end(self, values: Floats, is_high: bool) -> Floats:
@@ -109,7 +112,10 @@ class Effort:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Problem:
-    """What is searched in a scenario, for what, and how long; ``spread`` is None for the device as it is said to be."""
+    """What is searched in a scenario, for what, and how long.
+
+    ``spread`` is None for the device as it is said to be, with sensors without noise.
+    """
 
     name: str
     description: str

@@ -8,42 +8,72 @@ from typing import Any, Literal
 import numpy as np
 
 from ppafo.errors import StudyError
+from ppafo.metrics import METRICS
+from ppafo.simulation.numbers import TIMES, with_numbers
 from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
+from ppafo.simulation.simulate import OPEN_LOOP, simulate
 from ppafo.studies.comparison.configurations import with_overrides
 from ppafo.studies.sweep.sampling.distributions import Floats
-from ppafo.studies.tuning.judging import Judged, Runs, bad_ends, judge
+from ppafo.studies.tuning.judging import Judged, Runs, bad_ends, judge, keeps, shortfall
 from ppafo.studies.tuning.loading import load_tuning
-from ppafo.studies.tuning.problem import Gains, Problem
+from ppafo.studies.tuning.problem import Constraint, Gains, Problem, Spread
 from ppafo.studies.tuning.search import Start, search
+from ppafo.studies.uncertainty.draws import renoised
+from ppafo.studies.uncertainty.intervals import Interval, noise_interval
 from ppafo.studies.uncertainty.outcomes import Model, Outcomes, Tally, Watch, scenario_model
 
 FRESH_DRAWS = 1024
 """Draws that the search never saw, over which the result is judged in the end."""
+LEAST_ERRORS = ("peak_error", "rms_error_hold")
+"""Metrics that are never below what the supply lacks of the largest reference."""
+_NOISE_DRAWS = 512
+"""Fresh draws that are run once more with other noise."""
+_NOISE_CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Ceiling:
+    """Draws in which the reference asks for more torque than the supply can hold, whatever the gains.
+
+    ``share`` is theirs of all; ``explains`` are the metrics of the constraints that they alone break: no gains can keep
+    them, or the other draws do.
+    """
+
+    share: float
+    explains: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
     """Gains [SI] and what they give.
 
-    ``values`` are the metrics by which they are judged [SI]: as the device is said to be, or at their bad end over the
-    draws of the search; ``fresh`` the same over draws that the search never saw (empty without uncertainty).
-    ``objective`` and ``violation`` are those of the search; ``result`` is one run of the device as it is said to be.
+    ``values`` are the metrics by which the search judges them [SI]: as the device is said to be, or at their bad end
+    over the draws of the search; ``fresh`` the same over draws that the search never saw (empty without draws).
+    ``objective`` is that of the search. ``violation`` and ``without_value`` are those of the search first, of the fresh
+    draws second (the same again without draws). ``noise`` is the share of the variance over the fresh draws that the
+    noise of the sensors makes, by metric. ``result`` is one run of the device as it is said to be.
     """
 
     gains: Gains
     values: Mapping[str, float]
     fresh: Mapping[str, float]
     objective: float
-    violation: float
-    without_value: float
+    violation: tuple[float, float]
+    without_value: tuple[float, float]
+    ceiling: Ceiling
+    noise: Mapping[str, Interval]
     result: Result
 
     @property
+    def is_feasible_in_search(self) -> bool:
+        """True where all constraints are kept and no run fails over what the search saw."""
+        return self.violation[0] == 0.0 and self.without_value[0] == 0.0
+
+    @property
     def is_feasible(self) -> bool:
-        """True where all constraints are kept and no run fails."""
-        return self.violation == 0.0 and self.without_value == 0.0
+        """True where all constraints are kept and no run fails, over fresh draws too."""
+        return self.is_feasible_in_search and self.violation[1] == 0.0 and self.without_value[1] == 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +137,8 @@ def _loaded(tuning: Problem | str | Path | Mapping[str, Any], overrides: Sequenc
 def _most_runs(problem: Problem) -> int:
     effort, draws = problem.effort, 1 if problem.spread is None else problem.spread.draws
     candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
-    return draws * (candidates + 3) + (2 * FRESH_DRAWS if problem.spread is not None else 0)
+    noise = _NOISE_DRAWS if problem.spread is not None and problem.spread.uncertainty.has_noise else 0
+    return draws * (candidates + 3) + (2 * (FRESH_DRAWS + noise) if problem.spread is not None else 0)
 
 
 def _draws(problem: Problem, first: int, count: int) -> dict[str, Floats]:
@@ -151,21 +182,63 @@ def _scales(problem: Problem, before: Runs) -> dict[str, float]:
 
 def _setting(model: Model, problem: Problem, scales: Mapping[str, float], gains: Gains) -> Setting:
     spread = problem.spread
-    fixed = _draws(problem, 0, 1 if spread is None else spread.draws)
-    runs = _runs(model, problem, [gains], fixed)
+    runs = _runs(model, problem, [gains], _draws(problem, 0, 1 if spread is None else spread.draws))
     judged: Judged = judge(runs, problem, scales)
-    fresh: dict[str, float] = {}
-    if spread is not None:
-        fresh = _values(_runs(model, problem, [gains], _draws(problem, spread.draws, FRESH_DRAWS)), problem)
+    columns = {} if spread is None else _draws(problem, spread.draws, FRESH_DRAWS)
+    again = runs if spread is None else _runs(model, problem, [gains], columns)
+    rejudged: Judged = judge(again, problem, scales)
+    noise: dict[str, Interval] = {}
+    if spread is not None and spread.uncertainty.has_noise:
+        other = _runs(model, problem, [gains], renoised(columns, _NOISE_DRAWS))
+        noise = _noise(again, other)
     return Setting(
         gains=gains,
         values=_values(runs, problem),
-        fresh=fresh,
+        fresh={} if spread is None else _values(again, problem),
         objective=float(judged.objective[0]),
-        violation=float(judged.violation[0]),
-        without_value=float(judged.without_value[0]),
+        violation=(float(judged.violation[0]), float(rejudged.violation[0])),
+        without_value=(float(judged.without_value[0]), float(rejudged.without_value[0])),
+        ceiling=_ceiling(problem, gains, columns, again),
+        noise=noise,
         result=simulate(tuned_scenario(problem, gains)),
     )
+
+
+def _noise(runs: Runs, other: Runs) -> dict[str, Interval]:
+    """Return the share of noise in each metric of the first candidate, where it varies."""
+    pairs = {name: (runs.metrics[name][0], values[0]) for name, values in other.metrics.items()}
+    found = {
+        name: noise_interval(first[: second.size], second, _NOISE_CONFIDENCE) for name, (first, second) in pairs.items()
+    }
+    return {name: share for name, share in found.items() if share is not None}
+
+
+def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: Runs) -> Ceiling:
+    """Return in how many draws the supply cannot hold the reference, and which broken constraints that explains."""
+    given = {path: column for path, column in draws.items() if path not in TIMES}
+    scenario = with_numbers(tuned_scenario(problem, gains), given)
+    if scenario.control.kind == OPEN_LOOP:
+        return Ceiling(0.0, ())
+    known = runs.metrics
+    lacking = np.broadcast_to(shortfall(scenario), known[problem.metrics[0]][:1].shape)
+    explained = [
+        item.metric
+        for item in problem.constraints
+        if "reference" in METRICS[item.metric].channels
+        and not keeps(item, float(bad_ends(known[item.metric], problem.spread, item.is_most)[0]))
+        and _is_explained(item, problem.spread, known[item.metric], lacking)
+    ]
+    return Ceiling(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
+
+
+def _is_explained(item: Constraint, spread: Spread | None, values: Floats, lacking: Floats) -> bool:
+    """Tell whether the draws below the ceiling alone break a constraint: no gains can, or the others keep it."""
+    if item.metric in LEAST_ERRORS and item.is_most:
+        least = np.mean(lacking, axis=1) if spread is None or spread.share is None else spread.bad_end(lacking, True)
+        if not keeps(item, float(least[0])):
+            return True
+    rest = values[:, lacking[0] == 0.0]
+    return rest.shape[1] < 2 or keeps(item, float(bad_ends(rest, spread, item.is_most)[0]))
 
 
 def tuned_scenario(problem: Problem, gains: Gains) -> Scenario:

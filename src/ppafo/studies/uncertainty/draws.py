@@ -1,6 +1,6 @@
 """Draws from the distributions of a study, as columns of values for an ensemble."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import StudyError, nearest_name
+from ppafo.simulation.scenario import Scenario
 from ppafo.studies.sweep.loading import load_study
+from ppafo.studies.sweep.noise import NOISE, other_noise, with_noise
 from ppafo.studies.sweep.sampling.correlation import correlated
 from ppafo.studies.sweep.sampling.distributions import Floats
 from ppafo.studies.sweep.sampling.uniforms import uniform_numbers
 from ppafo.studies.sweep.study import Configuration, Drawn, Sample, Study
 
 MOST_DRAWS = 2**26
+REPLICATES = 16
+"""Independent scrambles of the Sobol sequence among which draws are dealt out in turn."""
 
 Columns = dict[str, Floats]
 
@@ -40,6 +44,42 @@ class Uncertainty:
         """Return independent draws number ``first`` to ``first + count - 1`` of the stream that ``seed`` names."""
         sample = Sample("random", first + count, seed)
         return self.columns(uniform_numbers(sample, len(self.drawn), first, count))
+
+    def replicated_columns(self, first: int, count: int, seed: int) -> Columns:
+        """Return draws number ``first`` to ``first + count - 1`` of randomised Sobol replicates.
+
+        Draw j is number j // REPLICATES of the scramble j % REPLICATES. The scrambles are independent, so that the
+        spread between their means says how well a mean is known (Owen, 1997).
+        """
+        numbers = np.arange(first, first + count)
+        uniform = np.empty((count, len(self.drawn)))
+        for replicate in range(REPLICATES):
+            own = numbers % REPLICATES == replicate
+            if own.any():
+                start, length = int(numbers[own][0]) // REPLICATES, int(np.count_nonzero(own))
+                sample = Sample("sobol", start + length, replicate_seed(seed, replicate))
+                uniform[own] = uniform_numbers(sample, len(self.drawn), start, length)
+        return self.columns(uniform)
+
+    def hearing(self, scenarios: Iterable[Scenario]) -> "Uncertainty":
+        """Return the same with a noise stream for each draw, where any of some scenarios is noisy."""
+        return Uncertainty(*with_noise(self.drawn, self.scores, scenarios, self.paths))
+
+    @property
+    def has_noise(self) -> bool:
+        """Tell whether each draw has a noise stream of its own."""
+        return NOISE in self.paths
+
+
+def replicate_seed(seed: int, replicate: int) -> int:
+    """Return the seed of one of several independent replicates."""
+    return int(np.random.SeedSequence([seed, replicate]).generate_state(1, np.uint64)[0])
+
+
+def renoised(columns: Columns, most: int) -> Columns:
+    """Return the first draws, at most so many, each with another noise stream and all else as it was."""
+    first = {path: column[:most] for path, column in columns.items()}
+    return first | {NOISE: other_noise(first[NOISE])}
 
 
 def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Study:

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 ANYWHERE = 0.2
 KEEPS_CHOICE = 0.7
-CENTRES = 400
+CENTRES = 200
 NARROWEST = 0.02
 """Smallest standard deviation of a bell along any direction, of the side of the cube."""
 ENOUGH = 100.0

@@ -1,8 +1,12 @@
-"""Draws completions of the torque task, runs each with both valves, and weighs them by what the paper reports."""
+"""Draws completions of the torque task, runs each with both valves, and weighs them by what the paper reports.
 
-import math
+Rounds that follow what agreed so far may all miss the same corner, which no count of effective draws shows. So the
+draws are shared out to replicates, none of which knows where another looks, and the spread between them is the error.
+"""
+
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,23 +14,14 @@ from numpy.typing import NDArray
 from ppafo.errors import ScenarioError
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.loading import load_scenario
-from ppafo.studies.unreported_settings.evidence import (
-    GAS,
-    IMPROVEMENT,
-    METRICS,
-    Metrics,
-    agreement,
-    improvement,
-    saving,
-)
+from ppafo.studies.uncertainty.draws import replicate_seed
+from ppafo.studies.unreported_settings.evidence import GAS, IMPROVEMENT, METRICS, Metrics, agreement
 from ppafo.studies.unreported_settings.proposal import Proposal, effective, next_proposal
 from ppafo.studies.unreported_settings.settings import (
     CELLS,
     PROPORTIONAL,
-    SETTINGS,
     SOLENOID,
     Draws,
-    Setting,
     columns,
     spread,
     values_of,
@@ -35,15 +30,13 @@ from ppafo.studies.unreported_settings.settings import (
 Floats = NDArray[np.float64]
 
 CHUNK = 32_768
+REPLICATES = 8
 ROUNDS = 12
 FEWEST, MOST = 1_000, 20_000_000
 DEFAULT_DRAWS = 262_144
 DEFAULT_SEED = 2011
 
 ENOUGH = 100.0
-TOO_FEW = "too few to say"
-IMPLIED, NARROWED = 0.5, 0.8
-"""A setting is implied (narrowed) where what is left of its range is below this share of what was allowed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +44,47 @@ class Family:
     """All completions that could be run: settings by name, metrics by valve and name, and how densely they were drawn.
 
     Each (draws,). The first ``even`` are spread evenly over what is allowed, the others lie where the results agree.
-    ``drawn`` counts also those that no run can have or that failed.
+    ``replicate`` is which search drew each; ``densities`` (draws, searches) is how densely each search draws there,
+    over the even spread, 1 from another search where a completion can have no weight; ``sizes`` (searches,) is how much
+    each drew. ``drawn`` counts also those that no run can have or that failed.
     """
 
     draws: Draws
     metrics: Metrics
-    density: Floats
+    densities: Floats
+    sizes: Floats
+    replicate: NDArray[np.intp]
     even: int
     drawn: int
     seed: int
+
+    @property
+    def density(self) -> Floats:
+        """How densely all searches together draw, over the even spread."""
+        return np.asarray(self.densities @ self.sizes / np.sum(self.sizes))
+
+    def without_each(self) -> "list[Family]":
+        """Return, for each search, what the others found, weighed as if there had been no more."""
+        found = []
+        for number in range(self.sizes.size):
+            kept = self.replicate != number
+            even = int(np.count_nonzero(kept[: self.even]))
+            others = np.delete(self.densities[kept], number, axis=1)
+            # The numbers of the searches close up, as their columns do.
+            numbers = self.replicate[kept] - (self.replicate[kept] > number)
+            found.append(
+                Family(
+                    {name: values[kept] for name, values in self.draws.items()},
+                    {valve: {name: item[kept] for name, item in of.items()} for valve, of in self.metrics.items()},
+                    others,
+                    np.delete(self.sizes, number),
+                    numbers,
+                    even,
+                    self.drawn,
+                    self.seed,
+                )
+            )
+        return found
 
     @property
     def weights(self) -> Floats:
@@ -83,70 +108,109 @@ class Family:
         return effective(self.weights)
 
 
-@dataclass(frozen=True, slots=True)
-class Implied:
-    """What the results say about one setting: its median and 90 % interval, what is left of its range, in words.
-
-    For a choice, ``shares`` are the weights of the choices and the numbers are nan.
-    """
-
-    setting: Setting
-    median: float
-    low: float
-    high: float
-    left: float
-    shares: tuple[float, ...]
-    verdict: str
-
-
-@dataclass(frozen=True, slots=True)
-class Conclusion:
-    """A statement of the paper, and in which share of all completions, and of their weight, it holds [-].
-
-    ``by_the_rest`` is the share of the weight that follows without the results that already say it, and
-    ``rest_effective`` the number of completions that equal weights would need to say as much about that.
-    """
-
-    statement: str
-    of_all: float
-    of_weight: float
-    by_the_rest: float
-    rest_effective: float
-
-
 def infer_settings(
     count: int = DEFAULT_DRAWS, seed: int = DEFAULT_SEED, say: Callable[[str], None] = lambda _: None
 ) -> Family:
     """Run ``count`` completions with both valves and weigh them. ScenarioError for a count that is of no use.
 
-    A third is spread evenly; the rest follows in rounds, each drawn near what agreed best so far.
+    They are shared out to searches. A third of each is spread evenly; the rest follows in rounds, each drawn near what
+    agreed best so far in that search. In the end every completion is weighed as if all had been drawn from the mixture
+    of all searches.
     """
     if not FEWEST <= count <= MOST:
         raise ScenarioError(f"{count} draws: from {FEWEST} to {MOST} are of use")
-    chance = np.random.default_rng(seed)
-    rounds = [count // 3, *[(count - count // 3) // ROUNDS] * ROUNDS]
-    points = spread(rounds[0], seed)
-    proposals: list[Proposal | None] = [None]
-    densities = [_density(None, points)]
-    ran = _run(points, say, 0, count)
-    even = int(ran.completed.sum())
-    for number, size in enumerate(rounds[1:]):
-        # Every third round looks where the improvement does not count, so that it can be judged by the rest.
-        left_out = (IMPROVEMENT,) if number % 3 == 1 else ()
-        agrees = np.where(ran.completed, agreement(ran.metrics, left_out), 0.0)
-        proposal = next_proposal(points, agrees / _mixture(densities, rounds), CELLS, chance)
-        if proposal is None:
-            break
-        added = proposal.drawn(size, chance)
-        ran = ran.joined(_run(added, say, len(points), count))
-        points = np.concatenate([points, added])
-        earlier = zip(densities, proposals, strict=True)
-        densities = [np.concatenate([known, _density(one, added)]) for known, one in earlier]
-        proposals.append(proposal)
-        densities.append(_density(proposal, points))
-    density = _mixture(densities, rounds)[ran.completed]
-    metrics = {valve: {name: column[ran.completed] for name, column in of.items()} for valve, of in ran.metrics.items()}
-    return Family(values_of(points[ran.completed]), metrics, density, even, len(points), seed)
+    each = count // REPLICATES
+    rounds = [each // 3, *[(each - each // 3) // ROUNDS] * ROUNDS]
+    seeds = [replicate_seed(seed, number) for number in range(REPLICATES)]
+    searches = [_Search(np.random.default_rng(own), rounds, spread(rounds[0], own)) for own in seeds]
+    added = [search.points for search in searches]
+    for number in range(ROUNDS + 1):
+        _run_together(searches, added)
+        say(f"{sum(len(search.points) for search in searches)} of {count} completions")
+        if number < ROUNDS:
+            # Every third round looks where the improvement does not count, so that it can be judged by the rest.
+            left_out = (IMPROVEMENT,) if number % 3 == 1 else ()
+            added = [search.next_points(number + 1, left_out) for search in searches]
+    return _family(searches, seed)
+
+
+@final
+class _Search:
+    """One search: the points so far, what came of them, the proposals and how densely each draws at the points."""
+
+    def __init__(self, chance: np.random.Generator, rounds: Sequence[int], points: Floats) -> None:
+        self.chance, self.rounds, self.points = chance, rounds, points
+        self.ran: _Ran | None = None
+        self.proposals: list[Proposal | None] = [None]
+        self.known = [np.ones(len(points))]
+
+    @property
+    def size(self) -> int:
+        """How many points its proposals were asked for."""
+        return sum(self.rounds[: len(self.proposals)])
+
+    def next_points(self, number: int, left_out: Collection[str]) -> Floats:
+        """Draw the points of a round near what agreed best so far; none where nothing agrees."""
+        assert self.ran is not None, "the points so far have been run"
+        agrees = np.where(self.ran.completed, agreement(self.ran.metrics, left_out), 0.0)
+        proposal = next_proposal(self.points, agrees / _mixed(self.known, self.rounds), CELLS, self.chance)
+        if proposal is None or len(self.proposals) < number:
+            return np.empty((0, self.points.shape[1]))
+        added = proposal.drawn(self.rounds[number], self.chance)
+        earlier = zip(self.known, self.proposals, strict=True)
+        self.known = [np.concatenate([known, _density(one, added)]) for known, one in earlier]
+        self.points = np.concatenate([self.points, added])
+        self.proposals.append(proposal)
+        self.known.append(_density(proposal, self.points))
+        return added
+
+    def density(self, points: Floats) -> Floats:
+        """How densely this search draws at points, over the even spread."""
+        return _mixed([_density(one, points) for one in self.proposals], self.rounds)
+
+
+def _run_together(searches: Sequence[_Search], added: Sequence[Floats]) -> None:
+    """Run the new points of all searches, which is quicker together, and hand each its own."""
+    whole, ends = _run(np.concatenate(added)), np.cumsum([len(points) for points in added])
+    for search, first, last in zip(searches, [0, *ends[:-1].tolist()], ends.tolist(), strict=True):
+        part = whole.part(slice(first, last))
+        search.ran = part if search.ran is None else search.ran.joined(part)
+
+
+def _family(searches: Sequence[_Search], seed: int) -> Family:
+    """Return all searches as one family, what each drew evenly first."""
+    ran, replicate, is_even, densities = [], [], [], []
+    for number, search in enumerate(searches):
+        assert search.ran is not None, "every search has run"
+        ran.append(search.ran)
+        replicate.append(np.full(len(search.points), number))
+        is_even.append(np.arange(len(search.points)) < search.rounds[0])
+        own = _mixed(search.known, search.rounds)
+        # What contradicts the text has no weight, whatever its density.
+        counts = np.flatnonzero(agreement(search.ran.metrics, (IMPROVEMENT, *GAS)) > 0.0)
+        density = np.ones((len(search.points), len(searches)))
+        for column, other in enumerate(searches):
+            if other is search:
+                density[:, column] = own
+            else:
+                density[counts, column] = other.density(search.points[counts])
+        densities.append(density)
+    whole, even = _joined(ran), np.concatenate(is_even)
+    rows = np.flatnonzero(whole.completed)
+    rows = rows[np.argsort(~even[rows], kind="stable")]
+    points = np.concatenate([search.points for search in searches])
+    metrics = {valve: {name: item[rows] for name, item in of.items()} for valve, of in whole.metrics.items()}
+    sizes = np.array([search.size for search in searches], dtype=np.float64)
+    return Family(
+        values_of(points[rows]),
+        metrics,
+        np.concatenate(densities)[rows],
+        sizes,
+        np.concatenate(replicate)[rows],
+        int(np.count_nonzero(even[rows])),
+        len(points),
+        seed,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,29 +221,34 @@ class _Ran:
     completed: NDArray[np.bool_]
 
     def joined(self, later: "_Ran") -> "_Ran":
-        metrics = {
-            valve: {name: np.concatenate([column, later.metrics[valve][name]]) for name, column in of.items()}
-            for valve, of in self.metrics.items()
-        }
-        return _Ran(metrics, np.concatenate([self.completed, later.completed]))
+        return _joined([self, later])
+
+    def part(self, rows: slice) -> "_Ran":
+        metrics = {valve: {name: item[rows] for name, item in of.items()} for valve, of in self.metrics.items()}
+        return _Ran(metrics, self.completed[rows])
 
 
-def _run(points: Floats, say: Callable[[str], None], before: int, count: int) -> _Ran:
+def _joined(parts: Sequence[_Ran]) -> _Ran:
+    metrics = {
+        valve: {name: np.concatenate([part.metrics[valve][name] for part in parts]) for name in of}
+        for valve, of in parts[0].metrics.items()
+    }
+    return _Ran(metrics, np.concatenate([part.completed for part in parts]))
+
+
+def _run(points: Floats) -> _Ran:
     """Run completions with both valves, chunk by chunk."""
-    ran: _Ran | None = None
-    for first in range(0, len(points), CHUNK):
+    parts = []
+    for first in range(0, max(1, len(points)), CHUNK):
         draws = values_of(points[first : first + CHUNK])
         completed = np.ones(len(points[first : first + CHUNK]), dtype=bool)
-        metrics = {}
-        for valve in (SOLENOID, PROPORTIONAL):
+        metrics = {valve: {name: np.empty(0) for name in METRICS} for valve in (SOLENOID, PROPORTIONAL)}
+        for valve in metrics if completed.size else ():
             result = run_ensemble(load_scenario(f"torque-task-{valve}"), columns(draws, valve), METRICS)
             completed &= result.status == COMPLETED
             metrics[valve] = result.metrics
-        part = _Ran(metrics, completed)
-        ran = part if ran is None else ran.joined(part)
-        say(f"{before + first + completed.size} of {count} completions")
-    assert ran is not None, "there is at least one completion"
-    return ran
+        parts.append(_Ran(metrics, completed))
+    return _joined(parts)
 
 
 def _density(proposal: Proposal | None, points: Floats) -> Floats:
@@ -187,94 +256,8 @@ def _density(proposal: Proposal | None, points: Floats) -> Floats:
     return np.ones(len(points)) if proposal is None else proposal.density(points)
 
 
-def _mixture(densities: Sequence[Floats], sizes: Sequence[int]) -> Floats:
+def _mixed(densities: Sequence[Floats], sizes: Sequence[int]) -> Floats:
     """How densely points were drawn, over the even spread, from the mixture of the proposals used so far."""
     used = sizes[: len(densities)]
     total = sum(size * density for density, size in zip(densities, used, strict=True))
     return np.asarray(total / sum(used))
-
-
-def implied(family: Family) -> list[Implied]:
-    """What the results imply for each setting, in their order; no verdict where too few completions agree."""
-    found = [_of_setting(setting, family.draws[setting.name], family.weights) for setting in SETTINGS]
-    return found if family.is_enough else [replace(item, verdict=TOO_FEW) for item in found]
-
-
-def _of_setting(setting: Setting, values: Floats, weight: Floats) -> Implied:
-    if setting.choices:
-        shares = tuple(float(weight[values == choice].sum()) for choice in setting.choices)
-        left = spread_of(shares)
-        return Implied(setting, np.nan, np.nan, np.nan, left, shares, _verdict(left))
-    low, median, high = weighted_quantiles(values, weight, (0.05, 0.5, 0.95))
-    scale = np.log if setting.is_logarithmic else np.asarray
-    left = float((scale(high) - scale(low)) / (0.9 * (scale(setting.high) - scale(setting.low))))
-    return Implied(setting, median, low, high, left, (), _verdict(left))
-
-
-def spread_of(shares: Sequence[float]) -> float:
-    """How far weights spread over choices, 0 for one alone to 1 for all alike, by their perplexity; nan for none."""
-    if not sum(shares) > 0.0:
-        return float("nan")
-    entropy = -sum(share * math.log(share) for share in shares if share > 0.0)
-    return (math.exp(entropy) - 1.0) / (len(shares) - 1)
-
-
-def _verdict(left: float) -> str:
-    if math.isnan(left):
-        return "nothing agrees"
-    if left < IMPLIED:
-        return "implied"
-    return "narrowed" if left < NARROWED else "left open"
-
-
-def weighted_quantiles(values: Floats, weight: Floats, levels: tuple[float, ...]) -> list[float]:
-    """Quantiles of weighted values; nan where there is no weight."""
-    order = np.argsort(values)
-    total = np.cumsum(weight[order])
-    if total.size == 0 or total[-1] <= 0.0:
-        return [float("nan")] * len(levels)
-    places = np.searchsorted(total, np.array(levels) * total[-1])
-    return [float(values[order[min(place, order.size - 1)]]) for place in places]
-
-
-def conclusions(family: Family) -> list[Conclusion]:
-    """How firmly the paper's conclusions hold over all completions."""
-    better, less = improvement(family.metrics) > 0.0, saving(family.metrics) > 0.0
-    said: dict[str, tuple[NDArray[np.bool_], tuple[str, ...]]] = {
-        "The proportional valve tracks better.": (better, (IMPROVEMENT,)),
-        "The proportional valve uses less gas.": (less, GAS),
-        "It does both.": (better & less, (IMPROVEMENT, *GAS)),
-    }
-    found = []
-    for statement, (holds, left_out) in said.items():
-        rest = family.weights_without(left_out)
-        of_all, of_weight = float(holds[: family.even].mean()), float(family.weights[holds].sum())
-        found.append(Conclusion(statement, of_all, of_weight, float(rest[holds].sum()), effective(rest)))
-    return found
-
-
-def strongest_links(family: Family, count: int = 4) -> list[tuple[str, str, float]]:
-    """Pairs of settings that the results tie together most, with their weighted correlation of ranks [-]."""
-    names = [setting.name for setting in SETTINGS if len(setting.choices) != 2]
-    ranks = np.array([_ranks(family.draws[name]) for name in names])
-    total = family.weights.sum()
-    if total <= 0.0:
-        return []
-    away = ranks - (ranks * family.weights).sum(axis=1, keepdims=True) / total
-    covariance = (away * family.weights) @ away.T / total
-    spread = np.sqrt(np.diag(covariance))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        correlation = np.nan_to_num(covariance / np.outer(spread, spread))
-    pairs = [
-        (names[one], names[two], float(correlation[one, two]))
-        for one in range(len(names))
-        for two in range(one + 1, len(names))
-    ]
-    return sorted(pairs, key=lambda pair: -abs(pair[2]))[:count]
-
-
-def _ranks(values: Floats) -> Floats:
-    """Ranks from 0 to 1; equal values share one."""
-    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
-    middle = np.cumsum(counts) - 0.5 * counts
-    return np.asarray(middle[places] / values.size)

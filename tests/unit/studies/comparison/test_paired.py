@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from ppafo.studies.comparison.paired import best_shares, paired, pareto_front
+from ppafo.studies.sweep.sampling.distributions import NormalAround
+from ppafo.studies.sweep.study import Drawn
+from ppafo.studies.uncertainty.draws import Uncertainty
 
 
 def test_pairs_are_counted_and_incomplete_ones_left_out() -> None:
@@ -31,6 +34,22 @@ def test_more_is_better_where_the_metric_says_so() -> None:
     assert more.better.value == pytest.approx(0.7)
     assert neither is not None
     assert neither.better is None
+
+
+def test_configurations_that_are_equally_good_are_called_different_no_more_often_than_is_said() -> None:
+    normals = Uncertainty(tuple(Drawn(f"x{number}", NormalAround(0.0, 1.0)) for number in range(6)))
+    differs, is_better = [], []
+    for seed in range(300):
+        drawn = normals.replicated_columns(0, 256, seed)
+        shared = drawn["x0"] ** 2 + drawn["x1"]
+        first = shared + 0.3 * drawn["x2"] + 0.2 * drawn["x4"] ** 3
+        item = paired("x", first, shared + 0.3 * drawn["x3"] + 0.2 * drawn["x5"] ** 3, -1, 0.95)
+        assert item is not None
+        assert item.better is not None
+        differs.append(not item.difference.low <= 0.0 <= item.difference.high)
+        is_better.append(not item.better.low <= 0.5 <= item.better.high)
+    assert 0.01 <= np.mean(differs) <= 0.08
+    assert np.mean(is_better) <= 0.05
 
 
 def test_common_draws_see_a_difference_that_separate_draws_do_not() -> None:

@@ -11,6 +11,7 @@ import pytest
 import ppafo
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ScenarioError
+from ppafo.reporting.league_table import league_notes
 from ppafo.studies.league import ENTRANTS, League, league
 from ppafo.studies.league.draws import UNCERTAINTIES, drawn_devices, drawn_factors
 from ppafo.studies.league.standing import Robustness
@@ -100,6 +101,21 @@ def test_a_run_that_diverged_counts_as_worst(small: League) -> None:
     robust = Robustness(np.array([0.1, 0.2, np.inf, 0.3]), np.ones(4))
     assert (robust.failed, robust.error(0.5), robust.error(0.95)) == (1, 0.3, np.inf)
     assert all(standing.robustness and standing.robustness.failed == 0 for standing in small.standings)
+
+
+def test_every_draw_has_noise_of_its_own_and_its_share_is_told() -> None:
+    noisy = (*SHORT, "sensors.pressure_noise=5 kPa_d")
+    one, other = (
+        league("torque-task-proportional", (*noisy, f"sensors.seed={seed}"), draws=4, entrants=[BY_NAME["pid-paper"]])
+        for seed in (1, 2)
+    )
+    robust, again = one.standings[0].robustness, other.standings[0].robustness
+    assert robust is not None
+    assert again is not None
+    assert robust.errors.tolist() == again.errors.tolist(), "the seed of the scenario does not decide"
+    assert robust.noise is not None
+    assert robust.noise.high > 0.0
+    assert any("noise makes: pid-paper" in note for note in league_notes(one))
 
 
 def test_who_cannot_play_is_absent_and_the_reason_is_told() -> None:

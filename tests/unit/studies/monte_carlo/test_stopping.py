@@ -8,10 +8,11 @@ import pytest
 from scipy import stats
 
 from ppafo.errors import StudyError
+from ppafo.reporting.monte_carlo_report import remarks
 from ppafo.studies.monte_carlo import StoppingRule, draw_until, monte_carlo
 from ppafo.studies.monte_carlo.statistic import Mean, Probability, Quantile, parse_statistic
 from ppafo.studies.monte_carlo.study import stopping_rule
-from ppafo.studies.sweep.sampling.distributions import Floats, LogNormalAround
+from ppafo.studies.sweep.sampling.distributions import Floats, LogNormalAround, NormalAround
 from ppafo.studies.sweep.study import Drawn
 from ppafo.studies.uncertainty.draws import Uncertainty
 from ppafo.studies.uncertainty.outcomes import Model, Outcomes
@@ -46,7 +47,7 @@ def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
     assert widths[-1] <= 0.05 < min(widths[:-1])
     assert [look.draws for look in found.looks] == [64 * 2**number for number in range(len(widths))]
     assert found.values.size == found.last.draws
-    assert np.array_equal(found.values, UNCERTAIN.random_columns(0, found.last.draws, 1)["x"])
+    assert np.array_equal(found.values, UNCERTAIN.replicated_columns(0, found.last.draws, 1)["x"])
 
 
 def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
@@ -84,6 +85,48 @@ def test_without_the_correction_they_would_not() -> None:
         intervals = [Mean("N m").estimate(values[: look.draws], 0.9) for look in looks]
         held.append(all(interval.low <= MEAN <= interval.high for interval in intervals))
     assert np.mean(held) < 0.88
+
+
+NORMALS = Uncertainty(tuple(Drawn(f"x{number}", NormalAround(0.0, 1.0)) for number in range(6)))
+
+
+def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
+    def heavy(columns: Mapping[str, Floats]) -> Outcomes:
+        values = np.exp(2.0 * sum(columns[path] for path in NORMALS.paths) / math.sqrt(6.0))
+        return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
+
+    rule = StoppingRule(0.5, is_relative=True, first=64, most=4096)
+    found = [draw_until(heavy, NORMALS, METRIC, Mean("N m"), rule, seed) for seed in range(60)]
+    wrong = [not item.last.interval.low <= math.exp(2.0) <= item.last.interval.high for item in found]
+    narrow = [any(rule.is_narrow(look.interval) for look in item.looks) for item in found]
+    assert np.mean(narrow) > 0.3, "an interval that is narrow enough comes often"
+    assert np.mean([item.is_met and is_wrong for item, is_wrong in zip(found, wrong, strict=True)]) <= 0.05
+    warned = [item for item in found if not item.last.is_carried]
+    assert len(warned) > 50
+    assert "do not trust this interval" in remarks(warned[0])[0]
+    quiet = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), StoppingRule(0.05, False, first=512), 1)
+    assert quiet.is_met
+    assert remarks(quiet) == []
+
+
+def test_replicates_know_the_mean_of_a_smooth_function_far_better_than_independent_draws() -> None:
+    def smooth(columns: Mapping[str, Floats]) -> Floats:
+        return 3.0 + columns["x0"] + 2.0 * columns["x1"] + 3.0 * columns["x2"] + 0.1 * columns["x0"] * columns["x1"]
+
+    seeds = range(200)
+    drawn = [smooth(NORMALS.replicated_columns(0, 1024, seed)) for seed in seeds]
+    independent = [np.mean(smooth(NORMALS.random_columns(0, 1024, seed))) for seed in seeds]
+    assert np.var(independent) > 100.0 * np.var([np.mean(values) for values in drawn])
+    intervals = [Mean("N m").estimate(values, 0.9) for values in drawn]
+    held = np.mean([interval.low <= 3.0 <= interval.high for interval in intervals])
+    assert 0.85 <= held <= 0.95
+
+
+def test_replicates_in_pieces_are_those_of_the_whole() -> None:
+    whole = NORMALS.replicated_columns(0, 100, 3)
+    pieces = [NORMALS.replicated_columns(first, count, 3) for first, count in ((0, 5), (5, 40), (45, 55))]
+    for path, values in whole.items():
+        assert np.array_equal(values, np.concatenate([piece[path] for piece in pieces]))
 
 
 def test_failed_draws_are_left_out_and_counted_or_refused() -> None:

@@ -11,6 +11,8 @@ import pytest
 
 import ppafo
 from ppafo.errors import DataError, StudyError
+from ppafo.metrics import METRICS
+from ppafo.signals.channels import CHANNELS
 from ppafo.storage.places import DiskFolder
 from ppafo.studies.sweep import room
 from ppafo.studies.sweep import run as run_module
@@ -20,6 +22,7 @@ from ppafo.studies.sweep.manifest import stored_bins
 from ppafo.studies.sweep.progress import Progress
 from ppafo.studies.sweep.results import StudyResults, load_study_results
 from ppafo.studies.sweep.run import LOG, run_study
+from ppafo.studies.sweep.tables import stored_unit
 
 AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
 
@@ -42,11 +45,37 @@ def test_every_run_is_what_it_is_alone(small_results: StudyResults) -> None:
             f"reference.level={float(table['reference.level'][run])!r} N m",
         ]
         alone = ppafo.simulate(f"torque-task-{table['configuration'][run]}", overrides)
-        for metric in ("rms_error", "gas_supplied"):
-            assert table[metric][run] == pytest.approx(alone.metrics[metric].value, rel=1e-9)
+        assert table["rms_error"][run] == pytest.approx(alone.metrics["rms_error"].value, rel=1e-12)
+        assert table["gas_supplied"][run] == alone.metrics["gas_supplied"].value, "the course has the same bits"
         kept = small_results.trajectories("torque")[run]
         expected = np.interp(0.02 * np.arange(11), alone.recording.time, alone.recording["torque"])
         np.testing.assert_allclose(kept, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_noise_has_a_column_with_which_a_row_is_run_again(varying: Callable[..., Any]) -> None:
+    document = varying({"path": "valve.area", "kind": "uniform", "minimum": "9 mm^2", "maximum": "11 mm^2"}, runs=4)
+    noisy = ["run.duration=0.2 s", "sensors.pressure_noise=5 kPa_d"]
+    document["configurations"] = [
+        {"name": name, "scenario": "torque-task-proportional", "overrides": noisy} for name in ("one", "other")
+    ]
+    results = run_study(document)
+    table, seeds = results.table(), results.by_configuration("sensors.seed")
+    assert np.unique(seeds["one"]).size == 4
+    assert seeds["one"].tolist() == seeds["other"].tolist()
+    again = [f"valve.area={float(table['valve.area'][2])!r} m^2", f"sensors.seed={int(table['sensors.seed'][2])}"]
+    alone = ppafo.simulate("torque-task-proportional", [*noisy, *again]).metrics
+    assert table["rms_error"][2] == pytest.approx(alone["rms_error"].value, rel=1e-12)
+
+
+def test_tables_tell_absolute_pressures_from_differences(varying: Callable[..., Any]) -> None:
+    document = varying(
+        {"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"},
+        {"path": "sensors.pressure_resolution", "kind": "uniform", "minimum": "0 Pa_d", "maximum": "9 Pa_d"},
+    )
+    units = load_study(document).units
+    assert (units["supply.pressure"], units["sensors.pressure_resolution"]) == ("Pa_a", "Pa_d")
+    assert stored_unit(METRICS["largest_pressure"].unit) == stored_unit(CHANNELS["pressure_1"].unit) == "Pa_a"
+    assert stored_unit(CHANNELS["pressure_difference"].unit) == "Pa_d"
 
 
 def test_both_configurations_get_the_same_draws(small_results: StudyResults) -> None:
@@ -60,7 +89,7 @@ def test_the_folder_opens_as_it_is_with_units_in_the_columns(small_results: Stud
     table = pyarrow.dataset.dataset(f"{folder}/runs").to_table()
     assert table.num_rows == 32
     units = {field.name: (field.metadata or {}).get(b"unit") for field in table.schema}
-    assert units["supply.pressure"] == b"Pa"
+    assert units["supply.pressure"] == b"Pa_a"
     assert units["gas_supplied"] == b"kg"
     assert units["failure_time"] == b"s"
     frame = table.select(["configuration", "status", "rms_error"]).to_pylist()[0]

@@ -6,15 +6,29 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ppafo.studies.uncertainty.intervals import mean_interval, quantile_interval, share_interval
+from ppafo.studies.uncertainty.intervals import (
+    draws_that_carry,
+    quantile_interval,
+    replicates_interval,
+    share_interval,
+)
 
 
-def test_the_interval_of_a_mean_is_the_one_of_student() -> None:
-    values = np.random.default_rng(1).normal(3.0, 2.0, 25)
-    interval = mean_interval(values, 0.9)
-    known = stats.ttest_1samp(values, 0.0).confidence_interval(0.9)
+def test_the_interval_of_a_mean_is_the_one_of_student_over_replicates() -> None:
+    values = np.random.default_rng(1).normal(3.0, 2.0, 64)
+    interval = replicates_interval(values, 4, 0.9)
+    known = stats.ttest_1samp([values[number::4].mean() for number in range(4)], 0.0).confidence_interval(0.9)
     assert (interval.low, interval.high) == pytest.approx((known.low, known.high), rel=1e-12)
     assert interval.value == pytest.approx(values.mean())
+    assert replicates_interval(values[:3], 4, 0.9).width == math.inf
+
+
+def test_one_large_draw_carries_a_mean_alone_and_normal_draws_all_do() -> None:
+    random = np.random.default_rng(1)
+    assert draws_that_carry(np.array([0.0] * 499 + [1.0])) == pytest.approx(1.0, rel=0.01)
+    assert draws_that_carry(random.normal(size=500)) == 500.0
+    assert draws_that_carry(random.exponential(size=100_000)) == pytest.approx(25_000, rel=0.2)
+    assert draws_that_carry(np.ones(7)) == 7.0
 
 
 @pytest.mark.parametrize(("hits", "draws"), [(0, 40), (3, 40), (40, 40), (250, 1000)])

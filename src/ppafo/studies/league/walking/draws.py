@@ -11,10 +11,12 @@ from ppafo.engine.run import NEVER_FAILED, Run
 from ppafo.model.gait import GaitTiming
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.plant import plant_parameters
-from ppafo.studies.league.draws import SEED, drawn_device, drawn_factors
+from ppafo.studies.league.draws import NOISE_DRAWS, SEED, drawn_device, drawn_factors
 from ppafo.studies.league.walking.course import Toes, course_of, toes_of
 from ppafo.studies.league.walking.measures import measures, settled_strides
+from ppafo.studies.league.walking.standing import WalkingRobustness
 from ppafo.studies.league.walking.task import WalkingTask
+from ppafo.studies.sweep.noise import other_noise
 from ppafo.walking.anthropometry import Build, drawn_builds
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.planning import plan_walk, vented, with_leg
@@ -59,8 +61,8 @@ def drawn_wearers(configuration: Configuration, run: Run, count: int) -> DrawnWe
 
 def drawn_measures(
     task: WalkingTask, configuration: Configuration, draws: int, say: Callable[[str], None] = lambda _: None
-) -> list[dict[str, float] | None]:
-    """The measures of a walk on so many drawn wearers and devices; None where a walk diverged.
+) -> WalkingRobustness:
+    """The measures of a walk on so many drawn wearers and devices, of the first of them with other noise too.
 
     ``say`` is told every so often how many have walked.
     """
@@ -74,7 +76,20 @@ def drawn_measures(
         found += _measured(task, run, wearers, plants, toes, batch, part)
         if part.stop // TOLD > part.start // TOLD:
             say(f"{configuration.controller.name}: {part.stop} of {draws} draws have walked")
-    return found
+    again: list[dict[str, float] | None] = []
+    if not configuration.has_ideal_sensors:
+        other = _renoised(batch, NOISE_DRAWS)
+        for part in _groups(other):
+            again += _measured(task, run, wearers, plants, toes, other, part)
+    return WalkingRobustness(tuple(found), tuple(again))
+
+
+def _renoised(batch: Batch, most: int) -> Batch:
+    """The first walks of a batch, each with another noise stream."""
+    parameters = batch.parameters[:, :most].copy()
+    row = row_numbers(batch.program.parameter_rows())["sensors.seed"]
+    parameters[row] = other_noise(parameters[row])
+    return Batch(batch.program, batch.clock, parameters, batch.states[:, :most])
 
 
 def drawn_plants(configuration: Configuration, run: Run, factors: Floats) -> list[PlantParameters]:

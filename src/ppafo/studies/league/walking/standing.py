@@ -9,14 +9,28 @@ from ppafo.studies.league.walking.bound import WalkingBound
 from ppafo.studies.league.walking.entrants import WalkingEntrant
 from ppafo.studies.league.walking.playing import PlayedStride
 from ppafo.studies.league.walking.task import WalkingTask
+from ppafo.studies.uncertainty.intervals import Interval, noise_interval
 from ppafo.walking.configuration import Configuration
 
 
 @dataclass(frozen=True, slots=True)
 class WalkingRobustness:
-    """Measures by name for each drawn wearer and device; None where the walk diverged."""
+    """Measures by name for each drawn wearer and device; None where the walk diverged.
+
+    ``renoised`` are those of the first of them with other noise; none where the sensors are ideal.
+    """
 
     drawn: tuple[Mapping[str, float] | None, ...]
+    renoised: tuple[Mapping[str, float] | None, ...] = ()
+
+    @property
+    def noise(self) -> Interval | None:
+        """Share of the variance of the torque errors over the draws that noise makes, with its 95 % interval."""
+        first, again = (
+            np.array([np.nan if item is None else item["torque_error"] for item in items])
+            for items in (self.drawn[: len(self.renoised)], self.renoised)
+        )
+        return noise_interval(first, again, 0.95) if again.size else None
 
     def error(self, share: float) -> float:
         """RMS torque error [N m] that this share of the draws does not exceed; inf where a walk diverged."""

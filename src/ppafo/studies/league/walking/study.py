@@ -10,7 +10,7 @@ from ppafo.studies.league.walking.draws import drawn_measures
 from ppafo.studies.league.walking.entrants import WALKING_ENTRANTS, WalkingEntrant
 from ppafo.studies.league.walking.nominal import walked_measures
 from ppafo.studies.league.walking.playing import played
-from ppafo.studies.league.walking.standing import WalkingBounded, WalkingLeague, WalkingRobustness, WalkingStanding
+from ppafo.studies.league.walking.standing import WalkingBounded, WalkingLeague, WalkingStanding
 from ppafo.studies.league.walking.task import WalkingTask
 from ppafo.walking.configuration import Configuration
 
@@ -45,7 +45,7 @@ def _standing(
     task: WalkingTask, entrant: WalkingEntrant, configuration: Configuration, draws: int, say: Callable[[str], None]
 ) -> WalkingStanding:
     found = walked_measures(task, configuration)
-    robustness = WalkingRobustness(tuple(drawn_measures(task, configuration, draws, say))) if draws else None
+    robustness = drawn_measures(task, configuration, draws, say) if draws else None
     return WalkingStanding(entrant, configuration, found, robustness, _command(task, entrant))
 
 

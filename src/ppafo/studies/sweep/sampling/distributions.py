@@ -123,3 +123,15 @@ class OneOf:
         """Return the value [SI] below which each share lies."""
         number = np.searchsorted(np.asarray(self.shares[:-1]), uniform, side="right")
         return np.asarray(self.choices)[number]
+
+
+@dataclass(frozen=True, slots=True)
+class WholeNumbersBetween:
+    """Equally likely whole numbers, both ends among them."""
+
+    minimum: float
+    maximum: float
+
+    def values(self, uniform: Floats) -> Floats:
+        """Return the value below which, with itself, each share lies."""
+        return np.minimum(np.floor(self.minimum + (self.maximum - self.minimum + 1.0) * uniform), self.maximum)

@@ -20,6 +20,8 @@ _WORDS_PER_STEP = 4
 _FRACTION_BITS = 53
 _SOBOL_BITS = 32
 MOST_SOBOL_DIMENSIONS = 21201
+_MOST_ENGINES = 64
+"""Wound engines that are remembered; the one that was made first goes first."""
 
 
 def uniform_numbers(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
@@ -71,6 +73,8 @@ def _sobol(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
         if engine is None or engine.num_generated > first:
             engine = qmc.Sobol(dimensions, scramble=True, bits=_SOBOL_BITS, rng=np.random.default_rng(sample.seed))
             _WOUND.engines[key] = engine
+            if len(_WOUND.engines) > _MOST_ENGINES:
+                del _WOUND.engines[next(iter(_WOUND.engines))]
         if first > engine.num_generated:
             engine.fast_forward(first - engine.num_generated)
         with warnings.catch_warnings():

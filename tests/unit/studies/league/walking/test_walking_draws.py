@@ -29,7 +29,7 @@ def test_the_first_draw_with_the_tasks_own_device_is_the_walk_itself(monkeypatch
         return np.ones((count, len(UNCERTAINTIES)))
 
     monkeypatch.setattr(draws, "drawn_factors", none_changed)
-    first, second = drawn_measures(TASK, WALKED, 2)
+    first, second = drawn_measures(TASK, WALKED, 2).drawn
     assert first is not None
     assert second is not None
     own = walked_measures(TASK, WALKED)
@@ -41,4 +41,4 @@ def test_draws_are_the_same_in_groups_of_any_size(monkeypatch: pytest.MonkeyPatc
     together = drawn_measures(TASK, WALKED, 3)
     monkeypatch.setattr(draws, "NUMBERS_AT_ONCE", 1.0)
     assert drawn_measures(TASK, WALKED, 3) == together
-    assert set(together[0] or {}) == set(MEASURES)
+    assert set(together.drawn[0] or {}) == set(MEASURES)
