@@ -24,7 +24,7 @@ from ppafo.identification.trajectory.section import (
 )
 from ppafo.identification.trajectory.setting import Setting, noise_of_channels, quantity_of
 from ppafo.identification.trajectory.verdicts import interval_factor
-from ppafo.identification.trajectory.without_scenario import experiment_without_scenario
+from ppafo.identification.trajectory.without_scenario import compared_channels, experiment_without_scenario
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.recorded.inputs import LONGEST_STEP
 from ppafo.simulation.scenario import Scenario
@@ -95,12 +95,17 @@ def _with_step(experiment: Experiment, text: str, said: str) -> Experiment:
 
 def _experiment_of(item: ExperimentSection, scenario: str, source: Source, setting: Setting) -> Experiment:
     said = f"{setting.file}: experiment '{item.label}'"
+    for name in ("held", "volume"):
+        if getattr(item, name) is not None:
+            raise IdentificationError(
+                f"{said}: {name} and a scenario: the scenario says how the vane moves; leave one out"
+            )
     return Experiment(
         label=item.label,
         scenario=_scenario(scenario, item.overrides, setting),
         recording=source.recording,
         start=quantity_of(f"{said}: start", item.start or "0 s", "s"),
-        channels=item.channels,
+        channels=compared_channels(item),
         noise=noise_of_channels(item.noise, said),
         inputs=item.inputs or (),
         initial_state="scenario" if item.initial_state in (None, "scenario") else "recording",
