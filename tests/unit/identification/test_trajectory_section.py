@@ -390,7 +390,7 @@ def test_a_contradiction_about_the_vane_is_told(solve: Solve, laboratory: Path, 
 def test_a_bench_prior_from_a_recording_that_is_fitted_too_is_refused(solve: Solve) -> None:
     prior = '[trajectory]\nparameters = [{ path = "friction.viscous_damping", prior = "bench" }]\n'
     text = STEP.replace("step.csv", "decay.csv") + "channels = ['angle']\n"
-    with pytest.raises(PpafoError, match="prior = 'bench' comes from decay.csv sha256:.*it would count twice"):
+    with pytest.raises(PpafoError, match=r"prior = 'bench' comes from decay\.csv sha256:.*it would count twice"):
         solve(f"{DECAY}{prior}{text}")
 
 

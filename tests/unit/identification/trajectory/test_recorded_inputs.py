@@ -115,7 +115,7 @@ def test_along_a_recorded_angle_a_wrong_inertia_does_not_matter(
 
 def test_the_same_recording_in_two_experiments_is_refused_and_two_parts_of_it_are_not(experiment: Experiment) -> None:
     other = dataclasses.replace(experiment, label="again")
-    with pytest.raises(IdentificationError, match="experiment 'step'.*experiment 'again'.* are the same recording"):
+    with pytest.raises(IdentificationError, match=r"experiment 'step'.*experiment 'again'.* are the same recording"):
         TrajectoryProblem((FLOW,), (experiment, other))
     late = dataclasses.replace(other, start=0.35)
     assert len(TrajectoryProblem((FLOW,), (experiment, late)).experiments) == 2
