@@ -26,6 +26,7 @@ _MOST_BLOCKS = 64
 """More would find what follows from sample to sample, for which there is an interval of its own."""
 
 _FEWEST_IN_A_BLOCK = 2
+_DRAWS = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,5 +92,17 @@ def _missing(residuals: Floats, blocks: tuple[Indices, ...], parameters: int, ch
     parts = [residuals[block] for block in blocks]
     between = sum(float(part.sum()) ** 2 / part.size for part in parts) / freedom
     within = sum(float(((part - part.mean()) ** 2).sum()) for part in parts) / inner
-    is_missing = exceeds_chance(between, within, freedom, inner, chance)
+    is_missing = exceeds_chance(between, within, freedom, inner, chance) and _exceeds_uneven_noise(parts, chance)
     return LackOfFit(between, freedom, blocks) if is_missing else None
+
+
+def _exceeds_uneven_noise(parts: list[Floats], chance: float) -> bool:
+    """Return whether the blocks' means scatter more than noise does that is larger in some blocks than in others.
+
+    The F test takes one variance for all. Here each block has its own: were all errors independent, the sum of the
+    squared means times their size would be one of squared normal numbers, weighted by the blocks' mean squares.
+    """
+    weights = np.array([float(part @ part) / part.size for part in parts])
+    seen = sum(float(part.sum()) ** 2 / part.size for part in parts)
+    draws = np.random.default_rng(1).standard_normal((_DRAWS, weights.size))
+    return bool(np.mean(draws**2 @ weights >= seen) <= chance)
