@@ -53,7 +53,8 @@ class LackOfFit:
 def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Sequence[Floats] = ()) -> LackOfFit:
     """Return the lack of fit that widens intervals most, over numbers of blocks, in the order of samples and others.
 
-    ``along`` are variables over which a misfit may run besides, such as a pressure.
+    ``along`` are variables over which a misfit may run besides, such as a pressure. Readings that have some are steady
+    ones, whose noise may differ from place to place; in a course of time a misfit may fill one block alone.
     """
     freedom = max(1, residuals.size - parameters)
     widest = LackOfFit(float(residuals @ residuals) / freedom, freedom, ())
@@ -63,7 +64,11 @@ def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Se
     for order in orders:
         for count in counts:
             found = _missing(residuals, tuple(np.array_split(order, count)), parameters, chance)
-            if found is not None and found.deviation(confidence) > widest.deviation(confidence):
+            if found is None or (
+                along and not _exceeds_uneven_noise([residuals[block] for block in found.blocks], chance)
+            ):
+                continue
+            if found.deviation(confidence) > widest.deviation(confidence):
                 widest = found
     return widest
 
@@ -92,7 +97,7 @@ def _missing(residuals: Floats, blocks: tuple[Indices, ...], parameters: int, ch
     parts = [residuals[block] for block in blocks]
     between = sum(float(part.sum()) ** 2 / part.size for part in parts) / freedom
     within = sum(float(((part - part.mean()) ** 2).sum()) for part in parts) / inner
-    is_missing = exceeds_chance(between, within, freedom, inner, chance) and _exceeds_uneven_noise(parts, chance)
+    is_missing = exceeds_chance(between, within, freedom, inner, chance)
     return LackOfFit(between, freedom, blocks) if is_missing else None
 
 

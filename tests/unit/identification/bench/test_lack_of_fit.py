@@ -27,7 +27,7 @@ def test_white_noise_is_hardly_ever_said_to_miss() -> None:
 
 def test_noise_that_is_larger_in_some_places_is_hardly_ever_said_to_miss() -> None:
     scale = np.where(TIME > 0.95, 1.0, 0.05)
-    seen = sum(lack_of_fit(scale * noise(seed), 2, 0.95).is_seen for seed in range(200))
+    seen = sum(lack_of_fit(scale * noise(seed), 2, 0.95, (TIME,)).is_seen for seed in range(200))
     assert seen <= 8
 
 
