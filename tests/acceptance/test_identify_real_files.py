@@ -48,6 +48,18 @@ def test_friction_of_the_cylinder_grows_with_pressure(cylinder: Identification) 
     assert "grows" in cylinder.results[0]["friction.static_torque"].explanation
 
 
+def test_friction_of_the_cylinder_says_its_pressure_and_nothing_of_it_counts_as_identified(
+    cylinder: Identification,
+) -> None:
+    friction = cylinder.results[0]["friction.static_torque"]
+    assert friction.verdict_in_words.startswith("holds for this model only, at 431.6 kPa")
+    assert [check.name for check in cylinder.results[0].failed] == ["friction over pressure"]
+    assert cylinder.new_set.written == ()
+    assert set(cylinder.new_set.fitted) == {"actuator.torque_constant", "friction.static_torque"}
+    left = cylinder.results[0]["static_torque.friction_at_no_pressure"]
+    assert left.low < friction.value - 5.07e-6 * 4.316e5 < left.high
+
+
 def test_mean_forces_alone_would_count_the_regulator_as_friction(cylinder: Identification) -> None:
     friction = cylinder.results[0]["friction.static_torque"].value
     growth = cylinder.results[0]["static_torque.friction_per_pressure"].value
@@ -67,6 +79,10 @@ def test_the_printed_chamber_gets_no_area(raw_files: Path) -> None:
     result = identify(raw_files / "chamber-problem.toml").results[0]
     assert result["actuator.leak.area"].verdict == "law does not describe the data"
     assert "vane_leak.relaxation_rate" in [item.path for item in result.estimates]
+    plateau = result["vane_leak.plateau"]
+    assert 7.4e5 < plateau.low < plateau.high < 7.55e5, "below the last readings, 7.55 bar"
+    told = next(check for check in result.failed if check.name == "leak or relaxation")
+    assert "give the same curve" in told.statement
 
 
 def test_a_chamber_whose_laws_cannot_be_told_apart_gets_no_area_either(raw_files: Path) -> None:
@@ -75,6 +91,9 @@ def test_a_chamber_whose_laws_cannot_be_told_apart_gets_no_area_either(raw_files
     outcome = identify(raw_files / "formlabs-problem.toml")
     assert outcome.new_set.written == ()
     assert outcome.results[0]["vane_leak.area_over_volume"].verdict == "weak"
+    assert "which law" in [check.name for check in outcome.results[0].failed]
+    missing = {item.name for item in outcome.beforehand[0].prospects if not item.can_be_had}
+    assert missing == {"area of the leak", "law of the leak", "plateau or leak"}
 
 
 @pytest.mark.parametrize("number", [0, 1])
@@ -82,7 +101,7 @@ def test_the_page_shows_what_the_command_prints(
     raw_files: Path, number: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (raw_files / "problem.toml").write_text(blocks("toml")[number], encoding="utf-8")
-    assert main(["identify", str(raw_files / "problem.toml")]) == number
+    assert main(["identify", str(raw_files / "problem.toml")]) == 1
     assert capsys.readouterr().out.strip() == blocks("text")[number].strip()
 
 
@@ -92,6 +111,6 @@ def test_the_command_of_the_page_leaves_what_the_page_says(
     words = blocks("sh")[0].split()
     monkeypatch.chdir(tmp_path)
     (raw_files / "problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
-    assert main([str(raw_files / word) if word == "problem.toml" else word for word in words[1:]]) == 0
+    assert main([str(raw_files / word) if word == "problem.toml" else word for word in words[1:]]) == 1
     made = {path.name for path in (tmp_path / "identified").iterdir()}
     assert {"cylinder.toml", "estimates.json", "identify.txt", "static_torque.png"} <= made

@@ -104,7 +104,7 @@ def test_every_claim_on_a_synthetic_measurement_is_named_in_the_text_below_the_t
 ) -> None:
     synthetic = [claim.id for claim in reproduction.claims if claim.is_synthetic]
     assert synthetic
-    below = TEXT.partition('"Synthetic" matters more.')[2]
+    below = TEXT.partition('"Shown on synthetic data" is no reproduction')[2]
     assert [name for name in synthetic if f"`{name}`" not in below] == []
 
 

@@ -35,9 +35,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_override_argument(parser)
     parser.add_argument(
         "--motion",
-        metavar="free|measured",
+        metavar="free|measured|held",
         default="free",
-        help="free: the model moves the vane; measured: the vane is led along the recorded angle",
+        help="free: the model moves the vane; measured: it follows the recorded angle; held: it stays where it starts",
+    )
+    parser.add_argument(
+        "--volume",
+        metavar="VOLUME",
+        help="no vane: chamber 1 is a fixed volume, '60 cm^3', filled and vented by the valve; pressure_1 is compared",
     )
     parser.add_argument(
         "--initial",
@@ -87,7 +92,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.validation import ReplaySettings, parse_thresholds, validate
     from ppafo.validation.alignment import parse_limit
     from ppafo.validation.start import parse_initial
-    from ppafo.validation.validate import check_motion
+    from ppafo.validation.validate import check_motion, parse_volume
 
     atmosphere = load_device(parsed.parameters, parsed.valve, parsed.overrides).supply.atmospheric_pressure
     settings = ReplaySettings(
@@ -95,6 +100,7 @@ def run(parsed: argparse.Namespace) -> int:
         initial=parse_initial(parsed.initial, atmosphere),
         longest_delay=parse_limit(parsed.longest_delay),
         thresholds=parse_thresholds(parsed.thresholds),
+        volume=parse_volume(parsed.volume),
     )
     columns = _column_map(parsed.columns)
     check_output(parsed.out, file_names(parsed.recordings))

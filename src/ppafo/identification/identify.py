@@ -7,11 +7,12 @@ from pathlib import Path
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.check import Prospect
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import NewSet, with_estimates
 from ppafo.identification.problem import ProblemFile, ProcedureProblem, load_problem
-from ppafo.identification.procedures import RECOMMENDED_ORDER, Setting, run_procedure
-from ppafo.identification.source import Source
+from ppafo.identification.procedures import RECOMMENDED_ORDER, Setting, prospects_of, run_procedure, window_of
+from ppafo.identification.source import Source, Use, used_twice
 from ppafo.identification.trajectory.outcome import TrajectoryOutcome, solve_section
 from ppafo.identification.trajectory.section import ExperimentSection
 from ppafo.identification.trajectory.setting import Setting as FitSetting
@@ -26,10 +27,19 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
+class Beforehand:
+    """What the recordings of a procedure can give and what not, said before anything was fitted."""
+
+    procedure: str
+    prospects: tuple[Prospect, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Identification:
-    """The outcome of a problem: results in the order in which they were made, the set before and after."""
+    """The outcome of a problem: what could be had, results in the order of making, the set before and after."""
 
     name: str
+    beforehand: tuple[Beforehand, ...]
     results: tuple[BenchResult, ...]
     trajectory: TrajectoryOutcome | None
     before: ParameterSet
@@ -61,11 +71,12 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, tell: Tell = la
     """Return the outcome of a problem whose paths begin in ``folder``; ``file`` is what messages call it."""
     before = _base_set(problem, folder)
     valve = chosen_valve(before, problem.device.valve)
-    current, results = before, []
-    # The sort is stable: two procedures of one kind stay in the order of the file.
-    for number, item in sorted(enumerate(problem.procedure, start=1), key=lambda pair: _place(pair[1])):
-        sources = tuple(_source(folder, name, item.columns, problem, current) for name in item.recordings)
-        result = run_procedure(sources, item, Setting(current, valve, f"{file}: procedure {number}, {item.kind}"))
+    current, results = before, list[BenchResult]()
+    tasks = _tasks(problem, folder, file, before)
+    _refuse_twice(tasks, before, valve, file)
+    beforehand = tuple(_look(task, Setting(before, valve, task.place), tell) for task in tasks)
+    for task in tasks:
+        result = run_procedure(task.sources, task.item, Setting(current, valve, task.place))
         results.append(result)
         current = with_estimates(current, result.estimates).parameter_set
     bench = {estimate.path: estimate for estimate in _bench_estimates(results)}
@@ -73,7 +84,57 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, tell: Tell = la
     estimates = (*_bench_estimates(results), *(() if fitted is None else fitted.fit.estimates))
     new_set = with_estimates(before, estimates, valve)
     named = replace(new_set, parameter_set=_named(new_set, problem))
-    return Identification(problem.name, tuple(results), fitted, before, named)
+    return Identification(problem.name, beforehand, tuple(results), fitted, before, named)
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """A procedure with its recordings, and what messages call it."""
+
+    item: ProcedureProblem
+    sources: tuple[Source, ...]
+    place: str
+
+
+def _tasks(problem: ProblemFile, folder: Path, file: str, before: ParameterSet) -> list[_Task]:
+    """Return the procedures in the recommended order, all recordings read; two of one kind stay in the file's order."""
+    return [
+        _Task(
+            item,
+            tuple(_source(folder, name, item.columns, problem, before) for name in item.recordings),
+            f"{file}: procedure {number}, {item.kind}",
+        )
+        for number, item in sorted(enumerate(problem.procedure, start=1), key=lambda pair: _place(pair[1]))
+    ]
+
+
+def _refuse_twice(tasks: list[_Task], before: ParameterSet, valve: str, file: str) -> None:
+    """Refuse samples that two recordings of one kind of procedure have in common."""
+    for kind in RECOMMENDED_ORDER:
+        uses = [
+            Use(
+                f"recording {number} of procedure {task.item.kind}",
+                source.trace,
+                source.recording,
+                frozenset({kind}),
+                *times,
+            )
+            for task in tasks
+            if task.item.kind == kind
+            for times in [window_of(task.item, Setting(before, valve, task.place))]
+            for number, source in enumerate(task.sources, start=1)
+        ]
+        twice = used_twice(uses)
+        if twice:
+            raise IdentificationError(f"{file}: {twice}")
+
+
+def _look(task: _Task, setting: Setting, tell: Tell) -> Beforehand:
+    found = Beforehand(task.item.kind, prospects_of(task.sources, task.item, setting))
+    missing = [prospect for prospect in found.prospects if not prospect.can_be_had]
+    for prospect in missing:
+        tell(f"{found.procedure}: cannot be had: {prospect.name}: {prospect.statement}")
+    return found
 
 
 def _bench_estimates(results: Iterable[BenchResult]) -> list[Estimate]:
@@ -125,7 +186,8 @@ def _source(folder: Path, name: str, columns: str | None, problem: ProblemFile, 
 def _named(new_set: NewSet, problem: ProblemFile) -> ParameterSet:
     old = new_set.parameter_set
     told = (
-        f"Values with origin 'identified' come from the problem '{problem.name}'; the others are those of '{old.name}'."
+        f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}', the fitted ones being "
+        f"weak or true for this model only; the others are those of '{old.name}'."
     )
     return replace(
         old,

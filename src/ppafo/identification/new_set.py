@@ -17,21 +17,28 @@ _FORMS = (frozenset(item.name for item in AREA_FORM), frozenset(item.name for it
 
 @dataclass(frozen=True, slots=True)
 class NewSet:
-    """A set with identified values: their paths, and what is wrong with it as a device (an empty text if nothing)."""
+    """A set with new values, and what is wrong with it as a device (an empty text if nothing).
+
+    ``written`` are the paths of the identified ones. ``fitted`` are those of values that are weak or hold for this
+    model only: the set has them, with the origin ``fitted``, and they do not count as identified.
+    """
 
     parameter_set: ParameterSet
     written: tuple[str, ...]
+    fitted: tuple[str, ...]
     problem: str
 
 
 def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], valve: str | None = None) -> NewSet:
     """Return the set with every usable estimate that has a place in it; the later of two for one path counts."""
-    written: dict[str, None] = {}
+    found: dict[str, bool] = {}
     for estimate in estimates:
         if _has_a_place(parameter_set, estimate):
             parameter_set = _with_estimate(parameter_set, estimate)
-            written[estimate.path] = None
-    return NewSet(parameter_set, tuple(written), _device_problem(parameter_set, valve))
+            found[estimate.path] = estimate.is_identified
+    written = tuple(path for path, is_identified in found.items() if is_identified)
+    fitted = tuple(path for path, is_identified in found.items() if not is_identified)
+    return NewSet(parameter_set, written, fitted, _device_problem(parameter_set, valve))
 
 
 def _has_a_place(parameter_set: ParameterSet, estimate: Estimate) -> bool:
@@ -56,7 +63,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
     entry = Entry(
         value=value,
         unit=unit,
-        origin="identified",
+        origin="identified" if estimate.is_identified else "fitted",
         source="; ".join(estimate.recordings),
         note=f"{estimate.verdict_in_words}, {interval}. {estimate.explanation} Before, {was}.",
         uncertainty=max(high - value, value - low),

@@ -4,17 +4,29 @@ The order matters where one leans on another: torque and friction are measured f
 flow of the open valve before its map, and the leak last, since its chambers must be known to hold.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from ppafo.errors import IdentificationError, UnitError, nearest_name
+from ppafo.identification.bench.beforehand import (
+    data_prospects,
+    decay_prospects,
+    flow_prospects,
+    leak_prospects,
+    map_prospects,
+    static_prospects,
+)
 from ppafo.identification.bench.free_decay import FreeDecaySettings, free_decay
 from ppafo.identification.bench.gas_flow import GasAt
+from ppafo.identification.bench.leak_samples import VaneLeakSettings
 from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, open_valve_flow
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_torque
 from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
-from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
+from ppafo.identification.bench.vane_leak import vane_leak
+from ppafo.identification.check import Prospect
 from ppafo.identification.problem import (
     FreeDecayProblem,
     OpenValveFlowProblem,
@@ -95,18 +107,31 @@ class Setting:
 
 def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, setting: Setting) -> BenchResult:
     """Return what a procedure of a problem makes of its recordings."""
-    return _RUNS[problem.kind](sources, problem, setting)
+    procedure = _PROCEDURES[problem.kind]
+    return procedure.run(sources, procedure.settings(problem, setting))
 
 
-def _static_torque(sources: tuple[Source, ...], problem: StaticTorqueProblem, _setting: Setting) -> BenchResult:
-    return static_torque(sources, StaticTorqueSettings(problem.confidence, problem.calibration))
+def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:
+    """Return first and last time [s] that a procedure uses of its recordings."""
+    texts = {name: getattr(problem, name, None) for name in ("start", "end")}
+    first, last = (setting.given(name, text, "s") for name, text in texts.items())
+    return -math.inf if first is None else first, math.inf if last is None else last
 
 
-def _free_decay(sources: tuple[Source, ...], problem: FreeDecayProblem, setting: Setting) -> BenchResult:
+def prospects_of(sources: tuple[Source, ...], problem: ProcedureProblem, setting: Setting) -> tuple[Prospect, ...]:
+    """Return what a procedure can have of its recordings and what not, before it runs."""
+    procedure = _PROCEDURES[problem.kind]
+    return (*procedure.prospects(sources, procedure.settings(problem, setting)), *data_prospects(sources))
+
+
+def _static_torque(problem: StaticTorqueProblem, _setting: Setting) -> StaticTorqueSettings:
+    return StaticTorqueSettings(problem.confidence, problem.calibration)
+
+
+def _free_decay(problem: FreeDecayProblem, setting: Setting) -> FreeDecaySettings:
     start, end = (setting.given(name, getattr(problem, name), "s") for name in ("start", "end"))
     inertia, half_width, source = _inertia(problem, setting)
-    settings = FreeDecaySettings(start, end, inertia, half_width, source, problem.confidence, problem.calibration)
-    return free_decay(sources, settings)
+    return FreeDecaySettings(start, end, inertia, half_width, source, problem.confidence, problem.calibration)
 
 
 def _inertia(problem: FreeDecayProblem, setting: Setting) -> tuple[float | None, float, str]:
@@ -125,24 +150,24 @@ def _inertia(problem: FreeDecayProblem, setting: Setting) -> tuple[float | None,
     return value, setting.half_width("foot_plate.inertia", "kg m^2"), f"{entry.origin} in {setting.parameter_set.name}"
 
 
-def _open_valve_flow(sources: tuple[Source, ...], problem: OpenValveFlowProblem, setting: Setting) -> BenchResult:
+def _open_valve_flow(problem: OpenValveFlowProblem, setting: Setting) -> OpenValveFlowSettings:
     path = setting.valve_named(problem.valve)
     area = number_in_si(setting.parameter_set, f"{path}.area")
     gas, sure = setting.gas(problem.gas, problem.temperature), (problem.confidence, problem.calibration)
-    return open_valve_flow(sources, OpenValveFlowSettings(gas, problem.law, area, path, *sure))
+    return OpenValveFlowSettings(gas, problem.law, area, path, *sure)
 
 
-def _valve_map(sources: tuple[Source, ...], problem: ValveMapProblem, setting: Setting) -> BenchResult:
+def _valve_map(problem: ValveMapProblem, setting: Setting) -> ValveMapSettings:
     gas, path = setting.gas(problem.gas, problem.temperature), setting.valve_named(problem.valve)
-    return valve_map(sources, ValveMapSettings(gas, path, problem.confidence, problem.calibration))
+    return ValveMapSettings(gas, path, problem.confidence, problem.calibration)
 
 
-def _vane_leak(sources: tuple[Source, ...], problem: VaneLeakProblem, setting: Setting) -> BenchResult:
+def _vane_leak(problem: VaneLeakProblem, setting: Setting) -> VaneLeakSettings:
     start, end = (setting.given(name, getattr(problem, name), "s") for name in ("start", "end"))
     volume_1, volume_2 = _volumes(problem, setting)
     forms = ("discharge_coefficient", "critical_ratio")
     coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
-    settings = VaneLeakSettings(
+    return VaneLeakSettings(
         gas=setting.gas(problem.gas, problem.temperature),
         volume_1=volume_1,
         volume_2=volume_2,
@@ -153,7 +178,6 @@ def _vane_leak(sources: tuple[Source, ...], problem: VaneLeakProblem, setting: S
         calibration=problem.calibration,
         critical_ratio=ratio,
     )
-    return vane_leak(sources, settings)
 
 
 def _volumes(problem: VaneLeakProblem, setting: Setting) -> tuple[float | None, float | None]:
@@ -173,10 +197,19 @@ def _volumes(problem: VaneLeakProblem, setting: Setting) -> tuple[float | None, 
     return given[0] or found[0], given[1] or found[1]
 
 
-_RUNS: dict[str, Callable[..., BenchResult]] = {
-    "static_torque": _static_torque,
-    "free_decay": _free_decay,
-    "open_valve_flow": _open_valve_flow,
-    "valve_map": _valve_map,
-    "vane_leak": _vane_leak,
+@dataclass(frozen=True, slots=True)
+class _Procedure:
+    """How a procedure gets its settings, what it can give before it runs, and how it runs."""
+
+    settings: Callable[..., Any]
+    prospects: Callable[..., tuple[Prospect, ...]]
+    run: Callable[..., BenchResult]
+
+
+_PROCEDURES = {
+    "static_torque": _Procedure(_static_torque, static_prospects, static_torque),
+    "free_decay": _Procedure(_free_decay, decay_prospects, free_decay),
+    "open_valve_flow": _Procedure(_open_valve_flow, flow_prospects, open_valve_flow),
+    "valve_map": _Procedure(_valve_map, map_prospects, valve_map),
+    "vane_leak": _Procedure(_vane_leak, leak_prospects, vane_leak),
 }

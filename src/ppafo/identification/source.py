@@ -1,6 +1,9 @@
 """A recording with the name and the hash of its file, so that a value can be traced back to what was measured."""
 
+import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import combinations
 
 from ppafo.signals import Recording
 
@@ -26,3 +29,43 @@ class Source:
 def traces(sources: tuple[Source, ...]) -> tuple[str, ...]:
     """Return what an estimate from these recordings names as its origin."""
     return tuple(source.trace for source in sources)
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """A recording as it is used: by what, the file's trace, the channels that count, first and last time [s]."""
+
+    by: str
+    trace: str
+    recording: Recording
+    channels: frozenset[str]
+    first: float
+    last: float
+
+    def overlaps(self, other: "Use") -> bool:
+        """Whether both use samples of one time in one channel, should they be the same recording."""
+        return self.first < other.last and other.first < self.last and bool(self.channels & other.channels)
+
+
+def used_twice(uses: Iterable[Use]) -> str:
+    """Return why some samples would count twice, an empty text where none do.
+
+    Recordings are the same where the hash of their numbers is, under whatever names their files go.
+    """
+    known = [(use, _digest(use.recording)) for use in uses]
+    for (one, digest), (other, second) in combinations(known, 2):
+        if digest == second and one.overlaps(other):
+            return (
+                f"{one.by} ({one.trace}) and {other.by} ({other.trace}) are the same recording, sha256 {digest[:12]} "
+                f"of its numbers: its samples would count twice"
+            )
+    return ""
+
+
+def _digest(recording: Recording) -> str:
+    """Return the hash of times and values, whatever the file looks like."""
+    total = hashlib.sha256(recording.time.tobytes())
+    for name in sorted(recording.names):
+        total.update(name.encode())
+        total.update(recording[name].tobytes())
+    return total.hexdigest()

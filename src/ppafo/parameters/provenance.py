@@ -4,7 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Origin = Literal["published", "datasheet", "derived", "identified", "assumed"]
+Origin = Literal["published", "datasheet", "derived", "identified", "fitted", "assumed"]
+"""How a value came to be known; ``fitted`` is one that recordings do not fix, or whose recordings no model explains."""
 
 _STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 _Text = Annotated[str, Field(min_length=1)]

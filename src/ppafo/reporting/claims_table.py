@@ -25,9 +25,7 @@ def count_sentence(claims: Sequence[Claim]) -> str:
     """Return how many claims have each verdict, for example ``18 claims: 3 reproduced, 4 contradicted``."""
     counts = verdict_counts(claims)
     told = ", ".join(f"{count} {VERDICTS[verdict]}" for verdict, count in counts.items() if count)
-    synthetic = sum(claim.is_synthetic for claim in claims)
-    rest = f"; {synthetic} of them synthetic" if synthetic else ""
-    return f"{len(claims)} claims: {told}{rest}"
+    return f"{len(claims)} claims: {told}"
 
 
 def _row(claim: Claim) -> tuple[str, ...]:

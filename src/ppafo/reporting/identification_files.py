@@ -23,11 +23,13 @@ def identification_document(identification: Identification) -> dict[str, Any]:
         "problem": identification.name,
         "started_from": identification.before.name,
         "is_good": identification.is_good,
+        "beforehand": [plain(item) for item in identification.beforehand],
         "procedures": [_procedure(result) for result in identification.results],
         **trajectory_document(identification.trajectory),
         "new_set": {
             "file": f"{identification.name}.toml",
             "identified": list(identification.new_set.written),
+            "fitted": list(identification.new_set.fitted),
             "problem": identification.new_set.problem,
         },
     }
@@ -67,4 +69,5 @@ def _procedure(result: BenchResult) -> dict[str, Any]:
         "recordings_are": result.kind,
         "estimates": [plain(item) for item in result.estimates],
         "checks": [plain(item) for item in result.checks],
+        "remarks": list(result.remarks),
     }

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from ppafo.identification.bench.result import BenchResult, counted
 from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate
-from ppafo.identification.identify import Identification
+from ppafo.identification.identify import Beforehand, Identification
 from ppafo.identification.trajectory.expected import Expected
 from ppafo.identification.trajectory.outcome import TrajectoryOutcome
 from ppafo.identification.trajectory.profiles import Profile
@@ -24,16 +24,26 @@ def identification_table(identification: Identification) -> list[str]:
     """Return lines of text: for each procedure its estimates and checks, then what the new set got."""
     rows = [_row(item, identification.before) for item in identification.estimates]
     widths = [max((len(row[column]) for row in rows), default=0) for column in range(4)]
-    lines: list[str] = []
+    lines = _beforehand(identification.beforehand)
     for result in identification.results:
         lines += [*_procedure(result, identification.before, widths), ""]
     if identification.trajectory is not None:
         lines += [*_trajectory(identification.trajectory, identification.before, widths), ""]
-    written = identification.new_set.written
-    told = f"{counted(len(written), 'value')} identified: {', '.join(written)}" if written else "no value identified"
-    lines += textwrap.wrap(f"new set '{identification.name}': {told}", _WIDTH, subsequent_indent="  ")
+    lines += textwrap.wrap(f"new set '{identification.name}': {_found(identification)}", _WIDTH, subsequent_indent="  ")
     if identification.new_set.problem:
         lines += textwrap.wrap(f"it makes no device yet: {identification.new_set.problem}", _WIDTH)
+    return lines
+
+
+def _beforehand(found: Iterable[Beforehand]) -> list[str]:
+    """Return what was known before anything was fitted, procedure by procedure."""
+    lines: list[str] = []
+    for item in found:
+        lines.append(f"before {item.procedure}, from the recordings alone:")
+        for prospect in item.prospects:
+            word = "can be had" if prospect.can_be_had else "CANNOT be had"
+            lines += _wrapped(f"  {word}: {prospect.name}: {prospect.statement}", "    ")
+        lines.append("")
     return lines
 
 
@@ -41,7 +51,18 @@ def _procedure(result: BenchResult, before: ParameterSet, widths: list[int]) -> 
     kind = "" if result.kind == "measured" else f" ({result.kind})"
     lines = textwrap.wrap(f"{result.procedure}{kind}: {result.summary}", _WIDTH, subsequent_indent="  ")
     lines += [_estimate(item, before, widths) for item in result.estimates]
-    return lines + _checks(result.checks)
+    lines += _checks(result.checks)
+    for remark in result.remarks:
+        lines += _wrapped(f"  remark: {remark}", "          ")
+    return lines
+
+
+def _found(identification: Identification) -> str:
+    """Return how many values are identified, and apart from them which are fitted only."""
+    written, fitted = identification.new_set.written, identification.new_set.fitted
+    told = f"{counted(len(written), 'value')} identified: {', '.join(written)}" if written else "no value identified"
+    rest = f"; fitted only, weak or for this model only: {', '.join(fitted)}" if fitted else ""
+    return f"{told}{rest}"
 
 
 def _trajectory(outcome: TrajectoryOutcome, before: ParameterSet, widths: list[int]) -> list[str]:

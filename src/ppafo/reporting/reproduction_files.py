@@ -15,6 +15,7 @@ from ppafo.reporting.unreported_figure import unreported_figure
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.owned_folder import FolderKind, check_owned_folder, read_json, write_owned_folder
 from ppafo.studies.reproduction import Reproduction
+from ppafo.studies.reproduction.claim import verdict_counts
 from ppafo.studies.reproduction.step_response import Levels
 from ppafo.studies.reproduction.study import EXPERIMENTS
 from ppafo.studies.reproduction.synthetic import NoEvidence
@@ -71,8 +72,9 @@ def reproduction_files(reproduction: Reproduction) -> dict[str, bytes]:
 
 
 def claims_document(reproduction: Reproduction) -> dict[str, Any]:
-    """Return what ``claims.json`` says: the claims, and what was changed for this run."""
+    """Return what ``claims.json`` says: the claims, how many have each verdict, and what was changed for this run."""
     return {
+        "counts": verdict_counts(reproduction.claims),
         "claims": [claim.document() for claim in reproduction.claims],
         "overrides": list(reproduction.overrides),
         "versions": dict(reproduction.step.versions),

@@ -16,14 +16,20 @@ from ppafo.reporting.unreported_table import ERRORS, conclusion_rows, setting_ro
 from ppafo.simulation.result import Result
 from ppafo.studies.reproduction import Claim, Reproduction
 from ppafo.studies.reproduction.assumed import AssumedValue
-from ppafo.studies.reproduction.claim import VERDICTS, verdict_counts
+from ppafo.studies.reproduction.claim import VERDICTS, Verdict, verdict_counts
 from ppafo.studies.reproduction.study import PROPORTIONAL, SOLENOID, STEP
 from ppafo.studies.unreported_settings.implications import conclusions
 
 TEMPLATE = "reproduction.html.jinja"
 
 _EXPERIMENTS = {STEP: "step response", SOLENOID: "torque task, solenoid", PROPORTIONAL: "torque task, proportional"}
-_SYMBOLS = {"reproduced": "✓", "reproduced_with_assumptions": "≈", "contradicted": "✗", "not_testable": "○"}
+_SYMBOLS: dict[Verdict, str] = {
+    "reproduced": "✓",
+    "reproduced_with_assumptions": "≈",
+    "shown_on_synthetic": "◇",
+    "contradicted": "✗",
+    "not_testable": "○",
+}
 _TASK_METRICS = (
     "rms_error",
     "rms_error_ramp",
@@ -112,7 +118,6 @@ def _claim_row(claim: Claim) -> dict[str, Any]:
         "word": claim.verdict_words,
         "symbol": _SYMBOLS[claim.verdict],
         "note": claim.note,
-        "is_synthetic": claim.is_synthetic,
         "is_assumed": claim.verdict == "reproduced_with_assumptions",
     }
 

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ppafo.engine.lanes import Floats
-from ppafo.engine.replay import led_by_recording, replay
+from ppafo.engine.replay import replay
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import DataError, SimulationError
 from ppafo.model.plant import chamber_pressures
@@ -20,17 +20,17 @@ from ppafo.simulation.recorded.inputs import (
     EXTERNAL_TORQUE,
     SUPPLY,
     RecordedInputs,
+    led_along,
     sample_period,
     step_inputs,
-    step_times,
 )
-from ppafo.simulation.recorded.scenario import recorded_scenario, with_highest_supply
-from ppafo.simulation.recorded.start import Start, between_stops
+from ppafo.simulation.recorded.scenario import held_at, recorded_scenario, with_highest_supply
+from ppafo.simulation.recorded.start import Start
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import Measured
 
-Motion = Literal["free", "measured"]
+Motion = Literal["free", "measured", "held"]
 
 MOST_STEPS = 20_000_000
 _WHOLE = 1.0e-9
@@ -49,16 +49,11 @@ class Replayed:
 
 def replay_recording(measured: Measured, device: Device, start: Start, motion: Motion, extra: float) -> Replayed:
     """Run the model on the inputs of a recording and ``extra`` seconds longer, with the last inputs."""
-    run = _planned(measured, device, start, extra)
+    run = _planned(measured, device, start, motion, extra)
     if motion == "measured":
-        run = replace(run, program=led_by_recording(run.program), path=(0.0, start.angle, 0.0))
+        run = led_along(run, start.angle)
     inputs = _inputs(measured, motion)
-    given = step_inputs(inputs, device, run)
-    if motion == "measured":
-        given = replace(
-            given, parameters={**given.parameters, **_path(measured, device, step_times(run) + 0.5 * run.step)}
-        )
-    outcome = replay(batch_of(run), given)
+    outcome = replay(batch_of(run), step_inputs(inputs, device, run))
     failed = float(outcome.states[state_row_numbers(run)["result.failure_time"], 0])
     if failed < NEVER_FAILED or not np.isfinite(outcome.record).all():
         until = min(failed, run.step * run.step_count)
@@ -66,8 +61,7 @@ def replay_recording(measured: Measured, device: Device, start: Start, motion: M
             f"{measured.file}: the model diverged {until:.6g} s after the first sample; look at the volumes, the "
             "inertia and the valve of the set (ppafo audit)"
         )
-    names = (*inputs.names, ANGLE) if motion == "measured" else inputs.names
-    return Replayed(_recording(measured, run, outcome.record[:, :, 0]), run.step, names)
+    return Replayed(_recording(measured, run, outcome.record[:, :, 0]), run.step, inputs.names)
 
 
 def _inputs(measured: Measured, motion: Motion) -> RecordedInputs:
@@ -75,15 +69,17 @@ def _inputs(measured: Measured, motion: Motion) -> RecordedInputs:
     names = (
         COMMAND,
         *(name for name in (SUPPLY, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE) if _is_used(measured, name, motion)),
+        *((ANGLE,) if motion == "measured" else ()),
     )
     return RecordedInputs(measured.recording, names, float(measured.recording.time[0]))
 
 
-def _planned(measured: Measured, device: Device, start: Start, extra: float) -> Run:
-    """The run of a free vane, whose steps are fine enough for a led one too."""
+def _planned(measured: Measured, device: Device, start: Start, motion: Motion, extra: float) -> Run:
+    """The run of a free or a held vane; the steps of a free one are fine enough for a led one too."""
     recording = measured.recording
     duration = recording.duration + max(extra, sample_period(recording.time))
-    scenario = recorded_scenario(recording, with_highest_supply(device, recording), start, duration, measured.file)
+    highest, held = with_highest_supply(device, recording), held_at(start.angle) if motion == "held" else None
+    scenario = recorded_scenario(recording, highest, start, duration, measured.file, held)
     run = plan_run(scenario)
     if run.step_count > MOST_STEPS:
         raise DataError(
@@ -101,18 +97,9 @@ def _record_every(run: Run) -> int:
     return max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
 
 
-def _path(measured: Measured, device: Device, middle: Floats) -> dict[str, Floats]:
-    """The straight piece of the recorded angle that holds at each step; after the last sample the vane stands still."""
-    time = measured.recording.time - measured.recording.time[0]
-    angles = between_stops(measured.recording[ANGLE], device, measured.file)
-    rates = np.append(np.diff(angles) / np.diff(time), 0.0)
-    piece = np.searchsorted(time, middle, side="right") - 1
-    return {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
-
-
 def _is_used(measured: Measured, name: str, motion: Motion) -> bool:
     """True where an input is in the recording; a torque on a led vane is what leads it, not an input."""
-    return measured.has(name) and not (name == EXTERNAL_TORQUE and motion == "measured")
+    return measured.has(name) and not (name == EXTERNAL_TORQUE and motion != "free")
 
 
 def _recording(measured: Measured, run: Run, record: Floats) -> Recording:

@@ -6,7 +6,8 @@ import numpy as np
 
 from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.parameters.device import Device
-from ppafo.simulation.recorded.start import Start, between_stops, samples_at_rest
+from ppafo.simulation.recorded.inputs import between_stops
+from ppafo.simulation.recorded.start import Start, samples_at_rest
 from ppafo.units import parse_quantity
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
 from ppafo.validation.measured import Measured
@@ -30,6 +31,12 @@ def parse_initial(texts: "list[str] | tuple[str, ...]", atmosphere: float) -> di
         except UnitError as error:
             raise DataError(f"initial value '{one_line(text)}': {error}") from error
     return values
+
+
+def of_fixed_volume(device: Device, given: Mapping[str, float]) -> dict[str, float]:
+    """Return where the replay of a fixed volume starts beside its pressure, which nothing else touches."""
+    beside = {ANGLE: device.actuator.angle_min, PRESSURE_2: device.supply.atmospheric_pressure}
+    return {**given, **beside}
 
 
 def start_of(measured: Measured, device: Device, given: Mapping[str, float]) -> Start:

@@ -1,24 +1,26 @@
 """A parameter set held against recordings."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, nearest_name, one_line
+from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.inputs import SUPPLY, regular_interval
+from ppafo.simulation.recorded.scenario import fixed_volume
 from ppafo.storage.column_map import ColumnMap
+from ppafo.units import parse_quantity
 from ppafo.validation.agreement import ChannelAgreement, Comparison, RecordingAgreement, channel_agreement, common_delay
 from ppafo.validation.alignment import DEFAULT_LIMIT, Curve, Delay
 from ppafo.validation.compared import ANGLE, COMPARED, PRESSURE_1, PRESSURE_2, PRESSURE_DIFFERENCE
 from ppafo.validation.measured import Measured, read_measured, supply_gauge
 from ppafo.validation.replay import Motion, Replayed, replay_recording
-from ppafo.validation.start import start_of
+from ppafo.validation.start import of_fixed_volume, start_of
 from ppafo.validation.thresholds import Thresholds, parse_thresholds
 
 _OTHER_SUPPLY = 0.05
@@ -27,21 +29,24 @@ _AT_LIMIT = "model and measurement are further apart in time than a delay of {:g
 _CHANNEL_AT_LIMIT = (
     "own delay of {} is at the limit of {:g} s that was looked for: no delay of a sensor, another course"
 )
-MOTIONS: tuple[Motion, ...] = ("free", "measured")
+MOTIONS: tuple[Motion, ...] = ("free", "measured", "held")
 
 
 @dataclass(frozen=True, slots=True)
 class ReplaySettings:
     """How recordings are replayed and judged.
 
-    ``motion`` ``free`` lets the vane move as the model demands, ``measured`` leads it along the recorded angle;
-    ``initial`` values [SI] by channel go before the first samples; ``longest_delay`` [s] limits the delay looked for.
+    ``motion`` ``free`` lets the vane move as the model demands, ``measured`` leads it along the recorded angle,
+    ``held`` holds it where it starts. With a ``volume`` [m^3] there is no vane: chamber 1 is a fixed volume that the
+    valve fills and vents. ``initial`` values [SI] by channel go before the first samples; ``longest_delay`` [s] limits
+    the delay looked for.
     """
 
     motion: Motion = "free"
     initial: Mapping[str, float] = field(default_factory=dict)
     longest_delay: float = DEFAULT_LIMIT
     thresholds: Thresholds = field(default_factory=parse_thresholds)
+    volume: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +93,9 @@ def validate(
 
 def compare_recording(measured: Measured, device: Device, settings: ReplaySettings) -> RecordingAgreement:
     """Return how far the model of a device is from one recording, on the inputs of that recording."""
+    if settings.volume is not None:
+        device = fixed_volume(device, settings.volume)
+        settings = replace(settings, motion="held", initial=of_fixed_volume(device, settings.initial))
     _check_angle(measured, settings.motion)
     start = start_of(measured, device, settings.initial)
     replayed = replay_recording(measured, device, start, settings.motion, settings.longest_delay)
@@ -105,7 +113,7 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
         step=replayed.step,
         delay=delay,
         channels=channels,
-        remarks=(*measured.remarks, *_remarks(measured, device, settings.motion), *late),
+        remarks=(*measured.remarks, *_remarks(measured, device, settings), *late),
     )
 
 
@@ -127,11 +135,24 @@ def measured_values(recording: Recording, name: str) -> Floats | None:
 
 
 def check_motion(text: str) -> Motion:
-    """Return the way in which the vane moves in a replay: ``free`` or ``measured``."""
+    """Return the way in which the vane moves in a replay: ``free``, ``measured`` or ``held``."""
     for motion in MOTIONS:
         if motion == text:
             return motion
-    raise DataError(f"motion '{one_line(text)}' is neither {' nor '.join(MOTIONS)}{nearest_name(text, MOTIONS)}")
+    raise DataError(f"motion '{one_line(text)}' is none of {', '.join(MOTIONS)}{nearest_name(text, MOTIONS)}")
+
+
+def parse_volume(text: str | None) -> float | None:
+    """Return a fixed volume [m^3] in the place of chamber 1; None where there is a vane."""
+    if text is None:
+        return None
+    try:
+        volume = parse_quantity(text, "m^3")
+    except UnitError as error:
+        raise DataError(f"volume '{one_line(text)}': {error}") from error
+    if not volume > 0.0:
+        raise DataError(f"volume '{one_line(text)}' must be above zero")
+    return volume
 
 
 def _check_angle(measured: Measured, motion: Motion) -> None:
@@ -145,18 +166,26 @@ def _comparisons(measured: Measured, replayed: Replayed, device: Device, setting
     items = []
     for name, kind in COMPARED.items():
         values = measured_values(measured.recording, name)
-        if values is None or name in replayed.inputs:
+        if values is None or name in replayed.inputs or name in _not_of_motion(settings):
             continue
         full_range = kind.full_range(device, gauge)
         model = replayed.recording
         curve = Curve(measured.recording.time, values, model.time, model[name], full_range)
         items.append(Comparison(name, kind.unit, curve, settings.thresholds.limit(name).share_of(full_range)))
     if not items:
-        raise DataError(f"{measured.file}: has nothing to compare beside the angle that the vane was led along")
+        word = "pressure_1" if settings.volume is not None else "anything beside the angle that the vane was led along"
+        raise DataError(f"{measured.file}: has nothing to compare; it needs {word}")
     return items
 
 
-def _remarks(measured: Measured, device: Device, motion: str) -> tuple[str, ...]:
+def _not_of_motion(settings: ReplaySettings) -> tuple[str, ...]:
+    """The channels that say nothing where the vane is held, or where there is none."""
+    if settings.volume is not None:
+        return tuple(name for name in COMPARED if name != PRESSURE_1)
+    return (ANGLE,) if settings.motion == "held" else ()
+
+
+def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tuple[str, ...]:
     remarks = []
     own = device.supply.pressure - device.supply.atmospheric_pressure
     followed = supply_gauge(measured.recording, device)
@@ -167,6 +196,10 @@ def _remarks(measured: Measured, device: Device, motion: str) -> tuple[str, ...]
         remarks.append("the supply pressure was not recorded; that of the set was taken")
     if regular_interval(measured.recording.time) is None:
         remarks.append("samples are not regular in time; changes of the command were placed on the nearest step")
-    if motion == "measured":
+    if settings.volume is not None:
+        remarks.append(f"chamber 1 was taken as a fixed volume of {settings.volume * 1e6:.4g} cm^3 without a vane")
+    elif settings.motion == "held":
+        remarks.append("the vane was held where it starts; the angle is not compared")
+    if settings.motion == "measured":
         remarks.append("the vane was led along the recorded angle, which is therefore not compared")
     return tuple(remarks)

@@ -14,6 +14,7 @@ from ppafo.identification.problem import json_schema, parse_problem
 from ppafo.parameters.loading import load_device, load_parameter_set, parse_parameter_set
 from ppafo.parameters.writing import parameter_set_toml
 from ppafo.reporting.identification_files import identification_files
+from ppafo.reporting.identification_table import identification_table
 from ppafo.storage import write_csv
 
 HEAD = 'schema_version = 1\nname = "twin"\ndevice.set = "ppafo2011"\n'
@@ -32,6 +33,8 @@ Solve = Callable[[str], Identification]
 def bench(tmp_path: Path, planted: ModuleType) -> Path:
     """A folder with one recording for each procedure."""
     leak = planted.leak("orifice", planted.orifice_rate(0.3e-6 * 0.113, 60e-6))
+    growing = planted.static(growth=8.0e-7)
+    write_csv(tmp_path / "growing.csv", growing.recording)
     sources = (planted.static(), planted.decay(), planted.flow(), planted.sweep(), leak)
     for source in sources:
         write_csv(tmp_path / f"{source.recording.label}.csv", source.recording)
@@ -84,6 +87,57 @@ def test_the_new_set_reads_back_and_makes_a_device(solved: Solve, bench: Path) -
     device = load_device(bench / "twin.toml")
     assert device.valve.settings["dead_band"] == pytest.approx(0.12, abs=0.01)
     assert outcome.is_good
+
+
+def test_a_value_that_is_not_identified_is_written_as_fitted_and_not_counted(
+    solved: Solve, planted: ModuleType
+) -> None:
+    rises = STATIC.replace("static.csv", "growing.csv")
+    outcome = solved(rises)
+    assert outcome.new_set.written == ("actuator.torque_constant",)
+    assert outcome.new_set.fitted == ("friction.static_torque",)
+    entry = outcome.new_set.parameter_set.numbers["friction.static_torque"]
+    assert entry.origin == "fitted"
+    assert entry.note.startswith("holds for this model only, at 327.5 kPa")
+    table = identification_table(outcome)
+    assert "1 value identified: actuator.torque_constant; fitted only" in " ".join(table)
+
+
+def test_a_weak_value_is_written_as_fitted(solved: Solve, bench: Path, planted: ModuleType) -> None:
+    write_csv(bench / "rough.csv", planted.decay(noise=0.1).recording)
+    outcome = solved(DECAY.replace("decay.csv", "rough.csv"))
+    weak = {item.path for item in outcome.estimates if item.verdict == "weak" and item.path.startswith("friction.")}
+    assert weak
+    assert not weak & set(outcome.new_set.written)
+    assert {outcome.new_set.parameter_set.numbers[path].origin for path in weak} == {"fitted"}
+
+
+@pytest.mark.parametrize("name", ["decay.csv", "copy.csv"])
+def test_the_same_recording_twice_is_refused_by_the_hash_of_its_numbers(solved: Solve, bench: Path, name: str) -> None:
+    (bench / "copy.csv").write_text("# a copy\n" + (bench / "decay.csv").read_text())
+    for text in (DECAY.replace('"decay.csv"', f'"decay.csv", "{name}"'), DECAY + DECAY.replace("decay.csv", name)):
+        with pytest.raises(PpafoError, match=r"problem\.toml: .* are the same recording, sha256 \w{12} of its numbers"):
+            solved(text)
+
+
+def test_two_parts_of_one_recording_are_not_the_same_samples_twice(solved: Solve) -> None:
+    outcome = solved(f'{DECAY}start = "1.1 s"\nend = "3 s"\n{DECAY}start = "3.5 s"\nend = "6 s"\n')
+    assert len(outcome.results) == 2
+
+
+def test_what_cannot_be_had_is_said_before_anything_is_fitted(solved: Solve, bench: Path) -> None:
+    said: list[str] = []
+    path = bench / "problem.toml"
+    path.write_text(f'{HEAD}{LEAK.partition("volume_1")[0]}{DECAY}inertia = "unknown"\n')
+    outcome = identify(path, said.append)
+    missing = {item.name for one in outcome.beforehand for item in one.prospects if not item.can_be_had}
+    assert missing == {"absolute values", "area of the leak", "plateau or leak"}
+    assert len(said) == 3
+    lines = identification_table(outcome)
+    assert lines[0] == "before free_decay, from the recordings alone:"
+    assert lines.index("before vane_leak, from the recordings alone:") < next(
+        n for n, line in enumerate(lines) if line.startswith("free_decay (synthetic)")
+    )
 
 
 def test_values_that_no_procedure_touched_stay_as_they_were(solved: Solve) -> None:
@@ -193,9 +247,10 @@ def test_a_leak_in_the_form_of_the_standard_is_written_in_that_form(bench: Path)
     problem = HEAD.replace("ppafo2011", "sonic.toml") + LEAK
     (bench / "problem.toml").write_text(problem)
     outcome = identify(bench / "problem.toml")
-    assert outcome.new_set.written == ("actuator.leak.sonic_conductance",)
+    assert outcome.new_set.written == ()
+    assert outcome.new_set.fitted == ("actuator.leak.sonic_conductance",), "an orifice leaked, not one of the standard"
     numbers = outcome.new_set.parameter_set.numbers
-    assert numbers["actuator.leak.sonic_conductance"].origin == "identified"
+    assert numbers["actuator.leak.sonic_conductance"].origin == "fitted"
     assert numbers["actuator.leak.critical_ratio"].origin == "assumed"
     assert "actuator.leak.area" not in numbers
     assert outcome.new_set.problem == ""

@@ -1,6 +1,7 @@
 """The section [trajectory] of a problem file, from recordings to the new set."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -12,7 +13,8 @@ from ppafo.cli.main import main
 from ppafo.errors import PpafoError
 from ppafo.identification.identify import Identification, identify
 from ppafo.identification.problem import json_schema
-from ppafo.parameters.loading import parse_parameter_set
+from ppafo.parameters.device import Orifice
+from ppafo.parameters.loading import load_device, parse_parameter_set
 from ppafo.parameters.writing import parameter_set_toml
 from ppafo.reporting.identification_files import identification_document, identification_files
 from ppafo.reporting.identification_table import identification_table
@@ -309,3 +311,90 @@ def test_the_command_says_what_it_does_and_writes_nothing_for_bad_input(
     assert main(["identify", str(laboratory / "problem.toml"), "--out", str(tmp_path / "none")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not (tmp_path / "none").exists()
+
+
+TANK = """
+[[trajectory.experiments]]
+label = "tank"
+recording = "tank.csv"
+volume = "60 cm^3"
+"""
+ONE_NUMBER = '[trajectory]\nparameters = [{ path = "valve.discharge_coefficient", start = "0.10" }]\n'
+
+
+def tank(folder: Path, command: float) -> None:
+    """A tank of 60 cm^3 behind the valve, by the textbook formulas with small steps of time; no angle, no chamber 2."""
+    device = load_device("ppafo2011")
+    gas, orifice, ratio = device.gas, device.valve.orifice, device.gas.heat_capacity_ratio
+    assert isinstance(orifice, Orifice)
+    product, room = gas.specific_gas_constant * gas.temperature, device.supply.atmospheric_pressure
+    step, pressure, values = 1.0e-5, 1.2e5 if command > 0.0 else 4.2e5, []
+    for number in range(40_001):
+        if number % 100 == 0:
+            values.append(pressure)
+        high, low = (device.supply.pressure, pressure) if command > 0.0 else (pressure, room)
+        r = max(low / high, (2 / (ratio + 1)) ** (ratio / (ratio - 1)))
+        psi = np.sqrt(max(0.0, 2 * ratio / (ratio - 1) * (r ** (2 / ratio) - r ** ((ratio + 1) / ratio))))
+        flow = 0.13 * orifice.area * abs(command) * high / np.sqrt(product) * psi
+        pressure += np.sign(command) * step * flow * product / 60e-6
+    samples = np.array(values) + np.random.default_rng(1).normal(0.0, 300.0, len(values))
+    channels = {"pressure_1": Channel(samples, "Pa"), "command": Channel(np.full(len(values), command), "-")}
+    write_csv(folder / "tank.csv", Recording("tank", 1.0e-3 * np.arange(len(values)), channels, "synthetic"))
+
+
+@pytest.mark.parametrize("command", [0.3, -0.3])
+def test_a_fixed_volume_filled_or_vented_through_the_valve_gives_its_coefficient(
+    solve: Solve, laboratory: Path, command: float
+) -> None:
+    tank(laboratory, command)
+    outcome = solve(f"{ONE_NUMBER}{TANK}")
+    assert outcome.trajectory is not None
+    (found,) = outcome.trajectory.fit.estimates
+    assert found.value == pytest.approx(0.13, rel=3e-3)
+    assert [channel.channel for channel in outcome.trajectory.fit.channels] == ["pressure_1"]
+
+
+def test_a_held_vane_is_fitted_in_its_pressures(solve: Solve, laboratory: Path) -> None:
+    overrides = ["run.duration=0.4 s", "valve.discharge_coefficient=0.13", "motion.kind=held", "motion.angle=75 deg"]
+    scenario = load_scenario("step-response", overrides)
+    clean = simulate(scenario).recording
+    supply = np.full(len(clean), scenario.device.supply.pressure)
+    held = noisy(clean.with_channel("supply_pressure", supply, "Pa"), 3)
+    kept = {name: held.channels[name] for name in ("pressure_1", "pressure_2", "command", "supply_pressure")}
+    write_csv(laboratory / "held.csv", Recording("held", held.time, kept, "synthetic"))
+    text = TANK.replace("tank", "held").replace('volume = "60 cm^3"', 'held = "75 deg"')
+    outcome = solve(f"{ONE_NUMBER}{text}")
+    assert outcome.trajectory is not None
+    (found,) = outcome.trajectory.fit.estimates
+    assert found.value == pytest.approx(0.13, rel=3e-3)
+    assert [channel.channel for channel in outcome.trajectory.fit.channels] == ["pressure_1", "pressure_2"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"{TANK}held = '75 deg'\n", "held and volume: with a fixed volume there is no vane"),
+        (TANK.replace("60 cm^3", "0 cm^3"), "volume = '0 cm^3' must be above zero"),
+        (TANK.replace("60 cm^3", "60 psi"), "volume"),
+        (f"{TANK}inputs = ['command', 'angle']\n", "the vane is held or absent, and inputs has 'angle'"),
+        (f"{TANK}scenario = 'step-response'\n", "volume and a scenario"),
+        (f"{STEP}inputs = ['angel']\n", "did you mean 'angle'"),
+    ],
+)
+def test_a_contradiction_about_the_vane_is_told(solve: Solve, laboratory: Path, text: str, message: str) -> None:
+    tank(laboratory, 0.3)
+    with pytest.raises(PpafoError, match=re.escape(message)):
+        solve(f"{ONE_NUMBER}{text}")
+
+
+def test_a_bench_prior_from_a_recording_that_is_fitted_too_is_refused(solve: Solve) -> None:
+    prior = '[trajectory]\nparameters = [{ path = "friction.viscous_damping", prior = "bench" }]\n'
+    text = STEP.replace("step.csv", "decay.csv") + "channels = ['angle']\n"
+    with pytest.raises(PpafoError, match=r"prior = 'bench' comes from decay\.csv sha256:.*it would count twice"):
+        solve(f"{DECAY}{prior}{text}")
+
+
+def test_a_recording_in_two_experiments_is_refused(solve: Solve) -> None:
+    again = STEP.replace('"step"', '"again"')
+    with pytest.raises(PpafoError, match=r"problem\.toml.*'step'.*'again'.*are the same recording"):
+        solve(f"{FIT}{again}")

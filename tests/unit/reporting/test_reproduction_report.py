@@ -99,7 +99,7 @@ def test_the_page_states_every_claim_with_both_numbers_and_the_verdict(reproduct
         assert words(typeset(claim.statement)) in text
         assert words(typeset(claim.note)) in text
     assert "contradicted" in text
-    assert "with assumptions, synthetic" in text
+    assert "shown on synthetic data" in text
 
 
 def test_the_page_holds_both_figures_and_fetches_nothing(page: str) -> None:

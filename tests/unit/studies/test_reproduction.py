@@ -9,6 +9,8 @@ import pytest
 
 from ppafo.errors import PpafoError, SimulationError
 from ppafo.parameters.audit.evidence import Evidence
+from ppafo.reporting.claims_table import count_sentence
+from ppafo.reporting.reproduction_files import claims_document
 from ppafo.simulation.result import Result, Status
 from ppafo.studies.reproduction import Claim, Reproduction, reproduce, study
 from ppafo.studies.reproduction.arithmetic import arithmetic_claims
@@ -77,11 +79,23 @@ def test_what_a_synthetic_measurement_tests_says_so_and_is_never_plainly_reprodu
     tested = [claim for claim in reproduction.claims if claim.is_synthetic]
     assert {claim.id for claim in tested} == SYNTHETIC
     for claim in tested:
-        assert claim.verdict in ("reproduced_with_assumptions", "contradicted")
-        assert claim.verdict_words.endswith(", synthetic")
+        assert claim.verdict in ("shown_on_synthetic", "contradicted")
+        assert "synthetic" in claim.verdict_words
         assert "synthetic: it shows that the procedure works, not that the paper's device" in claim.note
         assert any("virtual rig" in assumption for assumption in claim.assumptions)
         assert claim.document()["synthetic"] is True
+
+
+def test_claims_shown_on_synthetic_data_are_counted_apart_from_those_that_are_reproduced(
+    reproduction: Reproduction,
+) -> None:
+    counts = verdict_counts(reproduction.claims)
+    assert (counts["shown_on_synthetic"], counts["reproduced_with_assumptions"]) == (7, 4)
+    assert claims_document(reproduction)["counts"] == counts
+    assert "4 reproduced with assumptions, 7 shown on synthetic data" in count_sentence(reproduction.claims)
+    claim = next(claim for claim in reproduction.claims if claim.is_synthetic)
+    with pytest.raises(ValueError, match="does not go with synthetic"):
+        dataclasses.replace(claim, verdict="reproduced_with_assumptions")
 
 
 def test_every_planted_value_comes_back_from_the_rig_with_the_paper_s_physics() -> None:
@@ -112,13 +126,14 @@ def test_an_interval_beside_the_planted_value_contradicts_the_claim(reproduction
     judged = {claim.id: claim for claim in measured_claims(load_printed(), wrong, ())}
     assert judged["static_friction"].verdict == "contradicted"
     assert "does not hold it" in judged["static_friction"].note
-    assert judged["k_actuator"].verdict == "reproduced_with_assumptions"
+    assert judged["k_actuator"].verdict == "shown_on_synthetic"
+    assert judged["static_friction"].verdict_words == "contradicted, synthetic"
 
 
 def test_an_error_beyond_a_tenth_of_the_full_range_contradicts_the_claim(reproduction: Reproduction) -> None:
     evidence = reproduction.synthetic
     assert isinstance(evidence, SyntheticEvidence)
-    for degrees, verdict in ((10.9, "reproduced_with_assumptions"), (11.1, "contradicted")):
+    for degrees, verdict in ((10.9, "shown_on_synthetic"), (11.1, "contradicted")):
         channels = tuple(
             dataclasses.replace(channel, rms=math.radians(degrees)) if channel.channel == "angle" else channel
             for channel in evidence.step.channels

@@ -88,6 +88,52 @@ def test_a_varying_supply_and_a_led_vane_are_followed_as_an_independent_solver_h
     assert max(channel.share for channel in agree(constant, device, motion="measured").channels) > 2e-2
 
 
+def test_a_held_vane_is_filled_as_an_independent_solver_has_it(agree: Agree) -> None:
+    device = load_device("ppafo2011")
+    pressures = independent(device, lambda _time: 4.4e5, lambda _time: 1.3)
+    recording = recording_of(pressures, np.full(TIMES.size, 4.4e5), np.full(TIMES.size, 1.3))
+    without = Recording("bench", TIMES, {n: recording.channels[n] for n in recording.names if n != "angle"})
+    agreement = agree(without, device, motion="held", initial={"angle": 1.3})
+    assert {channel.channel for channel in agreement.channels} == {"pressure_1", "pressure_2", "pressure_difference"}
+    assert max(channel.share for channel in agreement.channels) < 3e-4
+    moved = agree(without, device, motion="held", initial={"angle": 1.6})
+    assert max(channel.share for channel in moved.channels) > 2e-2
+
+
+@pytest.mark.parametrize("command", [0.1, -0.1])
+def test_a_fixed_volume_without_a_vane_is_filled_and_vented_as_an_independent_solver_has_it(
+    agree: Agree, command: float
+) -> None:
+    device, volume = load_device("ppafo2011"), 60e-6
+    gas, valve = device.gas, device.valve.orifice
+    assert isinstance(valve, Orifice)
+    ratio, product = gas.heat_capacity_ratio, gas.specific_gas_constant * gas.temperature
+    factor = np.sqrt(ratio / product) * (2 / (ratio + 1)) ** ((ratio + 1) / (2 * (ratio - 1)))
+    opening = abs(command) * valve.area * valve.discharge_coefficient * factor
+
+    def slope(_time: float, state: np.ndarray) -> list[float]:
+        inside = float(state[0])
+        if command > 0.0:
+            flow = opening * 4.4e5 * choked_or_not(4.4e5, inside, ratio)
+        else:
+            flow = -opening * inside * choked_or_not(inside, device.supply.atmospheric_pressure, ratio)
+        return [flow * product / volume]
+
+    start = 1.2e5 if command > 0.0 else 4.2e5
+    pressure = solve_ivp(slope, (0.0, TIMES[-1]), [start], "LSODA", TIMES, rtol=1e-9, atol=1e-3).y[0]
+    channels = {
+        "pressure_1": Channel(pressure, "Pa"),
+        "supply_pressure": Channel(np.full(TIMES.size, 4.4e5), "Pa"),
+        "command": Channel(np.full(TIMES.size, command), "-"),
+    }
+    agreement = agree(Recording("tank", TIMES, channels), device, volume=volume)
+    assert [channel.channel for channel in agreement.channels] == ["pressure_1"]
+    assert agreement.channels[0].share < 3e-4
+    assert any("a fixed volume of 60 cm^3 without a vane" in remark for remark in agreement.remarks)
+    wrong = agree(Recording("tank", TIMES, channels), device, volume=1.1 * volume)
+    assert wrong.channels[0].share > 5e-3
+
+
 def test_a_supply_unlike_that_of_the_set_is_followed_and_said(agree: Agree) -> None:
     device = load_device("ppafo2011")
     pressures = independent(device, lambda _time: 6.0e5, lambda _time: 1.3)

@@ -14,6 +14,9 @@ from ppafo.signals.recording import Floats
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
 
+CLEARLY_WORSE = 10.0
+"""Difference in Akaike's criterion from which one law is refused in favour of another."""
+
 _MOST_CORRELATION = 0.999
 
 
@@ -22,7 +25,7 @@ class CurveFit:
     """Values, half widths, correlation of the errors, residuals; ``effective`` samples count as independent ones.
 
     ``widened`` says for each value how many times as wide its interval is as independent samples would have it, 1 where
-    the law misses them by no more than they scatter.
+    the law misses them by no more than they scatter. ``spread`` are standard errors for residuals of size one.
     """
 
     values: Floats
@@ -32,6 +35,7 @@ class CurveFit:
     effective: float
     at_bound: tuple[bool, ...]
     widened: Floats
+    spread: Floats
 
     @property
     def rms(self) -> float:
@@ -77,13 +81,21 @@ def fit_curve(
     Where the law misses the samples by more than they scatter, in their order or ``along`` other variables
     (``lack_of_fit``): 2. the variance between blocks of samples; 3. how the values change without each block.
     """
-    problem = _Bounded(residuals_of, lower, upper)
-    found = problem.solved(start)
+    fit = solve_curve(residuals_of, start, lower, upper, confidence)
+    missing = lack_of_fit(fit.residuals, start.size, confidence, along)
+    return _widened(fit, _Bounded(residuals_of, lower, upper), missing, confidence) if missing.is_seen else fit
+
+
+def solve_curve(
+    residuals_of: Callable[[Floats], Floats], start: Floats, lower: Floats, upper: Floats, confidence: float
+) -> CurveFit:
+    """Return the bounded least-squares fit with the first of these intervals; enough to compare laws with."""
+    found = _Bounded(residuals_of, lower, upper).solved(start)
     residuals, inverse = np.asarray(found.fun), _inverse(np.asarray(found.jac))
     spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = inverse / np.outer(spread, spread)
-    fit = CurveFit(
+    return CurveFit(
         values=np.asarray(found.x),
         half_widths=_following(residuals, spread.size, confidence) * spread,
         correlation=correlation,
@@ -91,9 +103,8 @@ def fit_curve(
         effective=effective_samples(residuals),
         at_bound=tuple(bool(flag) for flag in found.active_mask != 0),
         widened=np.ones(spread.size),
+        spread=spread,
     )
-    missing = lack_of_fit(residuals, spread.size, confidence, along)
-    return _widened(fit, problem, missing, spread, confidence) if missing.is_seen else fit
 
 
 def _following(residuals: Floats, parameters: int, confidence: float) -> float:
@@ -103,8 +114,9 @@ def _following(residuals: Floats, parameters: int, confidence: float) -> float:
     return float(quantile(confidence, max(1, int(freedom))) * np.sqrt(variance))
 
 
-def _widened(fit: CurveFit, problem: _Bounded, missing: LackOfFit, spread: Floats, confidence: float) -> CurveFit:
+def _widened(fit: CurveFit, problem: _Bounded, missing: LackOfFit, confidence: float) -> CurveFit:
     """Return the fit with the intervals that hold where the law misses the samples."""
+    spread = fit.spread
     freedom = max(1, fit.residuals.size - spread.size)
     independent = quantile(confidence, freedom) * float(np.sqrt(fit.residuals @ fit.residuals / freedom)) * spread
     without = []

@@ -4,10 +4,12 @@ import math
 from dataclasses import dataclass, replace
 
 from ppafo.identification.bench.result import verdict_of
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import WORTH_TELLING, Estimate, Verdict
 
 _ANY = -math.inf
 _NOTHING = 1.0e-9
+_CAPPED: Verdict = "holds for this model only"
+_MISSED = "The law misses the readings by more than they scatter: another law of the same device has another value."
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +17,8 @@ class Number:
     """A fitted number: where it belongs, its SI unit, half the width of its interval, what is to be said of it.
 
     ``scale`` stands in for the size of a value that may be zero; ``lowest`` is where its interval ends at the latest;
-    ``widened`` is how much wider than the scatter's the interval is, because the law misses the readings.
+    ``widened`` is how much wider than the scatter's the interval is, because the law misses the readings. ``condition``
+    says where the value holds, if the device has another one elsewhere.
     """
 
     path: str
@@ -26,6 +29,7 @@ class Number:
     scale: float | None = None
     lowest: float = _ANY
     widened: float = 1.0
+    condition: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,17 +63,21 @@ class Evidence:
         """Return the estimate of a number with an interval of a half width of its own, in its unit."""
         value, half = float(number.value), float(half_width)
         low, high = value - half, value + half
+        is_missed = float(number.widened) >= WORTH_TELLING
+        told = verdict or verdict_of(value, low, high, number.scale, is_missed or bool(number.condition))
+        missed = f" {_MISSED}" if is_missed and told == _CAPPED else ""
         return Estimate(
             path=number.path,
             value=value,
             unit=number.unit,
             low=max(number.lowest, low),
             high=high,
-            verdict=verdict or verdict_of(value, low, high, number.scale),
-            explanation=number.explanation,
+            verdict=told,
+            explanation=f"{number.explanation}{missed}",
             recordings=self.recordings,
             confidence=self.confidence,
             widened=float(number.widened),
+            condition=number.condition,
         )
 
     @property

@@ -63,10 +63,9 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
     decays = tuple(decay_of(source, chosen.start, chosen.end) for source in sources)
     fit = _fit(decays, chosen.confidence)
     estimates = _estimates(Evidence(traces(sources), chosen.confidence, chosen.calibration), fit, chosen)
-    checks = (_residual_check(decays, fit), _separated(fit), _stopped(decays, fit))
-    return BenchResult(
-        PROCEDURE, _summary(decays, fit, chosen), estimates, checks, _panels(decays, fit), kind_of(sources)
-    )
+    checks = (_residual_check(decays, fit), _separated(fit))
+    text, panels = _summary(decays, fit, chosen), _panels(decays, fit)
+    return BenchResult(PROCEDURE, text, estimates, checks, panels, kind_of(sources), (_stopped(decays, fit),))
 
 
 def _modelled(decay: Decay, own: Floats, rates: Floats) -> Floats:
@@ -183,13 +182,13 @@ def _separated(fit: CurveFit) -> Check:
     )
 
 
-def _stopped(decays: tuple[Decay, ...], fit: CurveFit) -> Check:
+def _stopped(decays: tuple[Decay, ...], fit: CurveFit) -> str:
     """Say whether the vane came to rest within the recording, where Coulomb friction shows best."""
     count = sum(
         stop_time(float(fit.values[3 + 2 * number]), *map(float, fit.values[:2])) <= decay.time[-1]
         for number, decay in enumerate(decays)
     )
-    return Check("came to rest", True, f"{count} of {len(decays)} decays reach rest within the recording")
+    return f"{count} of {len(decays)} decays reach rest within the recording"
 
 
 def _summary(decays: tuple[Decay, ...], fit: CurveFit, settings: FreeDecaySettings) -> str:

@@ -5,7 +5,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
-from ppafo.identification.check import Check
 from ppafo.identification.source import Source
 from ppafo.signals import CHANNELS, Recording, RecordingKind
 from ppafo.signals.faults import longest_gap, plateaus
@@ -71,7 +70,7 @@ def check_absolute(source: Source, procedure: str, name: str) -> None:
         )
 
 
-def pauses(sources: tuple[Source, ...]) -> tuple[Check, ...]:
+def pauses(sources: tuple[Source, ...]) -> tuple[str, ...]:
     """Return a remark on times without readings; steady readings lose nothing by them."""
     found = [(source, gap) for source in sources if (gap := longest_gap(source.recording.time)) is not None]
     if not found:
@@ -79,7 +78,7 @@ def pauses(sources: tuple[Source, ...]) -> tuple[Check, ...]:
     listed = [
         f"{source.name} has no reading for {gap.duration:.4g} s after sample {gap.index + 1}" for source, gap in found
     ]
-    return (Check("pauses", True, f"{'; '.join(listed)}; steady readings lose nothing by it"),)
+    return (f"pauses: {'; '.join(listed)}; steady readings lose nothing by it",)
 
 
 def window(recording: Recording, start: float | None, end: float | None) -> Recording:

@@ -26,6 +26,7 @@ _MOST_BLOCKS = 64
 """More would find what follows from sample to sample, for which there is an interval of its own."""
 
 _FEWEST_IN_A_BLOCK = 2
+_DRAWS = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,8 @@ class LackOfFit:
 def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Sequence[Floats] = ()) -> LackOfFit:
     """Return the lack of fit that widens intervals most, over numbers of blocks, in the order of samples and others.
 
-    ``along`` are variables over which a misfit may run besides, such as a pressure.
+    ``along`` are variables over which a misfit may run besides, such as a pressure. Readings that have some are steady
+    ones, whose noise may differ from place to place; in a course of time a misfit may fill one block alone.
     """
     freedom = max(1, residuals.size - parameters)
     widest = LackOfFit(float(residuals @ residuals) / freedom, freedom, ())
@@ -62,7 +64,11 @@ def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Se
     for order in orders:
         for count in counts:
             found = _missing(residuals, tuple(np.array_split(order, count)), parameters, chance)
-            if found is not None and found.deviation(confidence) > widest.deviation(confidence):
+            if found is None or (
+                along and not _exceeds_uneven_noise([residuals[block] for block in found.blocks], chance)
+            ):
+                continue
+            if found.deviation(confidence) > widest.deviation(confidence):
                 widest = found
     return widest
 
@@ -93,3 +99,15 @@ def _missing(residuals: Floats, blocks: tuple[Indices, ...], parameters: int, ch
     within = sum(float(((part - part.mean()) ** 2).sum()) for part in parts) / inner
     is_missing = exceeds_chance(between, within, freedom, inner, chance)
     return LackOfFit(between, freedom, blocks) if is_missing else None
+
+
+def _exceeds_uneven_noise(parts: list[Floats], chance: float) -> bool:
+    """Return whether the blocks' means scatter more than noise does that is larger in some blocks than in others.
+
+    The F test takes one variance for all. Here each block has its own: were all errors independent, the sum of the
+    squared means times their size would be one of squared normal numbers, weighted by the blocks' mean squares.
+    """
+    weights = np.array([float(part @ part) / part.size for part in parts])
+    seen = sum(float(part.sum()) ** 2 / part.size for part in parts)
+    draws = np.random.default_rng(1).standard_normal((_DRAWS, weights.size))
+    return bool(np.mean(draws**2 @ weights >= seen) <= chance)

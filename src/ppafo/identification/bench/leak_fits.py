@@ -1,14 +1,17 @@
 """The laws of a leak fitted to decays: of flow, a relaxation that no leak makes, and a curve without physics."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
+from ppafo.identification.bench.curve_fit import CLEARLY_WORSE, CurveFit, fit_curve
 from ppafo.identification.bench.evidence import Evidence, Number
 from ppafo.identification.bench.leak_laws import Chambers, Law, decay_times, difference_in_time
 from ppafo.identification.bench.leak_opening import Opening
+from ppafo.identification.bench.regression import CHANCE, exceeds_chance
 from ppafo.identification.check import Check
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.signals.recording import Floats
@@ -16,31 +19,37 @@ from ppafo.signals.recording import Floats
 EDGE = 20
 """Samples at either end that are averaged for a first guess."""
 
-CLEARLY_WORSE = 10.0
-"""Difference in AIC from which a law is refused."""
-
 DESCRIBES = 1.25
 """Misfit of a law over that of the smooth curve, up to which it describes the data."""
 
+Solve = Callable[[Callable[[Floats], Floats], Floats, Floats, Floats, float], CurveFit]
+
 _CLOSE = 0.01
 _DEGREE = 5
-_RELAXATION = "relaxation"
+RELAXATION = "relaxation"
 
 
 @dataclass(frozen=True, slots=True)
 class Decay:
-    """Times from the start [s], falling pressure difference [Pa], the chambers, and how well gas is kept."""
+    """Times from the start [s], falling pressure difference [Pa], the chambers, and how well gas is kept.
+
+    ``emptying`` is the number of the chamber that loses gas, 1 or 2.
+    """
 
     time: Floats
     difference: Floats
     chambers: Chambers
     lost_share: float
     floor: float
+    emptying: int = 1
 
 
 @dataclass(frozen=True, slots=True)
 class FittedLaw:
-    """A law fitted to all decays: its rate first, misfit [Pa], Akaike's criterion, and the curves."""
+    """A law fitted to all decays: its rate first, misfit [Pa], Akaike's criterion, and the curves.
+
+    ``plateaus`` are the differences [Pa] towards which a relaxation goes, each with half the width of its interval.
+    """
 
     name: str
     formula: str
@@ -51,6 +60,7 @@ class FittedLaw:
     criterion: float
     curves: tuple[Floats, ...]
     widened: float
+    plateaus: tuple[tuple[float, float], ...] = ()
 
 
 def smooth_curve(decay: Decay) -> Floats:
@@ -59,7 +69,9 @@ def smooth_curve(decay: Decay) -> Floats:
     return np.asarray(curve(decay.time))
 
 
-def fit_law(law: Law, decays: tuple[Decay, ...], count: float, confidence: float) -> FittedLaw:
+def fit_law(
+    law: Law, decays: tuple[Decay, ...], count: float, confidence: float, solve: Solve = fit_curve
+) -> FittedLaw:
     """Return a law of flow fitted to all decays with one rate; each decay has a start of its own."""
     starts = [float(np.mean(decay.difference[:EDGE])) for decay in decays]
     guesses = []
@@ -77,7 +89,7 @@ def fit_law(law: Law, decays: tuple[Decay, ...], count: float, confidence: float
 
     scale = max(starts)
     ones = np.ones(1 + len(decays))
-    fit = fit_curve(lambda values: _misfits(decays, curves(values)) / scale, ones, 1e-3 * ones, 1e3 * ones, confidence)
+    fit = solve(lambda values: _misfits(decays, curves(values)) / scale, ones, 1e-3 * ones, 1e3 * ones, confidence)
     wide = float(fit.half_widths[0]) * rate
     return _fitted(
         law.name, law.formula, law.rate_unit, float(fit.values[0]) * rate, wide, fit, scale, count, curves(fit.values)
@@ -85,7 +97,10 @@ def fit_law(law: Law, decays: tuple[Decay, ...], count: float, confidence: float
 
 
 def fit_relaxation(decays: tuple[Decay, ...], count: float, confidence: float) -> FittedLaw:
-    """Fit an exponential towards a difference of its own: gas that cools, a wall that creeps, a seal that closes."""
+    """Fit an exponential towards a difference of its own: gas that cools, a wall that creeps, a seal that closes.
+
+    Values are the rate, then for each decay its start and its plateau, over how far it fell.
+    """
     starts = [float(np.mean(decay.difference[:EDGE])) for decay in decays]
     drops = [start - decay.floor for start, decay in zip(starts, decays, strict=True)]
     longest = max(float(decay.time[-1]) for decay in decays)
@@ -93,18 +108,23 @@ def fit_relaxation(decays: tuple[Decay, ...], count: float, confidence: float) -
     def curves(values: Floats) -> list[Floats]:
         listed = []
         for number, (decay, start, drop) in enumerate(zip(decays, starts, drops, strict=True)):
-            top, fall = values[1 + 2 * number : 3 + 2 * number]
-            listed.append(start + drop * (top - fall * -np.expm1(-values[0] * decay.time / longest)))
+            top, end = values[1 + 2 * number : 3 + 2 * number]
+            listed.append(start + drop * (end + (top - end) * np.exp(-values[0] * decay.time / longest)))
         return listed
 
     scale = max(starts)
-    guess = np.array([2.0, *(item for _ in decays for item in (0.0, 1.0))])
-    lower = np.array([1e-2, *(item for _ in decays for item in (-10.0, 0.0))])
-    upper = np.array([1e3, *(item for _ in decays for item in (10.0, 1e3))])
+    guess = np.array([2.0, *(item for _ in decays for item in (0.0, -1.0))])
+    lower = np.array([1e-2, *(item for _ in decays for item in (-10.0, -1e3))])
+    upper = np.array([1e3, *(item for _ in decays for item in (10.0, 10.0))])
     fit = fit_curve(lambda values: _misfits(decays, curves(values)) / scale, guess, lower, upper, confidence)
     rate, wide = float(fit.values[0]) / longest, float(fit.half_widths[0]) / longest
     formula = "exponential towards a difference above zero"
-    return _fitted(_RELAXATION, formula, "1/s", rate, wide, fit, scale, count, curves(fit.values))
+    plateaus = tuple(
+        (start + drop * float(fit.values[place]), drop * float(fit.half_widths[place]))
+        for place, start, drop in zip(range(2, fit.values.size, 2), starts, drops, strict=True)
+    )
+    fitted = _fitted(RELAXATION, formula, "1/s", rate, wide, fit, scale, count, curves(fit.values))
+    return replace(fitted, plateaus=plateaus)
 
 
 def _misfits(decays: tuple[Decay, ...], curves: list[Floats]) -> Floats:
@@ -131,7 +151,7 @@ def best_law(fitted: list[FittedLaw]) -> FittedLaw:
     """Return the law with the least criterion; a law of flow where one comes near: relaxation imitates them."""
     least = min(item.criterion for item in fitted)
     near = [item for item in fitted if item.criterion - least <= CLEARLY_WORSE]
-    return min(near, key=lambda item: (item.name == _RELAXATION, item.criterion))
+    return min(near, key=lambda item: (item.name == RELAXATION, item.criterion))
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,17 +175,20 @@ def judge(fitted: list[FittedLaw], best: FittedLaw, noise: float, span: float, u
     orifice = fitted[0]
     rivals = [item.name for item in fitted[1:] if item.criterion - orifice.criterion < CLEARLY_WORSE]
     behind = orifice.criterion - best.criterion
-    misses = f"the orifice law misses the data by {orifice.rms:.3g} {unit} rms, a smooth curve by {noise:.3g} {unit}"
+    times = f"{orifice.rms / noise:.2f} times as far ({DESCRIBES:g} is good)"
+    misses = f"the orifice law misses the data by {orifice.rms:.3g} {unit} rms, "
+    misses += f"a smooth curve by {noise:.3g} {unit}: {times}"
     is_close = orifice.rms <= DESCRIBES * noise and behind <= CLEARLY_WORSE
+    decides = f"the {best.name} law misses by {best.rms:.3g} {unit}, which is clearly better (AIC by {behind:.3g}; "
+    decides += f"{CLEARLY_WORSE:g} is clear)"
     if not is_close and not rivals and orifice.rms <= _CLOSE * span:
         return Judgement(
             "weak",
-            f"{misses}: it is by far the best law, but something else takes part, such as the gas's temperature; "
+            f"{misses}; it is by far the best law, but something else takes part, such as the gas's temperature; "
             f"the interval covers what of that shows in the residuals",
         )
     if not is_close:
-        compared = f"the {best.name} law by {best.rms:.3g} {unit} (AIC {behind:.3g} better)"
-        compared = f"{misses}, {compared}" if best is not orifice else misses
+        compared = f"{misses}, and {decides}" if behind > CLEARLY_WORSE else misses
         return Judgement("law does not describe the data", f"{compared}; an area would be a pretence")
     if rivals:
         return Judgement(
@@ -176,19 +199,108 @@ def judge(fitted: list[FittedLaw], best: FittedLaw, noise: float, span: float, u
     return Judgement("identified", misses)
 
 
-def law_checks(
-    fitted: list[FittedLaw], best: FittedLaw, noise: float, judged: Judgement, unit: str
-) -> tuple[Check, Check]:
-    """Return what the comparison of the laws says: whether an orifice will do, and how the laws rank."""
+def law_checks(fitted: list[FittedLaw], best: FittedLaw, judged: Judgement, unit: str) -> tuple[Check, Check]:
+    """Return what the comparison of the laws says: whether an orifice will do, and whether one law is the best.
+
+    A relaxation imitates every law of flow, so that it is no rival of one that comes near to it.
+    """
+    rivals = [
+        item.name
+        for item in fitted
+        if item is not best and item.name != RELAXATION and item.criterion - best.criterion < CLEARLY_WORSE
+    ]
+    found = f"{best.name} is clearly the best" if not rivals else f"{best.name} and {' and '.join(rivals)} fit alike"
     ranking = sorted(fitted, key=lambda item: item.criterion)
     listed = ", ".join(
         f"{item.name} {item.rms:.3g} {unit} ({item.criterion - best.criterion:+.3g})" for item in ranking
     )
-    text = f"misfit {fitted[0].rms / noise:.2f} times that of a smooth curve; {DESCRIBES:g} is good"
     return (
-        Check("orifice law", judged.verdict != "law does not describe the data", text),
-        Check("which law", True, f"misfit (AIC above the best): {listed}"),
+        Check("orifice law", judged.verdict != "law does not describe the data", judged.reason),
+        Check("which law", not rivals, f"{found}; misfit (AIC above the best): {listed}"),
     )
+
+
+class OffsetLeak(NamedTuple):
+    """A linear leak behind sensors whose difference is off by the same in all decays: rate [1/s] and offset [Pa].
+
+    Both with half the width of their intervals.
+    """
+
+    rate: tuple[float, float]
+    offset: tuple[float, float]
+
+
+def leak_or_relaxation(
+    decays: tuple[Decay, ...], relaxation: FittedLaw, count: float, confidence: float
+) -> tuple[Check, OffsetLeak | None]:
+    """Return whether a plateau is the zero of a sensor that a linear leak runs towards, or that of a relaxation.
+
+    One decay cannot say: both are the same curve. Of several from different pressures the zero is the same in all,
+    the plateau of a relaxation goes with the pressure. Each is tested against plateaus of their own (F test).
+    """
+    name, (plateau, _) = "leak or relaxation", relaxation.plateaus[0]
+    if len(decays) == 1:
+        rate = relaxation.rate / (1.0 + decays[0].chambers.volume_ratio)
+        text = (
+            f"cannot be said: a linear leak of {rate:.3g} 1/s and sensors whose difference is off by {plateau:.4g} Pa "
+        )
+        return Check(name, False, f"{text}give the same curve; a decay from another pressure tells them apart"), None
+    offset = _shared_plateau(decays, confidence, lambda shared, _top: shared)
+    share = _shared_plateau(decays, confidence, lambda shared, top: shared * top)
+    freedom = max(1, int(count) - 1 - 2 * len(decays))
+    own = relaxation.rms**2 * count / freedom
+    scale, longest = _scales(decays)
+
+    def explains(fit: CurveFit) -> bool:
+        more = max(0.0, (fit.rms * scale) ** 2 - relaxation.rms**2) * count / (len(decays) - 1)
+        return not exceeds_chance(more, own, len(decays) - 1, freedom, CHANCE)
+
+    is_offset, is_share = explains(offset), explains(share)
+    if is_offset and is_share:
+        text = "cannot be said: a linear leak with sensors that are off, and a relaxation, explain these decays alike"
+        return Check(name, False, f"{text}; they begin at pressures too near each other"), None
+    if not is_offset:
+        return Check(name, True, "a relaxation: no zero of the sensors, the same in all decays, explains them"), None
+    units = np.array([1.0 / longest, scale])
+    (rate, zero), wide = (offset.values[:2] * units).tolist(), (offset.half_widths[:2] * units).tolist()
+    found = OffsetLeak((rate, wide[0]), (zero, wide[1]))
+    return Check(
+        name, True, f"a linear leak: sensors that are off by {found.offset[0]:.4g} Pa explain all decays"
+    ), found
+
+
+def _scales(decays: tuple[Decay, ...]) -> tuple[float, float]:
+    """Return the largest difference [Pa] and the longest time [s], in whose multiples curves are fitted."""
+    return max(float(decay.difference.max()) for decay in decays), max(float(decay.time[-1]) for decay in decays)
+
+
+def _shared_plateau(
+    decays: tuple[Decay, ...], confidence: float, plateau_of: Callable[[float, float], float]
+) -> CurveFit:
+    """Return the exponentials whose plateaus follow from one number and their starts; values: rate, number, starts."""
+    scale, longest = _scales(decays)
+
+    def residuals(values: Floats) -> Floats:
+        curves = []
+        for decay, top in zip(decays, values[2:].tolist(), strict=True):
+            end = plateau_of(float(values[1]), top)
+            speed = values[0] * (1.0 + decay.chambers.volume_ratio) / longest
+            curves.append(scale * (end + (top - end) * np.exp(-speed * decay.time)))
+        return _misfits(decays, curves) / scale
+
+    tops = np.array([float(np.mean(decay.difference[:EDGE])) / scale for decay in decays])
+    ends = np.array([float(np.mean(decay.difference[-EDGE:])) / scale for decay in decays])
+    limits = np.array([1e3, 10.0, *(10.0 for _ in decays)])
+    fits = [
+        fit_curve(residuals, np.array([2.0, guess, *tops]), np.array([1e-2, *-limits[1:]]), limits, confidence)
+        for guess in (float(ends.min()), float(np.mean(ends / tops)))
+    ]
+    return min(fits, key=lambda fit: fit.rms)
+
+
+def condition_of(best: FittedLaw, which: Check) -> str:
+    """Return where the rate of the best law holds: only if that law does, where the laws cannot be told apart."""
+    return "" if which.holds else f"if the leak is {best.name}"
 
 
 def opening_estimates(
@@ -204,5 +316,5 @@ def opening_estimates(
 
 def weakened(estimate: Estimate, judged: Judgement) -> Estimate:
     """Return the estimate, called weak where its law is."""
-    is_too_sure = estimate.verdict == "identified" and judged.verdict == "weak"
+    is_too_sure = estimate.verdict in ("identified", "holds for this model only") and judged.verdict == "weak"
     return replace(estimate, verdict="weak") if is_too_sure else estimate

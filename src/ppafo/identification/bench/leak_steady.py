@@ -20,6 +20,7 @@ from ppafo.identification.bench.leak_fits import (
     FittedLaw,
     Judgement,
     best_law,
+    condition_of,
     judge,
     law_checks,
     opening_estimates,
@@ -67,13 +68,15 @@ def steady_leak(
     best, noise = best_law(laws), _noise(readings)
     judged = judge(laws, best, noise, float(np.ptp(readings.flow)), "kg/s")
     evidence = Evidence(traces(sources), confidence, opening.gas.share_of_flow(calibration))
+    checks = law_checks(laws, best, judged, "kg/s")
     return BenchResult(
         PROCEDURE,
         f"{readings.flow.size} steady readings; best law: {best.name} ({best.formula}); orifice: {judged.verdict}",
-        _estimates(evidence, opening, fitted, best, judged),
-        (*law_checks(laws, best, noise, judged, "kg/s"), *pauses(sources)),
+        _estimates(evidence, opening, fitted, best, judged, condition_of(best, checks[1])),
+        checks,
         _panels(readings.difference, readings.flow, laws[0], best),
         kind_of(sources),
+        pauses(sources),
     )
 
 
@@ -136,7 +139,7 @@ def _zero(fit: CurveFit, scale: float) -> Number:
 
 
 def _estimates(
-    evidence: Evidence, opening: Opening, fitted: list[_Fitted], best: FittedLaw, judged: Judgement
+    evidence: Evidence, opening: Opening, fitted: list[_Fitted], best: FittedLaw, judged: Judgement, where: str
 ) -> tuple[Estimate, ...]:
     orifice, zero = fitted[0]
     text = f"In steady flow. {opening.gas.temperature_told}; {evidence.calibration_told}. {judged.sentence}"
@@ -146,7 +149,7 @@ def _estimates(
     if best is not orifice:
         text = f"Coefficient of the law that fits best: {best.formula}."
         path = f"vane_leak.{best.name}_coefficient"
-        number = Number(path, best.rate_unit, best.rate, best.half_width, text, lowest=0.0, widened=best.widened)
+        number = Number(path, best.rate_unit, best.rate, best.half_width, text, None, 0.0, best.widened, where)
         listed.append(weakened(evidence.calibrated(number), judged))
     return tuple(listed)
 

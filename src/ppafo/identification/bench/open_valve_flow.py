@@ -1,12 +1,13 @@
 """Flow through the fully open valve: Cd A of equations (6), (7), or C and b of ISO 6358 from several ratios."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
+from ppafo.identification.bench.curve_fit import CLEARLY_WORSE, CurveFit, fit_curve
 from ppafo.identification.bench.evidence import Evidence, Number
 from ppafo.identification.bench.gas_flow import GasAt, iso6358_shape, orifice_shape
 from ppafo.identification.bench.inputs import (
@@ -33,6 +34,7 @@ _FULLY_OPEN = 0.99
 _LARGEST_CRITICAL_RATIO = 0.95
 _SPREAD_OF_RATIOS = 0.15
 _GOOD_SHARE = 0.05
+_RATIO_STEP = 0.02
 
 Law = Literal["orifice", "iso6358"]
 
@@ -54,7 +56,7 @@ class OpenValveFlowSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class _Points:
+class OpenReadings:
     """Readings with the valve fully open: absolute pressures [Pa], flow [kg/s]."""
 
     upstream: Floats
@@ -63,7 +65,13 @@ class _Points:
 
     @property
     def ratio(self) -> Floats:
+        """Downstream over upstream pressure [-]."""
         return self.downstream / self.upstream
+
+    @property
+    def steps(self) -> Floats:
+        """The ratio in coarse steps: sorted by its own noise, residuals would run with it where the law is right."""
+        return np.round(self.ratio / _RATIO_STEP)
 
 
 def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings) -> BenchResult:
@@ -71,9 +79,9 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
     check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
     for source in sources:
         _check_source(source, settings.gas)
-    points = _points(sources)
+    points = open_readings(sources)
     orifice = _orifice_fit(points, settings)
-    sonic = _sonic_fit(points, settings) if _spans_enough(points, settings.gas) else None
+    sonic = _sonic_fit(points, settings) if spans_enough(points, settings.gas) else None
     if settings.law == "iso6358" and sonic is None:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
@@ -81,12 +89,14 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
         )
     evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow(settings.calibration))
     estimates = _estimates(evidence, settings, orifice, sonic)
-    checks = (*_checks(settings, orifice, sonic), *pauses(sources))
+    checks = _checks(settings, orifice, sonic)
+    one_ratio = "one pressure ratio, or choked flow alone: the orifice law and C with b cannot be told apart"
+    remarks = (*(() if sonic is not None else (one_ratio,)), *pauses(sources))
     text = f"{points.flow.size} readings, pressure ratios {points.ratio.min():.3g} to {points.ratio.max():.3g}; "
     text += f"Cd A = {orifice.values[0] * 1e6:.4g} mm^2"
     text += "" if sonic is None else f"; C = {sonic.values[0]:.4g} m^3/(s Pa), b = {sonic.values[1]:.3g}"
     panels = _panels(points, settings, orifice, sonic)
-    return BenchResult(PROCEDURE, text, estimates, checks, panels, kind_of(sources))
+    return BenchResult(PROCEDURE, text, estimates, checks, panels, kind_of(sources), remarks)
 
 
 def _check_source(source: Source, gas: GasAt) -> None:
@@ -98,7 +108,8 @@ def _check_source(source: Source, gas: GasAt) -> None:
     check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
 
 
-def _points(sources: tuple[Source, ...]) -> _Points:
+def open_readings(sources: tuple[Source, ...]) -> OpenReadings:
+    """Return the readings with the valve fully open; exchanged pressures and a valve that never was are refused."""
     upstream, downstream, flow = (pooled(sources, name) for name in CHANNELS)
     is_open = np.concatenate([_is_open(source) for source in sources])
     if is_open.sum() < FEWEST_SAMPLES:
@@ -106,7 +117,7 @@ def _points(sources: tuple[Source, ...]) -> _Points:
             f"{sources[0].name}: {PROCEDURE} needs {FEWEST_SAMPLES} readings with the valve fully open, "
             f"command 1 or -1; there are {int(is_open.sum())}"
         )
-    points = _Points(upstream[is_open], downstream[is_open], np.abs(flow[is_open]))
+    points = OpenReadings(upstream[is_open], downstream[is_open], np.abs(flow[is_open]))
     wrong = np.flatnonzero(points.downstream >= points.upstream)
     if wrong.size > points.flow.size // 10:
         raise IdentificationError(
@@ -124,17 +135,17 @@ def _is_open(source: Source) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
     return np.asarray(np.abs(source.recording["command"]) >= _FULLY_OPEN)
 
 
-def _spans_enough(points: _Points, gas: GasAt) -> bool:
+def spans_enough(points: OpenReadings, gas: GasAt) -> bool:
     """Whether flow is both nearly choked and clearly subsonic, so that the critical ratio has something to rest on."""
     choked = critical_pressure_ratio(gas.heat_capacity_ratio)
     return bool(np.ptp(points.ratio) >= _SPREAD_OF_RATIOS and points.ratio.max() > choked + 0.5 * _SPREAD_OF_RATIOS)
 
 
-def _orifice_flow(points: _Points, gas: GasAt) -> Floats:
+def _orifice_flow(points: OpenReadings, gas: GasAt) -> Floats:
     return gas.choked_flow_constant * orifice_shape(points.upstream, points.downstream, gas.heat_capacity_ratio)
 
 
-def _orifice_fit(points: _Points, settings: OpenValveFlowSettings) -> CurveFit:
+def _orifice_fit(points: OpenReadings, settings: OpenValveFlowSettings) -> CurveFit:
     per_area = _orifice_flow(points, settings.gas)
     start = np.array([per_area @ points.flow / (per_area @ per_area)])
     scale = float(np.abs(points.flow).max())
@@ -144,11 +155,11 @@ def _orifice_fit(points: _Points, settings: OpenValveFlowSettings) -> CurveFit:
         np.array([0.0]),
         np.array([np.inf]),
         settings.confidence,
-        (points.ratio, points.flow),
+        (points.steps,),
     )
 
 
-def _sonic_fit(points: _Points, settings: OpenValveFlowSettings) -> CurveFit:
+def _sonic_fit(points: OpenReadings, settings: OpenValveFlowSettings) -> CurveFit:
     """Fit C (as a multiple of a first guess, so that both unknowns are of order one) and b."""
     per_conductance = settings.gas.flow_per_sonic_conductance
     guess = float(points.flow.max()) / (per_conductance * float(points.upstream[np.argmax(points.flow)]))
@@ -165,7 +176,7 @@ def _sonic_fit(points: _Points, settings: OpenValveFlowSettings) -> CurveFit:
             np.zeros(2),
             np.array([100.0, _LARGEST_CRITICAL_RATIO]),
             settings.confidence,
-            (points.ratio, points.flow),
+            (points.steps,),
         )
         for start in (0.2, 0.5)
     ]
@@ -231,20 +242,26 @@ def _checks(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit 
     drift = abs(bound) <= max(0.01, 2.0 * reported.rms / np.sqrt(reported.effective))
     listed.append(Check("bias", bool(drift), f"mean residual {bound:+.2%} {noise}"))
     if sonic is not None:
-        count = min(orifice.effective, sonic.effective)
-        gain = count * np.log(max(orifice.rms, 1e-15) / max(sonic.rms, 1e-15)) * 2.0 - 2.0
-        better = "ISO 6358" if gain > 2.0 else "the orifice law" if gain < -2.0 else "neither law clearly"
-        text = f"AIC prefers {better} (difference {gain:+.1f}): rms {orifice.rms:.2%} orifice, {sonic.rms:.2%} ISO 6358"
-        listed.append(Check("which law", True, text))
-    else:
-        listed.append(
-            Check("which law", True, "one pressure ratio, or choked flow alone: C and b cannot be told apart")
-        )
+        listed.append(_which_law(settings, orifice, sonic))
     return tuple(listed)
 
 
+def _which_law(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit) -> Check:
+    """Ask whether the readings clearly prefer the law that was not asked for (Akaike's criterion)."""
+    count = min(orifice.effective, sonic.effective)
+    gain = count * math.log(max(orifice.rms, 1e-15) / max(sonic.rms, 1e-15)) * 2.0 - 2.0
+    better = (
+        "ISO 6358" if gain > CLEARLY_WORSE else "the orifice law" if gain < -CLEARLY_WORSE else "neither law clearly"
+    )
+    asked = "ISO 6358" if settings.law == "iso6358" else "the orifice law"
+    text = f"AIC prefers {better} (difference {gain:+.1f}): rms {orifice.rms:.2%} orifice, {sonic.rms:.2%} ISO 6358"
+    holds = better in (asked, "neither law clearly")
+    other = "iso6358" if settings.law == "orifice" else "orifice"
+    return Check("which law", holds, text if holds else f"{text}; try law = '{other}'")
+
+
 def _panels(
-    points: _Points, settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None
+    points: OpenReadings, settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None
 ) -> tuple[Panel, ...]:
     """Show conductance over ratio: flow over upstream pressure, which both laws make a function of the ratio alone."""
     ratios = np.linspace(0.0, 1.0, 201)

@@ -17,7 +17,10 @@ WEAK_WITHIN = 1.0
 
 @dataclass(frozen=True, slots=True)
 class BenchResult:
-    """Result of one procedure. ``kind`` is that of its recordings; figures say so where nobody measured them."""
+    """Result of one procedure. ``kind`` is that of its recordings; figures say so where nobody measured them.
+
+    ``checks`` can fail; ``remarks`` are what else is to be known, and nothing is tested by them.
+    """
 
     procedure: str
     summary: str
@@ -25,6 +28,7 @@ class BenchResult:
     checks: tuple[Check, ...]
     panels: tuple[Panel, ...]
     kind: RecordingKind
+    remarks: tuple[str, ...] = ()
 
     def __getitem__(self, path: str) -> Estimate:
         """Return the estimate at a path; KeyError where the procedure gave none."""
@@ -39,13 +43,18 @@ class BenchResult:
         return tuple(check for check in self.checks if not check.holds)
 
 
-def verdict_of(value: float, low: float, high: float, scale: float | None = None) -> Verdict:
-    """Return what an interval says of a value; ``scale`` stands in for a value that may well be zero."""
+def verdict_of(value: float, low: float, high: float, scale: float | None = None, is_capped: bool = False) -> Verdict:
+    """Return what an interval says of a value; ``scale`` stands in for a value that may well be zero.
+
+    ``is_capped`` says that the model does not explain the recordings, so that the value belongs to this model only.
+    """
     size = abs(value) if scale is None else scale
     half_width = (high - low) / 2.0
     if not math.isfinite(half_width) or half_width >= WEAK_WITHIN * size:
         return "not identifiable"
-    return "identified" if half_width <= IDENTIFIED_WITHIN * size else "weak"
+    if half_width > IDENTIFIED_WITHIN * size:
+        return "weak"
+    return "holds for this model only" if is_capped else "identified"
 
 
 def counted(number: int, noun: str) -> str:

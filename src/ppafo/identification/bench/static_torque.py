@@ -16,7 +16,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.evidence import Evidence, Number
 from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pauses
 from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.regression import Regression, labels_of, regress
+from ppafo.identification.bench.regression import CHANCE, Regression, labels_of, regress
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.bench.static_readings import PROCEDURE, Readings, readings_of
 from ppafo.identification.check import Check
@@ -58,21 +58,32 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
             source, PROCEDURE, "pressure_difference", "torque", source.recording["torque"], _MORE_THAN_FRICTION
         )
     growing = _fit(readings, True, chosen.confidence)
-    grows = growing.differs_from_zero(_GROWTH)
+    grows = _fit(readings, True, 1.0 - CHANCE).differs_from_zero(_GROWTH)
     fit = growing if grows else _fit(readings, False, chosen.confidence)
     _check_order(sources, fit)
     evidence = Evidence(traces(sources), chosen.confidence, chosen.calibration)
-    estimates = _estimates(evidence, readings, fit, growing)
+    estimates = _estimates(evidence, readings, fit, growing if grows else None, growing)
+    if grows:
+        estimates = (*estimates, evidence.calibrated(_at_no_pressure(readings, chosen.confidence)))
     straight = _straight(readings, grows, chosen.confidence)
-    checks = (straight, _outliers(readings, fit), _growth_check(growing, readings, grows), *pauses(sources))
     return BenchResult(
-        PROCEDURE, _summary(readings, fit, grows), estimates, checks, _panels(readings, fit), kind_of(sources)
+        PROCEDURE,
+        _summary(readings, fit, grows),
+        estimates,
+        (straight, _outliers(readings, fit), _growth_check(growing, readings, grows)),
+        _panels(readings, fit),
+        kind_of(sources),
+        pauses(sources),
     )
 
 
-def _fit(readings: Readings, with_growth: bool, confidence: float, extra: Floats | None = None) -> Regression:
+def _fit(
+    readings: Readings, with_growth: bool, confidence: float, extra: Floats | None = None, at: float | None = None
+) -> Regression:
+    """Return the regression; a friction that grows is that ``at`` a pressure difference [Pa], the mean one if None."""
     columns = [readings.pressure, np.ones_like(readings.pressure), -readings.branch]
-    columns += [-readings.branch * (readings.pressure - readings.middle)] if with_growth else []
+    middle = readings.middle if at is None else at
+    columns += [-readings.branch * (readings.pressure - middle)] if with_growth else []
     columns += [] if extra is None else [extra]
     design = np.stack(columns, axis=1)
     if readings.pressure.size <= design.shape[1]:
@@ -97,10 +108,13 @@ def _check_order(sources: tuple[Source, ...], fit: Regression) -> None:
         )
 
 
-def _estimates(evidence: Evidence, readings: Readings, fit: Regression, growing: Regression) -> tuple[Estimate, ...]:
+def _estimates(
+    evidence: Evidence, readings: Readings, fit: Regression, seen: Regression | None, growing: Regression
+) -> tuple[Estimate, ...]:
+    """Return what the readings give; ``seen`` is the growing friction where it was found to grow."""
     numbers = (
         _torque_constant(evidence, fit),
-        _static_torque(readings, fit, growing),
+        _static_torque(readings, fit, seen),
         Number(
             "static_torque.zero_offset",
             "N m",
@@ -130,17 +144,29 @@ def _torque_constant(evidence: Evidence, fit: Regression) -> Number:
     return Number("actuator.torque_constant", "m^3", value, half, text, widened=fit.widened[_SLOPE])
 
 
-def _static_torque(readings: Readings, fit: Regression, growing: Regression) -> Number:
-    growth = growing.coefficients[_GROWTH]
-    at_rest = growing.coefficients[_FRICTION] - growth * readings.middle
-    grown = (
-        f"it grows by {growth:.3g} m^3 with the pressure difference (per Pa), from {at_rest:.3g} N m at none"
-        if growing.differs_from_zero(_GROWTH)
-        else "no growth with pressure shows in these readings"
-    )
+def _static_torque(readings: Readings, fit: Regression, seen: Regression | None) -> Number:
+    """Return the friction; where it grows, that at the mean pressure difference, which the number says."""
+    condition = ""
+    grown = "no growth with pressure shows in these readings"
+    if seen is not None:
+        growth = seen.coefficients[_GROWTH]
+        at_rest = seen.coefficients[_FRICTION] - growth * readings.middle
+        condition = f"at {readings.middle / 1e3:.4g} kPa"
+        grown = f"it grows by {growth:.3g} m^3 with the pressure difference (per Pa), from {at_rest:.3g} N m at none, "
+        grown += "and a model with one friction torque is right at that pressure only"
     text = f"Half the distance of the branches at the mean pressure difference of {readings.middle:.4g} Pa; {grown}."
     value, half = fit.coefficients[_FRICTION], fit.half_widths[_FRICTION]
-    return Number("friction.static_torque", "N m", value, half, text, widened=fit.widened[_FRICTION])
+    widened = fit.widened[_FRICTION]
+    return Number("friction.static_torque", "N m", value, half, text, widened=widened, condition=condition)
+
+
+def _at_no_pressure(readings: Readings, confidence: float) -> Number:
+    """Return the friction that is left without a pressure difference, where it grows along a straight line."""
+    fit = _fit(readings, True, confidence, at=0.0)
+    lowest = float(readings.pressure.min())
+    text = f"Static friction without a pressure difference, on a line through readings from {lowest:.4g} Pa on."
+    value, half, widened = fit.coefficients[_FRICTION], fit.half_widths[_FRICTION], fit.widened[_FRICTION]
+    return Number("static_torque.friction_at_no_pressure", "N m", value, half, text, widened=widened)
 
 
 def _straight(readings: Readings, grows: bool, confidence: float) -> Check:
@@ -168,16 +194,20 @@ def _outliers(readings: Readings, fit: Regression) -> Check:
 
 
 def _growth_check(growing: Regression, readings: Readings, grows: bool) -> Check:
-    """Say whether one number for the friction will do; it is told, not judged."""
+    """Ask whether one number for the friction will do: a friction that grows fails, but for a chance of one percent."""
     low, high = (
         growing.coefficients[_FRICTION] + growing.coefficients[_GROWTH] * (pressure - readings.middle)
         for pressure in (readings.pressure.min(), readings.pressure.max())
     )
     if grows:
-        text = f"friction goes from {low:.3g} N m at the lowest to {high:.3g} N m at the highest pressure difference"
+        text = (
+            f"friction goes from {low:.3g} N m at the lowest to {high:.3g} N m at the highest pressure difference; a "
+        )
+        text += "model with one friction torque is right at one of them only"
     else:
-        text = "one friction torque describes all pressures"
-    return Check("friction over pressure", True, text)
+        most = (abs(growing.coefficients[_GROWTH]) + growing.half_widths[_GROWTH]) * float(np.ptp(readings.pressure))
+        text = f"one friction torque describes all pressures; more than {most:.2g} N m of growth would have shown"
+    return Check("friction over pressure", not grows, text)
 
 
 def _summary(readings: Readings, fit: Regression, grows: bool) -> str:

@@ -83,13 +83,21 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     fit, scale = fitted
     evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow(settings.calibration))
     estimates = _estimates(evidence, measured, fitted, settings.path)
-    checks = (*_checks(measured, fit), _meter_check(sources), *pauses(sources))
+    checks = (*_checks(measured, fit), _meter_check(sources))
+    remarks = (*_one_way(measured), *pauses(sources))
     values = fit.values
     text = (
         f"{measured.command.size} readings; dead band {values[_DEAD_BAND]:.3g}, hysteresis {values[_HYSTERESIS]:.3g}, "
     )
     text += f"gain {values[_GAIN] * scale * 1e6:.4g} mm^2"
-    return BenchResult(PROCEDURE, text, estimates, checks, _panels(measured, fit, scale), kind_of(sources))
+    return BenchResult(PROCEDURE, text, estimates, checks, _panels(measured, fit, scale), kind_of(sources), remarks)
+
+
+def is_two_way(sources: tuple[Source, ...]) -> bool:
+    """Return whether commands both rise and fall."""
+    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
+    branches = np.concatenate([_branch(source) for source in sources])
+    return bool((branches > 0).any() and (branches < 0).any())
 
 
 def area_of_command(
@@ -195,18 +203,21 @@ def _checks(measured: _Map, fit: CurveFit) -> tuple[Check, ...]:
     fits = Check(
         "residuals", fit.rms <= _GOOD_SHARE, f"the map misses the opening by {fit.rms:.2%} of the full one (rms)"
     )
-    both = bool((measured.command > 0.1).any() and (measured.command < -0.1).any())
     listed = [fits]
-    if both:
+    if not _one_way(measured):
         sides = [float(np.mean(fit.residuals[sign * measured.command > 0.1])) * sign for sign in (1.0, -1.0)]
         apart = abs(sides[0] - sides[1])
         text = f"the two directions differ by {apart:.2%} of the full opening"
         listed.append(Check("both ways alike", apart <= _GOOD_SHARE, text))
-    else:
-        listed.append(Check("both ways alike", True, "only one direction was recorded"))
     both_ways, one_way = "rising and falling commands were recorded", "the command went one way: hysteresis is unknown"
     text = both_ways if measured.is_two_way else one_way
     return (*listed, Check("hysteresis seen", measured.is_two_way, text))
+
+
+def _one_way(measured: _Map) -> tuple[str, ...]:
+    """Return a remark where the valve was opened one way only: nothing can be said of the other."""
+    both = bool((measured.command > 0.1).any() and (measured.command < -0.1).any())
+    return () if both else ("only one direction was recorded: whether the other is alike is unknown",)
 
 
 def _meter_check(sources: tuple[Source, ...]) -> Check:

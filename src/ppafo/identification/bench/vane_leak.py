@@ -4,72 +4,48 @@ An area is reported only where the orifice law describes the decay; a smooth cur
 law could come. A chamber whose pressure stands still is taken for a room, the atmosphere for example.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.curve_fit import effective_samples
+from ppafo.identification.bench.curve_fit import effective_samples, fit_curve, solve_curve
 from ppafo.identification.bench.evidence import Evidence, Number
-from ppafo.identification.bench.gas_flow import GasAt
-from ppafo.identification.bench.inputs import check_absolute, check_moves, check_sources, kind_of, window
+from ppafo.identification.bench.inputs import check_sources, kind_of
 from ppafo.identification.bench.leak_fits import (
-    EDGE,
     Decay,
     FittedLaw,
     Judgement,
+    OffsetLeak,
     best_law,
+    condition_of,
     fit_law,
     fit_relaxation,
     judge,
     law_checks,
+    leak_or_relaxation,
     opening_estimates,
     smooth_curve,
 )
-from ppafo.identification.bench.leak_laws import LAMINAR, LINEAR, Chambers
-from ppafo.identification.bench.leak_opening import Opening
+from ppafo.identification.bench.leak_laws import LAMINAR, LINEAR
+from ppafo.identification.bench.leak_samples import (
+    CHANNELS,
+    FEWEST_SAMPLES,
+    PROCEDURE,
+    Closed,
+    VaneLeakSettings,
+    closed_chambers,
+    decay_in,
+    given_ratio,
+)
 from ppafo.identification.bench.leak_steady import steady_leak
 from ppafo.identification.bench.picture import Panel, Series
 from ppafo.identification.bench.result import BenchResult, counted
 from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
-from ppafo.signals import Recording
-from ppafo.signals.faults import longest_gap, plateaus, stands_out
 from ppafo.signals.recording import Floats
 
-PROCEDURE = "vane_leak"
-CHANNELS = ("pressure_1", "pressure_2")
-FEWEST_SAMPLES = 20
-STANDS_STILL = 0.02
-"""Change of a pressure over that of the other, up to which a chamber counts as a room."""
-
 _LOST_ALLOWED = 0.05
-_NEARLY_EQUAL = 0.01
-
-
-@dataclass(frozen=True, slots=True)
-class VaneLeakSettings:
-    """The gas, chamber volumes [m^3] where known, the leak's discharge coefficient [-], and the times to use [s].
-
-    Without ``volume_1`` there is no area, only a rate. A ``critical_ratio`` [-] asks for a sonic conductance.
-    ``calibration`` is the relative uncertainty of the flow meter's gain [-], for steady readings.
-    """
-
-    gas: GasAt
-    volume_1: float | None = None
-    volume_2: float | None = None
-    discharge_coefficient: float | None = None
-    start: float | None = None
-    end: float | None = None
-    confidence: float = 0.95
-    calibration: float = 0.0
-    critical_ratio: float | None = None
-
-    @property
-    def opening(self) -> Opening:
-        """The leak in the form in which the set has it."""
-        return Opening(self.gas, self.discharge_coefficient, self.critical_ratio)
 
 
 def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
@@ -85,134 +61,156 @@ def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchR
             f"sensors share leaves its rate as it is; what counts is the volume. Leave it out"
         )
     check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
-    decays = tuple(_decay(source, settings) for source in sources)
+    closed = tuple(closed_chambers(source, settings) for source in sources)
+    tight = [not item.falls for item in closed]
+    if all(tight):
+        return _tight_leak(sources, closed, settings)
+    if any(tight):
+        raise IdentificationError(_none_shows(sources[tight.index(True)], closed[tight.index(True)]))
+    return _decaying_leak(sources, tuple(decay_in(item, settings) for item in closed), settings)
+
+
+def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], settings: VaneLeakSettings) -> BenchResult:
     smooth = tuple(smooth_curve(decay) for decay in decays)
     residuals = np.concatenate([decay.difference - curve for decay, curve in zip(decays, smooth, strict=True)])
     noise, count = float(np.sqrt(np.mean(residuals**2))), effective_samples(residuals)
-    fitted = [fit_law(law, decays, count, settings.confidence) for law in (settings.opening.law(), LAMINAR, LINEAR)]
-    fitted.append(fit_relaxation(decays, count, settings.confidence))
-    best = best_law(fitted)
-    orifice = fitted[0]
+    laws = (settings.opening.law(), LAMINAR, LINEAR)
+    fitted = [fit_law(law, decays, count, settings.confidence, solve_curve) for law in laws]
+    relaxation = fit_relaxation(decays, count, settings.confidence)
+    fitted.append(relaxation)
+    best, orifice = best_law(fitted), fitted[0]
     drop = max(float(np.ptp(decay.difference)) for decay in decays)
     judged = judge(fitted, best, noise, drop, "Pa")
+    checks = [*law_checks(fitted, best, judged, "Pa"), *_kept(decays)]
+    # Only what is told needs the intervals of a law that may miss, which take long.
+    told_laws = {
+        law.name: fit_law(law, decays, count, settings.confidence) for law in laws if law.name in _told(best, judged)
+    }
+    orifice, best = told_laws.get(orifice.name, orifice), told_laws.get(best.name, best)
     evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow())
-    estimates = _estimates(evidence, settings, orifice, best, judged)
+    numbers = _numbers(settings, {decay.emptying for decay in decays}, orifice, f"{judged.reason}.")
+    estimates = [*opening_estimates(evidence, settings.opening, numbers, judged)]
+    if best is relaxation:
+        told, leak = leak_or_relaxation(decays, relaxation, count, settings.confidence)
+        checks.append(told)
+        estimates += [evidence.plain(number) for number in _course(relaxation, leak)]
+    elif best.name != orifice.name:
+        estimates.append(evidence.plain(replace(_rate(best), condition=condition_of(best, checks[1]))))
     return BenchResult(
         PROCEDURE,
         f"{counted(len(decays), 'decay')}; best law: {best.name} ({best.formula}); orifice: {judged.verdict}",
-        estimates,
-        (*law_checks(fitted, best, noise, judged, "Pa"), _kept(decays)),
+        tuple(estimates),
+        tuple(checks),
         _panels(decays, orifice, best),
         kind_of(sources),
+        () if _kept(decays) else ("chamber 2 stands still and counts as a room",),
     )
 
 
-def _decay(source: Source, settings: VaneLeakSettings) -> Decay:
-    check_moves(source, PROCEDURE, "pressure_1")
-    part = window(source.recording, settings.start, settings.end)
-    _check_samples(source, part)
-    first, second = part["pressure_1"], part["pressure_2"]
-    for name in CHANNELS:
-        check_absolute(source, PROCEDURE, name)
-    difference = first - second
-    sign = 1.0 if np.mean(difference[:EDGE]) > 0.0 else -1.0
-    if sign < 0.0:
-        first, second = second, first
-    difference = sign * difference
-    start = float(np.mean(difference[:EDGE]))
-    low = np.flatnonzero(difference < _NEARLY_EQUAL * start)
-    last = int(low[0]) if low.size else difference.size
-    if last < FEWEST_SAMPLES:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: only {last} samples lie between start and equal pressures, "
-            f"{FEWEST_SAMPLES} are needed; record faster, or give start"
-        )
-    _check_falls(source, difference[:last])
-    ratio = _volume_ratio(first[:last], second[:last], settings, sign)
-    total = ratio * first[:last] + second[:last]
-    lost = abs(float(np.mean(total[-EDGE:]) - np.mean(total[:EDGE]))) / (1.0 + ratio)
-    drop = float(np.mean(difference[:EDGE]) - np.mean(difference[last - EDGE : last]))
-    chambers = Chambers(ratio, float(np.mean(total)))
-    times = part.time[:last] - part.time[0]
-    return Decay(times, difference[:last], chambers, lost / drop, float(difference[:last].min()))
+def _told(best: FittedLaw, judged: Judgement) -> set[str]:
+    """Return the names of the laws whose rates are told: the best one, and the orifice's where it gives an area."""
+    return {best.name, *(() if judged.verdict == "law does not describe the data" else ("orifice",))}
 
 
-def _check_samples(source: Source, part: Recording) -> None:
-    """Refuse a gap, and a sensor that was at its limit when the decay began."""
-    skipped = int(np.searchsorted(source.recording.time, part.time[0]))
-    gap = longest_gap(part.time)
-    if gap is not None:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: there is a gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s "
-            f"(sample {skipped + gap.index + 1}); give start or end, so that it lies outside"
-        )
-    for name in CHANNELS:
-        for plateau in plateaus(part[name]):
-            if plateau.first < EDGE and stands_out(part[name], plateau):
-                raise IdentificationError(
-                    f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {plateau.value:g} Pa for "
-                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and moves only then: the "
-                    f"sensor is saturated, or the chamber was not closed yet; give start"
-                )
+def _none_shows(source: Source, closed: Closed) -> str:
+    return (
+        f"{source.name}: {PROCEDURE}: no leak shows: the pressure difference falls by {closed.drop:.3g} Pa with a "
+        f"noise of {closed.noise:.3g} Pa, while it falls in the other recordings; give it its own procedure, which "
+        f"tells how large a leak may be"
+    )
 
 
-def _check_falls(source: Source, difference: Floats) -> None:
-    drop = float(np.mean(difference[:EDGE]) - np.mean(difference[-EDGE:]))
-    noise = float(np.std(np.diff(difference))) / np.sqrt(2.0)
-    if drop <= 3.0 * noise / np.sqrt(EDGE):
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: no leak shows: the pressure difference falls by {drop:.3g} Pa with a noise "
-            f"of {noise:.3g} Pa; record longer, and close both chambers first"
+def _tight_leak(sources: tuple[Source, ...], closed: tuple[Closed, ...], settings: VaneLeakSettings) -> BenchResult:
+    """Return how large a leak may be that does not show: as large as the fall that the samples allow."""
+    longest = max(float(item.time[-1]) for item in closed)
+    scale = max(float(np.mean(item.difference)) for item in closed)
+    shape = settings.opening.law().shape
+    falls = [
+        (1.0 + given_ratio(item, settings)) * float(shape(*(np.array([np.mean(p)]) for p in item[1:3]))[0]) / scale
+        for item in closed
+    ]
+
+    def residuals(values: Floats) -> Floats:
+        lines = zip(closed, values[1:], falls, strict=True)
+        return np.concatenate(
+            [item.difference / scale - start + values[0] * fall * item.time / longest for item, start, fall in lines]
         )
 
+    wide = np.full(1 + len(closed), np.inf)
+    start = np.array([0.0, *(float(np.mean(item.difference)) / scale for item in closed)])
+    fit = fit_curve(residuals, start, -wide, wide, 2.0 * settings.confidence - 1.0)
+    slope, half = float(fit.values[0]) / longest, float(fit.half_widths[0]) / longest
+    rate = max(slope, 0.0)
+    most = FittedLaw("orifice", "", rate, max(slope + half, 0.0) - rate, "1/s", fit.rms * scale, 0.0, (), 1.0)
+    text = f"No leak shows in {longest:.4g} s; with {settings.confidence:.0%} it is below the upper end."
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow())
+    estimates = tuple(
+        replace(evidence.estimate(number, number.half_width * (1.0 + evidence.calibration), "upper bound"), low=0.0)
+        for number in _numbers(settings, {item.fuller for item in closed}, most, text)
+    )
+    rises = slope + half < 0.0
+    told = "the pressure difference rises" if rises else "the pressure difference does not rise either"
+    check = Check("nothing flows in", not rises, f"{told}: {-slope * falls[0] * scale:+.3g} Pa/s at first sight")
+    summary = f"{counted(len(closed), 'recording')} of closed chambers; no leak shows, so there is an upper bound only"
+    shown = tuple(Series("measured", item.time, item.difference, "measured") for item in closed[:1])
+    panel = Panel("Closed chambers", "Time", "s", "Pressure difference", "Pa_d", shown)
+    return BenchResult(PROCEDURE, summary, estimates, (check,), (panel,), kind_of(sources))
 
-def _volume_ratio(first: Floats, second: Floats, settings: VaneLeakSettings, sign: float) -> float:
-    """Return the volume of the emptying chamber over that of the other, 0 where the other is a room."""
-    change = float(np.mean(first[:EDGE]) - np.mean(first[-EDGE:]))
-    rise = float(np.mean(second[-EDGE:]) - np.mean(second[:EDGE]))
-    if abs(rise) <= STANDS_STILL * abs(change):
-        return 0.0
-    if settings.volume_1 is not None and settings.volume_2 is not None:
-        ratio = settings.volume_1 / settings.volume_2
-        return ratio if sign > 0.0 else 1.0 / ratio
-    return max(rise / change, 0.0)
+
+def _course(relaxation: FittedLaw, leak: OffsetLeak | None) -> list[Number]:
+    """Return rate and plateau of a relaxation; of a linear leak where the sensors' zero explains the plateau."""
+    if leak is not None:
+        rate = Number(
+            "vane_leak.linear_rate", "1/s", *leak.rate, f"Rate of a linear leak: {LINEAR.formula}.", None, 0.0
+        )
+        text = "Difference that the sensors show at equal pressures, from several decays."
+        return [rate, Number("vane_leak.sensor_offset", "Pa", *leak.offset, text)]
+    listed = [_rate(relaxation)]
+    for number, (value, half) in enumerate(relaxation.plateaus, start=1):
+        path = "vane_leak.plateau" if len(relaxation.plateaus) == 1 else f"vane_leak.plateau_{number}"
+        text = "Pressure difference towards which the decay goes."
+        listed.append(Number(path, "Pa", value, half, text, widened=relaxation.widened))
+    return listed
 
 
-def _estimates(
-    evidence: Evidence, settings: VaneLeakSettings, orifice: FittedLaw, best: FittedLaw, judged: Judgement
-) -> tuple[Estimate, ...]:
-    numbers = _numbers(settings, orifice, judged)
-    listed = opening_estimates(evidence, settings.opening, numbers, judged)
-    if best.name == orifice.name:
-        return listed
+def _rate(best: FittedLaw) -> Number:
     text = f"Rate of the law that fits best: {best.formula}."
     path = f"vane_leak.{best.name}_rate"
-    rate = Number(path, best.rate_unit, best.rate, best.half_width, text, lowest=0.0, widened=best.widened)
-    return (*listed, evidence.plain(rate))
+    return Number(path, best.rate_unit, best.rate, best.half_width, text, lowest=0.0, widened=best.widened)
 
 
-def _numbers(settings: VaneLeakSettings, orifice: FittedLaw, judged: Judgement) -> list[Number]:
-    """Return the leak's size; its ratio to the volume of chamber 1 where that is not known."""
+def _numbers(settings: VaneLeakSettings, emptying: set[int], orifice: FittedLaw, reason: str) -> list[Number]:
+    """Return the leak's size; its ratio to the volume of the emptying chamber where that is not known."""
+    if len(emptying) > 1:
+        raise IdentificationError(
+            f"{PROCEDURE}: chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
+        )
+    chamber = min(emptying)
+    volume = settings.volume_1 if chamber == 1 else settings.volume_2
     gas = settings.gas
     per_volume = 1.0 / (gas.specific_gas_constant * gas.temperature)
-    if settings.volume_1 is None:
+    if volume is None:
         per_rate = per_volume / gas.choked_flow_constant
-        text = f"Cd A over the volume of chamber 1, which is not known: no area. {judged.sentence}."
+        text = (
+            f"Cd A over the volume of chamber {chamber}, which is not known: no area. {reason[:1].upper()}{reason[1:]}"
+        )
         value, half = orifice.rate * per_rate, orifice.half_width * per_rate
         path = "vane_leak.area_over_volume"
         return [Number(path, "1/m", value, half, text, lowest=0.0, widened=orifice.widened)]
-    conductance, half = (item * per_volume * settings.volume_1 for item in (orifice.rate, orifice.half_width))
-    text = f"From a volume of {settings.volume_1 * 1e6:.4g} cm^3, taken as exact. {gas.temperature_told}; "
-    text += f"{judged.reason}."
+    conductance, half = (item * per_volume * volume for item in (orifice.rate, orifice.half_width))
+    text = f"From a volume of {volume * 1e6:.4g} cm^3, taken as exact. {gas.temperature_told}; {reason}"
     return settings.opening.numbers(conductance, half, text, orifice.widened)
 
 
-def _kept(decays: tuple[Decay, ...]) -> Check:
-    lost = max(decay.lost_share for decay in decays)
+def _kept(decays: tuple[Decay, ...]) -> tuple[Check, ...]:
+    """Return whether what one chamber loses the other gains; nothing to ask where the other is a room."""
     if all(decay.chambers.volume_ratio == 0.0 for decay in decays):
-        return Check("gas is kept", True, "chamber 2 stands still and counts as a room")
+        return ()
+    lost = max(decay.lost_share for decay in decays)
     text = f"{lost:.1%} of the change in pressure difference is not passed from chamber to chamber"
-    return Check("gas is kept", lost <= _LOST_ALLOWED, text if lost <= _LOST_ALLOWED else f"{text}: it leaks outside")
+    return (
+        Check("gas is kept", lost <= _LOST_ALLOWED, text if lost <= _LOST_ALLOWED else f"{text}: it leaks outside"),
+    )
 
 
 def _panels(decays: tuple[Decay, ...], orifice: FittedLaw, best: FittedLaw) -> tuple[Panel, ...]:

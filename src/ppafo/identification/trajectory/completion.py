@@ -6,9 +6,8 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.experiment import Experiment
-from ppafo.simulation.recorded.inputs import COMMAND, SUPPLY
+from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, SUPPLY, between_stops
 from ppafo.simulation.recorded.scenario import recorded_control, with_highest_supply
-from ppafo.simulation.recorded.start import between_stops
 from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors
 
 _FITS = 1.0e-6
@@ -22,7 +21,16 @@ def scenario_of(experiment: Experiment) -> Scenario:
     if COMMAND in experiment.inputs:
         # Nobody measures for a controller that nobody asks.
         scenario = replace(scenario, control=recorded_control(recording), sensors=Sensors())
+    if ANGLE in experiment.inputs:
+        scenario = replace(scenario, motion=FreeMotion(_angle_at_start(experiment, scenario)))
     return scenario if experiment.initial_state == "scenario" else _with_initial_state(experiment, scenario)
+
+
+def _angle_at_start(experiment: Experiment, scenario: Scenario) -> float:
+    """Return the recorded angle at the start [rad], from which the vane is led on."""
+    recording = experiment.recording
+    angle = np.interp([experiment.start], recording.time, recording[ANGLE])
+    return float(between_stops(angle, scenario.device, f"experiment '{experiment.label}'")[0])
 
 
 def _with_initial_state(experiment: Experiment, scenario: Scenario) -> Scenario:
@@ -40,7 +48,7 @@ def _with_initial_state(experiment: Experiment, scenario: Scenario) -> Scenario:
         initial_pressure_1=means.get("pressure_1", scenario.initial_pressure_1),
         initial_pressure_2=means.get("pressure_2", scenario.initial_pressure_2),
     )
-    if "angle" in means and isinstance(scenario.motion, FreeMotion):
+    if ANGLE in means and ANGLE not in experiment.inputs and isinstance(scenario.motion, FreeMotion):
         angle = float(between_stops(np.array([means["angle"]]), scenario.device, said)[0])
         scenario = replace(scenario, motion=replace(scenario.motion, angle=angle))
     return scenario

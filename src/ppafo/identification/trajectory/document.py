@@ -24,7 +24,7 @@ from ppafo.identification.trajectory.section import (
 )
 from ppafo.identification.trajectory.setting import Setting, noise_of_channels, quantity_of
 from ppafo.identification.trajectory.verdicts import interval_factor
-from ppafo.identification.trajectory.without_scenario import experiment_without_scenario
+from ppafo.identification.trajectory.without_scenario import compared_channels, experiment_without_scenario
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.recorded.inputs import LONGEST_STEP
 from ppafo.simulation.scenario import Scenario
@@ -54,7 +54,8 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     """Return the problem of a section."""
     experiments = tuple(_experiment(item, setting) for item in section.experiments)
     scenarios = {item.label: item.scenario for item in experiments}
-    parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
+    sources = {item.label: item.source for item in experiments}
+    parameters = [_parameter(item, scenarios, sources, setting) for item in section.parameters]
     nuisances = [one for item in section.experiments for one in _nuisances(item, setting)]
     search = Search(
         loss=section.loss,
@@ -94,12 +95,17 @@ def _with_step(experiment: Experiment, text: str, said: str) -> Experiment:
 
 def _experiment_of(item: ExperimentSection, scenario: str, source: Source, setting: Setting) -> Experiment:
     said = f"{setting.file}: experiment '{item.label}'"
+    for name in ("held", "volume"):
+        if getattr(item, name) is not None:
+            raise IdentificationError(
+                f"{said}: {name} and a scenario: the scenario says how the vane moves; leave one out"
+            )
     return Experiment(
         label=item.label,
         scenario=_scenario(scenario, item.overrides, setting),
         recording=source.recording,
         start=quantity_of(f"{said}: start", item.start or "0 s", "s"),
-        channels=item.channels,
+        channels=compared_channels(item),
         noise=noise_of_channels(item.noise, said),
         inputs=item.inputs or (),
         initial_state="scenario" if item.initial_state in (None, "scenario") else "recording",
@@ -137,7 +143,9 @@ def _time_offset(item: ExperimentSection, setting: Setting) -> FreeParameter:
     return FreeParameter(TIME_OFFSET, low=-longest, high=longest, recordings=(item.label,))
 
 
-def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], setting: Setting) -> FreeParameter:
+def _parameter(
+    item: ParameterSection, scenarios: Mapping[str, Scenario], sources: Mapping[str, str], setting: Setting
+) -> FreeParameter:
     scenario = next((scenarios[label] for label in item.recordings if label in scenarios), None)
     acting = scenario or next(iter(scenarios.values()))
     quantity = declaration_of(item.path, acting)
@@ -148,7 +156,7 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
         return None if text is None else quantity_of(said, text, quantity.unit, atmosphere)
 
     if item.prior == "bench":
-        prior: Prior | None = _bench_prior(item, full_path(item.path, acting), setting)
+        prior: Prior | None = _bench_prior(item, full_path(item.path, acting), sources, setting)
     else:
         mean = None if item.prior is None else number("prior.mean", item.prior.mean)
         prior = None if item.prior is None or mean is None else Prior(mean, abs(mean) * item.prior.relative)
@@ -163,8 +171,8 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
     )
 
 
-def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
-    """Return what a bench procedure of the same problem found, as a prior."""
+def _bench_prior(item: ParameterSection, path: str, sources: Mapping[str, str], setting: Setting) -> Prior:
+    """Return what a bench procedure of the same problem found, as a prior; not from a recording that is fitted too."""
     estimate = setting.bench.get(path)
     if estimate is None or not estimate.is_usable:
         have = ", ".join(path for path, one in setting.bench.items() if one.is_usable) or "none"
@@ -172,4 +180,10 @@ def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
             f"{setting.file}: parameter '{item.path}': prior = 'bench': no procedure of this problem identified it; "
             f"identified: {have}"
         )
+    for label, source in sources.items():
+        if source in estimate.recordings and (not item.recordings or label in item.recordings):
+            raise IdentificationError(
+                f"{setting.file}: parameter '{item.path}': prior = 'bench' comes from {source}, which experiment "
+                f"'{label}' fits too: it would count twice; leave the prior out"
+            )
     return Prior(estimate.value, estimate.half_width / interval_factor(estimate.confidence))

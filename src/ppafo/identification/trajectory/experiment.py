@@ -8,14 +8,17 @@ from typing import Literal
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.signals import Recording
 from ppafo.simulation.recorded.checks import check_absolute, check_command, check_gaps
-from ppafo.simulation.recorded.inputs import COMMAND, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
 """What a recording is compared in [rad], [Pa], [Pa]."""
 
 INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE)
-"""Channels that a run may follow, sample by sample, instead of what its scenario says."""
+"""Channels that a run follows where they were recorded, sample by sample, if it has no scenario."""
+
+ALL_INPUTS = (*INPUTS, ANGLE)
+"""Channels that a run may follow instead of what its scenario says; along the angle the vane is led."""
 
 InitialState = Literal["scenario", "recording"]
 
@@ -26,7 +29,7 @@ class Experiment:
 
     ``noise`` is the standard deviation by channel [rad], [Pa]; channels without one have it estimated from the
     recording. ``channels`` are those that are compared. ``inputs`` names measured channels that the run follows sample
-    by sample: ``command``, in place of the scenario's controller, ``supply_pressure``, ``external_torque``.
+    by sample: ``command``, in place of the scenario's controller, ``supply_pressure``, ``external_torque``, ``angle``.
     ``initial_state`` takes angle and pressures at the start from the scenario or, as means of the samples up to the
     start, from the recording. ``source`` names the file and its hash.
     """
@@ -55,6 +58,8 @@ def check_experiment(experiment: Experiment) -> None:
             raise IdentificationError(f"{said}: {experiment.recording.label} has no channel '{name}'; it has {have}")
     if not experiment.channels:
         raise IdentificationError(f"{said}: no channel is to be compared")
+    if ANGLE in experiment.inputs and ANGLE in experiment.channels:
+        raise IdentificationError(f"{said}: the vane is led along the recorded angle, which is then not compared")
     if experiment.channels == ("angle",) and not isinstance(experiment.scenario.motion, FreeMotion):
         raise IdentificationError(f"{said}: the vane is led, so its angle says nothing; add a pressure")
     if experiment.scenario.control.kind == PYTHON_CONTROLLER and COMMAND not in experiment.inputs:
@@ -64,9 +69,9 @@ def check_experiment(experiment: Experiment) -> None:
 
 def _check_given(experiment: Experiment, said: str) -> None:
     for name in experiment.inputs:
-        if name not in INPUTS:
-            hint = nearest_name(name, INPUTS)
-            raise IdentificationError(f"{said}: '{name}' is no measured input{hint}; {', '.join(INPUTS)} are")
+        if name not in ALL_INPUTS:
+            hint = nearest_name(name, ALL_INPUTS)
+            raise IdentificationError(f"{said}: '{name}' is no measured input{hint}; {', '.join(ALL_INPUTS)} are")
         if name not in experiment.recording:
             have = ", ".join(experiment.recording.names)
             raise IdentificationError(

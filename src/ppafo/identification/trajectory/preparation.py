@@ -18,8 +18,8 @@ from ppafo.identification.trajectory.completion import scenario_of
 from ppafo.identification.trajectory.experiment import Experiment
 from ppafo.identification.trajectory.paths import with_numbers
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.recorded.inputs import ANGLE, RecordedInputs, led_along, step_inputs
+from ppafo.simulation.scenario import FreeMotion, Scenario
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -165,6 +165,8 @@ def _placed(prepared: Prepared, run: Run) -> Prepared:
     share = np.maximum(position - place, 0.0)
     share[share < _FITS] = 0.0
     frozen = replace(run, record_every=every, step_count=records * every)
+    if recorded is not None and recorded.has(ANGLE) and isinstance(prepared.scenario.motion, FreeMotion):
+        frozen = led_along(frozen, prepared.scenario.motion.angle)
     inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
     return replace(prepared, run=frozen, place=place, share=share, inputs=inputs)
 

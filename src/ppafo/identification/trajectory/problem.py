@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ppafo.errors import IdentificationError, nearest_name
+from ppafo.identification.source import Use, used_twice
 from ppafo.identification.trajectory.experiment import Experiment, check_experiment
 from ppafo.identification.trajectory.ranges import FreeParameter, Range, range_of
 
@@ -41,6 +42,9 @@ class TrajectoryProblem:
         _refuse_twice("experiment", [item.label for item in self.experiments])
         for experiment in self.experiments:
             check_experiment(experiment)
+        twice = used_twice(_use(item) for item in self.experiments)
+        if twice:
+            raise IdentificationError(twice)
         labels = [item.label for item in self.experiments]
         for parameter in self.parameters:
             for label in parameter.recordings:
@@ -59,6 +63,13 @@ class TrajectoryProblem:
 def ranges_of(problem: TrajectoryProblem) -> tuple[Range, ...]:
     """Return all parameters of a problem with start, bounds and scale settled; refuses those that contradict."""
     return tuple(range_of(parameter, problem.experiments_with(parameter)) for parameter in problem.parameters)
+
+
+def _use(item: Experiment) -> Use:
+    """Return what of its recording an experiment is compared with."""
+    last = item.start + item.scenario.duration
+    trace = item.source or item.recording.label
+    return Use(f"experiment '{item.label}'", trace, item.recording, frozenset(item.channels), item.start, last)
 
 
 def _refuse_twice(what: str, names: list[str]) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from ppafo.documents.models import NAME
-from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, INPUTS
+from ppafo.identification.trajectory.experiment import ALL_INPUTS
 from ppafo.identification.trajectory.problem import Loss
 from ppafo.identification.trajectory.ranges import Scale
 
@@ -67,10 +67,20 @@ class ExperimentSection(BaseModel):
         _Text | None, Field(description="time of the recording at which the run begins; 0 s, or the first sample")
     ] = None
     step: Annotated[_Text | None, Field(description="longest step of time in the run, such as '0.1 ms'")] = None
-    channels: Annotated[_Texts, Field(description="what is compared")] = FITTED_CHANNELS
+    channels: Annotated[
+        _Texts | None,
+        Field(description="what is compared; angle and both pressures unless given, without what is held or followed"),
+    ] = None
     noise: Annotated[_Noise, Field(description="standard deviation by channel, '0.1 deg', '500 Pa_d'")] = {}
     inputs: Annotated[
-        _Texts | None, Field(description=f"what the run follows in the recording: {', '.join(INPUTS)}")
+        _Texts | None, Field(description=f"what the run follows in the recording: {', '.join(ALL_INPUTS)}")
+    ] = None
+    held: Annotated[
+        _Text | None, Field(description="angle at which the vane is held, such as '75 deg'; without a scenario")
+    ] = None
+    volume: Annotated[
+        _Text | None,
+        Field(description="no vane: a fixed volume, such as '60 cm^3', is chamber 1; without a scenario"),
     ] = None
     initial_state: Annotated[
         Literal["scenario", "recording", "fitted"] | None,

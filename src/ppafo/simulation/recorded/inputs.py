@@ -1,23 +1,29 @@
 """Inputs of a run that were recorded: command, supply pressure and external torque, for every step."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.engine.replay import StepInputs
+from ppafo.engine.replay import StepInputs, led_by_recording
 from ppafo.engine.run import Run
+from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
 COMMAND, SUPPLY, EXTERNAL_TORQUE = "command", "supply_pressure", "external_torque"
 DORSIFLEXION_SUPPLY = "dorsiflexion_pressure"
+ANGLE = "angle"
+"""As an input, the vane is led along it, from sample to sample in straight lines."""
 
 LONGEST_STEP = 1.0e-3
 """Seconds over which a recorded pressure or torque is averaged, and the longest step of a replay."""
 
 SHORTEST_SAMPLE = 1.0e-4
 """Seconds; irregular samples are placed on a grid no finer than this."""
+
+_BEYOND_STOPS = 0.05
+"""Share of the full range by which a measured angle may be beyond a stop before it is refused; then it is the stop."""
 
 _UNIFORM = 0.02
 """Share of a sample by which a time may be off a regular grid; clocks write rounded times."""
@@ -62,9 +68,40 @@ def step_times(run: Run) -> Floats:
 
 
 def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
-    """Return what a run follows at each of its steps; ``device`` says which regulators follow the supply."""
+    """Return what a run follows at each of its steps; ``device`` says which regulators follow the supply.
+
+    A run that follows the angle is one of ``led_along``.
+    """
     command = held_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
-    return StepInputs(command, followed_parameters(inputs, device, run))
+    path = _path(inputs, device, run) if inputs.has(ANGLE) else {}
+    return StepInputs(command, {**followed_parameters(inputs, device, run), **path})
+
+
+def led_along(run: Run, angle: float) -> Run:
+    """Return the run with the vane led along a recorded angle, which is ``angle`` [rad] at the start."""
+    return replace(run, program=led_by_recording(run.program), path=(0.0, angle, 0.0))
+
+
+def _path(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
+    """Return the straight piece of the angle that holds at each step; after the last sample the vane stands still."""
+    time = inputs.recording.time - inputs.start
+    angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
+    rates = np.append(np.diff(angles) / np.diff(time), 0.0)
+    piece = np.maximum(np.searchsorted(time, step_times(run) + 0.5 * run.step, side="right") - 1, 0)
+    return {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
+
+
+def between_stops(angles: Floats, device: Device, file: str) -> Floats:
+    """Return angles [rad] as they are or, slightly beyond a stop, as the stop; DataError for those far beyond."""
+    lowest, highest = device.actuator.angle_min, device.actuator.angle_max
+    margin = _BEYOND_STOPS * (highest - lowest)
+    worst = angles[int(np.argmax(np.maximum(lowest - angles, angles - highest)))]
+    if not lowest - margin <= worst <= highest + margin:
+        shown, low, high = np.degrees([worst, lowest, highest])
+        raise DataError(
+            f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg"
+        )
+    return np.clip(angles, lowest, highest)
 
 
 def followed_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:

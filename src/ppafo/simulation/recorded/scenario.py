@@ -1,8 +1,8 @@
-"""The scenario of a recording that has none: a free vane from the recorded start, the command left to the recording."""
+"""The scenario of a recording that has none: a free or held vane from its start, the command left to the recording."""
 
 from dataclasses import replace
 
-from ppafo.parameters.device import Device
+from ppafo.parameters.device import Device, Orifice
 from ppafo.signals import Recording
 from ppafo.simulation.recorded.inputs import DORSIFLEXION_SUPPLY, LONGEST_STEP, SUPPLY, sample_period
 from ppafo.simulation.recorded.start import Start
@@ -10,15 +10,38 @@ from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     Control,
     FreeMotion,
+    LedMotion,
     Origin,
     ProfileChoice,
     Scenario,
     Sensors,
 )
 
+Motion = FreeMotion | LedMotion
 
-def recorded_scenario(recording: Recording, device: Device, start: Start, duration: float, file: str) -> Scenario:
-    """Return a run of ``duration`` [s] on the clock of a recording, whose command the caller sets step by step."""
+
+def held_at(angle: float) -> LedMotion:
+    """Return the motion of a vane that is held at an angle [rad]: both chambers are fixed volumes."""
+    return LedMotion(ProfileChoice("constant", {"level": angle}))
+
+
+def fixed_volume(device: Device, volume: float) -> Device:
+    """Return the device with a fixed volume [m^3] in the place of chamber 1 and no vane: nothing leaks from it.
+
+    It holds with the vane at the lower stop.
+    """
+    leak = device.actuator.leak
+    shut = replace(leak, area=0.0) if isinstance(leak, Orifice) else replace(leak, sonic_conductance=0.0)
+    return replace(device, actuator=replace(device.actuator, dead_volume_1=volume, leak=shut))
+
+
+def recorded_scenario(
+    recording: Recording, device: Device, start: Start, duration: float, file: str, motion: Motion | None = None
+) -> Scenario:
+    """Return a run of ``duration`` [s] on the clock of a recording, whose command the caller sets step by step.
+
+    The vane moves freely from where it starts unless another motion is given.
+    """
     period = sample_period(recording.time)
     return Scenario(
         name=recording.label,
@@ -27,7 +50,7 @@ def recorded_scenario(recording: Recording, device: Device, start: Start, durati
         duration=duration,
         time_step=min(period, LONGEST_STEP),
         output_interval=period,
-        motion=FreeMotion(start.angle, start.angular_velocity),
+        motion=motion or FreeMotion(start.angle, start.angular_velocity),
         initial_pressure_1=start.pressure_1,
         initial_pressure_2=start.pressure_2,
         control=recorded_control(recording),

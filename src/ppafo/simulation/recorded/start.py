@@ -4,17 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.errors import DataError
-from ppafo.parameters.device import Device
 from ppafo.signals import Recording
-from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.inputs import COMMAND
 
 REST_WINDOW = 0.05
 """Seconds before the first command over which the start is averaged; short, so that no leak shows in it."""
-
-_BEYOND_STOPS = 0.05
-"""Share of the full range by which a measured angle may be beyond a stop before it is refused; then it is the stop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,16 +28,3 @@ def samples_at_rest(recording: Recording) -> int:
         return 1
     quiet = command.size if not command.any() else int(np.argmax(command != 0.0))
     return max(1, min(quiet, int((time < time[0] + REST_WINDOW).sum())))
-
-
-def between_stops(angles: Floats, device: Device, file: str) -> Floats:
-    """Return angles [rad] as they are or, slightly beyond a stop, as the stop; DataError for those far beyond."""
-    lowest, highest = device.actuator.angle_min, device.actuator.angle_max
-    margin = _BEYOND_STOPS * (highest - lowest)
-    worst = angles[int(np.argmax(np.maximum(lowest - angles, angles - highest)))]
-    if not lowest - margin <= worst <= highest + margin:
-        shown, low, high = np.degrees([worst, lowest, highest])
-        raise DataError(
-            f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg"
-        )
-    return np.clip(angles, lowest, highest)

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-Verdict = Literal["reproduced", "reproduced_with_assumptions", "contradicted", "not_testable"]
+Verdict = Literal["reproduced", "reproduced_with_assumptions", "shown_on_synthetic", "contradicted", "not_testable"]
 
 VERDICTS: dict[Verdict, str] = {
     "reproduced": "reproduced",
     "reproduced_with_assumptions": "reproduced with assumptions",
+    "shown_on_synthetic": "shown on synthetic data",
     "contradicted": "contradicted",
     "not_testable": "not testable",
 }
@@ -21,8 +22,8 @@ class Claim:
 
     ``source`` is where the paper says it, ``assumptions`` what our number rests on beside the paper, ``note`` why the
     verdict is what it is. A claim that has to hold for this package to be sound has a window that it must fall into.
-    ``is_synthetic`` says that our number comes from a measurement on the virtual rig: it shows that the procedure
-    works, and nothing about the paper's device.
+    ``is_synthetic`` says that our number comes from a measurement on the virtual rig, with the paper's values planted.
+    Such a claim is at best ``shown_on_synthetic``: the procedure works, which says nothing about the paper's device.
     """
 
     id: str
@@ -37,11 +38,18 @@ class Claim:
     window: tuple[float, float] | None = None
     is_synthetic: bool = False
 
+    def __post_init__(self) -> None:
+        if (self.is_synthetic and self.verdict.startswith("reproduced")) or (
+            self.verdict == "shown_on_synthetic" and not self.is_synthetic
+        ):
+            raise ValueError(f"{self.id}: '{self.verdict}' does not go with synthetic = {self.is_synthetic}")
+
     @property
     def verdict_words(self) -> str:
-        """The verdict in words, and that it rests on a synthetic measurement where it does."""
+        """The verdict in words, and that it rests on a synthetic measurement where the verdict does not say so."""
         words = VERDICTS[self.verdict]
-        return f"{words.removeprefix('reproduced ')}, synthetic" if self.is_synthetic else words
+        is_told = not self.is_synthetic or self.verdict == "shown_on_synthetic"
+        return words if is_told else f"{words}, synthetic"
 
     @property
     def is_missed(self) -> bool:

@@ -191,7 +191,7 @@ def _step_error(item: _StepError, agreement: RecordingAgreement, rests_on: tuple
 
 
 def _verdict(holds: bool) -> Verdict:
-    return "reproduced_with_assumptions" if holds else "contradicted"
+    return "shown_on_synthetic" if holds else "contradicted"
 
 
 def _rig(preset: str) -> str:

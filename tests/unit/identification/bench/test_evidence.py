@@ -20,8 +20,15 @@ def test_calibration_adds_to_what_a_gain_touches_and_to_nothing_else() -> None:
 
 def test_a_widened_interval_is_told_beside_the_verdict() -> None:
     estimate = Evidence(("a.csv",)).plain(NUMBER)
-    assert estimate.verdict_in_words == "identified, widened 2.5 times (lack of fit)"
+    assert estimate.verdict_in_words == "holds for this model only, widened 2.5 times (lack of fit)"
+    assert estimate.is_usable
+    assert not estimate.is_identified
     assert Evidence(("a.csv",)).plain(Number("a.b", "", 2.0, 0.3, "why")).verdict_in_words == "identified"
+
+
+def test_a_number_that_holds_under_one_condition_is_not_identified_and_says_where_it_holds() -> None:
+    estimate = Evidence(("a.csv",)).plain(Number("a.b", "", 2.0, 0.3, "why", condition="at 430 kPa"))
+    assert estimate.verdict_in_words == "holds for this model only, at 430 kPa"
 
 
 def test_a_number_that_the_fit_holds_at_zero_is_at_its_bound() -> None:

@@ -25,6 +25,12 @@ def test_white_noise_is_hardly_ever_said_to_miss() -> None:
     assert seen <= 12
 
 
+def test_noise_that_is_larger_in_some_places_is_hardly_ever_said_to_miss() -> None:
+    scale = np.where(TIME > 0.95, 1.0, 0.05)
+    seen = sum(lack_of_fit(scale * noise(seed), 2, 0.95, (TIME,)).is_seen for seed in range(200))
+    assert seen <= 8
+
+
 def test_a_slow_misfit_below_the_noise_is_seen() -> None:
     found = lack_of_fit(noise(1) + 0.05 * np.sin(4.0 * np.pi * TIME), 2, 0.95)
     assert found.is_seen

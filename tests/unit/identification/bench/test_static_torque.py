@@ -48,6 +48,26 @@ def test_constant_friction_is_not_said_to_grow(planted: ModuleType) -> None:
     assert result["static_torque.friction_per_pressure"].verdict == "not identifiable"
 
 
+def test_friction_that_grows_fails_its_check_and_constant_friction_hardly_ever_does(planted: ModuleType) -> None:
+    def grows(growth: float, seed: int) -> bool:
+        result = static_torque((planted.static(growth=growth, seed=seed),))
+        return "friction over pressure" in [check.name for check in result.failed]
+
+    assert sum(grows(0.0, seed) for seed in range(200)) <= 6
+    assert all(grows(4.0e-7, seed) for seed in range(50))
+
+
+def test_friction_that_grows_says_which_pressure_it_is_for_and_what_is_left_without_one(planted: ModuleType) -> None:
+    growth, inside = 8.0e-7, 0
+    for seed in range(60):
+        result = static_torque((planted.static(growth=growth, seed=seed),))
+        friction, left = result["friction.static_torque"], result["static_torque.friction_at_no_pressure"]
+        assert (friction.verdict, friction.condition) == ("holds for this model only", "at 327.5 kPa")
+        inside += left.low <= planted.STATIC_TORQUE - growth * 47.5 * planted.PSI <= left.high
+    assert inside >= 54
+    assert static_torque((planted.static(),))["friction.static_torque"].verdict_in_words == "identified"
+
+
 def test_a_scale_that_only_pulls_does_not_bias_the_slope(planted: ModuleType) -> None:
     result = static_torque((planted.static(noise=0.0, floor=0.0),))
     assert result["actuator.torque_constant"].value == pytest.approx(planted.TORQUE_CONSTANT, rel=1e-6)

@@ -95,6 +95,32 @@ def test_a_supply_that_changes_is_followed_millisecond_by_millisecond(experiment
     assert followed[0] == pytest.approx(0.5 * (supply[0] + supply[1]))
 
 
+def test_along_a_recorded_angle_a_wrong_inertia_does_not_matter(
+    step: Scenario, recorded: Callable[..., Recording]
+) -> None:
+    """The vane goes where it went, so that the pressures alone give the valve, whatever moves the vane."""
+    heavy = dataclasses.replace(
+        step,
+        device=dataclasses.replace(step.device, foot_plate=dataclasses.replace(step.device.foot_plate, inertia=0.02)),
+    )
+    recording = recorded(step)
+    free = Experiment("step", heavy, recording, noise=NOISE)
+    led = dataclasses.replace(free, channels=("pressure_1", "pressure_2"), inputs=("angle",))
+    path = "valves.proportional.discharge_coefficient"
+    assert fit(TrajectoryProblem((FLOW,), (led,))).values[path] == pytest.approx(0.113, rel=5e-3)
+    assert abs(fit(TrajectoryProblem((FLOW,), (free,))).values[path] / 0.113 - 1.0) > 0.03
+    with pytest.raises(IdentificationError, match="led along the recorded angle, which is then not compared"):
+        TrajectoryProblem((FLOW,), (dataclasses.replace(free, inputs=("angle",)),))
+
+
+def test_the_same_recording_in_two_experiments_is_refused_and_two_parts_of_it_are_not(experiment: Experiment) -> None:
+    other = dataclasses.replace(experiment, label="again")
+    with pytest.raises(IdentificationError, match=r"experiment 'step'.*experiment 'again'.* are the same recording"):
+        TrajectoryProblem((FLOW,), (experiment, other))
+    late = dataclasses.replace(other, start=0.35)
+    assert len(TrajectoryProblem((FLOW,), (experiment, late)).experiments) == 2
+
+
 def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: Experiment) -> None:
     followed = with_input(experiment, "supply_pressure", np.full(len(experiment.recording), 4.0e5), "Pa")
     with pytest.raises(IdentificationError, match="follows the recorded 'supply_pressure'"):
