@@ -129,12 +129,27 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     for column, count in enumerate(numbers):
         counts[:, column] = count
     if (counts == counts[0]).all():
-        return [(np.arange(runs), Batch(*_program_and_clock(program, counts[0]), parameters, states))]
-    clocks, group = np.unique(counts, axis=0, return_inverse=True)
-    return [
-        (members, Batch(*_program_and_clock(program, clock), parameters[:, members], states[:, members]))
-        for clock, members in zip(clocks, _members(group.reshape(-1), len(clocks)), strict=True)
-    ]
+        clocks, groups = counts[:1], [np.arange(runs)]
+    else:
+        clocks, group = np.unique(counts, axis=0, return_inverse=True)
+        groups = _members(group.reshape(-1), len(clocks))
+    batches = []
+    for clock, members in zip(clocks, groups, strict=True):
+        own, ticks = _program_and_clock(program, clock)
+        ordered = members[_alike_together(run, members)] if own.is_adaptive and members.size > 1 else members
+        batches.append((ordered, Batch(own, ticks, parameters[:, ordered], states[:, ordered])))
+    return batches
+
+
+def _alike_together(run: Run, members: Members) -> Members:
+    """Order of some runs in which those beside each other do the same at about the same time.
+
+    Lanes of a block wait for the slowest at every step. How long the valve takes to move the gas says when a vane moves.
+    """
+    plant = run.plant
+    gas = plant.dead_volume_1 + plant.dead_volume_2 + plant.volume_per_angle * (plant.angle_max - plant.angle_min)
+    duration = np.broadcast_to(gas / (plant.valve_conductance * plant.gas_product), members.max() + 1)
+    return np.argsort(duration[members], kind="stable")
 
 
 def _program_and_clock(program: Program, counts: Floats) -> tuple[Program, Clock]:

@@ -11,10 +11,12 @@ from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import GasChange
 from ppafo.model.friction import holds_still
-from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, driving_torque
+from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, driving_torque
 
-ALLOWED_OF_ANGLE = 3.0e-6
+ALLOWED_OF_ANGLE = 2.0e-6
 """Error of one part over the range of the angle; with it a run keeps to 2e-4 of the range."""
+ALLOWED_BY_GAS = 3.0e-6
+"""Error of one part over the angle in which the smaller chamber would close."""
 MISSED_SHARE = 0.2
 """Share of the way between where the gas took the vane to be and where an event left it that counts as an error."""
 LOWEST_REBOUND = 1.0e-7
@@ -167,7 +169,10 @@ def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length:
     last = (sliding_torque - plant.viscous_damping * full_velocity) / plant.inertia
     bent = abs(last - begun.acceleration) * length * length / 6.0 if way != 0.0 else 0.0
     missed = MISSED_SHARE * abs(angle - begun.next_angle)
-    allowed = ALLOWED_OF_ANGLE * (plant.angle_max - plant.angle_min)
+    # Where a chamber is small, a little of the angle is much of the pressure.
+    volume_1, volume_2 = chamber_volumes(plant, begun.next_angle)
+    allowed_by_gas = ALLOWED_BY_GAS * min(volume_1, volume_2) / plant.volume_per_angle
+    allowed = min(ALLOWED_OF_ANGLE * (plant.angle_max - plant.angle_min), allowed_by_gas)
     return angle, rate, (bent + missed) / allowed
 
 

@@ -16,7 +16,7 @@ from ppafo.model.ports import admitted_flow
 
 GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
-ALLOWED_OF_PRESSURE = 3.0e-5
+ALLOWED_OF_PRESSURE = 6.0e-5
 """Error of one step over the pressure that matters; with it a run keeps to 1e-3 of the pressure range."""
 LEAST_PRESSURE = 0.02
 """The least pressure that matters, as a share of the atmosphere's."""
@@ -265,17 +265,20 @@ def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle
     """Estimated error of both pressures at the end of a step [s] over what is allowed [-].
 
     What the second stage adds to the first, damped once by the matrix of the step, so that a chamber that has settled
-    asks for no short step.
+    asks for no short step; and what a supply that takes no gas back would have taken, because it shuts inside the step.
     """
     linear = begun.linear
+    drawn = 1.5 * begun.first.supplied + 0.5 * second.supplied
+    refused = admitted_flow(drawn, plant.relieving) - drawn
     added_1 = linear.d * (begun.first.mass_1 + second.mass_1) - linear.b * (begun.first.mass_2 + second.mass_2)
     added_2 = linear.a * (begun.first.mass_2 + second.mass_2) - linear.c * (begun.first.mass_1 + second.mass_1)
     volume_1, volume_2 = chamber_volumes(plant, next_angle)
-    weight = 0.5 * step * linear.scale * plant.gas_product / ALLOWED_OF_PRESSURE
-    return max(
-        abs(added_1) / (volume_1 * pressure_that_matters(plant, begun.end_1)),
-        abs(added_2) / (volume_2 * pressure_that_matters(plant, begun.end_2)),
-    ) * abs(weight)
+    weight = 0.5 * step * plant.gas_product / ALLOWED_OF_PRESSURE
+    scale = abs(linear.scale)
+    return weight * max(
+        (scale * abs(added_1) + refused) / (volume_1 * pressure_that_matters(plant, begun.end_1)),
+        (scale * abs(added_2) + refused) / (volume_2 * pressure_that_matters(plant, begun.end_2)),
+    )
 
 
 def opening_error(plant: PlantParameters, begun: StillGas, shift: float, next_angle: float, step: float) -> float:
