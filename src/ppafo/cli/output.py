@@ -70,7 +70,9 @@ def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
     """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``ppafo sets | head``."""
     with _printing():
-        print(json_text(document) if as_json else text, flush=True)
+        shown = json_text(document) if as_json else text
+        encoding = sys.stdout.encoding or "utf-8"
+        print(shown.encode(encoding, "backslashreplace").decode(encoding), flush=True)
 
 
 def flush_output() -> None:

@@ -1,6 +1,5 @@
 """Folders of synthetic recordings: one CSV for each experiment, and ``rig.json`` with the truth behind all of them."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,8 @@ from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError
 from ppafo.rig.record import NOTICE, RigRecording
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.storage.files import add_files, check_files_can_be_added, read_bytes
+from ppafo.storage.files import add_files, check_files_can_be_added
+from ppafo.storage.owned_folder import read_json
 
 RIG_FILE = "rig.json"
 FORMAT = "ppafo rig"
@@ -46,9 +46,9 @@ def _earlier(folder: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     try:
-        document = json.loads(read_bytes(path))
-    except ValueError as error:
-        raise DataError(f"{path}: is not valid JSON, so it is not overwritten: {error}") from error
+        document = read_json(path)
+    except DataError as error:
+        raise DataError(f"{error}, so it is not overwritten") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{path}: was not written by the rig, so it is not overwritten")
     recordings = document.get("recordings")

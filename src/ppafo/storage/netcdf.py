@@ -78,7 +78,7 @@ def _recording(content: bytes, path: str | Path) -> Recording:
         if time.unit != TIME_UNIT:
             raise DataError(f"'{TIME}' is in '{time.unit}', it must be in '{TIME_UNIT}'")
         channels = {name: _channel(name, variable) for name, variable in variables.items()}
-        label = _attribute(file, "title") or Path(path).stem
+        label = _attribute(file, "title") or one_line(Path(path).stem)
         kind = recording_kind(_attribute(file, "kind") or "measured")
         return Recording(label, time.values, channels, kind)
 

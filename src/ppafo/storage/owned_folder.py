@@ -3,13 +3,13 @@
 A folder that is taken ends up with exactly the new files; until they are all written it stays as it was.
 """
 
-import json
 import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ppafo.documents.json_text import json_document
 from ppafo.errors import DataError, one_line, reason
 from ppafo.storage.files import check_folder_can_be_replaced, read_bytes, replace_folder
 
@@ -48,8 +48,8 @@ def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: Folder
 def read_json(path: Path) -> Any:
     """Return what a JSON file of ours holds, as plain data."""
     try:
-        return json.loads(read_bytes(path, _MOST_BYTES_WRITTEN).decode("utf-8"))
-    except (ValueError, RecursionError) as error:
+        return json_document(read_bytes(path, _MOST_BYTES_WRITTEN))
+    except ValueError as error:
         raise DataError(f"{path}: is not JSON: {one_line(error)}") from error
 
 

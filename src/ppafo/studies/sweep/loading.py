@@ -38,6 +38,7 @@ def load_study(study: str | Path | Mapping[str, Any], overrides: Sequence[str] =
     of the file. StudyError for anything that is not usable.
     """
     if isinstance(study, Mapping):
+        _FILE.check_depth(study, "study")
         document, source = copy.deepcopy(dict(study)), _Source("study", Path(), b"")
     else:
         source = _Source(label(str(study)), Path(study).parent, _FILE.read(study))
