@@ -24,7 +24,7 @@ def run(parsed: argparse.Namespace) -> int:
     """Do what was asked for, and show what is there."""
     from ppafo.engine.cache import cache_folder, clear, refusal
 
-    check_output(parsed.out)
+    check_output(parsed)
     folder = cache_folder()
     cleared = clear(folder) if parsed.clear and folder is not None else 0
     why_not = "" if parsed.clear else refusal(folder)

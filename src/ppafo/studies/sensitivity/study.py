@@ -9,7 +9,7 @@ from ppafo.errors import StudyError, nearest_name
 from ppafo.studies.sensitivity.analyse import Sensitivity, Settings, analyse
 from ppafo.studies.sensitivity.methods import METHODS
 from ppafo.studies.sweep.study import Study
-from ppafo.studies.uncertainty.draws import Uncertainty, chosen_configuration, study_of, uncertainty_in
+from ppafo.studies.uncertainty.draws import chosen_configuration, study_of, uncertainty_in
 from ppafo.studies.uncertainty.outcomes import Tally, Watch, scenario_model
 
 DEFAULT_SAMPLES = {"sobol": 1024, "morris": 128}
@@ -50,5 +50,5 @@ def sensitivity(
     settings = Settings(count, chosen.sample.seed if seed is None else seed, confidence, most_failed)
     tally = Tally(count * METHODS[method].block_rows(len(uncertainty.drawn)), watch)
     model = scenario_model(base.scenario, asked, threads, tally.add)
-    used = Uncertainty(uncertainty.drawn) if independent else uncertainty
+    used = replace(uncertainty, scores=None) if independent else uncertainty
     return replace(analyse(model, used, asked, METHODS[method], settings), name=f"{chosen.name}, {base.name}")

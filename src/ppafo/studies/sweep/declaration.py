@@ -190,8 +190,21 @@ class Outputs(BaseModel):
     )
 
 
-VARIED = (Grid, Listed, Uniform, LogUniform, Normal, TruncatedNormal, LogNormal, Triangular, Choice, Stated)
-Varied = Grid | Listed | Uniform | LogUniform | Normal | TruncatedNormal | LogNormal | Triangular | Choice | Stated
+class SameAs(BaseModel):
+    """The value that another varied path has in the same run."""
+
+    model_config = _STRICT
+
+    path: _Path
+    kind: Annotated[Literal["same_as"], Field(description="may be left out")] = "same_as"
+    same_as: Annotated[_Text, Field(description="a path that varies in this study")]
+    only: _Only = ()
+
+
+VARIED = (SameAs, Grid, Listed, Uniform, LogUniform, Normal, TruncatedNormal, LogNormal, Triangular, Choice, Stated)
+Varied = (
+    SameAs | Grid | Listed | Uniform | LogUniform | Normal | TruncatedNormal | LogNormal | Triangular | Choice | Stated
+)
 
 
 class StudyFile(BaseModel):
