@@ -103,7 +103,7 @@ def damaged(text: str, wanted: list[tuple[str, int, str]]) -> str:
         key, equals, value = lines[number].partition("=")
         lines[number] = {
             "value": f"{key}= {new}" if equals else lines[number],
-            "unit": re.sub(r'"([-+0-9.e]+)[^"]*"', lambda match: f'"{match[1]} {new}"', lines[number]),
+            "unit": re.sub(r'"([-+0-9.e]+)[^"]*"', rf'"\1 {new.replace(chr(92), chr(92) * 2)}"', lines[number]),
             "key": f"{new} ={value}" if equals else f"[{new}]",
             "line": f"{lines[number]}\n{new}",
             "repeat": f"{lines[number]}\n{lines[number]}",
