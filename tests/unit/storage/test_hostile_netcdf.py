@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.storage import read_netcdf
+from ppafo.storage import read_netcdf, read_recording, recordings
 
 SECRET = np.arange(3.0)
 
@@ -170,3 +170,33 @@ def test_file_of_texts_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bench.nc").write_bytes(content.getvalue())
     with pytest.raises(DataError, match="'time' must be numbers"):
         read_netcdf(tmp_path / "bench.nc")
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "the HDF5 library crashes on it"),
+        ("import time; time.sleep(60)", "the HDF5 library comes to no end with it"),
+    ],
+)
+def test_library_that_crashes_or_hangs_on_a_file_takes_nobody_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, message: str
+) -> None:
+    with h5py.File(tmp_path / "bench.nc", "w") as file:
+        file["time"] = np.arange(3.0)
+        file["time"].attrs["units"] = "s"
+    assert len(read_recording(tmp_path / "bench.nc")) == 3
+    monkeypatch.setattr(recordings, "_READING", code)
+    monkeypatch.setattr(recordings, "_MOST_SECONDS", 1.5)
+    with pytest.raises(DataError, match=rf"bench\.nc: is damaged: {message}"):
+        read_recording(tmp_path / "bench.nc")
+
+
+def test_module_in_the_working_folder_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "h5py.py").write_text(f"open({str(tmp_path / 'sprung')!r}, 'w')\n")
+    with h5py.File(tmp_path / "bench.nc", "w") as file:
+        file["time"] = np.arange(3.0)
+        file["time"].attrs["units"] = "s"
+    monkeypatch.chdir(tmp_path)
+    assert len(read_recording("bench.nc")) == 3
+    assert not (tmp_path / "sprung").exists()
