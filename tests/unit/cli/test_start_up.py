@@ -65,6 +65,8 @@ import sys
 class Interrupt:
     def find_spec(self, name, path=None, target=None):
         if name == MODULE:
+            if WRAPPED:
+                raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
             raise KeyboardInterrupt
 
 sys.meta_path.insert(0, Interrupt())
@@ -74,9 +76,10 @@ sys.exit(start())
 """
 
 
+@pytest.mark.parametrize("wrapped", [False, True])
 @pytest.mark.parametrize("module", ["ppafo.cli.main", "argparse", "ppafo.cli.schema", "pydantic"])
-def test_interrupt_while_modules_load_is_one_line(module: str) -> None:
-    code = INTERRUPTED.replace("MODULE", repr(module))
+def test_interrupt_while_modules_load_is_one_line(module: str, wrapped: bool) -> None:
+    code = INTERRUPTED.replace("MODULE", repr(module)).replace("WRAPPED", repr(wrapped))
     done = subprocess.run(
         [sys.executable, "-S", "-c", f"import sys; sys.path[:] = {sys.path!r}{code}"],
         capture_output=True,
