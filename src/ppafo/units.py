@@ -61,7 +61,7 @@ _LONGEST_UNIT = 60
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _PRESSURE_KIND = re.compile(r"([A-Za-z]+)_([gad])")
-_FACTOR = r"[A-Za-zµ]+(?:_[gad])?(?:\^-?[0-9])?"
+_FACTOR = r"[A-Za-zµ]+(?:_[gad])?(?:\^-?[1-9])?"
 _PRODUCT = rf"{_FACTOR}(?: {_FACTOR})*"
 _EXPRESSION = re.compile(rf"(?:1|{_PRODUCT})(?:/(?:{_FACTOR}|\({_PRODUCT}\)))*")
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "°": "deg", "μ": "µ", "%": "percent"})

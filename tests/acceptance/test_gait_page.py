@@ -27,7 +27,7 @@ def test_the_commands_and_the_python_of_the_page_run(
     commands = [line for block in blocks("sh") for line in block.splitlines()]
     assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 6
     files = {path.name for path in (tmp_path / "out" / "my-gait").iterdir()}
-    assert files == {"my-gait.toml", "gait.json", "gait.png", "gait.svg"}
+    assert files == {"my-gait.toml", "gait.json", "gait.png", "gait.svg", "ppafo.json"}
     assert "shank_angle" in read_opensim(tmp_path / "out" / "walk.sto").columns
     capsys.readouterr()
     names: dict[str, Any] = {}

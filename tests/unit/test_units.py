@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ppafo.errors import UnitError
@@ -164,3 +164,31 @@ def test_any_text_is_a_quantity_or_a_clear_error(text: str) -> None:
 def test_importing_the_module_does_not_load_pint() -> None:
     code = "import sys, ppafo.units; sys.exit('pint' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("unit", ["mm^0", "degC^0", "percent^0", "m/s^0", "m^-0"])
+@pytest.mark.parametrize("si_unit", ["", "m", "K"])
+def test_unit_to_the_power_of_zero_is_no_unit(unit: str, si_unit: str) -> None:
+    with pytest.raises(UnitError, match="is not a unit; write it like"):
+        parse_quantity(f"1 {unit}", si_unit)
+
+
+FACTORS = ["m", "mm", "s", "K", "degC", "deg", "psi", "psi_g", "%", "N", "1", "", "kkg", "lbf", "Pa_d"]
+unit_texts = st.lists(
+    st.tuples(
+        st.sampled_from(FACTORS),
+        st.sampled_from(["", "^0", "^1", "^-1", "^9", "**2", "²", "^-0", "^10", "^1.5", "^^2", "_g"]),
+        st.sampled_from(["", " ", "/", "*", "·", "(", ")", "/(", "\u00a0"]),
+    ),
+    max_size=6,
+).map(lambda parts: "".join("".join(part) for part in parts))
+
+
+@settings(max_examples=1500, deadline=None)
+@given(unit=unit_texts, number=st.sampled_from(["1", "-0", "1e308", "1e-320", "0.5", "9" * 300]))
+def test_any_text_is_a_quantity_or_refused_as_none(unit: str, number: str) -> None:
+    for si_unit in ("", "m", "K", "Pa_a", "Pa_d", "rad", "1/s"):
+        try:
+            assert math.isfinite(parse_quantity(f"{number} {unit}", si_unit))
+        except UnitError as error:
+            assert len(str(error).splitlines()) == 1

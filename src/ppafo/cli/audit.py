@@ -34,7 +34,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.parameters import apply_overrides, load_parameter_set
     from ppafo.parameters.audit import audit
 
-    check_output(parsed.out)
+    check_output(parsed)
     parameter_set = apply_overrides(load_parameter_set(parsed.name), parsed.overrides)
     findings = audit(parameter_set)
     counts = {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}

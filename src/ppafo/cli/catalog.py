@@ -22,6 +22,7 @@ COMMANDS: dict[str, str] = {
     "sets": "list parameter sets, or show one with the source of every value",
     "parts": "list real parts with the origin of every figure",
     "audit": "check a parameter set for contradictions",
+    "cache": "show, compile or remove the compiled models of this computer",
     "schema": "print the JSON Schema of a file format",
     "bench": "measure speed against other solvers in the same run",
 }

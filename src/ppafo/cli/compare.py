@@ -3,7 +3,7 @@
 import argparse
 
 from ppafo.cli.arguments import UsageError
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, check_own_folder, print_result, write_files
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, check_output, print_result, write_files
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.cli.study_options import add_study_options, confidence, most_failed, progress, seed, threads
 from ppafo.cli.whole_numbers import whole_number
@@ -31,11 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(parsed: argparse.Namespace) -> int:
     """Compare, print and write; 1 where a run diverged."""
     load_compiler()
-    from ppafo.reporting.comparison_report import FILES, REPORT, comparison_document, comparison_files, comparison_text
+    from ppafo.reporting.comparison_report import REPORT, comparison_document, comparison_files, comparison_text
     from ppafo.studies.comparison import compare
     from ppafo.studies.comparison.study import DEFAULT_DRAWS
 
-    check_own_folder(parsed.out, FILES)
+    check_output(parsed)
     draws = whole_number(parsed.draws, "--draws")
     with progress() as line:
         comparison = compare(
@@ -54,7 +54,7 @@ def run(parsed: argparse.Namespace) -> int:
     lines = comparison_text(comparison)
     if parsed.out is not None:
         load_drawing()
-        write_files(parsed.out, comparison_files(comparison))
+        write_files(parsed, comparison_files(comparison))
         lines += ["", f"report: {parsed.out / REPORT}"]
     print_result("\n".join(lines), comparison_document(comparison), parsed.json)
     return EXIT_GOOD if all(case.status.is_completed for case in comparison.cases) else EXIT_CHECK_FAILED

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_own_folder, print_result, write_files
+from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_output, print_result, write_files
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.errors import StudyError
 
@@ -24,11 +24,11 @@ def run(parsed: argparse.Namespace) -> int:
         return _list(parsed)
     if parsed.design is None:
         raise StudyError(f"no design was given: name one ({', '.join(FILE.names())}) or give a .toml file")
-    from ppafo.reporting.design_files import FILE_NAMES, design_files
+    from ppafo.reporting.design_files import design_files
     from ppafo.reporting.design_table import design_document, design_table
     from ppafo.studies.design import load_design, run_design
 
-    check_own_folder(parsed.out, FILE_NAMES)
+    check_output(parsed)
     read_design_file(parsed.design)
     load_compiler()
     problem = load_design(parsed.design, _seed(parsed.seed))
@@ -38,7 +38,7 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.out is not None:
         load_drawing()
         files = design_files(design)
-        write_files(parsed.out, files)
+        write_files(parsed, files)
         lines += ["", f"written: {parsed.out} ({', '.join(files)})"]
     print_result("\n".join(lines), design_document(design), parsed.json)
     return EXIT_GOOD

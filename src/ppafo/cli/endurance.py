@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, print_result
+from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, named_option, print_result
 from ppafo.cli.quick_imports import load_drawing
 from ppafo.errors import DataError, ParameterError, UnitError
 
@@ -77,7 +77,8 @@ def _one(parsed: argparse.Namespace, bottle: "Bottle", schedule: "Schedule") -> 
 
     kind = _folder_kind()
     if parsed.out is not None:
-        check_owned_folder(parsed.out, kind)
+        with named_option():
+            check_owned_folder(parsed.out, kind)
     if parsed.recordings:
         made = _of_recording(parsed.recordings[0], parsed, bottle, schedule)
     else:

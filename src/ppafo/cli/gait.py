@@ -8,6 +8,7 @@ from ppafo.cli.output import (
     EXIT_GOOD,
     add_json_argument,
     add_output_arguments,
+    check_new_file,
     check_output,
     print_result,
     write_files,
@@ -86,6 +87,7 @@ def _list(parsed: argparse.Namespace) -> int:
 def _show(parsed: argparse.Namespace) -> int:
     from ppafo.gait import at_speed, load_gait
 
+    check_output(parsed)
     gait = load_gait(parsed.gait)
     if parsed.speed is not None:
         gait = at_speed(gait, _quantity("--speed", parsed.speed, "m/s"))
@@ -96,7 +98,7 @@ def _import(parsed: argparse.Namespace) -> int:
     from ppafo.gait.recorded import import_gait
 
     settings = _settings(parsed)
-    _check_folder(settings.name, parsed.out)
+    check_output(parsed)
     imported = import_gait(parsed.files, settings)
     return _deliver(imported.gait, imported, parsed)
 
@@ -135,21 +137,14 @@ def _quantity(option: str, text: str, si_unit: str) -> float:
         raise DataError(f"{option} {text!r}: {error}") from error
 
 
-def _check_folder(name: str, folder: Path | None) -> None:
-    from ppafo.reporting.gait_files import file_names
-
-    check_output(folder, file_names(name))
-
-
 def _deliver(gait: "Gait", imported: "ImportedGait | None", parsed: argparse.Namespace) -> int:
     from ppafo.reporting.gait_files import gait_document, gait_files, gait_table
 
     lines = gait_table(gait, imported)
     if parsed.out is not None:
-        _check_folder(gait.name, parsed.out)
         load_drawing()
         files = gait_files(gait, imported)
-        write_files(parsed.out, files)
+        write_files(parsed, files)
         lines.append(f"written: {parsed.out} ({', '.join(files)})")
     print_result("\n".join(lines), gait_document(gait, imported), parsed.json)
     return EXIT_GOOD
@@ -161,6 +156,7 @@ def _record(parsed: argparse.Namespace) -> int:
 
     if parsed.out.suffix.lower() != ".csv":
         raise DataError(f"--out {parsed.out}: a recording is written as .csv")
+    check_new_file(parsed.out)
     recording = walk_recording(load_gait(parsed.gait), _whole("--strides", parsed.strides))
     write_csv(parsed.out, recording)
     document = {"file": str(parsed.out), "samples": len(recording), "channels": list(recording.names)}
@@ -174,6 +170,7 @@ def _export(parsed: argparse.Namespace) -> int:
 
     if parsed.out.suffix.lower() != ".sto":
         raise DataError(f"--out {parsed.out}: OpenSim's name for such a file ends in .sto")
+    check_new_file(parsed.out)
     recording = read_recording(parsed.recording)
     write_opensim(parsed.out, recording)
     document = {"file": str(parsed.out), "samples": len(recording), "channels": list(recording.names)}

@@ -27,13 +27,13 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.reporting.identification_files import identification_document, identification_files
     from ppafo.reporting.identification_table import identification_table
 
-    check_output(parsed.out)
+    check_output(parsed)
     identification = identify(parsed.problem, tell)
     lines = identification_table(identification)
     if parsed.out is not None:
         load_drawing()
         files = identification_files(identification)
-        write_files(parsed.out, files)
+        write_files(parsed, files)
         lines += ["", f"written: {parsed.out} ({', '.join(files)})"]
     print_result("\n".join(lines), identification_document(identification), parsed.json)
     return EXIT_GOOD if identification.is_good else EXIT_CHECK_FAILED

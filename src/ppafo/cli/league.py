@@ -11,7 +11,7 @@ from ppafo.cli.output import (
     EXIT_GOOD,
     add_output_arguments,
     add_override_argument,
-    check_own_folder,
+    check_output,
     print_result,
     tell,
     write_files,
@@ -62,11 +62,11 @@ def run(parsed: argparse.Namespace) -> int:
         option = "--gait" if parsed.gait is not None else "--minutes"
         raise ScenarioError(f"{option} belongs to a leg that walks: add --walk")
     load_compiler()
-    from ppafo.reporting.league_files import NAMES, league_files
+    from ppafo.reporting.league_files import league_files
     from ppafo.reporting.league_table import league_document, league_table
     from ppafo.studies.league import league
 
-    check_own_folder(parsed.out, NAMES)
+    check_output(parsed)
     played = league(parsed.scenario or _TASK, parsed.overrides, parsed.draws, say=tell)
     return _shown(parsed, league_table(played), league_document(played), lambda: league_files(played))
 
@@ -75,13 +75,12 @@ def _walking(parsed: argparse.Namespace) -> int:
     if parsed.scenario is not None:
         raise ScenarioError(f"{parsed.scenario}: a league has one task; give a scenario or --walk, not both")
     load_compiler()
-    from ppafo.reporting.league_files import NAMES
     from ppafo.reporting.walking_league_document import walking_league_document
     from ppafo.reporting.walking_league_files import walking_league_files
     from ppafo.reporting.walking_league_table import walking_league_table
     from ppafo.studies.league.walking import walking_league, walking_task
 
-    check_own_folder(parsed.out, NAMES)
+    check_output(parsed)
     task = walking_task(parsed.walk, parsed.overrides, parsed.gait, minutes_of(parsed.minutes or _MINUTES))
     league = walking_league(task, parsed.draws, say=tell)
     document = walking_league_document(league)
@@ -99,7 +98,7 @@ def _shown(
 
     if parsed.out is not None:
         load_drawing()
-        write_files(parsed.out, files())
+        write_files(parsed, files())
         lines = [*lines, "", f"report: {parsed.out / REPORT}"]
     print_result("\n".join(lines), document, parsed.json)
     return EXIT_GOOD

@@ -51,11 +51,12 @@ def _run(words: list[str]) -> int:
         print(f"ppafo: {one_line(error)}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
-        print("ppafo: interrupted; nothing was written", file=sys.stderr)
+        print("ppafo: interrupted; nothing is half written", file=sys.stderr)
         return EXIT_INTERRUPTED
 
 
 def _parsed(words: list[str]) -> argparse.Namespace:
+    _check_text(words)
     chosen = next((word for word in words if not word.startswith("-")), None)
     check_command(chosen, tuple(COMMANDS))
     parser = build_parser(chosen)
@@ -64,3 +65,10 @@ def _parsed(words: list[str]) -> argparse.Namespace:
     if parsed.command is None:
         raise UsageError(f"no command was given; known are {', '.join(COMMANDS)}; 'ppafo --help' says what each does")
     return parsed
+
+
+def _check_text(words: list[str]) -> None:
+    """Refuse, before anything runs, a name that is not UTF-8: no result could say which file it is of."""
+    for word in words:
+        if not word.isascii() and any("\ud800" <= character <= "\udfff" for character in word):
+            raise UsageError(f"'{one_line(word)}' is not text in UTF-8; give the file or folder another name")

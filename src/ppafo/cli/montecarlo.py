@@ -2,7 +2,7 @@
 
 import argparse
 
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, check_own_folder, print_result, write_files
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, check_output, print_result, write_files
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.cli.study_options import add_study_options, confidence, most_failed, progress, seed, threads
 from ppafo.cli.whole_numbers import whole_number
@@ -33,7 +33,6 @@ def run(parsed: argparse.Namespace) -> int:
     """Draw, print and write; 1 where the interval did not become narrow enough."""
     load_compiler()
     from ppafo.reporting.monte_carlo_report import (
-        FILES,
         REPORT,
         monte_carlo_document,
         monte_carlo_files,
@@ -41,7 +40,7 @@ def run(parsed: argparse.Namespace) -> int:
     )
     from ppafo.studies.monte_carlo import monte_carlo
 
-    check_own_folder(parsed.out, FILES)
+    check_output(parsed)
     with progress() as line:
         estimate = monte_carlo(
             parsed.study,
@@ -61,7 +60,7 @@ def run(parsed: argparse.Namespace) -> int:
     lines = monte_carlo_text(estimate)
     if parsed.out is not None:
         load_drawing()
-        write_files(parsed.out, monte_carlo_files(estimate))
+        write_files(parsed, monte_carlo_files(estimate))
         lines += ["", f"report: {parsed.out / REPORT}"]
     print_result("\n".join(lines), monte_carlo_document(estimate), parsed.json)
     return EXIT_GOOD if estimate.is_met else EXIT_CHECK_FAILED

@@ -4,7 +4,7 @@ import argparse
 import contextlib
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -38,39 +38,49 @@ def add_override_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def check_output(folder: Path | None, names: Iterable[str] = ()) -> None:
-    """Refuse, before anything runs, a folder into which files of these names cannot be written later."""
-    if folder is not None:
-        from ppafo.storage.files import check_files_can_be_added
+def check_output(parsed: argparse.Namespace) -> None:
+    """Refuse, before anything runs, a folder of ``--out`` that is not absent, empty or this command's own result."""
+    if parsed.out is not None:
+        from ppafo.storage.owned_folder import check_owned_folder, marked_folder
 
-        try:
-            check_files_can_be_added(folder, names)
-        except DataError as error:
-            raise DataError(f"--out {error}") from error
+        with named_option():
+            check_owned_folder(parsed.out, marked_folder(_command(parsed)))
 
 
-def check_own_folder(folder: Path | None, names: Iterable[str]) -> None:
-    """Refuse, before anything runs, a folder that holds anything but files of these names, which would be replaced."""
-    wanted = frozenset(names)
-    if folder is not None and folder.is_dir():
-        foreign = sorted(entry.name for entry in folder.iterdir() if entry.name not in wanted)
-        if foreign:
-            raise DataError(f"--out {folder}: holds '{foreign[0]}', which is not ours; choose another folder")
-    check_output(folder, wanted)
+def check_new_file(path: Path) -> None:
+    """Refuse a file of ``--out`` that is there: nothing in it would say whose it is."""
+    if os.path.lexists(path):
+        raise DataError(f"--out {path}: is there already; remove it or choose another name")
+
+
+@contextlib.contextmanager
+def named_option() -> Iterator[None]:
+    """Begin what is said of a folder with the option that named it."""
+    try:
+        yield
+    except DataError as error:
+        raise DataError(f"--out {error}") from error
+
+
+def _command(parsed: argparse.Namespace) -> str:
+    """Return the command with its action, such as ``gait show``."""
+    return " ".join(word for word in (parsed.command, getattr(parsed, "action", None)) if word)
 
 
 def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.Namespace) -> None:
     """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where asked, and print one of them."""
     if parsed.out is not None:
         contents = {f"{name}.txt": text, f"{name}.json": json_text(document)}
-        write_files(parsed.out, {file: f"{content}\n".encode() for file, content in contents.items()})
+        write_files(parsed, {file: f"{content}\n".encode() for file, content in contents.items()})
     print_result(text, document, parsed.json)
 
 
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
     """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``ppafo sets | head``."""
     with _printing():
-        print(json_text(document) if as_json else text, flush=True)
+        shown = json_text(document) if as_json else text
+        encoding = sys.stdout.encoding or "utf-8"
+        print(shown.encode(encoding, "backslashreplace").decode(encoding), flush=True)
 
 
 def flush_output() -> None:
@@ -97,14 +107,12 @@ def _drop_output() -> None:
     os.close(nowhere)
 
 
-def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into the folder of ``--out``, made if need be: all of them or none."""
-    from ppafo.storage.files import add_files
+def write_files(parsed: argparse.Namespace, contents: Mapping[str, bytes]) -> None:
+    """Make the folder of ``--out`` hold exactly these files, and the mark by which it is known: all of them or none."""
+    from ppafo.storage.owned_folder import write_marked_folder
 
-    try:
-        add_files(folder, contents)
-    except DataError as error:
-        raise DataError(f"--out {error}") from error
+    with named_option():
+        write_marked_folder(parsed.out, contents, _command(parsed))
 
 
 def tell(text: str) -> None:

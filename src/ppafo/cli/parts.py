@@ -18,7 +18,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.parameters.parts import load_catalogue
     from ppafo.reporting.parts_table import part_lines, parts_document, parts_lines
 
-    check_output(parsed.out)
+    check_output(parsed)
     catalogue = load_catalogue(parsed.catalogue)
     if parsed.part is None:
         deliver("parts", "\n".join(parts_lines(catalogue)), parts_document(catalogue, catalogue.parts), parsed)

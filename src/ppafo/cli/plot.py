@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, print_result
+from ppafo.cli.output import EXIT_GOOD, add_json_argument, check_new_file, print_result
 from ppafo.errors import DataError
 
 
@@ -26,6 +26,8 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.out is not None and parsed.out.suffix.removeprefix(".") not in FIGURE_FORMATS:
         allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
         raise DataError(f"--out {parsed.out}: the name must end in one of {allowed}")
+    if parsed.out is not None:
+        check_new_file(parsed.out)
     figure = stored_figure(read_result(parsed.folder))
     if parsed.out is None:
         contents = {parsed.folder / name: content for name, content in figure_files(figure).items()}

@@ -8,6 +8,7 @@ from ppafo.cli.output import (
     EXIT_GOOD,
     add_output_arguments,
     add_override_argument,
+    named_option,
     print_result,
     tell,
 )
@@ -37,7 +38,8 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.studies.reproduction import reproduce
 
     if parsed.out is not None:
-        check_reproduction_folder(parsed.out)
+        with named_option():
+            check_reproduction_folder(parsed.out)
     reproduction = reproduce(parsed.overrides, tell)
     lines = [*_changed(parsed.overrides), *claims_table(reproduction.claims), *_missed(reproduction)]
     if parsed.out is not None:

@@ -3,9 +3,9 @@
 import argparse
 from pathlib import Path
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, print_result
+from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, named_option, print_result
 from ppafo.cli.quick_imports import load_compiler
-from ppafo.errors import DataError, ParameterError
+from ppafo.errors import ParameterError
 
 _DEFAULT_OUT = Path("out") / "rig"
 
@@ -71,10 +71,8 @@ def _record(parsed: argparse.Namespace) -> int:
 
     chosen_experiment(parsed.experiment)
     seed = _whole_number(parsed.seed)
-    try:
+    with named_option():
         check_rig_folder(parsed.out, parsed.experiment)
-    except DataError as error:
-        raise DataError(f"--out {error}") from error
     made = record(parsed.experiment, parsed.preset, seed, parsed.device, parsed.overrides, parsed.valve)
     files = write_rig_recording(parsed.out, made)
     counted = f"{len(made.recording)} samples of {', '.join(made.recording.names)}"

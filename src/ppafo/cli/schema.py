@@ -36,7 +36,7 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.format not in FORMATS:
         hint = nearest_name(parsed.format, FORMATS)
         raise DataError(f"there is no file format '{parsed.format}'{hint}; known are {', '.join(FORMATS)}")
-    check_output(parsed.out)
+    check_output(parsed)
     document = importlib.import_module(FORMATS[parsed.format]).json_schema()
     parsed.json = True
     deliver(f"{parsed.format}.schema", "", document, parsed)

@@ -2,7 +2,7 @@
 
 import argparse
 
-from ppafo.cli.output import EXIT_GOOD, check_own_folder, print_result, write_files
+from ppafo.cli.output import EXIT_GOOD, check_output, print_result, write_files
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.cli.study_options import add_study_options, confidence, most_failed, progress, seed, threads
 from ppafo.cli.whole_numbers import whole_number
@@ -31,7 +31,6 @@ def run(parsed: argparse.Namespace) -> int:
     """Run the design, print and write the indices."""
     load_compiler()
     from ppafo.reporting.sensitivity_report import (
-        FILES,
         REPORT,
         sensitivity_document,
         sensitivity_files,
@@ -39,7 +38,7 @@ def run(parsed: argparse.Namespace) -> int:
     )
     from ppafo.studies.sensitivity import sensitivity
 
-    check_own_folder(parsed.out, FILES)
+    check_output(parsed)
     with progress() as line:
         found = sensitivity(
             parsed.study,
@@ -58,7 +57,7 @@ def run(parsed: argparse.Namespace) -> int:
     lines = sensitivity_text(found)
     if parsed.out is not None:
         load_drawing()
-        write_files(parsed.out, sensitivity_files(found))
+        write_files(parsed, sensitivity_files(found))
         lines += ["", f"report: {parsed.out / REPORT}"]
     print_result("\n".join(lines), sensitivity_document(found), parsed.json)
     return EXIT_GOOD

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(parsed: argparse.Namespace) -> int:
     """List the sets, or show one."""
-    check_output(parsed.out)
+    check_output(parsed)
     if parsed.action == "show":
         _show(parsed)
     else:

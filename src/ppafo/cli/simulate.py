@@ -5,7 +5,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, add_json_argument, add_override_argument, print_result
+from ppafo.cli.output import (
+    EXIT_CHECK_FAILED,
+    EXIT_GOOD,
+    add_json_argument,
+    add_override_argument,
+    named_option,
+    print_result,
+)
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.errors import ScenarioError
 
@@ -36,7 +43,8 @@ def run(parsed: argparse.Namespace) -> int:
 
     scenario = load_scenario(parsed.scenario, parsed.overrides)
     folder = parsed.out if parsed.out is not None else DEFAULT_FOLDER / scenario.name
-    check_result_folder(folder)
+    with named_option():
+        check_result_folder(folder)
     result = _simulated(scenario)
     _save(result, folder)
     print_result(_text(result, folder), _document(result, folder), parsed.json)

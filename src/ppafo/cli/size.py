@@ -6,7 +6,7 @@ from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
     EXIT_GOOD,
     add_output_arguments,
-    check_own_folder,
+    check_output,
     print_result,
     tell,
     write_files,
@@ -30,10 +30,10 @@ def run(parsed: argparse.Namespace) -> int:
         return _list(parsed)
     if parsed.sizing is None:
         raise StudyError(f"no sizing was given: name one ({', '.join(FILE.names())}) or give a .toml file")
-    from ppafo.reporting.sizing_files import FILE_NAMES, sizing_files
+    from ppafo.reporting.sizing_files import sizing_files
     from ppafo.reporting.sizing_table import sizing_document, sizing_table
 
-    check_own_folder(parsed.out, FILE_NAMES)
+    check_output(parsed)
     read_sizing_file(parsed.sizing)
     load_compiler()
     from ppafo.studies.sizing import run_sizing
@@ -43,7 +43,7 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.out is not None:
         load_drawing()
         files = sizing_files(sizing)
-        write_files(parsed.out, files)
+        write_files(parsed, files)
         lines += ["", f"written: {parsed.out} ({', '.join(files)})"]
     print_result("\n".join(lines), sizing_document(sizing), parsed.json)
     return EXIT_CHECK_FAILED if sizing.choice is None else EXIT_GOOD

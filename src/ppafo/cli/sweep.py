@@ -35,10 +35,14 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.study is None:
         raise StudyError("no study was given: name one or give a .toml file; 'ppafo sweep --list' shows them")
     try:
-        results = _results(parsed)
+        return _run_and_report(parsed)
     except KeyboardInterrupt:
         print("\nppafo: interrupted; finished chunks are kept, and the same command goes on from them", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _run_and_report(parsed: argparse.Namespace) -> int:
+    results = _results(parsed)
     load_drawing()
     from ppafo.reporting.study_report import study_document, study_text, write_report
 

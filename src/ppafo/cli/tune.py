@@ -9,7 +9,7 @@ from ppafo.cli.output import (
     EXIT_GOOD,
     add_output_arguments,
     add_override_argument,
-    check_own_folder,
+    check_output,
     print_result,
     write_files,
 )
@@ -38,17 +38,17 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.tuning is None:
         raise StudyError("no tuning was given: name one or give a .toml file; 'ppafo tune --list' shows them")
     load_compiler()
-    from ppafo.reporting.tuning_report import FILES, REPORT, tuning_document, tuning_files, tuning_text
+    from ppafo.reporting.tuning_report import REPORT, tuning_document, tuning_files, tuning_text
     from ppafo.studies.tuning import tune
 
     problem = _problem(parsed)
-    check_own_folder(parsed.out, FILES)
+    check_output(parsed)
     with progress() as line:
         tuning = tune(problem, (), threads(parsed), line)
     lines = tuning_text(tuning)
     if parsed.out is not None:
         load_drawing()
-        write_files(parsed.out, tuning_files(tuning))
+        write_files(parsed, tuning_files(tuning))
         lines += ["", f"report: {parsed.out / REPORT}"]
     print_result("\n".join(lines), tuning_document(tuning), parsed.json)
     return EXIT_GOOD if tuning.after.is_feasible else EXIT_CHECK_FAILED

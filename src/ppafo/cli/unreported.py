@@ -1,13 +1,12 @@
 """``ppafo unreported``: what the paper's results imply about the settings that it does not print."""
 
 import argparse
-from pathlib import Path
 
 from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
     EXIT_GOOD,
     add_output_arguments,
-    check_own_folder,
+    check_output,
     print_result,
     tell,
     write_files,
@@ -37,7 +36,7 @@ def run(parsed: argparse.Namespace) -> int:
 
     draws = whole_number(parsed.draws, "--draws") or 0
     seed = whole_number(parsed.seed, "--seed") or 0
-    check_own_folder(parsed.out, (_DOCUMENT, *(f"{_FIGURE}.{ending}" for ending in _FORMATS)))
+    check_output(parsed)
     family = infer_settings(draws, seed, tell)
     document = unreported_document(family)
     lines = unreported_table(family)
@@ -48,7 +47,7 @@ def run(parsed: argparse.Namespace) -> int:
 
         figures = rendered(unreported_figure(family), _FORMATS)
         contents = {f"{_FIGURE}.{ending}": content for ending, content in figures.items()}
-        write_files(Path(parsed.out), {**contents, _DOCUMENT: f"{json_text(document)}\n".encode()})
+        write_files(parsed, {**contents, _DOCUMENT: f"{json_text(document)}\n".encode()})
         lines += ["", f"figure: {parsed.out / f'{_FIGURE}.png'}"]
     print_result("\n".join(lines), document, parsed.json)
     return EXIT_GOOD if family.effective > 0.0 else EXIT_CHECK_FAILED

@@ -1,7 +1,6 @@
 """``ppafo validate PARAMETERS RECORDINGS``: replays recordings on the model and says how far apart they are."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ppafo.cli.output import (
@@ -87,7 +86,7 @@ def run(parsed: argparse.Namespace) -> int:
     """Compare, print and write; 1 where an error is above its limit."""
     load_compiler()
     from ppafo.parameters import load_device
-    from ppafo.reporting.agreement_files import REPORT, agreement_files, file_names
+    from ppafo.reporting.agreement_files import REPORT, agreement_files
     from ppafo.reporting.agreement_table import agreement_document, agreement_table
     from ppafo.validation import ReplaySettings, parse_thresholds, validate
     from ppafo.validation.alignment import parse_limit
@@ -103,12 +102,12 @@ def run(parsed: argparse.Namespace) -> int:
         volume=parse_volume(parsed.volume),
     )
     columns = _column_map(parsed.columns)
-    check_output(parsed.out, file_names(parsed.recordings))
+    check_output(parsed)
     validation = validate(parsed.parameters, parsed.recordings, parsed.valve, parsed.overrides, settings, tell, columns)
     lines = agreement_table(validation)
     if parsed.out is not None:
         load_drawing()
-        write_files(Path(parsed.out), agreement_files(validation))
+        write_files(parsed, agreement_files(validation))
         lines += ["", f"report: {parsed.out / REPORT}"]
     print_result("\n".join(lines), agreement_document(validation), parsed.json)
     return EXIT_GOOD if validation.passes else EXIT_CHECK_FAILED

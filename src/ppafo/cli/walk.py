@@ -4,18 +4,19 @@ import argparse
 import re
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
     EXIT_GOOD,
     add_json_argument,
     add_override_argument,
+    named_option,
     print_result,
     tell,
 )
 from ppafo.cli.quick_imports import load_compiler, load_drawing
-from ppafo.errors import DataError, ScenarioError
+from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
     from ppafo.studies.endurance import Endurance
@@ -71,7 +72,8 @@ def _one(configuration: "Configuration", minutes: float, parsed: argparse.Namesp
 
     folder = parsed.out if parsed.out is not None else Path("out") / f"walk-{configuration.name}"
     checked_seconds(configuration, minutes)
-    _check(folder, WALK_FOLDER, check_owned_folder)
+    with named_option():
+        check_owned_folder(folder, WALK_FOLDER)
     comparison = compare_walks(configuration, minutes, _progress)
     if minutes > _LONG:
         tell("drawing and writing")
@@ -81,13 +83,6 @@ def _one(configuration: "Configuration", minutes: float, parsed: argparse.Namesp
     document = walk_document(comparison, life) | {"folder": str(folder), "files": sorted(files)}
     print_result("\n".join(_lines(comparison, life, folder, sorted(files))), document, parsed.json)
     return _exit_code(comparison)
-
-
-def _check(folder: Path, kind: Any, check: Any) -> None:
-    try:
-        check(folder, kind)
-    except DataError as error:
-        raise DataError(f"--out {error}") from error
 
 
 def _progress(done: float, total: float) -> None:
@@ -127,7 +122,8 @@ def _many(configuration: "Configuration", minutes: float, parsed: argparse.Names
     count = _whole("--wearers", parsed.wearers)
     seed = _whole("--seed", parsed.seed)
     folder = parsed.out if parsed.out is not None else Path("out") / f"wearers-{configuration.name}"
-    _check(folder, POPULATION_FOLDER, check_owned_folder)
+    with named_option():
+        check_owned_folder(folder, POPULATION_FOLDER)
     population = walk_population(configuration, minutes, count, seed, _walked)
     files = population_files(population)
     write_owned_folder(folder, files, POPULATION_FOLDER)

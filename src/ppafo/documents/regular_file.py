@@ -9,13 +9,15 @@ MOST_BYTES_TYPED = 1_000_000
 
 def read_regular_file(path: Path, most: int | None = None) -> bytes:
     """Return the content of a regular file, refused above ``most`` bytes; any OSError has its reason as text."""
-    mode = path.stat().st_mode
+    found = path.stat()
+    mode = found.st_mode
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(None, "it is a directory, not a file")
     if not stat.S_ISREG(mode):
         raise OSError(None, "it is a device or a pipe, not a regular file")
-    with path.open("rb") as file:
-        content = file.read() if most is None else file.read(most + 1)
-    if most is not None and len(content) > most:
-        raise OSError(None, f"it is larger than {most / 1e6:g} MB, the most that is read of such a file")
-    return content
+    if most is None or found.st_size <= most:
+        with path.open("rb") as file:
+            content = file.read() if most is None else file.read(most + 1)
+        if most is None or len(content) <= most:
+            return content
+    raise OSError(None, f"it is larger than {most / 1e6:g} MB, the most that is read of such a file")

@@ -1,11 +1,13 @@
 """From a name or a path to the document in a TOML file; every mistake is one clear line."""
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from ppafo.documents.json_text import MOST_LEVELS, is_nested_too_deeply
 from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
 from ppafo.errors import PpafoError, nearest_name, one_line, reason
 
@@ -50,11 +52,18 @@ class TomlKind:
         if not text.strip():
             raise self.error(f"{file}: is empty; 'ppafo schema {self.schema}' prints what belongs in it")
         try:
-            return tomllib.loads(text)
+            document = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise self.error(f"{file}: is not valid TOML: {one_line(error)}") from error
         except (RecursionError, ValueError) as error:
             raise self.error(f"{file}: is not usable TOML: nested too deeply or a number too long") from error
+        self.check_depth(document, file)
+        return document
+
+    def check_depth(self, document: Mapping[str, Any], file: str) -> None:
+        """Refuse tables that lie in each other too deep; ``file`` is what messages call the document."""
+        if is_nested_too_deeply(document):
+            raise self.error(f"{file}: has tables nested deeper than {MOST_LEVELS} levels; a few are enough")
 
 
 def label(file: str) -> str:

@@ -1,85 +1,304 @@
-"""Generated modules on disk: written once, named by their hash, compiled once for each computer."""
+"""Generated modules on disk: compiled once for each computer, kept in a folder that nobody else can write.
 
+Loading compiled code runs it, so a folder is used only where it belongs to this user, and a program only where it is
+whole to the last bit. Whatever is wrong with the folder, a model is compiled and runs; only the next start waits again.
+"""
+
+import contextlib
 import hashlib
-import importlib.util
+import json
 import logging
 import os
+import re
+import secrets
+import shutil
+import stat
 import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
-from ppafo.errors import SimulationError
+from ppafo.documents.regular_file import read_regular_file
+from ppafo.errors import reason
 
 logger = logging.getLogger("ppafo")
 
 CACHE_VARIABLE = "PPAFO_CACHE_DIR"
+LONGEST_UNUSED = 90.0 * 86400.0
+"""Seconds after which a program that no start has asked for is removed."""
+
+MOST_BYTES = 500_000_000
+"""Size of all programs above which those that were not used for longest are removed."""
+
+_PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
+"""What the name of a program looks like; beside it, one of an earlier release, which lay in several files."""
+
+_ASIDE = re.compile(r"\.writing-[0-9a-f]{16}")
+_LONGEST_ASIDE = 86400.0
+_CHECKSUMS = "checksums.json"
+_KEPT, _NOT_KEPT = "cache=True", "cache=False"
+_WRITTEN_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _LOADING = threading.RLock()
 
 
-def cache_folder() -> Path:
-    """Folder of the generated modules: ``PPAFO_CACHE_DIR``, or the user's cache folder."""
+@dataclass(frozen=True, slots=True)
+class CachedProgram:
+    """A program in the cache: where it is, its bytes, and when it was last used, in seconds since 1970."""
+
+    place: Path
+    size: int
+    used: float
+
+
+def cache_folder() -> Path | None:
+    """Return the folder of the programs: ``PPAFO_CACHE_DIR``, or the user's cache; None where the user has no home."""
     if os.environ.get(CACHE_VARIABLE):
-        return Path(os.environ[CACHE_VARIABLE])
+        return Path(os.environ[CACHE_VARIABLE]).absolute()
     import platformdirs
 
-    return Path(platformdirs.user_cache_dir("ppafo", appauthor=False)) / "programs"
+    try:
+        folder = Path(platformdirs.user_cache_dir("ppafo", appauthor=False)) / "programs"
+    except RuntimeError:
+        return None
+    return folder if folder.is_absolute() else None
 
 
 def load_generated(kind: str, source: str) -> ModuleType:
-    """Import the module with this source, from the cache where it is there; compiled code is cached beside it."""
-    digest = hashlib.sha256(source.encode()).hexdigest()[:24]
-    name = f"ppafo_{kind}_{digest}"
+    """Import the module with this source, from the cache where it is there and whole."""
+    name = f"ppafo_{kind}_{hashlib.sha256(source.encode()).hexdigest()[:24]}"
     # A second thread must not get a module of which only the beginning has run.
     with _LOADING:
         return sys.modules[name] if name in sys.modules else _imported(name, source)
 
 
-def _imported(name: str, source: str) -> ModuleType:
-    path = _written(f"{name}.py", source)
-    is_new = not any((path.parent / "__pycache__").glob(f"{name}.*.nbi"))
-    if is_new:
-        logger.warning("ppafo: compiling a model for this computer, once; this takes some seconds ...")
-    start = time.perf_counter()
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise SimulationError(f"{path}: the generated module cannot be imported; delete it and try again")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+def refusal(folder: Path | None) -> str:
+    """Return why programs are neither read from nor kept in a folder, as the end of a sentence; empty where they are.
+
+    The folder is made if need be. It must be this user's own and no link, and nobody else may write it or put another
+    in its place.
+    """
+    if folder is None:
+        return "this user has no home folder"
     try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    if is_new:
-        logger.warning("ppafo: compiled in %.1f s and kept in %s", time.perf_counter() - start, path.parent)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+        found = folder.lstat()
+        above = [place.stat() for place in folder.resolve().parents]
+    except (OSError, ValueError) as error:
+        return f"{folder} cannot be made: {reason(error)}"
+    whose = _why_not_private(folder, found, above)
+    if whose or os.access(folder, os.W_OK | os.X_OK):
+        return whose
+    return f"{folder} cannot be written"
+
+
+def _why_not_private(folder: Path, found: os.stat_result, above: list[os.stat_result]) -> str:
+    if not stat.S_ISDIR(found.st_mode):
+        return f"{folder} is {'a link' if stat.S_ISLNK(found.st_mode) else 'not a folder'}"
+    if not hasattr(os, "geteuid"):
+        return ""
+    if found.st_uid != os.geteuid():
+        return f"{folder} belongs to another user"
+    if found.st_mode & _WRITTEN_BY_OTHERS:
+        return f"others can write into {folder}; 'ppafo cache --clear' and 'chmod 700' make it safe"
+    is_exchanged = any(_can_be_exchanged(place) for place in above)
+    return f"others can put another folder in the place of {folder}" if is_exchanged else ""
+
+
+def _can_be_exchanged(place: os.stat_result) -> bool:
+    """Tell whether another user can rename what lies in a folder."""
+    is_theirs = place.st_uid not in (0, os.geteuid())
+    return is_theirs or bool(place.st_mode & stat.S_IWOTH and not place.st_mode & stat.S_ISVTX)
+
+
+def cached_programs(folder: Path) -> list[CachedProgram]:
+    """Return the programs in a cache folder, the one that was used last first."""
+    places = [*_named(folder, _PROGRAM), *_named(folder / "__pycache__", _PROGRAM)]
+    return sorted((_measured(place) for place in places), key=lambda item: -item.used)
+
+
+def clear(folder: Path) -> int:
+    """Remove all programs, and the folder where nothing else is in it; returns how many bytes that made free."""
+    freed = 0
+    for program in [*cached_programs(folder), *map(_measured, _named(folder, _ASIDE))]:
+        _remove(program.place)
+        freed += 0 if os.path.lexists(program.place) else program.size
+    for emptied in (folder / "__pycache__", folder):
+        with contextlib.suppress(OSError):
+            emptied.rmdir()
+    return freed
+
+
+def evict(folder: Path) -> None:
+    """Remove programs unused for ``LONGEST_UNUSED``, those beyond ``MOST_BYTES``, and what a killed process left."""
+    now, total = time.time(), 0
+    for program in cached_programs(folder):
+        total += program.size
+        if now - program.used > LONGEST_UNUSED or total > MOST_BYTES:
+            _remove(program.place)
+    for place in _named(folder, _ASIDE):
+        if now - _measured(place).used > _LONGEST_ASIDE:
+            _remove(place)
+
+
+def _imported(name: str, source: str) -> ModuleType:
+    folder = cache_folder()
+    why_not = refusal(folder)
+    if folder is None or why_not:
+        logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
+        return _compiled_in_memory(name, source)
+    kept = folder / f"{name}-{_machine()}"
+    module = _kept_module(kept, name, source)
+    if module is not None:
+        return module
+    try:
+        return _compiled_and_kept(kept, name, source)
+    except OSError as error:
+        logger.warning("ppafo: the compiled model is not kept in %s: %s", folder, reason(error))
+        return _compiled_in_memory(name, source)
+
+
+def _kept_module(kept: Path, name: str, source: str) -> ModuleType | None:
+    """Return the module of a program that is there and whole; one that is damaged is removed."""
+    if not os.path.lexists(kept):
+        return None
+    if not _is_whole(kept):
+        logger.warning("ppafo: the compiled model %s is damaged; it is made anew", kept.name)
+        _remove(kept)
+        return None
+    try:
+        module = _run(name, source, kept / f"{name}.py")
+        os.utime(kept)
+    except OSError:  # another process has removed it in this instant, or the disk is full
+        return sys.modules.get(name)
     return module
 
 
-def _written(file_name: str, source: str) -> Path:
-    """Path of the module's file, written aside and renamed; in a temporary folder where the cache is not writable."""
+def _compiled_and_kept(kept: Path, name: str, source: str) -> ModuleType:
+    """Compile a program in a folder aside, which takes its place when it is whole."""
+    aside = kept.with_name(f".writing-{secrets.token_hex(8)}")
     try:
-        return _write(cache_folder(), file_name, source)
-    except OSError as error:
-        fallback = Path(tempfile.gettempdir()) / f"ppafo-programs-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
-        logger.warning("ppafo: the cache folder cannot be written (%s); using %s", error, fallback)
-        try:
-            return _write(fallback, file_name, source)
-        except OSError as second:
-            raise SimulationError(
-                f"no folder for compiled models can be written ({second}); set {CACHE_VARIABLE} to one that can"
-            ) from second
+        aside.mkdir(mode=0o700)
+        path = aside / f"{name}.py"
+        path.write_text(source, encoding="utf-8")
+        with _told(f"kept in {kept.parent}"):
+            module = _run(name, source, path)
+        (aside / _CHECKSUMS).write_text(json.dumps(_checksums(aside), indent=2), encoding="utf-8")
+        with contextlib.suppress(OSError):  # another process was quicker, with the same program
+            aside.rename(kept)
+        evict(kept.parent)
+    except OSError:
+        sys.modules.pop(name, None)
+        raise
+    finally:
+        _remove(aside)
+    return module
 
 
-def _write(folder: Path, file_name: str, source: str) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / file_name
-    if path.is_file() and path.read_text(encoding="utf-8") == source:
-        return path
-    handle, aside = tempfile.mkstemp(dir=folder, suffix=".tmp")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(source)
-    Path(aside).replace(path)
-    return path
+def _compiled_in_memory(name: str, source: str) -> ModuleType:
+    with _told("not kept"):
+        return _run(name, source.replace(_KEPT, _NOT_KEPT), Path(f"<{name}>"))
+
+
+@contextlib.contextmanager
+def _told(where: str) -> Iterator[None]:
+    """Say that a program is being compiled, and at the end how long that took and where it is."""
+    logger.warning("ppafo: compiling a model for this computer; this takes some seconds ...")
+    start = time.perf_counter()
+    yield
+    logger.warning("ppafo: compiled in %.1f s and %s", time.perf_counter() - start, where)
+
+
+def _run(name: str, source: str, path: Path) -> ModuleType:
+    """Return the module made by running its source; Python's own compiled file, which may be damaged, is not asked."""
+    module = ModuleType(name)
+    module.__file__ = str(path)
+    code = compile(source, str(path), "exec")
+    sys.modules[name] = module
+    try:
+        with _numba_files_beside_source():
+            if path.is_absolute():
+                _check_numba_can_write(path.parent / "__pycache__")
+            exec(code, module.__dict__)  # the text that was generated here
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+@contextlib.contextmanager
+def _numba_files_beside_source() -> Iterator[None]:
+    """Let Numba keep its files in the program's folder: those of ``NUMBA_CACHE_DIR`` are checked by nobody."""
+    from numba.core import config
+
+    others = {name: getattr(config, name) for name in ("CACHE_DIR", "CACHE_LOCATOR_CLASSES") if hasattr(config, name)}
+    try:
+        for name in others:
+            setattr(config, name, "")
+        yield
+    finally:
+        for name, value in others.items():
+            setattr(config, name, value)
+
+
+def _check_numba_can_write(folder: Path) -> None:
+    """Raise OSError where Numba would take another folder, of which nobody knows what is in it."""
+    folder.mkdir(mode=0o700, exist_ok=True)
+    tempfile.TemporaryFile(dir=folder).close()
+
+
+@cache
+def _machine() -> str:
+    """Return a short hash of the processor and of the compiler: programs of others must not be taken for damaged."""
+    import numba
+    from numba.core.registry import cpu_target
+
+    processor = cpu_target.target_context.codegen().magic_tuple()
+    described = repr((processor, numba.__version__, sys.implementation.cache_tag))
+    return hashlib.sha256(described.encode()).hexdigest()[:12]
+
+
+def _is_whole(kept: Path) -> bool:
+    """Tell whether a program's folder is as it was written, file by file."""
+    try:
+        stated = json.loads(read_regular_file(kept / _CHECKSUMS))
+        return not kept.is_symlink() and bool(stated) and stated == _checksums(kept)
+    except (OSError, ValueError, RecursionError):
+        return False
+
+
+def _checksums(folder: Path) -> dict[str, str]:
+    """Return the hash of every file of a program but the list of them itself."""
+    files = sorted(path for path in folder.rglob("*") if not path.is_dir() and path.name != _CHECKSUMS)
+    return {path.relative_to(folder).as_posix(): hashlib.sha256(read_regular_file(path)).hexdigest() for path in files}
+
+
+def _named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
+    """Return what in a folder has such a name; what others put beside it is left alone."""
+    try:
+        return [place for place in folder.iterdir() if pattern.fullmatch(place.name)]
+    except OSError:
+        return []
+
+
+def _measured(place: Path) -> CachedProgram:
+    try:
+        files = [place] if place.is_symlink() or not place.is_dir() else [place, *place.rglob("*")]
+        return CachedProgram(place, sum(path.lstat().st_size for path in files), place.lstat().st_mtime)
+    except OSError:  # another process has removed it in this instant
+        return CachedProgram(place, 0, time.time())
+
+
+def _remove(place: Path) -> None:
+    """Remove a program, a file or a link; what cannot be removed stays."""
+    with contextlib.suppress(OSError):
+        if place.is_dir() and not place.is_symlink():
+            shutil.rmtree(place)
+        else:
+            place.unlink()

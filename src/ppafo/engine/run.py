@@ -144,7 +144,8 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
 def _alike_together(run: Run, members: Members) -> Members:
     """Order of some runs in which those beside each other do the same at about the same time.
 
-    Lanes of a block wait for the slowest at every step. How long the valve takes to move the gas says when a vane moves.
+    Lanes of a block wait for the slowest at every step. When a vane moves depends on how long the valve takes to move
+    the gas.
     """
     plant = run.plant
     gas = plant.dead_volume_1 + plant.dead_volume_2 + plant.volume_per_angle * (plant.angle_max - plant.angle_min)

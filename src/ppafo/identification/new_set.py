@@ -8,7 +8,14 @@ from ppafo.identification.estimate import Estimate
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
-from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, shown
+from ppafo.parameters.parameter_set import (
+    PRESSURE_PATH,
+    SECOND_PRESSURE_PATH,
+    ParameterSet,
+    atmospheric_pressure,
+    has_one_pressure,
+    shown,
+)
 from ppafo.parameters.provenance import Entry
 from ppafo.units import from_si
 
@@ -69,7 +76,10 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
         uncertainty=max(high - value, value - low),
     )
     kept = {path: old for path, old in parameter_set.numbers.items() if path not in _other_form(estimate.path)}
-    return replace(parameter_set, numbers={**kept, estimate.path: entry})
+    found = {estimate.path: entry}
+    if estimate.path == PRESSURE_PATH and has_one_pressure(parameter_set):
+        found[SECOND_PRESSURE_PATH] = entry  # what was fitted is the pressure of both regulators
+    return replace(parameter_set, numbers={**kept, **found})
 
 
 def fitting_unit(unit: str, quantity: Quantity) -> str:

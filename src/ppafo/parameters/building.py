@@ -27,6 +27,7 @@ from ppafo.parameters.parameter_set import (
     chosen_valve,
     entry_in_si,
     shown,
+    with_second_pressure,
 )
 
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
@@ -35,6 +36,7 @@ _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Device:
     """Return the device with one of the set's valves (default: the set's own choice), in SI units."""
     name = chosen_valve(parameter_set, valve)
+    parameter_set = with_second_pressure(parameter_set)
     _check_complete(parameter_set, name)
     reader = _reader(parameter_set)
     device = Device(
@@ -116,17 +118,25 @@ def _valve(parameter_set: ParameterSet, read: Callable[[str], float], name: str)
     return Valve(kind, _orifice(parameter_set, read, section), settings)
 
 
+def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
+    """Return the names by which an orifice is given in both forms at once, none where it is in one or in neither."""
+    area, sonic = (_given(parameter_set, section, form) for form in (declaration.AREA_FORM, declaration.SONIC_FORM))
+    return (*area, *sonic) if area and sonic else ()
+
+
+def _given(parameter_set: ParameterSet, section: str, form: Iterable[Quantity]) -> list[str]:
+    return sorted(item.name for item in form if f"{section}.{item.name}" in parameter_set.numbers)
+
+
 def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
     """Tell which form an orifice is given in; both at once would be two answers to one question."""
-    names = {path.rpartition(".")[2] for path in parameter_set.numbers if path.rpartition(".")[0] == section}
-    area = sorted(names & {quantity.name for quantity in declaration.AREA_FORM})
-    sonic = sorted(names & {quantity.name for quantity in declaration.SONIC_FORM})
-    if area and sonic:
+    both = both_forms(parameter_set, section)
+    if both:
         raise ParameterError(
-            f"{parameter_set.file}: {section} has {', '.join(area)} and {', '.join(sonic)}; "
+            f"{parameter_set.file}: {section} has {', '.join(both)}; "
             f"give either area and discharge_coefficient or sonic_conductance and critical_ratio"
         )
-    return bool(sonic)
+    return bool(_given(parameter_set, section, declaration.SONIC_FORM))
 
 
 def _check_complete(parameter_set: ParameterSet, valve: str) -> None:

@@ -1,10 +1,14 @@
 """What a device is, in SI units: plain frozen values that the rest of the package computes with."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.model.gas import specific_gas_constant
+
+SAME_PRESSURE = 1.0e-6
+"""Relative difference below which two pressures are one that was written in two units."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +88,11 @@ class Supply:
     dorsiflexion_pressure: float
     atmospheric_pressure: float
     relieving: bool = False
+
+    @property
+    def has_one_pressure(self) -> bool:
+        """Whether both regulators are set to one pressure, so that a change of the first is one of both."""
+        return math.isclose(self.pressure, self.dorsiflexion_pressure, rel_tol=SAME_PRESSURE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,16 @@ from dataclasses import dataclass, replace
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
-from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, entry_in_si, written
+from ppafo.parameters.parameter_set import (
+    PRESSURE_PATH,
+    SECOND_PRESSURE_PATH,
+    ParameterSet,
+    atmospheric_pressure,
+    chosen_valve,
+    entry_in_si,
+    has_one_pressure,
+    written,
+)
 from ppafo.parameters.provenance import Entry, FlagEntry, TextEntry
 from ppafo.units import split_quantity
 
@@ -47,17 +56,31 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
 
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
     Naming another gas brings that gas's molar mass and heat capacity ratio; giving an orifice in the form of ISO 6358
-    drops its area and discharge coefficient, and the reverse.
+    drops its area and discharge coefficient, and the reverse. ``supply.pressure`` is that of both regulators where both
+    have one, unless ``supply.dorsiflexion_pressure`` is given apart.
     """
     chosen = chosen_valve(parameter_set, valve)
-    for override in overrides:
+    orders = list(overrides)
+    given = [override.partition("=")[0].strip() for override in orders]
+    for number, override in enumerate(orders):
         on_one_line = one_line(override)
         path, separator, text = (part.strip() for part in on_one_line.partition("="))
         if not separator or not path or not text:
             raise ParameterError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
         change = _CHANGES.get(path, _with_number)
+        is_for_both = path == PRESSURE_PATH and has_one_pressure(parameter_set) and not _is_apart(given, number)
         parameter_set = change(parameter_set, _Order(path, chosen, text))
+        if is_for_both:
+            parameter_set = _with_number(parameter_set, _Order(SECOND_PRESSURE_PATH, chosen, text))
     return parameter_set
+
+
+def _is_apart(given: list[str], number: int) -> bool:
+    """Tell whether these overrides give the second pressure beside the first one, which stands at ``number``.
+
+    A pair of both that comes earlier, as in a file, is one that a later override of the first changes.
+    """
+    return SECOND_PRESSURE_PATH in given and not {PRESSURE_PATH, SECOND_PRESSURE_PATH} <= set(given[:number])
 
 
 def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:

@@ -1,16 +1,19 @@
 """A parameter set in memory: every value by its dotted path, as it was given."""
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import alternatives, quantities
+from ppafo.parameters.device import SAME_PRESSURE
 from ppafo.parameters.provenance import Citation, Entry, FlagEntry, TextEntry
 from ppafo.units import base_value, format_quantity, to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
+PRESSURE_PATH, SECOND_PRESSURE_PATH = "supply.pressure", "supply.dorsiflexion_pressure"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -67,6 +70,28 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
         unit = entry.unit
         raise ParameterError(f"{parameter_set.file}: {ATMOSPHERE_PATH} = {entry.value:g} {unit}: give it as absolute")
     return entry_in_si(entry, parameter_set.declared()[ATMOSPHERE_PATH], STANDARD_ATMOSPHERE)
+
+
+def has_one_pressure(parameter_set: ParameterSet) -> bool:
+    """Tell whether both regulators are set to one pressure, so that a change of the first is one of both."""
+    entries = [parameter_set.numbers.get(path) for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)]
+    declared, atmosphere = parameter_set.declared(), atmospheric_pressure(parameter_set)
+    try:
+        first, second = (
+            entry_in_si(entry, declared[PRESSURE_PATH], atmosphere) for entry in entries if entry is not None
+        )
+    except (UnitError, ValueError):  # one of them is missing, or is no pressure
+        return False
+    return math.isclose(first, second, rel_tol=SAME_PRESSURE)
+
+
+def with_second_pressure(parameter_set: ParameterSet) -> ParameterSet:
+    """Return the set with the first regulator's pressure for the second too, unless the set gives it apart."""
+    first = parameter_set.numbers.get(PRESSURE_PATH)
+    if first is None or SECOND_PRESSURE_PATH in parameter_set.numbers:
+        return parameter_set
+    second = first.model_copy(update={"note": f"follows {PRESSURE_PATH}"})
+    return replace(parameter_set, numbers={**parameter_set.numbers, SECOND_PRESSURE_PATH: second})
 
 
 def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:

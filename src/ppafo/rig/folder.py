@@ -1,14 +1,14 @@
 """Folders of synthetic recordings: one CSV for each experiment, and ``rig.json`` with the truth behind all of them."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 from ppafo.documents.json_text import json_text
-from ppafo.errors import DataError
+from ppafo.errors import DataError, reason
 from ppafo.rig.record import NOTICE, RigRecording
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.storage.files import add_files, check_files_can_be_added, read_bytes
+from ppafo.storage.files import add_files, check_files_can_be_added
+from ppafo.storage.owned_folder import read_json
 
 RIG_FILE = "rig.json"
 FORMAT = "ppafo rig"
@@ -21,13 +21,14 @@ def csv_name(experiment: str) -> str:
 
 def check_rig_folder(folder: Path, experiment: str) -> None:
     """Refuse, before anything runs, a folder that cannot be written or whose ``rig.json`` is not the rig's."""
+    _check_own(folder, csv_name(experiment))
     check_files_can_be_added(folder, [csv_name(experiment), RIG_FILE])
-    _earlier(folder)
 
 
 def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
     """Write recording and truth into a folder beside those of other experiments; returns the file names."""
     name = csv_name(made.truth["experiment"])
+    _check_own(folder, name)
     recordings = {**_earlier(folder), name: dict(made.truth)}
     document = {
         "format": FORMAT,
@@ -40,15 +41,28 @@ def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
     return tuple(contents)
 
 
+def _check_own(folder: Path, name: str) -> None:
+    """Refuse a folder of others, and a file of others that a recording would replace."""
+    earlier = _earlier(folder)
+    try:
+        present = {entry.name for entry in folder.iterdir()} if folder.is_dir() else set()
+    except OSError as error:
+        raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
+    if present and RIG_FILE not in present:
+        raise DataError(f"{folder}: is not empty and has no recordings of the rig ({RIG_FILE}); choose another folder")
+    if name in present and name not in earlier:
+        raise DataError(f"{folder}: holds a {name} that is not of the rig; move it or choose another folder")
+
+
 def _earlier(folder: Path) -> dict[str, Any]:
     """Return what ``rig.json`` says of recordings that are already in a folder; refuse a file of another kind."""
     path = folder / RIG_FILE
     if not path.exists():
         return {}
     try:
-        document = json.loads(read_bytes(path))
-    except ValueError as error:
-        raise DataError(f"{path}: is not valid JSON, so it is not overwritten: {error}") from error
+        document = read_json(path)
+    except DataError as error:
+        raise DataError(f"{error}, so it is not overwritten") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{path}: was not written by the rig, so it is not overwritten")
     recordings = document.get("recordings")

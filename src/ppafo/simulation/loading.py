@@ -55,6 +55,7 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()
         raise ScenarioError(f"a scenario is a dictionary laid out as a scenario file, not a {type(content).__name__}")
     name = content.get("name")
     file = f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
+    _FILE.check_depth(content, file)
     return _scenario(Given(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides)))
 
 

@@ -12,6 +12,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SECTIONS, SONIC_FORM
 from ppafo.parameters.device import Orifice, SonicOrifice
+from ppafo.parameters.parameter_set import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.simulation import declaration
 from ppafo.simulation.scenario import FreeMotion, LedMotion, Scenario
 
@@ -44,9 +45,12 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     """Return the scenario with numbers replaced, by the paths of ``declared_numbers`` that are not in ``TIMES``.
 
-    An orifice given in the other form takes that form; both numbers of it must be there.
+    An orifice given in the other form takes that form; both numbers of it must be there. The supply's pressure is that
+    of both regulators where the scenario has one pressure for both and the second is not given apart.
     """
     chosen = {chosen_path(path, scenario): number for path, number in numbers.items()}
+    if PRESSURE_PATH in chosen and SECOND_PRESSURE_PATH not in chosen and scenario.device.supply.has_one_pressure:
+        chosen[SECOND_PRESSURE_PATH] = chosen[PRESSURE_PATH]
     for section, place in _ORIFICES.items():
         form = other_form(scenario, section)
         if any(f"{section}.{name}" in chosen for name in form):

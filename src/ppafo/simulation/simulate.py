@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import ppafo
-from ppafo.engine.lanes import BatchResult, Floats, run_batch
+from ppafo.engine.lanes import BatchResult, Floats, load_program, run_batch
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together
 from ppafo.metrics.catalog import evaluate
 from ppafo.model.friction import sliding_friction
@@ -145,3 +145,9 @@ def _external_torque(
     friction = np.array([sliding_friction(float(value), plant.dynamic_torque) for value in rate])
     gravity = gravity_torque(angle, plant.gravity_torque)  # type: ignore[arg-type]
     return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
+
+
+def compile_model(scenario: Scenario | str | Path) -> None:
+    """Compile the model of a scenario into the cache, unless it is there; nothing is run."""
+    chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    load_program(plan_run(chosen).program)

@@ -73,7 +73,7 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         check_clock(values[:, 0], range(first + 2, first + 2 + len(values)))
         time, *channels = (_channel(column, values[:, index], atmosphere) for index, column in enumerate(columns))
         named = {column.name: channel for column, channel in zip(columns[1:], channels, strict=True)}
-        return Recording(label or Path(path).stem, time.values, named, kind_of_comments(lines[:first]))
+        return Recording(label or one_line(Path(path).stem), time.values, named, kind_of_comments(lines[:first]))
     except csv.Error as error:
         raise DataError(f"{path}: is not a CSV file: {error}") from error
     except DataError as error:

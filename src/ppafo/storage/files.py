@@ -12,8 +12,11 @@ from ppafo.errors import DataError, reason
 LEFT_ASIDE = ".writing-"
 """Part of the name of a file that is being written; one that is still there was left by a process that was killed."""
 
+MOST_BYTES_RECORDED = 2_000_000_000
+"""More than this is no recording that is read: an hour at 1 kHz with twenty channels stays below it, as text too."""
 
-def read_bytes(path: str | Path, most: int | None = None) -> bytes:
+
+def read_bytes(path: str | Path, most: int = MOST_BYTES_RECORDED) -> bytes:
     """Return the content of a regular file that is there and is not empty, refused above ``most`` bytes."""
     try:
         content = read_regular_file(Path(path), most)

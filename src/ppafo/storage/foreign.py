@@ -40,7 +40,7 @@ def read_foreign(
         }
         time = channels.pop(TIME).values
         check_clock(time, [line for line, _ in rows])
-        recording = Recording(label or Path(path).stem, time, channels, kind_of_comments(_comments(lines)))
+        recording = Recording(label or one_line(Path(path).stem), time, channels, kind_of_comments(_comments(lines)))
         return recording if columns.direction is None else _with_direction(recording, columns.direction)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error

@@ -4,6 +4,8 @@ Read as the HDF5 files that they are: h5netcdf prints a traceback of its own whe
 """
 
 import io
+import math
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,20 @@ from ppafo.storage.files import read_bytes, write_file
 
 _DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowError, MemoryError)
 """What h5py raises where a file is cut off or damaged."""
+
+_NUMBERS = frozenset("fiu")
+_BYTES_OF_A_NUMBER = 8
+_ALWAYS_ALLOWED, _MOST_GROWTH = 32_000_000, 100
+"""Bytes of memory that any file may ask for, and how often its own size a larger one may."""
+
+_GZIP, _SHUFFLE, _FLETCHER = 1, 2, 3
+_FILTERS = frozenset({_GZIP, _SHUFFLE, _FLETCHER})
+"""Numbers that HDF5 gives to gzip, to the shuffling of bytes and to the Fletcher checksum."""
+
+_CHECKSUM_ROOM = 64
+_PACKED = ("scale_factor", "add_offset")
+_GAPS = ("_FillValue", "missing_value")
+"""Attributes of the NetCDF conventions by which the numbers of a file are not those that were recorded."""
 
 
 def write_netcdf(path: str | Path, recording: Recording, scenario: Mapping[str, Any] | None = None) -> Path:
@@ -42,7 +58,7 @@ def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None
 
 
 def read_netcdf(path: str | Path) -> Recording:
-    """Return the recording in a NetCDF file."""
+    """Return the recording in a NetCDF file; one that points outside itself or unpacks to far more is refused."""
     content = read_bytes(path)
     try:
         return _recording(content, path)
@@ -56,22 +72,96 @@ def _recording(content: bytes, path: str | Path) -> Recording:
     import h5py
 
     with h5py.File(io.BytesIO(content), "r") as file:
-        if TIME not in file:
-            raise DataError(f"there is no variable '{TIME}'")
-        time = _channel(TIME, file[TIME])
+        variables = _own_variables(file)
+        _check_sizes(variables, len(content))
+        time = _channel(TIME, variables.pop(TIME))
         if time.unit != TIME_UNIT:
             raise DataError(f"'{TIME}' is in '{time.unit}', it must be in '{TIME_UNIT}'")
-        channels = {str(name): _channel(name, variable) for name, variable in file.items() if name != TIME}
-        label = _attribute(file, "title") or Path(path).stem
+        channels = {name: _channel(name, variable) for name, variable in variables.items()}
+        label = _attribute(file, "title") or one_line(Path(path).stem)
         kind = recording_kind(_attribute(file, "kind") or "measured")
         return Recording(label, time.values, channels, kind)
 
 
+def _own_variables(file: Any) -> dict[str, Any]:
+    """Return the variables by name; none is opened before it is known to lie in this file."""
+    import h5py
+
+    names = [str(name) for name in file]
+    if TIME not in names:
+        raise DataError(f"there is no variable '{TIME}'")
+    for name in names:
+        if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+            raise DataError(f"'{name}' is a link; a recording holds its numbers itself")
+    variables = {name: file[name] for name in names}
+    for name, variable in variables.items():
+        if len(getattr(variable, "shape", None) or ()) != 1 or variable.dtype.kind not in _NUMBERS:
+            raise DataError(f"'{name}' must be numbers over '{TIME}' alone")
+        if variable.is_virtual or variable.external:
+            raise DataError(f"the numbers of '{name}' lie in another file; a recording holds its numbers itself")
+    return variables
+
+
+def _check_sizes(variables: Mapping[str, Any], file_bytes: int) -> None:
+    """Refuse, before memory is taken, numbers that the file does not hold or that grow out of all proportion."""
+    wanted = 0
+    for name, variable in variables.items():
+        if variable.size != variables[TIME].size:
+            raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
+        _check_filters(name, variable)
+        wanted += variable.size * _BYTES_OF_A_NUMBER
+        if variable.chunks is not None:
+            wanted += math.prod(variable.chunks) * variable.dtype.itemsize
+    if wanted > max(_ALWAYS_ALLOWED, _MOST_GROWTH * file_bytes):
+        raise DataError(
+            f"asks for {wanted / 1e6:,.0f} MB of memory, the file has {file_bytes / 1e6:.2g} MB; "
+            f"a recording asks for at most {_MOST_GROWTH} times its file"
+        )
+    for name, variable in variables.items():
+        _check_stored(name, variable)
+
+
+def _check_filters(name: str, variable: Any) -> None:
+    """Refuse what is not stored plain or by the common filters; gzip within gzip grows without limit."""
+    properties = variable.id.get_create_plist()
+    filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
+    after = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
+    if not set(filters) <= _FILTERS or not set(after) <= {_FLETCHER}:
+        raise DataError(f"'{name}' is packed in a way that is not read; save it with gzip, or not packed")
+
+
+def _check_stored(name: str, variable: Any) -> None:
+    """Refuse values that nobody wrote, and chunks that unpack to more than they say."""
+    size, chunks = variable.size, variable.chunks
+    if chunks is None:
+        if variable.id.get_storage_size() < size * variable.dtype.itemsize:
+            raise DataError(f"'{name}' has {size} values, and the file does not hold them")
+        return
+    count = variable.id.get_num_chunks()
+    if count < -(-size // chunks[0]):
+        raise DataError(f"'{name}' has {size} values, and the file does not hold all of them")
+    most = chunks[0] * variable.dtype.itemsize + _CHECKSUM_ROOM
+    for number in range(count):
+        stored = variable.id.get_chunk_info(number)
+        unpacker = zlib.decompressobj()
+        packed = b"" if variable.compression is None else variable.id.read_direct_chunk(stored.chunk_offset)[1]
+        try:
+            grown = len(unpacker.decompress(packed, most + 1)) > most
+        except zlib.error:
+            grown = False  # not packed after all, or damaged: the library says so
+        if grown or stored.size > 2 * most:
+            raise DataError(f"'{name}' unpacks to more than it says")
+
+
 def _channel(name: str, variable: Any) -> Channel:
-    if len(getattr(variable, "shape", ())) != 1:
-        raise DataError(f"'{name}' must be numbers over '{TIME}' alone")
-    unit = unit_of_attribute(_attribute(variable, "units"))
-    return Channel(np.asarray(variable[:], dtype=np.float64), unit)
+    for key in _PACKED:
+        if key in variable.attrs:
+            raise DataError(f"'{name}' is packed by its attribute '{key}'; save it as plain numbers")
+    values = np.asarray(variable[:], dtype=np.float64)
+    for key in _GAPS:
+        if key in variable.attrs and np.isin(values, np.asarray(variable.attrs[key], dtype=np.float64)).any():
+            raise DataError(f"'{name}' has gaps ('{key}'); fill them or cut the file there")
+    return Channel(values, unit_of_attribute(_attribute(variable, "units")))
 
 
 def _attribute(place: Any, name: str) -> str:

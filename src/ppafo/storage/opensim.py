@@ -17,7 +17,6 @@ from ppafo.signals.channels import TIME
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes, write_file
 
-_MOST_BYTES = 500_000_000
 _END = "endheader"
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)", re.IGNORECASE)
@@ -52,7 +51,7 @@ class _Header:
 def read_opensim(path: str | Path) -> OpenSimTable:
     """Return the table in a ``.mot`` or ``.sto`` file; DataError names file, line and column of what is wrong."""
     try:
-        lines = _lines(read_bytes(path, _MOST_BYTES))
+        lines = _lines(read_bytes(path))
         header = _header(lines)
         number, labels = _labels(lines, header)
         values = _rows(lines, number + 1, labels, header)

@@ -3,13 +3,13 @@
 A folder that is taken ends up with exactly the new files; until they are all written it stays as it was.
 """
 
-import json
 import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ppafo.documents.json_text import json_document, json_text
 from ppafo.errors import DataError, one_line, reason
 from ppafo.storage.files import check_folder_can_be_replaced, read_bytes, replace_folder
 
@@ -30,6 +30,32 @@ class FolderKind:
     files_of: Callable[[Path], Collection[str]]
 
 
+MARK = "ppafo.json"
+"""The file by which the folder of a command is recognised that has no document of its own kind."""
+
+_FORMAT = "ppafo files"
+
+
+def marked_folder(command: str) -> FolderKind:
+    """Return the kind of folder that a command writes which marks it by ``MARK``."""
+
+    def files_of(folder: Path) -> set[str]:
+        document = read_json(folder / MARK)
+        if not isinstance(document, dict) or document.get("format") != _FORMAT or document.get("command") != command:
+            raise DataError(f"{folder}: is not a result of 'ppafo {command}' ({MARK} says so); choose another folder")
+        files = document.get("files")
+        return {MARK, *map(str, files if isinstance(files, list) else ())}
+
+    return FolderKind(f"result of 'ppafo {command}'", MARK, files_of)
+
+
+def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: str) -> None:
+    """Make a folder hold exactly these files and ``MARK``, where it is absent, empty or that command's own."""
+    document = {"format": _FORMAT, "schema_version": 1, "command": command, "files": sorted(contents)}
+    marked = {**contents, MARK: f"{json_text(document)}\n".encode()}
+    write_owned_folder(folder, marked, marked_folder(command))
+
+
 def check_owned_folder(folder: Path, kind: FolderKind) -> None:
     """Refuse a folder that holds anything of somebody else's, or that cannot be made."""
     if os.path.isdir(folder):  # noqa: PTH112  # Path.is_dir raises where no file can have the name
@@ -48,8 +74,8 @@ def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: Folder
 def read_json(path: Path) -> Any:
     """Return what a JSON file of ours holds, as plain data."""
     try:
-        return json.loads(read_bytes(path, _MOST_BYTES_WRITTEN).decode("utf-8"))
-    except (ValueError, RecursionError) as error:
+        return json_document(read_bytes(path, _MOST_BYTES_WRITTEN))
+    except ValueError as error:
         raise DataError(f"{path}: is not JSON: {one_line(error)}") from error
 
 

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _LEVEL = 1
+_MOST_VALUES = 200_000_000
+"""Values of a table that is read; those of a chunk with channels over time are some millions."""
+
 _FLOATING = ("double", "float")
 
 
@@ -68,9 +71,21 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
 
     try:
         with file, pq.ParquetFile(file, page_checksum_verification=True) as opened:
+            _check_size(opened.metadata, name)
             return opened.read(columns=None if columns is None else list(columns))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:120]}") from error
+
+
+def _check_size(metadata: Any, name: str) -> None:
+    """Refuse, before memory is taken, a table of more values than any of ours: a constant takes no room in the file."""
+    values = sum(
+        metadata.row_group(group).column(column).num_values
+        for group in range(metadata.num_row_groups)
+        for column in range(metadata.row_group(group).num_columns)
+    )
+    if values > _MOST_VALUES:
+        raise DataError(f"{name}: has {values:,} values, more than any table of a study")
 
 
 def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:

@@ -6,14 +6,17 @@ A file is there whole or not at all: on a disk it is written aside and renamed, 
 import contextlib
 import io
 import shutil
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from ppafo.documents.json_text import json_document
 from ppafo.errors import DataError, reason
 from ppafo.storage.files import LEFT_ASIDE, write_file
 
 _ADDRESS_MARK = "://"
+_MOST_BYTES_OF_DOCUMENT = 100_000_000
 
 
 class Place(Protocol):
@@ -49,6 +52,15 @@ class Place(Protocol):
         ...
 
 
+def read_document(place: Place, name: str) -> Any:
+    """Return what a JSON file of ours holds, as plain data; OSError or ValueError where that is not possible."""
+    with place.open(name) as file:
+        content = file.read(_MOST_BYTES_OF_DOCUMENT + 1)
+    if len(content) > _MOST_BYTES_OF_DOCUMENT:
+        raise ValueError(f"{name} is larger than {_MOST_BYTES_OF_DOCUMENT / 1e6:g} MB")
+    return json_document(content)
+
+
 def place_at(address: str | Path) -> Place:
     """Return the folder at a path or an address such as ``s3://bucket/study``."""
     text = str(address)
@@ -75,7 +87,10 @@ class DiskFolder:
 
     def open(self, name: str) -> io.BufferedIOBase:
         """Return a file for reading."""
-        return (self.folder / name).open("rb")
+        path = self.folder / name
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise OSError(None, f"{path} is not a regular file")
+        return path.open("rb")
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file aside, then rename it."""

@@ -1,5 +1,8 @@
 """A recording from wherever it is: a NetCDF file, a CSV file or a result folder."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +17,11 @@ WALK_RECORDING = "recording.nc"
 """What the folder of a walk has in place of a result."""
 
 
+_READING = "import sys; from ppafo.storage.netcdf import read_netcdf; read_netcdf(sys.argv[1])"
+_MOST_SECONDS, _BYTES_PER_SECOND = 30.0, 5e6
+"""How long reading may take: what a start takes on a busy computer, and as long as a slow disk needs for the file."""
+
+
 def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
     """Return the recording in a ``.nc`` or ``.csv`` file, or in a result folder or that of a walk.
 
@@ -23,15 +31,36 @@ def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) ->
     if place.is_dir():
         recording = place / WALK_RECORDING
         if recording.is_file() and not (place / RUN_FILE).exists():
-            return read_netcdf(recording)
+            return _of_strangers(recording)
         if not (place / RUN_FILE).exists():
             raise DataError(f"{place}: holds no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})")
         return read_result(place).recording
     if place.suffix == ".nc":
-        return read_netcdf(place)
+        return _of_strangers(place)
     if place.suffix == ".csv":
         return _of_its_folder(read_csv(place, atmosphere=atmosphere), place)
     raise DataError(f"{path}: is neither a .nc or .csv file nor a result folder")
+
+
+def _of_strangers(path: Path) -> Recording:
+    """Return the recording in a NetCDF file that another process has read first.
+
+    The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.
+    """
+    if sys.executable and path.is_file():
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        words = [sys.executable, "-P", "-c", _READING, str(path)]  # -P: nothing of the working folder is imported
+        most = _MOST_SECONDS + path.stat().st_size / _BYTES_PER_SECOND
+        nothing = subprocess.DEVNULL
+        try:
+            code = subprocess.run(
+                words, env=environment, stdin=nothing, stdout=nothing, stderr=nothing, timeout=most, check=False
+            ).returncode
+        except subprocess.TimeoutExpired as error:
+            raise DataError(f"{path}: is damaged: the HDF5 library comes to no end with it") from error
+        if code < 0:
+            raise DataError(f"{path}: is damaged: the HDF5 library crashes on it")
+    return read_netcdf(path)
 
 
 def _of_its_folder(recording: Recording, path: Path) -> Recording:

@@ -86,7 +86,8 @@ def _planned(measured: Measured, device: Device, start: Start, motion: Motion, e
             f"{measured.file}: {duration:.4g} s would take {run.step_count} steps of {run.step:.2g} s, at most "
             f"{MOST_STEPS} are allowed; cut the recording into parts"
         )
-    plant = run.plant._replace(supply_pressure=device.supply.pressure)
+    supply = device.supply
+    plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)
     samples = math.ceil(run.step_count / run.steps_per_sample)
     return replace(run, plant=plant, record_every=_record_every(run), step_count=samples * run.steps_per_sample)
 

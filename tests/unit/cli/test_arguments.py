@@ -1,5 +1,6 @@
 """Words that the command line does not understand, and output that nobody can take."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -84,3 +85,30 @@ def test_a_reader_that_has_gone_is_no_mistake() -> None:
         process.stdout.close()
         assert process.stderr.read() == b""
         assert process.wait(timeout=30) == 0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["validate", "ppafo2011", "bench-\udcff.csv", "--out", "out"],
+        ["simulate", "step-response", "--out", "out-\udcff"],
+        ["sweep", "pressure-and-area", "--out", "out-\udcff"],
+    ],
+)
+def test_name_that_is_not_utf_8_is_refused_before_anything_runs(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert "is not text in UTF-8; give the file or folder another name" in said
+    assert said.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_terminal_that_cannot_show_a_character_gets_its_escape() -> None:
+    code = "from ppafo.cli.output import print_result; print_result('5 \\u00b0 \\udcff', {'a': '\\udcff'}, False)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "PYTHONIOENCODING": "ascii"}, capture_output=True, check=True
+    )
+    assert done.stdout == b"5 \\xb0 \\udcff\n"

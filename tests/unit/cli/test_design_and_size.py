@@ -67,7 +67,7 @@ def test_a_design_is_printed_and_written_with_its_doubts(folder: Path, capsys: p
     printed = capsys.readouterr().out
     assert "* suggested: it has the smallest sum of error, gas and mass" in printed
     assert "enfield-ls-v05s  mass (assumed)" in printed
-    names = ["design.json", "front.csv", "front.png", "front.svg", "report.html"]
+    names = ["design.json", "front.csv", "front.png", "front.svg", "ppafo.json", "report.html"]
     assert sorted(path.name for path in out.iterdir()) == names
     document = json.loads((out / "design.json").read_text())
     assert 0 <= document["suggested"] < len(document["front"])
@@ -95,7 +95,7 @@ def test_a_sizing_is_printed_and_written(folder: Path, capsys: pytest.CaptureFix
     printed = capsys.readouterr().out
     assert "(typed, not measured)" in printed
     assert "* suggested: enfield-ls-v05s at " in printed
-    names = ["report.html", "sizing.json", "sizing.png", "sizing.svg", "suggested.csv"]
+    names = ["ppafo.json", "report.html", "sizing.json", "sizing.png", "sizing.svg", "suggested.csv"]
     assert sorted(path.name for path in out.iterdir()) == names
     document = json.loads((out / "sizing.json").read_text())
     assert document["suggested"] == "enfield-ls-v05s"
@@ -124,7 +124,7 @@ def test_an_interrupted_study_writes_nothing_and_ends_with_130(
     file = folder / ("design.toml" if command == "design" else "sizing.toml")
     assert main([command, str(file), "--out", str(folder / "out")]) == 130
     assert not (folder / "out").exists()
-    assert "interrupted; nothing was written" in capsys.readouterr().err
+    assert "interrupted; nothing is half written" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 from ppafo.cli import league
 from ppafo.cli.main import build_parser, main
 from ppafo.reporting.league_files import NAMES
+from ppafo.storage.owned_folder import MARK
 from ppafo.studies.league import DRAWS, ENTRANTS, TASK, walking
 from ppafo.studies.league.walking.task import CONFIGURATION, MINUTES
 
@@ -19,7 +20,7 @@ def test_the_league_is_printed_and_written(tmp_path: Path, capsys: pytest.Captur
     out = tmp_path / "out"
     assert main(["league", *SHORT, "--draws", "3", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert sorted(entry.name for entry in out.iterdir()) == sorted(NAMES)
+    assert sorted(entry.name for entry in out.iterdir()) == sorted([*NAMES, MARK])
     document = json.loads((out / "league.json").read_text())
     names = [standing["name"] for standing in document["standings"]]
     assert sorted(names) == sorted(entrant.name for entrant in ENTRANTS)
@@ -70,7 +71,7 @@ def test_a_walking_league_is_printed_and_written(
     out = tmp_path / "out"
     assert main(["league", "--walk", "--minutes", "6 s", "--draws", "2", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert sorted(entry.name for entry in out.iterdir()) == sorted(NAMES)
+    assert sorted(entry.name for entry in out.iterdir()) == sorted([*NAMES, MARK])
     document = json.loads((out / "league.json").read_text())
     assert [standing["name"] for standing in document["standings"]] == ["event_proportional", "off"]
     assert document["seconds"] == pytest.approx(6.0)

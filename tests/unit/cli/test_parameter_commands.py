@@ -46,7 +46,11 @@ def test_the_audit_takes_overrides_and_prints_json(capsys: pytest.CaptureFixture
 def test_out_writes_text_and_json_and_leaves_nothing_else(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "folder"
     main(["audit", "ppafo2011", "--out", str(folder)])
-    assert sorted(item.name for item in folder.iterdir()) == ["audit-ppafo2011.json", "audit-ppafo2011.txt"]
+    assert sorted(item.name for item in folder.iterdir()) == [
+        "audit-ppafo2011.json",
+        "audit-ppafo2011.txt",
+        "ppafo.json",
+    ]
 
 
 def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -54,7 +58,7 @@ def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys
     file.write_text("")
     assert main(["audit", "ppafo2011", "--out", str(file)]) == 2
     captured = capsys.readouterr()
-    assert captured.err.startswith(f"ppafo: --out {file}: cannot be written")
+    assert captured.err.startswith(f"ppafo: --out {file}: is a file; a result of 'ppafo audit' needs a folder")
     assert captured.err.count("\n") == 1
     assert captured.out == ""
 

@@ -196,5 +196,5 @@ def test_an_interrupt_while_writing_ends_with_130_and_leaves_nothing(tmp_path: P
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert error == "ppafo: interrupted; nothing was written\n"
+    assert error == "ppafo: interrupted; nothing is half written\n"
     assert names(tmp_path) == []

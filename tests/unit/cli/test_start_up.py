@@ -57,3 +57,40 @@ def test_main_leaves_the_garbage_collection_of_a_calling_program_alone() -> None
         "print(gc.isenabled() and gc.get_threshold() == before)"
     )
     assert printed_by(code).splitlines()[-1] == "True"
+
+
+INTERRUPTED = """
+import sys
+
+class Interrupt:
+    def find_spec(self, name, path=None, target=None):
+        if name == MODULE:
+            if WRAPPED:
+                raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Interrupt())
+sys.argv = ["ppafo", "schema", "scenario"]
+from ppafo.__main__ import start
+sys.exit(start())
+"""
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+@pytest.mark.parametrize("module", ["ppafo.cli.main", "argparse", "ppafo.cli.schema", "pydantic"])
+def test_interrupt_while_modules_load_is_one_line(module: str, wrapped: bool) -> None:
+    code = INTERRUPTED.replace("MODULE", repr(module)).replace("WRAPPED", repr(wrapped))
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", f"import sys; sys.path[:] = {sys.path!r}{code}"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 130
+    assert done.stderr == "ppafo: interrupted; nothing is half written\n"
+    assert done.stdout == ""
+
+
+def test_package_can_be_started_as_a_module() -> None:
+    done = subprocess.run([sys.executable, "-m", "ppafo", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("ppafo ")

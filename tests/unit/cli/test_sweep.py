@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.reporting import study_report
 from ppafo.studies.sweep import run as run_module
 
 STUDY = """
@@ -129,6 +130,18 @@ def test_an_interruption_says_that_the_command_goes_on(
     assert "the same command goes on" in capsys.readouterr().err
     monkeypatch.undo()
     assert swept(study, tmp_path / "out") == 0
+
+
+def test_interruption_after_the_last_chunk_says_that_the_chunks_are_kept(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*words: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study_report, "write_report", interrupted)
+    assert swept(study, tmp_path / "out") == 130
+    assert "finished chunks are kept" in capsys.readouterr().err
+    assert list((tmp_path / "out" / "runs").iterdir())
 
 
 def test_studies_of_the_package_are_listed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -41,6 +41,7 @@ def test_agreement_is_printed_and_written(bench: Path, tmp_path: Path, capsys: p
     assert "every RMS error is within its limit" in printed
     assert sorted(entry.name for entry in out.iterdir()) == [
         "agreement.json",
+        "ppafo.json",
         "report.html",
         "step-agreement.png",
         "step-agreement.svg",

@@ -51,7 +51,7 @@ def test_the_printed_set_says_what_is_missing_and_where_it_is_completed() -> Non
     with pytest.raises(ParameterError) as caught:
         load_device("ppafo2011-printed")
     message = str(caught.value)
-    for path in ("actuator.dead_volume_1", "actuator.leak.discharge_coefficient", "supply.dorsiflexion_pressure"):
+    for path in ("actuator.dead_volume_1", "actuator.leak.discharge_coefficient", "supply.atmospheric_pressure"):
         assert path in message
     assert "use 'ppafo2011'" in message
 

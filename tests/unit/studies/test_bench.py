@@ -306,6 +306,11 @@ def test_quick_chooses_the_small_size(missed_target):
 
 def test_the_result_folder_has_text_markdown_and_json(missed_target, tmp_path, capsys):
     command.run(parsed(out=tmp_path / "here", json=True))
-    assert {path.name for path in (tmp_path / "here").iterdir()} == {"bench.txt", "bench.md", "bench.json"}
+    assert {path.name for path in (tmp_path / "here").iterdir()} == {
+        "bench.txt",
+        "bench.md",
+        "bench.json",
+        "ppafo.json",
+    }
     written = json.loads((tmp_path / "here" / "bench.json").read_text(encoding="utf-8"))
     assert json.loads(capsys.readouterr().out) == written

@@ -3,6 +3,7 @@
 A map is a TOML file or one of ``CONVENTIONS``. A term is the name of a column; ``-`` before it takes it away.
 """
 
+from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,9 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from ppafo.documents.models import published_schema
 from ppafo.documents.problems import first_problem
 from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
-from ppafo.documents.toml_text import label
+from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, reason
 
+_FILE = TomlKind("gait map", "gait-map", resources.files("ppafo.gait.recorded"), DataError)
 _STRICT = ConfigDict(strict=True, extra="forbid", frozen=True)
 _Text = Annotated[str, Field(min_length=1)]
 _Terms = Annotated[
@@ -174,18 +176,12 @@ CONVENTIONS = {"csv": package_map, "opensim": opensim_map, "c3d": plug_in_gait_m
 
 def load_map(path: str | Path) -> GaitMap:
     """Return the map in a TOML file."""
-    import tomllib
-
     file = label(str(path))
     try:
         content = read_regular_file(Path(path), MOST_BYTES_TYPED)
-        return GaitMap.model_validate(tomllib.loads(content.decode("utf-8")))
+        return GaitMap.model_validate(_FILE.parse(content, file))
     except ValidationError as error:
         raise DataError(f"{file}: {first_problem(error.errors(include_url=False), GaitMap)}") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise DataError(f"{file}: is not valid TOML: {error}") from error
     except (OSError, ValueError) as error:
         raise DataError(f"{file}: cannot be read: {reason(error)}") from error
 

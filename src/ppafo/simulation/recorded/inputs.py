@@ -59,7 +59,7 @@ def supply_paths(device: Device) -> tuple[str, ...]:
     """Return the parameters that follow a recorded supply: both regulators, unless they have two pressures."""
     supply = device.supply
     both = ("plant.supply_pressure", "plant.dorsiflexion_pressure")
-    return both if supply.pressure == supply.dorsiflexion_pressure else both[:1]
+    return both if supply.has_one_pressure else both[:1]
 
 
 def step_times(run: Run) -> Floats:

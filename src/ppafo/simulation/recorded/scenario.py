@@ -71,6 +71,6 @@ def with_highest_supply(device: Device, recording: Recording) -> Device:
     supply = device.supply
     recorded = {name: float(recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in recording}
     highest = max(supply.pressure, recorded.get(SUPPLY, 0.0))
-    both = supply.pressure == supply.dorsiflexion_pressure
+    both = supply.has_one_pressure
     other = max(highest if both else supply.dorsiflexion_pressure, recorded.get(DORSIFLEXION_SUPPLY, 0.0))
     return replace(device, supply=replace(supply, pressure=highest, dorsiflexion_pressure=other))

@@ -11,8 +11,6 @@ from ppafo.studies.design.candidates import Candidates, Floats
 from ppafo.studies.design.problem import DesignProblem
 from ppafo.studies.design.variables import DEAD_VOLUME, OWN, SIZE
 
-_PRESSURE, _OTHER_PRESSURE = "supply.pressure", "supply.dorsiflexion_pressure"
-
 
 def values_of(problem: DesignProblem, candidates: Candidates) -> dict[str, Floats]:
     """Return the chosen numbers (candidates,) in SI, by path."""
@@ -32,7 +30,7 @@ def design_columns(problem: DesignProblem, scenario: Scenario, candidates: Candi
         columns |= {f"{DEAD_VOLUME}_{chamber}": chosen[DEAD_VOLUME] for chamber in (1, 2)}
     known = declared_numbers(scenario)
     columns |= {path: values for path, values in chosen.items() if path not in OWN and (path in known or path in TIMES)}
-    return with_both_pressures(columns, scenario)
+    return columns
 
 
 def valve_numbers(valve: Part) -> dict[str, float]:
@@ -41,10 +39,3 @@ def valve_numbers(valve: Part) -> dict[str, float]:
     orifice = {item.name: valve.values[item.name] for item in ORIFICE if item.name in valve.values}
     own = {name: valve.values[name] for name in settings if name in valve.values}
     return {f"valve.{name}": number for name, number in (orifice | settings | own).items()}
-
-
-def with_both_pressures(columns: dict[str, Floats], scenario: Scenario) -> dict[str, Floats]:
-    """Return the columns with both supply pressures alike where the scenario has them so and only one is chosen."""
-    supply = scenario.device.supply
-    follows = supply.dorsiflexion_pressure == supply.pressure and _OTHER_PRESSURE not in columns
-    return columns | ({_OTHER_PRESSURE: columns[_PRESSURE]} if follows and _PRESSURE in columns else {})

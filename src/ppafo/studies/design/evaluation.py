@@ -6,6 +6,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.parameters.parameter_set import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.parts import Part
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.scenario import Scenario
@@ -110,8 +111,11 @@ class Evaluation:
         for task in problem.tasks:
             for scenario in task.scenarios.values():
                 supply = scenario.device.supply
-                for name in ("pressure", "dorsiflexion_pressure"):
-                    highest = np.maximum(highest, chosen.get(f"supply.{name}", getattr(supply, name)))
+                first = chosen.get(PRESSURE_PATH, supply.pressure)
+                second = chosen.get(
+                    SECOND_PRESSURE_PATH, first if supply.has_one_pressure else supply.dorsiflexion_pressure
+                )
+                highest = np.maximum(highest, np.maximum(first, second))
         return np.asarray(np.maximum(0.0, highest / ratings - 1.0))
 
 

@@ -9,7 +9,7 @@ from ppafo.errors import StudyError, nearest_name
 from ppafo.studies.sensitivity.analyse import Sensitivity, Settings, analyse
 from ppafo.studies.sensitivity.methods import METHODS
 from ppafo.studies.sweep.study import Study
-from ppafo.studies.uncertainty.draws import Uncertainty, chosen_configuration, study_of, uncertainty_in
+from ppafo.studies.uncertainty.draws import chosen_configuration, study_of, uncertainty_in
 from ppafo.studies.uncertainty.outcomes import Tally, Watch, scenario_model
 
 DEFAULT_SAMPLES = {"sobol": 8192, "morris": 128, "shapley": 2048}
@@ -44,7 +44,7 @@ def sensitivity(
     chosen = study_of(study, overrides)
     base = chosen_configuration(chosen, configuration)
     known = uncertainty_in(chosen, base)
-    used = (Uncertainty(known.drawn) if independent else known).hearing([base.scenario])
+    used = (replace(known, scores=None) if independent else known).hearing([base.scenario])
     by = METHODS[method or ("sobol" if used.scores is None else "shapley")]
     asked = tuple(metrics) or chosen.outputs.metrics
     if not asked:

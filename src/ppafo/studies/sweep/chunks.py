@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ppafo.studies.sweep.sampling.correlation import correlated
 from ppafo.studies.sweep.sampling.distributions import Floats
 from ppafo.studies.sweep.sampling.uniforms import uniform_numbers
-from ppafo.studies.sweep.study import Configuration, Study
+from ppafo.studies.sweep.study import Configuration, Study, with_followers
 
 MOST_RUNS_OF_CHUNK = 65_536
 _FEWEST_RUNS_OF_CHUNK = 512
@@ -73,7 +73,8 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
 
 def varied_columns(study: Study, configuration: Configuration, values: dict[str, Floats]) -> dict[str, Floats]:
     """Return the values that the runs of a configuration get."""
-    return {path: column for path, column in values.items() if study.varies(path, configuration.name)}
+    own = {path: column for path, column in values.items() if study.varies(path, configuration.name)}
+    return with_followers(own, study.same_in(configuration.name))
 
 
 def _distributed(study: Study, draws: NDArray[np.int64]) -> dict[str, Floats]:

@@ -1,7 +1,6 @@
 """One chunk from its number to its files; the same on any thread, process or machine."""
 
 import hashlib
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,7 @@ from ppafo.errors import ScenarioError, StudyError
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.parquet import parquet_bytes
-from ppafo.storage.places import Place, place_at
+from ppafo.storage.places import Place, place_at, read_document
 from ppafo.studies.sweep.bands import Bins, bins_around
 from ppafo.studies.sweep.chunks import Chunk, chunk, chunk_count, drawn_values, varied_columns
 from ppafo.studies.sweep.manifest import BinsOf
@@ -96,11 +95,10 @@ def work_on_chunk(task: Task, number: int) -> Finished:
 def finished_chunk(place: Place, study: Study, number: int) -> Finished | None:
     """Return what is known of a chunk whose files are as they were written; None where one is missing or damaged."""
     try:
-        with place.open(note_file(number)) as file:
-            note = json.load(file)
+        note = read_document(place, note_file(number))
         finished = Finished(number, int(note["runs"]), int(note["failed"]))
         whole = all(_is_whole(place, chunk_file(folder, number), note["sha256"]) for folder in folders(study))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError):
         return None
     return finished if whole and finished.runs == chunk(study, number).runs else None
 

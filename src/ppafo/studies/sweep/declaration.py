@@ -202,11 +202,24 @@ class Outputs(BaseModel):
     )
 
 
+class SameAs(BaseModel):
+    """The value that another varied path has in the same run."""
+
+    model_config = _STRICT
+
+    path: _Path
+    kind: Annotated[Literal["same_as"], Field(description="may be left out")] = "same_as"
+    same_as: Annotated[_Text, Field(description="a path that varies in this study")]
+    only: _Only = ()
+
+
 VARIED = (
-    *(Grid, Listed, Uniform, LogUniform, Normal, TruncatedNormal, LogNormal, Triangular, Choice, WholeNumbers, Stated),
+    *(SameAs, Grid, Listed, Uniform, LogUniform, Normal, TruncatedNormal, LogNormal, Triangular, Choice, WholeNumbers),
+    Stated,
 )
 Varied = (
-    Grid
+    SameAs
+    | Grid
     | Listed
     | Uniform
     | LogUniform

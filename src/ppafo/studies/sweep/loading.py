@@ -39,11 +39,12 @@ def load_study(study: str | Path | Mapping[str, Any], overrides: Sequence[str] =
     of the file. StudyError for anything that is not usable.
     """
     if isinstance(study, Mapping):
+        _FILE.check_depth(study, "study")
         document, source = copy.deepcopy(dict(study)), _Source("study", Path(), b"")
     else:
         source = _Source(label(str(study)), Path(study).parent, _FILE.read(study))
         document = _FILE.parse(source.text, source.file)
-    return _built(_changed(document, overrides, runs, source.file), source)
+    return _built(_changed(_with_kinds(document), overrides, runs, source.file), source)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,15 @@ class _Source:
     def refusal(self, text: object) -> StudyError:
         """Return an error that names the file."""
         return StudyError(f"{self.file}: {text}")
+
+
+def _with_kinds(document: dict[str, Any]) -> dict[str, Any]:
+    """Return the document; a table that has ``same_as`` needs no kind beside it."""
+    tables = document.get("vary")
+    for table in tables if isinstance(tables, list | tuple) else ():
+        if isinstance(table, dict) and "same_as" in table:
+            table.setdefault("kind", "same_as")
+    return document
 
 
 def _changed(document: dict[str, Any], overrides: Sequence[str], runs: int | None, file: str) -> dict[str, Any]:
@@ -88,7 +98,8 @@ def _built(document: dict[str, Any], source: _Source) -> Study:
     _check_asks_for_something(parsed, source)
     _check_set_or_varied(parsed, source)
     places = {item.path: _place(item, configurations, source) for item in parsed.vary}
-    varied = [_varied(item, places[item.path], configurations, source) for item in parsed.vary]
+    moving = [item for item in parsed.vary if not isinstance(item, declared.SameAs)]
+    varied = [_varied(item, places[item.path], configurations, source) for item in moving]
     own = tuple(item for item in varied if isinstance(item, Drawn))
     drawn, scores = own, _scores(parsed, own, source)
     if own:
@@ -101,6 +112,7 @@ def _built(document: dict[str, Any], source: _Source) -> Study:
         configurations=configurations,
         axes=tuple(item for item in varied if isinstance(item, Axis)),
         drawn=drawn,
+        same=_same(parsed, places, source),
         scores=scores,
         sample=_sample(parsed, drawn, source),
         outputs=checked_outputs(parsed.outputs, configurations, source.refusal),
@@ -189,6 +201,25 @@ def _stated(item: declared.Stated, place: VariedPath, configurations: Iterable[C
     if len(found) > 1:
         raise UnitError("the parameter sets of the configurations state different values; use 'only', or give them")
     return Drawn(item.path, found.pop())
+
+
+def _same(parsed: declared.StudyFile, places: Mapping[str, VariedPath], source: _Source) -> dict[str, str]:
+    """Return the path that a path follows, by path; refuses one that does not vary, or has another unit."""
+    own = [item.path for item in parsed.vary if not isinstance(item, declared.SameAs)]
+    same: dict[str, str] = {}
+    for item in parsed.vary:
+        if not isinstance(item, declared.SameAs):
+            continue
+        if item.same_as not in own:
+            hint = nearest_name(item.same_as, own) or f"; there are {', '.join(own) or 'none'}"
+            raise source.refusal(f"vary '{item.path}': same_as = '{item.same_as}' does not vary by itself here{hint}")
+        unit, other = places[item.path].quantity.unit, places[item.same_as].quantity.unit
+        if unit != other:
+            raise source.refusal(
+                f"vary '{item.path}': same_as = '{item.same_as}' is in '{other or '-'}', this path in '{unit or '-'}'"
+            )
+        same[item.path] = item.same_as
+    return same
 
 
 def _varying(item: declared.Varied, configurations: Iterable[Configuration]) -> list[Configuration]:

@@ -3,15 +3,17 @@
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field, ValidationError
 
 import ppafo
 from ppafo.documents.json_text import json_text
-from ppafo.documents.problems import shown
+from ppafo.documents.problems import first_problem, shown
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.simulation.document import scenario_document
-from ppafo.storage.places import Place
+from ppafo.storage.places import Place, read_document
 from ppafo.studies.sweep.bands import Bins
 from ppafo.studies.sweep.chunks import chunk_count, chunk_size
 from ppafo.studies.sweep.study import Study
@@ -54,9 +56,8 @@ def manifest(study: Study, bins: BinsOf) -> dict[str, Any]:
 def read_manifest(place: Place) -> dict[str, Any]:
     """Return the document of a folder of results; DataError where it is none."""
     try:
-        with place.open(MANIFEST) as file:
-            document = json.load(file)
-    except (OSError, ValueError, RecursionError) as error:
+        document = read_document(place, MANIFEST)
+    except (OSError, ValueError) as error:
         raise DataError(f"{place.address}: holds no results of a study ({MANIFEST} cannot be read)") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{place.address}: {MANIFEST} is not of the results of a study")
@@ -65,7 +66,32 @@ def read_manifest(place: Place) -> dict[str, Any]:
             f"{place.address}: has schema_version {shown(document.get('schema_version'))}, "
             f"this version of ppafo reads {SCHEMA_VERSION}"
         )
+    try:
+        _Stored.model_validate(document)
+    except ValidationError as error:
+        text = first_problem(error.errors(include_url=False), _Stored)
+        raise DataError(f"{place.address}: {MANIFEST}: {text}") from error
     return document
+
+
+class _Named(BaseModel):
+    name: str
+
+
+class _StoredStudy(_Named):
+    configurations: Annotated[list[_Named], Field(min_length=1)]
+    outputs: dict[str, Any]
+
+
+class _Stored(BaseModel):
+    """What everybody may rely on in the document; how it differs from that of a study is said elsewhere."""
+
+    study: _StoredStudy
+    runs: Annotated[int, Field(ge=1)]
+    chunks: Annotated[int, Field(ge=1)]
+    varied: dict[str, Any]
+    metrics: dict[str, dict[str, Any]]
+    bins: dict[str, dict[str, dict[Literal["low", "high"], float]]]
 
 
 def stored_bins(document: Mapping[str, Any]) -> BinsOf:

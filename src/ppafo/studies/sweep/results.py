@@ -1,6 +1,5 @@
 """What a folder of results holds, read when it is asked for."""
 
-import json
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import BaseModel
 
 from ppafo.errors import DataError, StudyError, nearest_name
 from ppafo.storage.parquet import as_numpy, read_parquet
-from ppafo.storage.places import Place, place_at
+from ppafo.storage.places import Place, place_at, read_document
 from ppafo.studies.sweep.compute import RUNS_FOLDER, TRAJECTORIES_FOLDER, chunk_file
 from ppafo.studies.sweep.manifest import read_manifest
 
@@ -139,10 +139,19 @@ def load_study_results(folder: str | Path) -> StudyResults:
     place = place_at(folder)
     document = read_manifest(place)
     try:
-        with place.open(SUMMARY) as file:
-            summary = json.load(file)
+        summary = read_document(place, SUMMARY)
+        _Summary.model_validate(summary)
     except (OSError, ValueError) as error:
         raise DataError(
-            f"{place.address}: the study is not finished (there is no {SUMMARY}); start it again, it goes on"
+            f"{place.address}: the study is not finished (there is no whole {SUMMARY}); start it again, it goes on"
         ) from error
     return StudyResults(place, document, summary)
+
+
+class _Summary(BaseModel):
+    """What everybody may rely on in a summary."""
+
+    completed: int
+    diverged: int
+    refused: int
+    configurations: dict[str, dict[str, dict[str, Any]]]

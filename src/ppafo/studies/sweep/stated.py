@@ -38,8 +38,9 @@ def _entry(path: str, scenario: Scenario) -> tuple[Entry | None, float]:
     origin = scenario.origin
     folder = Path(origin.file).parent if origin.file is not None else Path()
     own = [text for text in origin.overrides if is_of_device(split_override(text)[0])]
-    given = [*origin.content["device"].get("overrides", ()), *own]
-    parameters = apply_overrides(load_parameter_set(set_name(origin.parameter_set, folder)), given, origin.valve)
+    parameters = load_parameter_set(set_name(origin.parameter_set, folder))
+    for given in (origin.content["device"].get("overrides", ()), own):
+        parameters = apply_overrides(parameters, given, origin.valve)
     inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
     entry = parameters.numbers.get(inside)
     if entry is None:

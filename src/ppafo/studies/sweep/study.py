@@ -63,11 +63,11 @@ class Outputs:
 class Study:
     """Configurations, each run at every grid point with every draw.
 
-    ``units`` has the SI unit of every varied path, ``only`` the configurations of those that do not vary in all;
-    ``scores`` is the lower Cholesky factor of the correlation of the normal scores, None where there is none;
-    ``runs_of_chunk`` is how many runs are worked out together, None for a choice that keeps memory small;
-    ``document`` is the study file as plain data, with what was changed on the command line; ``text`` the bytes of the
-    file, none where the study came as data.
+    ``same`` has the path that a path follows, by path; ``units`` the SI unit of every varied path, ``only`` the
+    configurations of those that do not vary in all; ``scores`` is the lower Cholesky factor of the correlation of the
+    normal scores, None where there is none; ``runs_of_chunk`` is how many runs are worked out together, None for a
+    choice that keeps memory small; ``document`` is the study file as plain data, with what was changed on the command
+    line; ``text`` the bytes of the file, none where the study came as data.
     """
 
     name: str
@@ -75,6 +75,7 @@ class Study:
     configurations: tuple[Configuration, ...]
     axes: tuple[Axis, ...]
     drawn: tuple[Drawn, ...]
+    same: Mapping[str, str]
     scores: tuple[tuple[float, ...], ...] | None
     sample: Sample
     outputs: Outputs
@@ -111,6 +112,15 @@ class Study:
         """Number of all runs."""
         return len(self.configurations) * self.runs_of_configuration
 
+    def same_in(self, configuration: str) -> dict[str, str]:
+        """Return the path that a path follows, by path, in a configuration."""
+        return {path: other for path, other in self.same.items() if self.varies(path, configuration)}
+
     def varies(self, path: str, configuration: str) -> bool:
         """Tell whether a path is varied in a configuration."""
         return path not in self.only or configuration in self.only[path]
+
+
+def with_followers(columns: Mapping[str, Any], same: Mapping[str, str]) -> dict[str, Any]:
+    """Return the columns, and beside them those of the paths that follow one of them."""
+    return {**columns, **{path: columns[other] for path, other in same.items() if other in columns}}

@@ -42,6 +42,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Sequence[str]
     ``overrides`` change the scenario. StudyError for anything that is not usable.
     """
     if isinstance(tuning, Mapping):
+        _FILE.check_depth(tuning, "tuning")
         return _problem(copy.deepcopy(dict(tuning)), "tuning", Path(), overrides)
     file = label(str(tuning))
     return _problem(_FILE.parse(_FILE.read(tuning), file), file, Path(tuning).parent, overrides)

@@ -1,7 +1,7 @@
 """Draws from the distributions of a study, as columns of values for an ensemble."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from ppafo.studies.sweep.noise import NOISE, other_noise, with_noise
 from ppafo.studies.sweep.sampling.correlation import correlated
 from ppafo.studies.sweep.sampling.distributions import Floats
 from ppafo.studies.sweep.sampling.uniforms import uniform_numbers
-from ppafo.studies.sweep.study import Configuration, Drawn, Sample, Study
+from ppafo.studies.sweep.study import Configuration, Drawn, Sample, Study, with_followers
 
 MOST_DRAWS = 2**26
 REPLICATES = 16
@@ -25,10 +25,14 @@ Columns = dict[str, Floats]
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """Distributions of some paths, and the Cholesky factor of the correlation of their normal scores (None: none)."""
+    """Distributions of some paths, and the Cholesky factor of the correlation of their normal scores (None: none).
+
+    ``same`` has the path that a path follows, by path.
+    """
 
     drawn: tuple[Drawn, ...]
     scores: tuple[tuple[float, ...], ...] | None = None
+    same: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -38,7 +42,8 @@ class Uncertainty:
     def columns(self, uniform: Floats) -> Columns:
         """Return values [SI] (draws,) by path for uniform numbers in (0, 1), shape (draws, paths)."""
         shares = uniform if self.scores is None else correlated(uniform, self.scores)
-        return {item.path: item.distribution.values(shares[:, row]) for row, item in enumerate(self.drawn)}
+        values = {item.path: item.distribution.values(shares[:, row]) for row, item in enumerate(self.drawn)}
+        return with_followers(values, self.same)
 
     def random_columns(self, first: int, count: int, seed: int) -> Columns:
         """Return independent draws number ``first`` to ``first + count - 1`` of the stream that ``seed`` names."""
@@ -63,7 +68,8 @@ class Uncertainty:
 
     def hearing(self, scenarios: Iterable[Scenario]) -> "Uncertainty":
         """Return the same with a noise stream for each draw, where any of some scenarios is noisy."""
-        return Uncertainty(*with_noise(self.drawn, self.scores, scenarios, self.paths))
+        drawn, scores = with_noise(self.drawn, self.scores, scenarios, self.paths)
+        return replace(self, drawn=drawn, scores=scores)
 
     @property
     def has_noise(self) -> bool:
@@ -100,7 +106,7 @@ def uncertainty_of(study: Study) -> Uncertainty:
         )
     if not study.drawn:
         raise StudyError(f"study '{study.name}': nothing in it has a distribution; give it a [[vary]] of kind 'normal'")
-    return Uncertainty(study.drawn, study.scores)
+    return Uncertainty(study.drawn, study.scores, study.same)
 
 
 def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
@@ -111,9 +117,10 @@ def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
         raise StudyError(
             f"study '{study.name}': nothing has a distribution in the configuration '{configuration.name}'"
         )
+    same = study.same_in(configuration.name)
     if len(kept) == len(whole.drawn):
-        return whole
-    return Uncertainty(tuple(whole.drawn[row] for row in kept), _factor_of_some(whole.scores, kept))
+        return replace(whole, same=same)
+    return Uncertainty(tuple(whole.drawn[row] for row in kept), _factor_of_some(whole.scores, kept), same)
 
 
 def chosen_configuration(study: Study, name: str | None) -> Configuration:

@@ -230,7 +230,7 @@ def test_files_are_named_in_messages_and_scenarios_are_relative_to_them(tmp_path
 
 def test_every_kind_of_the_layout_can_be_built() -> None:
     kinds = {item.model_fields["kind"].annotation.__args__[0] for item in VARIED}  # type: ignore[union-attr]
-    assert kinds == {"grid", "list", "stated", *_DISTRIBUTIONS}
+    assert kinds == {"grid", "list", "stated", "same_as", *_DISTRIBUTIONS}
 
 
 @pytest.mark.parametrize("name", list_studies())

@@ -1,0 +1,87 @@
+"""``ppafo cache``: the compiled models on this computer: where they are, how much they take, compile, remove."""
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_output, deliver
+from ppafo.cli.quick_imports import load_compiler
+from ppafo.errors import SimulationError
+
+_DAY = 86400.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    orders = parser.add_mutually_exclusive_group()
+    orders.add_argument("--warm", action="store_true", help="compile the models of the scenarios of the package")
+    orders.add_argument("--clear", action="store_true", help="remove all compiled models")
+    add_output_arguments(parser)
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Do what was asked for, and show what is there."""
+    from ppafo.engine.cache import cache_folder, clear, refusal
+
+    check_output(parsed)
+    folder = cache_folder()
+    cleared = clear(folder) if parsed.clear and folder is not None else 0
+    why_not = "" if parsed.clear else refusal(folder)
+    if parsed.warm:
+        _warm(why_not)
+    document = _document(folder, why_not) | ({"freed": cleared} if parsed.clear else {})
+    deliver("cache", "\n".join(_lines(document)), document, parsed)
+    return EXIT_GOOD
+
+
+def _warm(why_not: str) -> None:
+    if why_not:
+        raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
+    load_compiler()
+    from ppafo.simulation.loading import list_scenarios
+    from ppafo.simulation.simulate import compile_model
+
+    for name in list_scenarios():
+        compile_model(name)
+
+
+def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
+    from ppafo.engine.cache import LONGEST_UNUSED, MOST_BYTES, cached_programs
+
+    programs = [] if folder is None else cached_programs(folder)
+    now = time.time()
+    return {
+        "folder": None if folder is None else str(folder),
+        "not_used": why_not or None,
+        "size": sum(program.size for program in programs),
+        "kept_unused_days": LONGEST_UNUSED / _DAY,
+        "most_bytes": MOST_BYTES,
+        "programs": [
+            {"name": program.place.name, "size": program.size, "unused_days": max(0.0, (now - program.used) / _DAY)}
+            for program in programs
+        ],
+    }
+
+
+def _lines(document: dict[str, Any]) -> list[str]:
+    lines = [f"folder: {document['folder'] or 'none'}"]
+    if document["not_used"]:
+        lines.append(f"not used: {document['not_used']}")
+    if "freed" in document:
+        lines.append(f"removed: {_megabytes(document['freed'])}")
+    lines.append(f"programs: {len(document['programs'])}, {_megabytes(document['size'])}")
+    lines += [
+        f"  {item['name']}  {_megabytes(item['size']):>8}  last used {_days(item['unused_days'])}"
+        for item in document["programs"]
+    ]
+    limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
+    return [*lines, f"removed by themselves: after {limits}"]
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"
+
+
+def _days(days: float) -> str:
+    return "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"

@@ -1,0 +1,171 @@
+"""``--out`` means the same in every command: absent, empty or its own earlier result; nothing of others is replaced."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.catalog import COMMANDS
+from ppafo.cli.main import main
+from ppafo.storage.owned_folder import MARK
+
+FOLDERS: dict[str, list[str]] = {
+    "reproduce": [],
+    "simulate": ["step-response"],
+    "unreported": ["--draws", "64"],
+    "sweep": ["pressure-and-area"],
+    "compare": ["step-response"],
+    "sensitivity": ["torque-task-uncertainty"],
+    "montecarlo": ["torque-task-uncertainty", "--metric", "rms_error"],
+    "tune": ["pid-gains"],
+    "walk": ["--minutes", "0.1"],
+    "walk --wearers": ["--wearers", "2"],
+    "league": [],
+    "league --walk": ["--walk"],
+    "validate": ["ppafo2011", "bench.csv"],
+    "rig": ["record", "step-response"],
+    "identify": ["problem.toml"],
+    "gait": ["show", "falisse2019-subject1"],
+    "gait import": ["import", "walk.mot", "--body-mass", "62 kg"],
+    "endurance": ["--gas-per-step", "0.3 g"],
+    "design": ["torque-task"],
+    "size": ["push-off"],
+    "sets": [],
+    "sets show": ["show", "ppafo2011"],
+    "parts": [],
+    "audit": ["ppafo2011"],
+    "schema": ["scenario"],
+    "cache": [],
+    "bench": ["--quick"],
+}
+"""The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
+
+FILES = {
+    "plot": (["{result}"], "figure.png"),
+    "gait record": (["falisse2019-subject1", "--strides", "1"], "walk.csv"),
+    "gait export": (["{result}"], "walk.sto"),
+}
+"""The words of every command that writes one file, and the file."""
+
+QUICK = ("sets", "sets show", "parts", "audit", "schema", "cache", "gait", "endurance")
+
+
+def words_of(name: str, out: Path) -> list[str]:
+    words = FOLDERS[name]
+    return [name.partition(" ")[0], *words, "--out", str(out)]
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_every_command_is_here() -> None:
+    assert {name.partition(" ")[0] for name in (*FOLDERS, *FILES)} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("theirs", ["notes.txt", "report.html", "run.json", MARK])
+@pytest.mark.parametrize("name", FOLDERS)
+def test_folder_of_others_is_refused_before_anything_runs(
+    name: str, theirs: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / theirs).write_text("mine")
+    assert main(words_of(name, out)) == 2
+    said = capsys.readouterr().err
+    assert str(out) in said
+    assert len(said.splitlines()) == 1
+    assert contents(tmp_path) == {f"out/{theirs}": b"mine"}
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_result_of_another_command_is_refused(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    other = "schema" if name != "schema" else "parts"
+    assert main(words_of(other, tmp_path / "out")) == 0
+    before = contents(tmp_path)
+    assert main(words_of(name, tmp_path / "out")) == 2
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_file_in_the_place_of_the_folder_is_refused(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").write_text("mine")
+    assert main(words_of(name, tmp_path / "out")) == 2
+    assert contents(tmp_path) == {"out": b"mine"}
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_own_earlier_result_is_replaced_whole_and_holds_nothing_else(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    assert main(words_of(name, out)) == 0
+    first = contents(out)
+    (stray,) = [path for path in sorted(out.iterdir()) if path.name not in (MARK, "endurance.json")][:1]
+    stray.write_text("an earlier one")
+    assert main(words_of(name, out)) == 0
+    assert set(contents(out)) == set(first)
+    assert stray.read_text() != "an earlier one"
+    (out / "notes.txt").write_text("mine")
+    before = contents(out)
+    assert main(words_of(name, out)) == 2
+    assert "notes.txt" in capsys.readouterr().err
+    assert contents(out) == before
+
+
+def test_smaller_result_leaves_nothing_of_a_larger_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["audit", "ppafo2011", "--out", str(out)]) == 0
+    assert main(["audit", "ppafo2011-printed", "--out", str(out)]) == 1
+    assert {path.name for path in out.iterdir()} == {
+        MARK,
+        "audit-ppafo2011-printed.txt",
+        "audit-ppafo2011-printed.json",
+    }
+
+
+def test_mark_that_names_no_files_lets_nothing_be_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["parts", "--out", str(out)]) == 0
+    document = json.loads((out / MARK).read_text())
+    (out / MARK).write_text(json.dumps(document | {"files": 3}))
+    assert main(["parts", "--out", str(out)]) == 2
+
+
+def test_rig_adds_an_experiment_and_replaces_nothing_of_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    record = ["rig", "record", "valve-map", "--preset", "ideal-laboratory", "--out", str(out)]
+    assert main(record) == 0
+    (out / "problem.toml").write_text("mine")
+    assert main(record) == 0
+    (out / "step-response.csv").write_text("mine")
+    capsys.readouterr()
+    assert main(["rig", "record", "step-response", "--out", str(out)]) == 2
+    assert "holds a step-response.csv that is not of the rig" in capsys.readouterr().err
+    assert (out / "step-response.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_file_that_is_there_is_not_replaced(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words, file = FILES[name]
+    result, out = tmp_path / "result", tmp_path / file
+    if "{result}" in words:
+        assert main(["simulate", "torque-task-proportional", "--set", "run.duration=0.1 s", "--out", str(result)]) == 0
+    out.write_text("mine")
+    given = [word.format(result=result) for word in words]
+    assert main([*name.split(), *given, "--out", str(out)]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert out.read_text() == "mine"
+    out.unlink()
+    assert main([*name.split(), *given, "--out", str(out)]) == 0
+    assert out.stat().st_size > 100

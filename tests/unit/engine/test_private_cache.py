@@ -1,0 +1,209 @@
+"""The cache of compiled models runs nothing of others, and whatever is wrong with it, a model is compiled and runs."""
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ppafo.engine import cache
+from ppafo.engine.cache import cache_folder, cached_programs, clear, evict, load_generated, refusal
+
+SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef twice(x):\n    return 2.0 * x\n'
+
+RUN = f"""
+import sys
+from ppafo.engine.cache import load_generated
+print(load_generated("test", {SOURCE!r}).twice(21.0))
+"""
+
+
+@pytest.fixture
+def compiled(fresh_cache: Path) -> Path:
+    """The folder of the one program in a fresh cache."""
+    assert loaded() == 42.0
+    (program,) = cached_programs(fresh_cache)
+    return program.place
+
+
+def loaded() -> float:
+    """What the program says when it is loaded as a new process loads it."""
+    module = load_generated("test", SOURCE)
+    value = float(module.twice(21.0))
+    del sys.modules[module.__name__]
+    return value
+
+
+class Trap:
+    """Makes a folder where it is unpickled."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
+        return os.mkdir, (str(self._folder),)
+
+
+def spoil(path: Path) -> None:
+    """Change one bit in the middle of a file."""
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(bytes(content))
+
+
+@pytest.mark.parametrize("ending", ["nbc", "nbi", "py", "json"])
+@pytest.mark.parametrize("damage", ["cut", "empty", "spoilt", "gone", "pipe", "folder"])
+def test_damaged_program_is_compiled_anew(compiled: Path, ending: str, damage: str) -> None:
+    (path,) = compiled.rglob(f"*.{ending}")
+    content = path.read_bytes()
+    if damage == "spoilt":
+        spoil(path)
+    else:
+        path.unlink()
+        if damage in ("cut", "empty"):
+            path.write_bytes(content[: len(content) // 2] if damage == "cut" else b"")
+        elif damage == "pipe":
+            os.mkfifo(path)
+        elif damage == "folder":
+            path.mkdir()
+    assert loaded() == 42.0
+    assert path.is_file()
+    assert cache._is_whole(compiled)
+
+
+def test_file_in_the_place_of_a_program_is_no_error(compiled: Path) -> None:
+    clear(compiled.parent)
+    compiled.parent.mkdir(mode=0o700)
+    compiled.write_text("not a folder")
+    assert loaded() == 42.0
+    assert cache._is_whole(compiled)
+
+
+def test_unwritable_cache_leads_to_no_shared_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path / "file" / "programs"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    guessed = tmp_path / f"ppafo-programs-{os.getuid()}"
+    guessed.mkdir(mode=0o777)
+    assert loaded() == 42.0
+    assert list(guessed.iterdir()) == []
+
+
+@pytest.mark.parametrize("kind", ["others can write", "link", "another user", "place can be taken"])
+def test_compiled_code_in_a_folder_that_is_not_private_is_not_run(
+    compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    (index,) = compiled.rglob("*.nbi")
+    index.write_bytes(pickle.dumps(Trap(tmp_path / "sprung")))
+    (compiled / "checksums.json").write_text(str(cache._checksums(compiled)).replace("'", '"'))
+    folder = compiled.parent
+    if kind == "others can write":
+        folder.chmod(0o777)
+    elif kind == "link":
+        monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path / "link"))
+        (tmp_path / "link").symlink_to(folder)
+    elif kind == "another user":
+        monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    else:
+        tmp_path.chmod(0o777)
+    assert refusal(cache_folder())
+    assert loaded() == 42.0
+    assert not (tmp_path / "sprung").exists()
+
+
+def test_cache_folder_is_made_for_its_user_alone(fresh_cache: Path) -> None:
+    before = os.umask(0)
+    try:
+        assert refusal(fresh_cache) == ""
+    finally:
+        os.umask(before)
+    assert fresh_cache.stat().st_mode & 0o077 == 0
+
+
+def test_files_of_numba_stay_in_the_program_wherever_its_own_variable_points(
+    fresh_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from numba.core import config
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "numba"))
+    assert loaded() == 42.0
+    assert not (tmp_path / "numba").exists()
+    assert list(fresh_cache.rglob("*.nbc"))
+    assert str(tmp_path / "numba") == config.CACHE_DIR
+
+
+def test_user_without_home_and_without_an_entry_goes_without_a_cache(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import pwd
+
+    def no_entry(_: int) -> None:
+        raise KeyError
+
+    for variable in ("HOME", "XDG_CACHE_HOME", "PPAFO_CACHE_DIR"):
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", no_entry)
+    monkeypatch.chdir(tmp_path)
+    assert cache_folder() is None
+    assert loaded() == 42.0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_full_disk_is_no_error(tmp_path: Path) -> None:
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
+    environment = {**os.environ, "PPAFO_CACHE_DIR": str(tmp_path / "programs")}
+    done = subprocess.run(
+        [sys.executable, "-c", limit + RUN], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "42.0\n", done.stderr
+    assert "is not kept" in done.stderr
+    assert list((tmp_path / "programs").iterdir()) == []
+
+
+def test_two_processes_that_compile_the_same_program_leave_it_whole(tmp_path: Path) -> None:
+    environment = {**os.environ, "PPAFO_CACHE_DIR": str(tmp_path / "programs")}
+    started = [
+        subprocess.Popen([sys.executable, "-c", RUN], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        for _ in range(2)
+    ]
+    assert [process.communicate()[0] for process in started] == [b"42.0\n"] * 2
+    (program,) = (tmp_path / "programs").iterdir()
+    assert cache._is_whole(program)
+
+
+def test_program_that_no_one_used_for_long_is_removed_and_a_used_one_stays(compiled: Path) -> None:
+    old = compiled.with_name(compiled.name.replace("ppafo_test", "ppafo_old"))
+    left = compiled.with_name(".writing-0123456789abcdef")
+    for place in (old, left):
+        place.mkdir()
+        os.utime(place, (0.0, 0.0))
+    evict(compiled.parent)
+    assert [place.name for place in compiled.parent.iterdir()] == [compiled.name]
+
+
+def test_programs_beyond_the_largest_size_are_removed_oldest_first(
+    compiled: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    older = compiled.with_name(compiled.name.replace("ppafo_test", "ppafo_older"))
+    older.mkdir()
+    (older / "large").write_bytes(bytes(1000))
+    used = compiled.stat().st_mtime
+    os.utime(older, (used - 60.0, used - 60.0))
+    monkeypatch.setattr(cache, "MOST_BYTES", cached_programs(compiled.parent)[0].size + 500)
+    evict(compiled.parent)
+    assert compiled.is_dir()
+    assert not older.exists()
+
+
+def test_clearing_leaves_what_is_not_a_program(compiled: Path) -> None:
+    (compiled.parent / "ppafo_results").mkdir()
+    (compiled.parent / "notes.txt").write_text("mine")
+    assert clear(compiled.parent) > 0
+    assert sorted(place.name for place in compiled.parent.iterdir()) == ["notes.txt", "ppafo_results"]
+    (compiled.parent / "notes.txt").unlink()
+    (compiled.parent / "ppafo_results").rmdir()
+    clear(compiled.parent)
+    assert not compiled.parent.exists()
