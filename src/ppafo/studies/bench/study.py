@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 from ppafo.studies.bench.ensemble import measure_ensemble
+from ppafo.studies.bench.free_vanes import measure_free_vanes
 from ppafo.studies.bench.machine import describe_machine
 from ppafo.studies.bench.report import BenchReport
 from ppafo.studies.bench.single_run import measure_single_run
@@ -20,12 +21,13 @@ class BenchSize:
     runs: int
     runs_duration: float
     runs_repetitions: int
+    free_vanes: int
     first_starts: int
     later_starts: int
 
 
-FULL = BenchSize("full", 5.0, 9, 4096, 3.0, 12, 2, 7)
-QUICK = BenchSize("quick", 1.0, 5, 1024, 1.0, 5, 1, 3)
+FULL = BenchSize("full", 5.0, 9, 4096, 3.0, 12, 1024, 2, 7)
+QUICK = BenchSize("quick", 1.0, 5, 1024, 1.0, 5, 128, 1, 3)
 
 
 def measure_speed(size: BenchSize, say: Callable[[str], None]) -> BenchReport:
@@ -33,6 +35,7 @@ def measure_speed(size: BenchSize, say: Callable[[str], None]) -> BenchReport:
     lines = [
         *measure_single_run(size.single_duration, size.single_repetitions, say),
         *measure_ensemble(size.runs, size.runs_duration, size.runs_repetitions, say),
+        *measure_free_vanes(size.free_vanes, size.runs_repetitions, say),
         *measure_start_up(size.first_starts, size.later_starts, say),
     ]
     return BenchReport(describe_machine(), asdict(size), tuple(lines))
