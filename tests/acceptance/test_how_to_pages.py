@@ -3,6 +3,7 @@
 import dataclasses
 import importlib.util
 import re
+import shlex
 import sys
 import textwrap
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 import ppafo
+from ppafo.cli.main import main
 from ppafo.control import controllers
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
@@ -83,6 +85,23 @@ def test_the_overrides_of_the_scenario_page_are_taken() -> None:
     assert len(overrides) == 3
     assert scenario.reference.settings["level"] == 5.0
     assert scenario.device.valve_name == "solenoid"
+
+
+def test_the_check_of_the_scenario_page_finds_what_the_page_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = shlex.split(blocks("write-a-scenario.md", "sh")[1].replace("\\\n", " "))
+    assert main(words[1:]) == 1
+    printed = capsys.readouterr().out
+    (shown,) = blocks("write-a-scenario.md", "text")
+    tables = [text[text.index("Check of") :].split("\n\n")[0].splitlines() for text in (printed, shown)]
+    names, shown_names = ([line.split("  ")[0] for line in table] for table in tables)
+    assert names == shown_names
+    assert {"rms_error", "angle over time"} <= set(names)
+    cause = "a measurement moved by 1e-07 of its range, which nobody could measure"
+    assert cause in " ".join(shown.split())
+    assert cause in printed
 
 
 def test_the_message_on_the_scenario_page_is_the_real_one() -> None:

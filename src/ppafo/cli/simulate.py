@@ -14,13 +14,16 @@ from ppafo.cli.output import (
     print_result,
 )
 from ppafo.cli.quick_imports import load_compiler, load_drawing
+from ppafo.documents.json_text import json_text
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
+    from ppafo.simulation.check import Check
     from ppafo.simulation.result import Result
     from ppafo.simulation.scenario import Scenario
 
 DEFAULT_FOLDER = Path("out")
+CHECK_FILE = "check.json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,12 +31,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help="name of a scenario, or a .toml file")
     add_override_argument(parser)
     parser.add_argument("--list", action="store_true", help="list the scenarios that come with the package")
+    parser.add_argument(
+        "--check",
+        action="store_true",
+        help="run again with half the error and from a start moved by 1e-7, and say which metrics the run determines",
+    )
     add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, help="result folder; default out/NAME of the scenario")
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Run a scenario and say what came of it; 1 where the run diverged."""
+    """Run a scenario and say what came of it; 1 where the run diverged, or does not determine what was checked."""
     if parsed.list:
         return _list(parsed)
     if parsed.scenario is None:
@@ -46,10 +54,11 @@ def run(parsed: argparse.Namespace) -> int:
     with named_option():
         check_result_folder(folder)
     result = _simulated(scenario)
-    _save(result, folder)
-    print_result(_text(result, folder), _document(result, folder), parsed.json)
+    check = result.check() if parsed.check and result.status.is_completed else None
+    _save(result, check, folder)
+    print_result(_text(result, check, folder), _document(result, check, folder), parsed.json)
     if result.status.is_completed:
-        return EXIT_GOOD
+        return EXIT_GOOD if check is None or check.is_determined else EXIT_CHECK_FAILED
     print(f"ppafo: {scenario.name}: {result.status.message}", file=sys.stderr)
     return EXIT_CHECK_FAILED
 
@@ -61,11 +70,12 @@ def _simulated(scenario: "Scenario") -> "Result":
     return simulate(scenario)
 
 
-def _save(result: "Result", folder: Path) -> None:
+def _save(result: "Result", check: "Check | None", folder: Path) -> None:
     load_drawing()
     from ppafo.reporting.figures import figure_files
 
-    result.save(folder, figure_files(result.plot()))
+    checked = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
+    result.save(folder, {**figure_files(result.plot()), **checked})
 
 
 def _list(parsed: argparse.Namespace) -> int:
@@ -79,15 +89,17 @@ def _list(parsed: argparse.Namespace) -> int:
     return EXIT_GOOD
 
 
-def _text(result: "Result", folder: Path) -> str:
-    from ppafo.reporting.metrics_table import metrics_table
+def _text(result: "Result", check: "Check | None", folder: Path) -> str:
+    from ppafo.reporting.metrics_table import metrics_table, shown_check
 
     head = f"{result.scenario.name}: {result.status.kind}"
-    tail = f"written: {folder} (recording.nc, recording.csv, run.json, figure.png, figure.svg)"
-    return "\n".join([head, "", *metrics_table(result.metrics), "", tail])
+    checked = [] if check is None else [repr(shown_check(check)), ""]
+    files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg"]
+    written = ", ".join(files if check is None else [*files, CHECK_FILE])
+    return "\n".join([head, "", *metrics_table(result.metrics), "", *checked, f"written: {folder} ({written})"])
 
 
-def _document(result: "Result", folder: Path) -> dict[str, Any]:
+def _document(result: "Result", check: "Check | None", folder: Path) -> dict[str, Any]:
     from ppafo.simulation.document import plain
 
     metrics = {name: plain(metric) for name, metric in result.metrics.items()}
@@ -95,5 +107,6 @@ def _document(result: "Result", folder: Path) -> dict[str, Any]:
         "scenario": result.scenario.name,
         "status": plain(result.status),
         "metrics": metrics,
+        **({} if check is None else {"check": check.document()}),
         "folder": str(folder),
     }

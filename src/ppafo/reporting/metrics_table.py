@@ -2,9 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ppafo.metrics import Metric
 from ppafo.units import from_si
+
+if TYPE_CHECKING:
+    from ppafo.simulation.check import Changed, Check
 
 _SHOWN_IN = {
     "kg": ("kg", "g"),
@@ -32,3 +36,18 @@ def in_shown_unit(metric: Metric) -> Metric:
         return metric
     si_unit, unit = _SHOWN_IN[metric.unit]
     return replace(metric, value=from_si(metric.value, unit, si_unit), unit=unit)
+
+
+def shown_check(check: "Check") -> "Check":
+    """Return a check in the units of these tables; the range of the pressures is a difference, as all changes are."""
+    return replace(
+        check,
+        metrics=tuple(_shown_row(row) for row in check.metrics),
+        courses=tuple(replace(row, unit=row.unit.replace("_a", "_d")) for row in map(_shown_row, check.courses)),
+    )
+
+
+def _shown_row(row: "Changed") -> "Changed":
+    one = in_shown_unit(Metric(1.0, row.unit, ""))
+    changes = {name: one.value * change for name, change in row.changes.items()}
+    return replace(row, unit=one.unit, value=one.value * row.value, allowed=one.value * row.allowed, changes=changes)

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+    from ppafo.simulation.check import Check
+
 
 @dataclass(frozen=True, slots=True)
 class Status:
@@ -57,6 +59,15 @@ class Result:
         remark = "" if self.status.is_completed else self.status.message
         atmosphere = self.scenario.device.supply.atmospheric_pressure
         return recording_figure(self.recording, self.scenario.name, remark, atmosphere)
+
+    def check(self) -> "Check":
+        """Return what this run determines: it runs again with half the error, and with start and measurements moved.
+
+        SimulationError for a run that diverged, and for a Python controller that gives another run each time.
+        """
+        from ppafo.simulation.check import check_result
+
+        return check_result(self)
 
     def dataset(self) -> "xarray.Dataset":
         """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON."""

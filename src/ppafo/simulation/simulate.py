@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import ppafo
-from ppafo.engine.lanes import BatchResult, Floats, load_program, run_batch
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together
+from ppafo.engine.lanes import BatchResult, Floats, load_program
+from ppafo.engine.run import NEVER_FAILED, Run, run_together
 from ppafo.metrics.catalog import evaluate
 from ppafo.model.friction import sliding_friction
 from ppafo.model.plant import chamber_pressures
@@ -37,10 +37,14 @@ def simulate(scenario: Scenario | str | Path, overrides: Sequence[str] = ()) -> 
     bad input.
     """
     chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
-    run = plan_run(chosen)
-    custom = chosen.control.custom
-    outcome = run_batch(batch_of(run)) if custom is None else run_sampled(run, custom)
-    return _result(chosen, run, outcome)
+    return results_of(chosen, [plan_run(chosen)])[0]
+
+
+def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
+    """Results of runs of one scenario, as planned or with other numbers; a Python controller has them in turn."""
+    custom = scenario.control.custom
+    outcomes = run_together(runs) if custom is None else [run_sampled(run, custom) for run in runs]
+    return [_result(scenario, run, outcome) for run, outcome in zip(runs, outcomes, strict=True)]
 
 
 def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> list[Result]:

@@ -1,0 +1,194 @@
+"""Whether a run determines its metrics: shipped scenarios do, a chaotic loop does not, and a check says so."""
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.errors import SimulationError
+from ppafo.model.sensors import Measurement
+from ppafo.reporting.metrics_table import shown_check
+from ppafo.simulation.check import HALF_ERROR, MOVED_MEASUREMENT, MOVED_START, Changed, Check
+from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.simulation.result import Status
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate
+
+CHAOTIC = (
+    "motion.kind=free",
+    "motion.angle=40 deg",
+    "actuator.dead_volume_1=0.5 cm^3",
+    "actuator.dead_volume_2=1.1 cm^3",
+    "sensors.angle_resolution=0.1 deg",
+    "sensors.pressure_resolution=0.05 psi_d",
+    "run.duration=0.6 s",
+)
+"""A free vane in a torque loop with next to no gas behind it and coarse sensors."""
+
+
+class Threshold:
+    """Full pressure on one side or the other, by a measurement and a level."""
+
+    def __init__(self, reading: Callable[[Measurement], float], level: float) -> None:
+        self.reading, self.level = reading, level
+
+    def reset(self) -> None:
+        pass
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+        return 0.5 if self.reading(measurement) > self.level else -0.5
+
+
+class Unforgetting:
+    """Remembers the last run."""
+
+    def __init__(self, command: float) -> None:
+        self.command = command
+
+    def reset(self) -> None:
+        pass
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+        self.command = min(1.0, self.command + 1e-3)
+        return self.command
+
+
+@pytest.fixture(scope="module")
+def chaotic() -> Check:
+    return simulate("torque-task-proportional", CHAOTIC).check()
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_a_scenario_of_the_package_determines_all_its_metrics(name: str) -> None:
+    result = simulate(name)
+    check = result.check()
+    assert check.is_determined, check.sentence
+    assert check.sentence.startswith("All metrics are determined")
+    assert [row.name for row in check.metrics] == list(result.metrics)
+    assert [row.value for row in check.metrics] == [metric.value for metric in result.metrics.values()]
+    assert (check.parts_at, check.failed) == (None, ())
+
+
+def test_every_repeat_of_a_run_really_differs_from_it(step_response: Scenario) -> None:
+    rows = {row.name: row for row in simulate(step_response).check().metrics}
+    assert list(rows["mechanical_work"].changes) == [HALF_ERROR, MOVED_START]
+    assert all(change != 0.0 for change in rows["mechanical_work"].changes.values())
+
+
+def test_a_chaotic_loop_is_found_with_the_time_at_which_its_runs_part(chaotic: Check) -> None:
+    assert not chaotic.is_determined
+    assert {"rms_error", "switchings"} <= {row.name for row in chaotic.metrics if not row.is_determined}
+    assert list(chaotic.metrics[0].changes) == [HALF_ERROR, MOVED_START, MOVED_MEASUREMENT]
+    assert MOVED_MEASUREMENT in chaotic.metrics[0].changed_by
+    assert chaotic.parts_at is not None
+    assert 0.0 < chaotic.parts_at < 0.6
+    assert chaotic.sentence.startswith("Not determined by this run: rms_error")
+    assert f"part at t = {chaotic.parts_at:.4g} s" in chaotic.sentence
+
+
+def test_the_same_kind_of_loop_with_another_sensor_and_a_fine_step_is_determined() -> None:
+    changes = [*CHAOTIC[:4], "motion.angle=60 deg", "sensors.angle_resolution=1 deg", "run.duration=0.6 s"]
+    fine = [*changes, "sensors.pressure_resolution=0.01 psi_d", "run.step=0.05 ms"]
+    check = simulate("torque-task-proportional", fine).check()
+    assert check.is_determined, check.sentence
+
+
+def test_what_only_the_error_changes_is_told_from_what_nobody_could_measure() -> None:
+    moved = Changed("switchings", "-", 7.0, 7e-3, {HALF_ERROR: 1.0, MOVED_START: -2.0})
+    inexact = Changed("rms_error", "N m", 1.0, 1e-3, {HALF_ERROR: -2e-3, MOVED_START: 1e-9})
+    firm = Changed("peak_error", "N m", 1.0, 1e-3, {HALF_ERROR: 1e-3, MOVED_START: 1e-9})
+    gone = Changed("gas_per_work", "kg/J", math.nan, 1e-3, {HALF_ERROR: 0.0, MOVED_START: math.inf})
+    assert (moved.changed_by, gone.changed_by) == ({HALF_ERROR, MOVED_START}, {MOVED_START})
+    assert inexact.changed_by == {HALF_ERROR}
+    sentence = Check("loop", (moved, inexact, firm), (), None, ()).sentence
+    assert sentence.startswith("Not determined by this run: switchings: a start moved by 1e-07 of its range")
+    assert "Nor: rms_error: half the error gives other values. Take a smaller run.step" in sentence
+    assert "peak_error" not in sentence
+    assert Check("loop", (firm,), (), None, ()).is_determined
+    diverged = Check("loop", (firm,), (), 0.1, (MOVED_START,))
+    assert not diverged.is_determined
+    assert diverged.sentence.endswith("how it ends: the run with start moved diverged. The runs part at t = 0.1 s.")
+
+
+def test_a_check_prints_each_metric_with_what_changed_and_marks_what_is_open(chaotic: Check) -> None:
+    lines = repr(chaotic).splitlines()
+    printed = {line.split("  ")[0]: line for line in lines[2:-2]}
+    for row in (*chaotic.metrics, *chaotic.courses):
+        assert printed[row.name].endswith("not determined") == (not row.is_determined)
+        change = row.changes[HALF_ERROR]
+        assert (f" {change:+.1e} " if change else " 0 ") in printed[row.name]
+    assert lines[-1] == chaotic.sentence
+
+
+def test_a_check_in_shown_units_says_the_same_of_every_number(chaotic: Check) -> None:
+    shown = shown_check(chaotic)
+    assert shown.sentence == chaotic.sentence
+    assert [row.unit for row in shown.courses] == ["deg", "psi_d"]
+    grams = next(row for row in shown.metrics if row.name == "gas_supplied")
+    kilograms = next(row for row in chaotic.metrics if row.name == "gas_supplied")
+    assert grams.unit == "g"
+    assert grams.changes[HALF_ERROR] == pytest.approx(1e3 * kilograms.changes[HALF_ERROR])
+
+
+def test_a_decision_by_a_hair_of_the_start_is_found(torque_task: Callable[[str], Scenario]) -> None:
+    atmosphere = torque_task("proportional").device.supply.atmospheric_pressure
+    controller = Threshold(lambda seen: seen.pressure_1, atmosphere * (1.0 + 0.5e-7))
+    once = dataclasses.replace(torque_task("proportional"), duration=0.05)
+    slow = dataclasses.replace(once, control=dataclasses.replace(once.control, period=0.05))
+    check = simulate(slow.controlled_by(controller)).check()
+    lost = next(row for row in check.metrics if row.name == "rms_error")
+    assert lost.changed_by == {MOVED_START}
+    assert "a start moved by 1e-07 of its range" in check.sentence
+    assert "half the error" not in check.sentence
+
+
+def test_a_decision_by_a_hair_of_a_reading_is_found_where_the_start_does_not_matter() -> None:
+    scenario = load_scenario(
+        "torque-task-proportional", ["motion.angle=75 deg", "sensors.angle_resolution=10 deg", "run.duration=0.05 s"]
+    )
+    controller = Threshold(lambda seen: seen.angle, 1.3089)
+    check = simulate(scenario.controlled_by(controller)).check()
+    lost = next(row for row in check.metrics if row.name == "rms_error")
+    assert lost.changed_by == {MOVED_MEASUREMENT}
+    assert "a measurement moved by 1e-07 of its range" in check.sentence
+
+
+def test_a_controller_that_gives_another_run_each_time_is_refused(torque_task: Callable[[str], Scenario]) -> None:
+    scenario = dataclasses.replace(torque_task("proportional"), duration=0.05)
+    result = simulate(scenario.controlled_by(Unforgetting(0.0)))
+    with pytest.raises(SimulationError, match=r"Unforgetting gives another run each time.* reset\(\) must forget"):
+        result.check()
+
+
+def test_a_run_that_diverged_is_not_checked(step_response: Scenario) -> None:
+    result = dataclasses.replace(simulate(step_response), status=Status("diverged", 0.01, "diverged at t = 0.01 s"))
+    with pytest.raises(SimulationError, match="step-response: the run diverged"):
+        result.check()
+
+
+def test_the_command_writes_and_prints_a_check_where_it_is_asked_for_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", "step-response", "--check", "--json", "--out", str(tmp_path)]) == 0
+    printed = json.loads(capsys.readouterr().out)["check"]
+    assert printed == json.loads((tmp_path / "check.json").read_text())
+    assert printed["is_determined"] is True
+    assert printed["metrics"][0]["changes"].keys() == {HALF_ERROR, MOVED_START}
+    assert main(["simulate", "step-response", "--out", str(tmp_path)]) == 0
+    assert "Check" not in capsys.readouterr().out
+    assert not (tmp_path / "check.json").exists()
+
+
+def test_the_command_ends_with_1_where_the_run_does_not_determine_its_metrics(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    changes = [word for change in CHAOTIC for word in ("--set", change)]
+    assert main(["simulate", "torque-task-proportional", *changes, "--check", "--out", str(tmp_path)]) == 1
+    printed = capsys.readouterr().out
+    assert "Not determined by this run: rms_error" in printed
+    assert printed.splitlines()[-1].endswith("check.json)")
+    assert json.loads((tmp_path / "check.json").read_text())["is_determined"] is False
