@@ -1,4 +1,4 @@
-"""A question that what is left unexplained answers: is this good enough to be believed?"""
+"""Questions about a fit: what can be had, asked before it; is it good enough to be believed, asked after it."""
 
 from dataclasses import dataclass
 
@@ -9,4 +9,13 @@ class Check:
 
     name: str
     holds: bool
+    statement: str
+
+
+@dataclass(frozen=True, slots=True)
+class Prospect:
+    """What recordings can give or cannot, known before anything is fitted: its name, whether, and why in words."""
+
+    name: str
+    can_be_had: bool
     statement: str

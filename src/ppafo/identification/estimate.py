@@ -6,12 +6,26 @@ from typing import Literal, get_args
 
 from ppafo.errors import IdentificationError
 
-Verdict = Literal["identified", "weak", "not identifiable", "at its bound", "law does not describe the data"]
-"""What the recordings say about a value; only the first two are fit to be written into a parameter set."""
+Verdict = Literal[
+    "identified",
+    "holds for this model only",
+    "weak",
+    "upper bound",
+    "not identifiable",
+    "at its bound",
+    "law does not describe the data",
+]
+"""What the recordings say about a value.
+
+Only the first is said where the model explains the recordings. The first three are fit to be used in a parameter set,
+the second and the third as fitted values that nobody should take for the device's own.
+"""
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
-_USABLE: tuple[Verdict, ...] = ("identified", "weak")
-_WORTH_TELLING = 1.05
+_USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only", "weak")
+
+WORTH_TELLING = 1.05
+"""Widening of an interval from which the law is said to miss the recordings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +37,7 @@ class Estimate:
     ``explanation`` is one or two sentences: residual check, what the value trades against, what is assumed.
     ``recordings`` names each source with its hash: ``static.csv sha256:0123abcd...``.
     ``widened`` is how many times as wide the interval is as the scatter alone would have it; 1 where the law describes
-    the recordings to within their scatter.
+    the recordings to within their scatter. ``condition`` says where the value holds, ``at 430 kPa``, if not everywhere.
     """
 
     path: str
@@ -36,6 +50,7 @@ class Estimate:
     recordings: tuple[str, ...]
     confidence: float = 0.95
     widened: float = 1.0
+    condition: str = ""
 
     def __post_init__(self) -> None:
         if self.verdict not in _VERDICTS:
@@ -50,15 +65,21 @@ class Estimate:
 
     @property
     def is_usable(self) -> bool:
-        """Whether the value may be written into a parameter set."""
+        """Whether the value may be used in a parameter set."""
         return self.verdict in _USABLE
 
     @property
+    def is_identified(self) -> bool:
+        """Whether the recordings fix the value and the model explains them: only such a value counts as identified."""
+        return self.verdict == "identified"
+
+    @property
     def verdict_in_words(self) -> str:
-        """The verdict, and by how much the interval was widened where the law misses the recordings."""
-        if self.is_usable and self.widened >= _WORTH_TELLING:
-            return f"{self.verdict}, widened {self.widened:.3g} times (lack of fit)"
-        return self.verdict
+        """The verdict, where it holds, and how much wider the interval is where the law misses the recordings."""
+        told = f"{self.verdict}, {self.condition}" if self.condition else self.verdict
+        if self.is_usable and self.widened >= WORTH_TELLING:
+            return f"{told}, widened {self.widened:.3g} times (lack of fit)"
+        return told
 
     @property
     def half_width(self) -> float:
