@@ -8,6 +8,7 @@ import numpy as np
 
 from ppafo.identification.trajectory.experiment import Experiment
 from ppafo.identification.trajectory.information import autocorrelation
+from ppafo.identification.trajectory.misfit import Misfit
 from ppafo.identification.trajectory.preparation import Floats, Measured, Prepared
 from ppafo.signals.channels import CHANNELS
 
@@ -97,8 +98,13 @@ def taken_for_noise(channel: ChannelFit, noise: str) -> str:
     )
 
 
-def too_large(channels: Sequence[ChannelFit]) -> str:
-    """Return which channel leaves more than its sensor can be blamed for, empty where none does."""
+def reason_of_misfit(misfit: Misfit, channels: Sequence[ChannelFit]) -> str:
+    """Return why the model does not explain the recordings, empty where it does.
+
+    Parts want different numbers, or a channel leaves more than its sensor can be blamed for.
+    """
+    if misfit.is_found:
+        return misfit.in_words
     for channel in channels:
         size = float(np.sqrt(channel.chi_square))
         if size > (_MUCH if channel.is_given else _OF_NO_SENSOR):

@@ -8,8 +8,8 @@ from ppafo.identification.trajectory.channels import (
     ChannelFit,
     channel_fits,
     predictions,
+    reason_of_misfit,
     taken_for_noise,
-    too_large,
 )
 from ppafo.identification.trajectory.columns import numbers_in, trajectories
 from ppafo.identification.trajectory.experiment import Experiment
@@ -118,7 +118,7 @@ def _evidence(
         prior_deviation=prior_coordinates(ranges)[1],
         inflation=uncertainty.inflation,
         residual_check=uncertainty.residual_check,
-        misfit=misfit.in_words if misfit.is_found else too_large(channels),
+        misfit=reason_of_misfit(misfit, channels),
         alone=misfit.alone,
         sources=tuple(_sources(problem, item) for item in ranges),
         search=problem.search,

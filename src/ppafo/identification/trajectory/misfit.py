@@ -10,16 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.identification.trajectory.mixture import inverted
-from ppafo.identification.trajectory.posterior import LinearModel, NoiseDraw, whitened
+from ppafo.identification.trajectory.mixture import inverted, solved
+from ppafo.identification.trajectory.posterior import LinearModel, NoiseDraw, drawn_posterior, whitened
 from ppafo.identification.trajectory.preparation import Floats, Prepared
+from ppafo.identification.trajectory.sensor_noise import SensorNoise, sensor_noise
+from ppafo.identification.trajectory.weighing import Weighed
 
-ALARM = 1.5e-3
+ALARM = 3.0e-3
 """Chance below which one of the comparisons is called a misfit."""
 
 _LEAST_SHARE = 0.02
 """Directions of which a part knows less than this share are not compared: its own fit would leave the linear range."""
 _SEEN = 0.05
+_DRAWS = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +63,16 @@ class Misfit:
         return f"{told} ({chance}; most in {one.worst})" if self.is_found else f"{told} ({chance})"
 
 
-def misfit_of(model: LinearModel, experiments: Sequence[Prepared], draws: Sequence[NoiseDraw], kept: int) -> Misfit:
-    """Return what fits of parts say against the joint fit, over draws of the noise."""
-    labels = _labels(experiments)
+def misfit_of(found: Weighed, seed: int) -> Misfit:
+    """Return what fits of parts say against the joint fit, over draws of the noise.
+
+    The noise is that of the finest parts, each fitted apart: what is left of the joint fit has the misfit in it, and
+    would hide it.
+    """
+    model, kept = found.model, len(found.optimum.point)
+    labels = _labels(found.optimum.residuals.experiments)
+    apart, noises = _apart(found, labels)
+    _, draws = drawn_posterior(apart, noises, kept, seed, chains=1, count=_DRAWS)
     atoms = [_atoms(model, draw, labels, kept) for draw in draws]
     halves = [f"{label} half" for label in ("first", "second")]
     kinds = {
@@ -77,6 +87,31 @@ def misfit_of(model: LinearModel, experiments: Sequence[Prepared], draws: Sequen
         if len(set(keys)) > 1:
             comparisons.append(_comparison(parts, keys, atoms, model, kept))
     return Misfit(tuple(comparisons), _alone(labels, atoms))
+
+
+def _apart(found: Weighed, labels: Sequence[tuple[str, str, slice]]) -> tuple[LinearModel, tuple[SensorNoise, ...]]:
+    """Return the linear model with columns of its own for each channel of each recording, and the noise it leaves."""
+    model, kept = found.model, len(found.optimum.point)
+    weights = [sensor.weights for sensor in found.sensors]
+    rows = whitened(model, found.noises, weights)[:, :kept]
+    _, root = inverted(rows.T @ rows + model.precision[:kept, :kept])
+    blocks = []
+    for _, _, place in labels:
+        values, vectors = np.linalg.eigh(root.T @ (rows[place].T @ rows[place]) @ root)
+        is_known = values > _LEAST_SHARE
+        block = np.zeros((len(rows), int(is_known.sum())))
+        block[place] = model.columns[place, :kept] @ root @ vectors[:, is_known] / np.sqrt(values[is_known])
+        blocks.append(block)
+    columns = np.hstack([*blocks, model.columns[:, kept:]])
+    width = columns.shape[1] - 1
+    apart = LinearModel(columns, model.sensors, np.zeros(width), np.zeros((width, width)))
+    whole = whitened(apart, found.noises, weights)
+    columns[:, -1] -= columns[:, :-1] @ np.linalg.lstsq(whole[:, :-1], whole[:, -1], rcond=None)[0]
+    noises = [
+        sensor_noise(apart.segments(apart.residuals, place), sensor.is_given)
+        for place, sensor in enumerate(found.sensors)
+    ]
+    return apart, tuple(noises)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +133,9 @@ def _labels(experiments: Sequence[Prepared]) -> list[tuple[str, str, slice]]:
 
 def _atoms(model: LinearModel, draw: NoiseDraw, labels: Sequence[tuple[str, str, slice]], kept: int) -> _Atoms:
     rows = whitened(model, draw.noises, draw.weights)
-    slopes, left = rows[:, :kept], rows[:, -1] + rows[:, :-1] @ draw.mean
+    products = rows.T @ rows
+    mean = -solved(products[:-1, :-1] + model.precision, products[:-1, -1] + model.pull)
+    slopes, left = rows[:, :kept], rows[:, -1] + rows[:, :-1] @ mean
     if rows.shape[1] > kept + 1:
         basis = np.linalg.qr(rows[:, kept:-1])[0]
         slopes = slopes - basis @ (basis.T @ slopes)

@@ -80,15 +80,20 @@ class NoiseDraw:
 
 
 def drawn_posterior(
-    model: LinearModel, noises: Sequence[SensorNoise], kept: int, seed: int
+    model: LinearModel,
+    noises: Sequence[SensorNoise],
+    kept: int,
+    seed: int,
+    chains: int = CHAINS,
+    count: int = DRAWS,
 ) -> tuple[Mixture, tuple[NoiseDraw, ...]]:
     """Return the distribution of the first ``kept`` columns with the noise drawn anew each time, and some draws."""
     means, covariances, draws, chain = [], [], [], []
     shown = []
-    for number in range(CHAINS):
+    for number in range(chains):
         random = np.random.default_rng([seed, number])
         states = [_State.of(noise, model, sensor) for sensor, noise in enumerate(noises)]
-        for turn in range(SETTLING + DRAWS):
+        for turn in range(SETTLING + count):
             states = _with_memory(model, states, random)
             mean, covariance, root = _given_noise(model, states)
             if turn >= SETTLING and turn % _SHOWN == 0:

@@ -82,10 +82,14 @@ def interval_factor(confidence: float) -> float:
 
 def relative(evidence: Evidence, index: int, half: float) -> float:
     """Return a half width in coordinates relative to the number; to its range where the search began at zero."""
-    item = evidence.ranges[index]
+    return relative_to_number(evidence.ranges[index], float(evidence.point[index]), half)
+
+
+def relative_to_number(item: Range, at: float, half: float) -> float:
+    """Return a half width in coordinates relative to the number at a coordinate, as ``relative`` does."""
     if item.scale == "log":
         return half
-    value = abs(item.number(float(evidence.point[index])))
+    value = abs(item.number(at))
     reference = max(value, item.size) if item.start == 0.0 else value
     return half * item.size / reference if reference > 0.0 else math.inf
 
