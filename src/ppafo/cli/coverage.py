@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import sys
 from pathlib import Path
 
 from ppafo.cli.arguments import UsageError
@@ -17,6 +18,7 @@ from ppafo.cli.output import (
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.cli.whole_numbers import whole_number
 
+EXIT_INTERRUPTED = 130
 FITS, FIGURE = "fits-{truths}-{seed}.jsonl", "ranks"
 FILES = ("coverage.txt", "coverage.json", f"{FIGURE}.png", f"{FIGURE}.svg")
 
@@ -53,7 +55,11 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.out is not None:
         Path(parsed.out).mkdir(parents=True, exist_ok=True)
     file = None if parsed.out is None else parsed.out / fits
-    lines = run_tasks(tasks, file, processes or os.cpu_count() or 1, tell)
+    try:
+        lines = run_tasks(tasks, file, processes or os.cpu_count() or 1, tell)
+    except KeyboardInterrupt:
+        print("\nppafo: interrupted; with --out finished fits are kept, and the same command goes on", file=sys.stderr)
+        return EXIT_INTERRUPTED
     text, document = coverage_text(lines, parsed.from_prior), coverage_document(lines, parsed.from_prior)
     if parsed.out is not None:
         load_drawing()

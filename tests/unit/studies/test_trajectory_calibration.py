@@ -15,7 +15,7 @@ from ppafo.studies.trajectory.noise_kinds import NOISE_KINDS, noise_kind
 
 
 def line(kind: str, number: int, below: float) -> Line:
-    return Line(kind, number, (below,) * 5, (1.0,) * 5, ("identified",) * 5, False, "angle white", 0.1)
+    return Line(kind, number, (below,) * 5, (1.0,) * 5, ("identified",) * 5, False, 0.5, "angle white", 0.1)
 
 
 def even(count: int) -> list[Line]:

@@ -16,8 +16,11 @@ from ppafo.identification.trajectory.preparation import Floats, Prepared
 from ppafo.identification.trajectory.sensor_noise import SensorNoise, sensor_noise
 from ppafo.identification.trajectory.weighing import Weighed
 
-ALARM = 3.0e-3
-"""Chance below which one of the comparisons is called a misfit."""
+ALARM = 1.0e-4
+"""Chance below which one of the comparisons is called a misfit.
+
+It is small because the chances are those of a linear model; an impact between two samples makes low ones more frequent.
+"""
 
 _LEAST_SHARE = 0.02
 """Directions of which a part knows less than this share are not compared: its own fit would leave the linear range."""

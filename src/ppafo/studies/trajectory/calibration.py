@@ -63,7 +63,8 @@ class Line:
     """What one repetition gave, by parameter in the order of ``FIVE_PARAMETERS``.
 
     ``below`` is the share of the posterior below the truth [-], ``width`` its standard deviation over the best
-    possible one [-]; ``alarm`` says that the test of misfit called the (right) model wrong.
+    possible one [-]; ``alarm`` says that the test of misfit called the (right) model wrong, ``chance`` is the least of
+    its comparisons.
     """
 
     kind: str
@@ -72,6 +73,7 @@ class Line:
     width: tuple[float, ...]
     verdicts: tuple[str, ...]
     alarm: bool
+    chance: float
     noise: str
     seconds: float
 
@@ -137,7 +139,8 @@ def _line(task: Task, found: TrajectoryFit, truth: Sequence[float], seconds: flo
         below=tuple(below),
         width=tuple(float(one) for one in widths),
         verdicts=tuple(estimate.verdict for estimate in found.estimates),
-        alarm=uncertainty.misfit.is_found,
+        alarm=bool(found.misfit),
+        chance=min(one.chance for one in uncertainty.misfit.comparisons),
         noise="; ".join(f"{one.channel} {one.in_words}" for one in uncertainty.sensors),
         seconds=seconds,
     )
