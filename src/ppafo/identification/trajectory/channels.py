@@ -14,7 +14,7 @@ from ppafo.signals.channels import CHANNELS
 
 _MUCH = 1.5
 _TOGETHER = 0.2
-_OF_NO_SENSOR = 6.0
+_OF_NO_SENSOR = 10.0
 """What is left over the noise from sample to sample: more than an autoregression of 0.98 makes is no sensor's."""
 PREDICTED = 0.95
 """Share of the samples of a new recording that a prediction holds."""

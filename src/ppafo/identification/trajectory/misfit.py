@@ -16,7 +16,7 @@ from ppafo.identification.trajectory.preparation import Floats, Prepared
 from ppafo.identification.trajectory.sensor_noise import SensorNoise, sensor_noise
 from ppafo.identification.trajectory.weighing import Weighed
 
-ALARM = 1.0e-4
+ALARM = 5.0e-4
 """Chance below which one of the comparisons is called a misfit.
 
 It is small because the chances are those of a linear model; an impact between two samples makes low ones more frequent.

@@ -113,7 +113,7 @@ def drawn_posterior(
 
 def whitened(model: LinearModel, noises: Sequence[SensorNoise], weights: Sequence[Sequence[Floats]]) -> Floats:
     """Return the columns whitened by the noise of the sensors, of variance 1 each."""
-    found = np.empty_like(model.columns)
+    found = np.zeros_like(model.columns)
     for places, noise, parts in zip(model.sensors, noises, weights, strict=True):
         for place, level, weight in zip(places, noise.levels, parts, strict=True):
             found[place] = noise.shape.rows(model.columns[place], weight)[0] / level

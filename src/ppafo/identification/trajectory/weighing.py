@@ -26,7 +26,7 @@ ROUGH = 0.5
 """The same where no step lowers the cost, although the slopes say so."""
 
 _HALVINGS = 5
-_GAP = 1.5
+_GAP = 3.0
 _ALIKE = 0.01
 
 
@@ -34,7 +34,8 @@ _ALIKE = 0.01
 class Sensor:
     """One sensor: channel, time between samples [s], the places of its recordings, its noise and its hum [Hz].
 
-    ``weights`` are those of the samples, by recording. A recording with a gap counts as two.
+    ``weights`` are those of the samples, by recording. A recording with a gap counts as two; one sample between two is
+    left out.
     """
 
     channel: str
@@ -60,7 +61,7 @@ class Whitening:
 
     def of(self, values: Floats) -> Floats:
         """Return columns (samples, columns) whitened."""
-        found = np.empty_like(values)
+        found = np.zeros_like(values)
         for sensor in self.sensors:
             for place, level, weight in zip(sensor.places, sensor.noise.levels, sensor.weights, strict=True):
                 rows = sensor.noise.shape.rows(np.ascontiguousarray(values[place]), weight)[0] / level
@@ -140,7 +141,9 @@ def _sensors(experiments: Sequence[Prepared], given: Sequence[frozenset[str]]) -
             found.setdefault(key, []).extend(part for part in parts if part.stop - part.start > 1)
             first += len(prepared.time)
     white = sensor_noise([np.ones(2)])
-    return tuple(Sensor(key[0], intervals[key], tuple(places), key[2], white) for key, places in found.items())
+    return tuple(
+        Sensor(key[0], intervals[key], tuple(places), key[2], white) for key, places in found.items() if places
+    )
 
 
 def _heard(sensor: Sensor, residuals: Floats, is_estimated: bool) -> Sensor:

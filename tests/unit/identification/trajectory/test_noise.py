@@ -14,6 +14,7 @@ from ppafo.identification.trajectory.posterior import LinearModel, drawn_posteri
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.sensor_noise import SensorNoise, sensor_noise, t_likelihood
 from ppafo.identification.trajectory.whitening import AutoRegression, Drift, from_coefficients, reflections_of, t_nodes
+from ppafo.signals.recording import Channel, Recording
 from ppafo.studies.trajectory.calibration import FIVE_PARAMETERS, Task, repetition
 from ppafo.studies.trajectory.noise_kinds import NOISE_KINDS, noise_kind
 
@@ -197,3 +198,22 @@ def test_a_drift_of_a_sensor_is_said_and_does_not_cap_the_verdict(experiment: Ex
     found = fit(TrajectoryProblem((FreeParameter("foot_plate.inertia", start=0.0085),), (drifting,)))
     assert found.estimates[0].verdict == "identified"
     assert "drift" in found.estimates[0].explanation
+
+
+def test_gaps_and_a_lone_sample_between_two_do_no_harm(experiment: Experiment) -> None:
+    kept = np.ones(len(experiment.recording), dtype=bool)
+    kept[100:111] = kept[112:126] = False
+    recording = experiment.recording
+    channels = {name: Channel(one.values[kept], one.unit) for name, one in recording.channels.items()}
+    gappy = Recording("synthetic gaps", recording.time[kept], channels, kind="synthetic")
+    torn = dataclasses.replace(experiment, recording=gappy)
+    found = fit(TrajectoryProblem((FreeParameter("foot_plate.inertia", start=0.0085),), (torn,)))
+    assert {len(sensor.places) for sensor in found.uncertainty.sensors} == {2}
+    estimate = found.estimates[0]
+    assert abs(estimate.value - 0.0084) < 3.0 / 1.96 * estimate.half_width
+    assert estimate.verdict == "identified"
+
+
+def test_slow_noise_of_a_sensor_alone_is_no_reason_to_doubt_the_model() -> None:
+    lines = [repetition(Task("slow", number, 18, False)) for number in range(2)]
+    assert not any(line.alarm for line in lines)
