@@ -77,7 +77,8 @@ def ranks_figure(lines: Sequence[Line]) -> "Figure":
     kinds = _by_kind(lines)
     rows = -(-len(kinds) // 5)
     with house_style():
-        figure = Figure(figsize=(9.6, 0.9 + 2.1 * rows), layout="constrained")
+        figure = Figure(figsize=(9.6, 1.1 + 2.1 * rows))
+        figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 0.95))
         axes = figure.subplots(rows, min(5, len(kinds)), sharex=True, sharey=True, squeeze=False)
         for place, (kind, of_kind) in zip(axes.flat, kinds, strict=False):
             _draw(place, kind, of_kind)

@@ -66,17 +66,18 @@ class Misfit:
         return f"{told} ({chance}; most in {one.worst})" if self.is_found else f"{told} ({chance})"
 
 
-def misfit_of(found: Weighed, seed: int) -> Misfit:
+def misfit_of(found: Weighed, together: Sequence[NoiseDraw], seed: int) -> Misfit:
     """Return what fits of parts say against the joint fit, over draws of the noise.
 
     The noise is that of the finest parts, each fitted apart: what is left of the joint fit has the misfit in it, and
-    would hide it.
+    would hide it. Not so where tails are heavy: a sample that a part fits by itself alone would weigh much, so that
+    the noise is that of the joint fit, of which ``together`` are draws.
     """
     model, kept = found.model, len(found.optimum.point)
     labels = _labels(found.optimum.residuals.experiments)
     apart, noises = _apart(found, labels)
     _, draws = drawn_posterior(apart, noises, kept, seed, chains=1, count=_DRAWS)
-    atoms = [_atoms(model, draw, labels, kept) for draw in draws]
+    atoms = [_atoms(model, _joined(*pair), labels, kept) for pair in zip(draws, together, strict=False)]
     halves = [f"{label} half" for label in ("first", "second")]
     kinds = {
         "experiments": [one for one, _, _ in labels],
@@ -90,6 +91,16 @@ def misfit_of(found: Weighed, seed: int) -> Misfit:
         if len(set(keys)) > 1:
             comparisons.append(_comparison(parts, keys, atoms, model, kept))
     return Misfit(tuple(comparisons), _alone(labels, atoms))
+
+
+def _joined(apart: NoiseDraw, together: NoiseDraw) -> NoiseDraw:
+    """Return the noise of sensors fitted apart, and that of the joint fit for those whose tails are heavy even then."""
+    chosen = [together if one.is_heavy else apart for one in apart.noises]
+    return NoiseDraw(
+        noises=tuple(draw.noises[place] for place, draw in enumerate(chosen)),
+        weights=tuple(draw.weights[place] for place, draw in enumerate(chosen)),
+        mean=together.mean,
+    )
 
 
 def _apart(found: Weighed, labels: Sequence[tuple[str, str, slice]]) -> tuple[LinearModel, tuple[SensorNoise, ...]]:

@@ -50,7 +50,7 @@ def uncertainty_of(found: Weighed, search: Search, low: Floats, high: Floats) ->
     """Return the uncertainty at an optimum whose noise is known; ``low`` and ``high`` bound the coordinates."""
     point = found.optimum.point
     kept = len(point)
-    mixture, _ = drawn_posterior(found.model, found.noises, kept, search.seed)
+    mixture, shown = drawn_posterior(found.model, found.noises, kept, search.seed)
     matrix, curvature = mixture.covariance, found.optimum.information
     tail = 0.5 - 0.5 * search.confidence
     ends = [
@@ -74,5 +74,5 @@ def uncertainty_of(found: Weighed, search: Search, low: Floats, high: Floats) ->
         low=np.array(ends[0]),
         high=np.array(ends[1]),
         sensors=found.sensors,
-        misfit=misfit_of(found, search.seed),
+        misfit=misfit_of(found, shown, search.seed),
     )
