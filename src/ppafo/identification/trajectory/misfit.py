@@ -26,6 +26,8 @@ _LEAST_SHARE = 0.02
 """Directions of which a part knows less than this share are not compared: its own fit would leave the linear range."""
 _SEEN = 0.05
 _DRAWS = 60
+_HEAVY = 5.0
+"""Degrees of freedom below which tails are heavy everywhere, and not at an impact alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +96,11 @@ def misfit_of(found: Weighed, together: Sequence[NoiseDraw], seed: int) -> Misfi
 
 
 def _joined(apart: NoiseDraw, together: NoiseDraw) -> NoiseDraw:
-    """Return the noise of sensors fitted apart, and that of the joint fit for those whose tails are heavy even then."""
-    chosen = [together if one.is_heavy else apart for one in apart.noises]
+    """Return the noise of sensors fitted apart, and that of the joint fit for those whose tails are heavy even then.
+
+    A few samples at an impact that the model misses make tails look somewhat heavy, but no more.
+    """
+    chosen = [together if one.freedom < _HEAVY else apart for one in apart.noises]
     return NoiseDraw(
         noises=tuple(draw.noises[place] for place, draw in enumerate(chosen)),
         weights=tuple(draw.weights[place] for place, draw in enumerate(chosen)),
