@@ -37,6 +37,7 @@ FOLDERS: dict[str, list[str]] = {
     "schema": ["scenario"],
     "cache": [],
     "bench": ["--quick"],
+    "coverage": ["--draws", "1"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
 

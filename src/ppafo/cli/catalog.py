@@ -14,6 +14,7 @@ COMMANDS: dict[str, str] = {
     "validate": "hold a parameter set against recordings, channel by channel",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": "bench recordings in, parameter set with uncertainty out",
+    "coverage": "how often the intervals of a trajectory fit hold, under ten kinds of noise",
     "gait": "list, show and import gaits; export recordings for OpenSim",
     "endurance": "how long a bottle of gas lasts for a gas use, and why it ends",
     "design": "find the parts and settings that no others beat in error, gas and mass",

@@ -9,7 +9,7 @@ from ppafo.parameters.writing import parameter_set_toml
 from ppafo.reporting.bench_figures import figure_3, procedure_figure
 from ppafo.reporting.identification_table import identification_table
 from ppafo.reporting.style import rendered
-from ppafo.reporting.trajectory_files import trajectory_document, trajectory_figures
+from ppafo.reporting.trajectory_files import posterior_file, trajectory_document, trajectory_figures
 from ppafo.simulation.document import plain
 
 FORMATS = ("png", "svg")
@@ -43,6 +43,7 @@ def identification_files(identification: Identification) -> dict[str, bytes]:
         ESTIMATES: f"{json_text(identification_document(identification))}\n".encode(),
         TEXT: f"{table}\n".encode(),
     }
+    files |= posterior_file(identification)
     counts: dict[str, int] = {}
     for result in identification.results:
         counts[result.procedure] = counts.get(result.procedure, 0) + 1

@@ -71,6 +71,9 @@ def _trajectory(outcome: TrajectoryOutcome, before: ParameterSet, widths: list[i
     told = "" if kind == "measured" else f" ({kind})"
     recordings = counted(len(outcome.fit.measurements), "recording")
     lines = [f"trajectory{told}: {counted(len(outcome.fit.estimates), 'number')} fitted to {recordings}"]
+    for one in outcome.beforehand:
+        if not one.can_be_had:
+            lines += _wrapped(f"  beforehand: CANNOT be had: {one.name}: {one.statement}", "              ")
     for item in outcome.fit.estimates:
         lines.append(_estimate(item, before, widths))
         if item.verdict != "identified":
@@ -78,8 +81,8 @@ def _trajectory(outcome: TrajectoryOutcome, before: ParameterSet, widths: list[i
     lines += _checks(outcome.checks)
     for remark in outcome.remarks:
         lines += _wrapped(f"  remark: {remark}", "          ")
-    for one in outcome.profiles:
-        lines += _wrapped(f"  profile: {_profile(one, before)}", "           ")
+    for curve in outcome.profiles:
+        lines += _wrapped(f"  profile: {_profile(curve, before)}", "           ")
     for number, candidate in enumerate(outcome.expected, start=1):
         lines += _wrapped(f"  next experiment {number}: {_candidate(candidate)}", "                     ")
     return lines

@@ -1,6 +1,8 @@
 """What a trajectory fit adds to the folder of an identification: its part of estimates.json, and its figures."""
 
 from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from ppafo.identification.identify import Identification
@@ -14,6 +16,8 @@ from ppafo.simulation.document import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+POSTERIOR = "posterior.nc"
 
 _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 
@@ -42,6 +46,12 @@ def trajectory_document(outcome: TrajectoryOutcome | None) -> dict[str, Any]:
             "covariance": fit.covariance.tolist(),
             "correlation": fit.correlation.tolist(),
             "channels": [plain(item) for item in fit.channels],
+            "noise": [{"channel": one.channel, "is_like": one.in_words} for one in fit.uncertainty.sensors],
+            "misfit": {
+                "reason": fit.misfit,
+                "comparisons": [plain(item) for item in fit.uncertainty.misfit.comparisons],
+            },
+            "beforehand": [plain(item) for item in outcome.beforehand],
             "remarks": list(outcome.remarks),
             "checks": [plain(item) for item in outcome.checks],
             "profiles": [_profile(item) for item in outcome.profiles],
@@ -65,6 +75,16 @@ def trajectory_figures(identification: Identification) -> "Iterator[tuple[str, F
         yield "trajectory-correlation", correlation_figure(paths, fit.correlation, kind)
     if outcome.profiles:
         yield "trajectory-profiles", profile_figure(outcome, identification.before, kind)
+
+
+def posterior_file(identification: Identification) -> dict[str, bytes]:
+    """Return the draws of a trajectory fit as a NetCDF file that ArviZ and xarray read; nothing without a fit."""
+    if identification.trajectory is None:
+        return {}
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / POSTERIOR
+        identification.trajectory.fit.posterior().to_netcdf(path, engine="h5netcdf")
+        return {POSTERIOR: path.read_bytes()}
 
 
 def _recording(fit: TrajectoryFit, index: int) -> dict[str, Any]:

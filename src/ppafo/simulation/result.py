@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
+from ppafo.simulation.check import Check
 from ppafo.simulation.document import result_document, scenario_document
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage import dataset_of, write_result
@@ -14,8 +15,6 @@ from ppafo.storage import dataset_of, write_result
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
-
-    from ppafo.simulation.check import Check
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +59,12 @@ class Result:
         atmosphere = self.scenario.device.supply.atmospheric_pressure
         return recording_figure(self.recording, self.scenario.name, remark, atmosphere)
 
-    def check(self) -> "Check":
+    def check(self) -> Check:
         """Return what this run determines: it runs again with half the error, and with start and measurements moved.
 
         SimulationError for a run that diverged, and for a Python controller that gives another run each time.
         """
-        from ppafo.simulation.check import check_result
+        from ppafo.simulation.checking import check_result
 
         return check_result(self)
 

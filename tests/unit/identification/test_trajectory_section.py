@@ -157,7 +157,7 @@ def test_every_recording_has_a_figure_and_correlations_and_profiles_have_one(bot
     names = {"fit-step", "fit-replayed", "correlation", "profiles"}
     files = identification_files(both)
     pictures = {f"trajectory-{name}.{kind}" for name in names for kind in ("png", "svg")}
-    assert set(files) == pictures | {"fitted.toml", "estimates.json", "identify.txt"}
+    assert set(files) == pictures | {"fitted.toml", "estimates.json", "identify.txt", "posterior.nc"}
     assert files["trajectory-profiles.png"].startswith(b"\x89PNG")
 
 

@@ -1,5 +1,6 @@
 """What a fit leaves unexplained, channel by channel."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,11 +8,16 @@ import numpy as np
 
 from ppafo.identification.trajectory.experiment import Experiment
 from ppafo.identification.trajectory.information import autocorrelation
+from ppafo.identification.trajectory.misfit import Misfit
 from ppafo.identification.trajectory.preparation import Floats, Measured, Prepared
 from ppafo.signals.channels import CHANNELS
 
 _MUCH = 1.5
 _TOGETHER = 0.2
+_OF_NO_SENSOR = 10.0
+"""What is left over the noise from sample to sample: more than an autoregression of 0.98 makes is no sensor's."""
+PREDICTED = 0.95
+"""Share of the samples of a new recording that a prediction holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +27,8 @@ class ChannelFit:
     ``noise`` is the standard deviation that weighs it, ``is_given`` False where it was estimated from the recording;
     ``rms``, ``bias`` (model less sample) and ``largest`` describe what is left; ``chi_square`` is the mean square over
     the noise and ``autocorrelation`` that of neighbouring residuals, 1 and 0 for a model that explains all but noise.
-    ``span`` is the range that the samples cover.
+    ``span`` is the range that the samples cover. ``prediction`` is the distance from the fitted run within which 95 %
+    of the samples of a new recording like this one are expected.
     """
 
     experiment: str
@@ -35,10 +42,11 @@ class ChannelFit:
     chi_square: float
     autocorrelation: float
     span: float
+    prediction: float
 
     @property
     def is_explained(self) -> bool:
-        """True where the model leaves nothing but noise."""
+        """True where the model leaves nothing but white noise."""
         return self.chi_square <= _MUCH**2 and self.autocorrelation <= _TOGETHER
 
     @property
@@ -71,13 +79,52 @@ def _channel_fit(experiment: Experiment, channel: Measured, left: Floats) -> Cha
         chi_square=float(np.mean(np.square(left / channel.noise))),
         autocorrelation=autocorrelation(left),
         span=float(np.ptp(channel.values)),
+        prediction=_predicted(left),
     )
 
 
-def unexplained(channel: ChannelFit) -> str:
-    """Return the sentence on a channel that holds more than noise."""
+def _predicted(left: Floats) -> float:
+    """Return the distance that 95 % of new samples keep: as those at hand, less one, for they were fitted."""
+    count = len(left)
+    return float(np.sort(np.abs(left))[min(count - 1, math.ceil(PREDICTED * (count + 1)))])
+
+
+def taken_for_noise(channel: ChannelFit, noise: str) -> str:
+    """Return the sentence on a channel that holds more than white noise; ``noise`` says what it was taken for."""
     return (
-        f"{channel.experiment}: {channel.channel} is not explained down to its noise (residuals "
-        f"{np.sqrt(channel.chi_square):.2g} times the noise, neighbours correlate {channel.autocorrelation:+.2f}): the "
-        f"model lacks something that acts on it"
+        f"{channel.experiment}: what is left of {channel.channel} is {np.sqrt(channel.chi_square):.2g} times its noise "
+        f"from sample to sample (neighbours correlate {channel.autocorrelation:+.2f}) and was taken for noise of the "
+        f"sensor: {noise}; if the sensor has no such noise, the model lacks something"
     )
+
+
+def reason_of_misfit(misfit: Misfit, channels: Sequence[ChannelFit]) -> str:
+    """Return why the model does not explain the recordings, empty where it does.
+
+    Parts want different numbers, or a channel leaves more than its sensor can be blamed for.
+    """
+    if misfit.is_found:
+        return misfit.in_words
+    for channel in channels:
+        size = float(np.sqrt(channel.chi_square))
+        if size > (_MUCH if channel.is_given else _OF_NO_SENSOR):
+            noise = "the noise that was given for it" if channel.is_given else "its noise from sample to sample"
+            return f"{channel.channel} of {channel.experiment} leaves {size:.2g} times {noise}"
+    return ""
+
+
+def predictions(channels: Sequence[ChannelFit]) -> tuple[str, ...]:
+    """Return a sentence for each recording: how near a new one like it is expected to the fitted run."""
+    found = []
+    for label in dict.fromkeys(channel.experiment for channel in channels):
+        widths = [
+            f"{channel.channel} +- {_shown(channel.prediction, channel.unit)}"
+            for channel in channels
+            if channel.experiment == label
+        ]
+        found.append(f"95 % of the samples of a new recording like '{label}' lie within {', '.join(widths)} of its run")
+    return tuple(found)
+
+
+def _shown(number: float, unit: str) -> str:
+    return f"{math.degrees(number):.3g} deg" if unit == "rad" else f"{number:.3g} {unit}"

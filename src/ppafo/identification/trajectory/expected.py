@@ -60,10 +60,7 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[Candidate]) ->
 
 def _known(fit: TrajectoryFit) -> Floats:
     """Return the information that the covariance of a fit stands for."""
-    uncertainty = fit.uncertainty
-    if fit.problem.search.loss == "linear":
-        return np.asarray(uncertainty.curvature / uncertainty.inflation)
-    return covariance(uncertainty.covariance)
+    return covariance(fit.uncertainty.covariance)
 
 
 def _expected(fit: TrajectoryFit, known: Floats, candidate: Candidate, directions: Floats) -> Expected:

@@ -4,7 +4,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ppafo.identification.trajectory.channels import ChannelFit, channel_fits, unexplained
+from ppafo.identification.trajectory.channels import (
+    ChannelFit,
+    channel_fits,
+    predictions,
+    reason_of_misfit,
+    taken_for_noise,
+)
 from ppafo.identification.trajectory.columns import numbers_in, trajectories
 from ppafo.identification.trajectory.experiment import Experiment
 from ppafo.identification.trajectory.information import correlation
@@ -18,6 +24,7 @@ from ppafo.identification.trajectory.search import Optimum, optimum
 from ppafo.identification.trajectory.step_error import step_remarks
 from ppafo.identification.trajectory.uncertainty import Uncertainty, uncertainty_of
 from ppafo.identification.trajectory.verdicts import Evidence, estimate_of
+from ppafo.identification.trajectory.weighing import weighed
 from ppafo.parameters.device import Device
 from ppafo.signals.channels import CHANNELS
 from ppafo.signals.recording import Channel, Recording, RecordingKind
@@ -30,13 +37,17 @@ def fit(problem: TrajectoryProblem, tell: Callable[[str], None] = lambda _text: 
     IdentificationError where the problem cannot be run.
     """
     found = optimum(residuals_of(problem), problem.search, tell)
-    residuals = found.residuals
+    tell("trajectory fit: noise of the sensors")
+    given = [frozenset(item.noise) for item in problem.experiments]
+    whole = weighed(found, given)
+    uncertainty = uncertainty_of(whole, problem.search, *coordinate_bounds(found.residuals.ranges))
+    residuals = whole.optimum.residuals
     signals = [
         {name: values[:, 0] for name, values in of_one.items()}
-        for of_one in trajectories(residuals.experiments, residuals.ranges, found.point[None, :])
+        for of_one in trajectories(residuals.experiments, residuals.ranges, uncertainty.centre[None, :])
     ]
     channels = channel_fits(problem.experiments, residuals.experiments, signals)
-    return _result(problem, found, channels, signals)
+    return _result(problem, found.cost, whole.optimum, uncertainty, channels, signals)
 
 
 def residuals_of(problem: TrajectoryProblem) -> Residuals:
@@ -61,37 +72,44 @@ def _prepared(experiment: Experiment, ranges: Sequence[Range], point: Floats) ->
 
 
 def _result(
-    problem: TrajectoryProblem, found: Optimum, channels: tuple[ChannelFit, ...], signals: list[dict[str, Floats]]
+    problem: TrajectoryProblem,
+    cost: float,
+    found: Optimum,
+    uncertainty: Uncertainty,
+    channels: tuple[ChannelFit, ...],
+    signals: list[dict[str, Floats]],
 ) -> TrajectoryFit:
-    prepared, ranges = found.residuals.experiments, found.residuals.ranges
-    uncertainty = uncertainty_of(found, channels, problem.search)
-    evidence = _evidence(problem, found, uncertainty)
-    slopes = np.array([item.slope(float(z)) for item, z in zip(ranges, found.point, strict=True)])
-    scenarios = tuple(with_numbers(item.scenario, numbers_in(item, ranges, found.point)) for item in prepared)
+    prepared, ranges, centre = found.residuals.experiments, found.residuals.ranges, uncertainty.centre
+    evidence = _evidence(problem, found, uncertainty, channels)
+    slopes = np.array([item.slope(float(z)) for item, z in zip(ranges, centre, strict=True)])
+    scenarios = tuple(with_numbers(item.scenario, numbers_in(item, ranges, centre)) for item in prepared)
     return TrajectoryFit(
         problem=problem,
         estimates=tuple(estimate_of(evidence, index) for index in range(len(ranges))),
         covariance=uncertainty.covariance * np.outer(slopes, slopes),
         correlation=evidence.correlation,
         uncertainty=uncertainty,
-        cost=found.cost,
+        cost=cost,
         evaluations=found.evaluations,
         channels=channels,
         models=tuple(_model(item, values) for item, values in zip(prepared, signals, strict=True)),
         measurements=tuple(_measurement(*pair) for pair in zip(problem.experiments, prepared, strict=True)),
         scenarios=scenarios,
-        remarks=_remarks(problem, found, channels, scenarios[0].device)
-        + step_remarks(found.residuals, found.point, signals),
+        remarks=_remarks(problem, found, evidence, uncertainty, channels, scenarios[0].device)
+        + step_remarks(found.residuals, centre, signals),
         optimum=found,
     )
 
 
-def _evidence(problem: TrajectoryProblem, found: Optimum, uncertainty: Uncertainty) -> Evidence:
-    ranges = found.residuals.ranges
+def _evidence(
+    problem: TrajectoryProblem, found: Optimum, uncertainty: Uncertainty, channels: Sequence[ChannelFit]
+) -> Evidence:
+    ranges, misfit = found.residuals.ranges, uncertainty.misfit
     low, high = coordinate_bounds(ranges)
     return Evidence(
         ranges=ranges,
-        point=found.point,
+        point=uncertainty.centre,
+        interval=(uncertainty.low, uncertainty.high),
         information=uncertainty.curvature,
         covariance=uncertainty.covariance,
         correlation=correlation(uncertainty.covariance),
@@ -100,6 +118,8 @@ def _evidence(problem: TrajectoryProblem, found: Optimum, uncertainty: Uncertain
         prior_deviation=prior_coordinates(ranges)[1],
         inflation=uncertainty.inflation,
         residual_check=uncertainty.residual_check,
+        misfit=reason_of_misfit(misfit, channels),
+        alone=misfit.alone,
         sources=tuple(_sources(problem, item) for item in ranges),
         search=problem.search,
     )
@@ -125,15 +145,26 @@ def _recording(label: str, prepared: Prepared, values: dict[str, Floats], kind: 
 
 
 def _remarks(
-    problem: TrajectoryProblem, found: Optimum, channels: Sequence[ChannelFit], device: Device
+    problem: TrajectoryProblem,
+    found: Optimum,
+    evidence: Evidence,
+    uncertainty: Uncertainty,
+    channels: Sequence[ChannelFit],
+    device: Device,
 ) -> tuple[str, ...]:
     stopped = (
         f"the search stopped after {problem.search.most_evaluations} evaluations before it settled: start nearer, or "
         f"allow more"
     )
     broken = broken_order(device)
+    misfit = f"the model does not explain the recordings: {evidence.misfit}; what it fixes holds for this model only"
     return (
         *([] if found.has_converged else [stopped]),
-        *(unexplained(channel) for channel in channels if not channel.is_explained),
+        *([misfit, *predictions(channels)] if evidence.misfit else _taken_for_noise(channels, uncertainty)),
         *([broken] if broken else []),
     )
+
+
+def _taken_for_noise(channels: Sequence[ChannelFit], uncertainty: Uncertainty) -> list[str]:
+    noises = {sensor.channel: sensor.in_words for sensor in uncertainty.sensors}
+    return [taken_for_noise(one, noises[one.channel]) for one in channels if not one.is_explained]

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.result import counted
-from ppafo.identification.check import Check
+from ppafo.identification.check import Check, Prospect
 from ppafo.identification.estimate import Estimate
+from ppafo.identification.trajectory.beforehand import prospects_of
 from ppafo.identification.trajectory.document import candidates_of, trajectory_problem
 from ppafo.identification.trajectory.expected import Expected, expected_information
-from ppafo.identification.trajectory.fitting import fit, noise_in
+from ppafo.identification.trajectory.fitting import fit, noise_in, residuals_of
 from ppafo.identification.trajectory.paths import broken_order, full_path
 from ppafo.identification.trajectory.problem import TrajectoryProblem, ranges_of
 from ppafo.identification.trajectory.profiles import Profile, profile
@@ -25,7 +26,8 @@ ACCEPTABLE_SHARE = 0.10
 class TrajectoryOutcome:
     """The fit, the profiles that were asked for, candidates by what they would bring, the best first, and checks.
 
-    ``remarks`` are sentences about the fit as a whole, also about where it contradicts a bench procedure.
+    ``beforehand`` is what the recordings could give and what not, known before the search. ``remarks`` are sentences
+    about the fit as a whole, also about where it contradicts a bench procedure.
     """
 
     fit: TrajectoryFit
@@ -33,6 +35,7 @@ class TrajectoryOutcome:
     expected: tuple[Expected, ...]
     checks: tuple[Check, ...]
     remarks: tuple[str, ...]
+    beforehand: tuple[Prospect, ...] = ()
 
     @property
     def failed(self) -> tuple[Check, ...]:
@@ -46,13 +49,17 @@ def solve_section(section: TrajectorySection, setting: Setting, tell: Callable[[
         problem = trajectory_problem(section, setting)
         paths = _profiled(section, problem, setting)
         candidates = candidates_of(section, setting, noise_in(problem))
+        beforehand = prospects_of(residuals_of(problem), problem.search)
+        for one in beforehand:
+            if not one.can_be_had:
+                tell(f"trajectory: cannot be had: {one.name}: {one.statement}")
         found = fit(problem, tell)
         profiles = tuple(_told_profiles(found, paths, tell))
         if candidates:
             tell(f"expected information of {counted(len(candidates), 'further experiment')}")
         expected = expected_information(found, candidates)
     remarks = (*found.remarks, *_contradictions(found, setting.bench))
-    return TrajectoryOutcome(found, profiles, expected, _checks(found), remarks)
+    return TrajectoryOutcome(found, profiles, expected, _checks(found), remarks, beforehand)
 
 
 def _told_profiles(found: TrajectoryFit, paths: Sequence[str], tell: Callable[[str], None]) -> Iterator[Profile]:
@@ -94,8 +101,10 @@ def _checks(found: TrajectoryFit) -> tuple[Check, ...]:
     told = f"RMS at most {left} of the range in {worst.channel} of {worst.experiment}; {good} is good"
     broken = next((text for text in (broken_order(item.device) for item in found.scenarios) if text), "")
     settled = found.optimum.has_converged
+    wrong = found.misfit
     return (
         Check("search", settled, f"{found.evaluations} evaluations, {'settled' if settled else 'stopped before it'}"),
         Check("what is left", worst.share <= ACCEPTABLE_SHARE, told),
+        Check("one model for all", not wrong, wrong or found.uncertainty.misfit.in_words),
         Check("numbers agree", not broken, broken or "no rule of a device is broken"),
     )

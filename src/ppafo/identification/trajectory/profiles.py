@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
-from ppafo.identification.trajectory.information import cost_of, covariance, directions_for
-from ppafo.identification.trajectory.paths import TIME_OFFSET, full_path, with_numbers
-from ppafo.identification.trajectory.preparation import Floats, Prepared
+from ppafo.identification.trajectory.information import covariance, directions_for
+from ppafo.identification.trajectory.paths import full_path
+from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.ranges import Range
-from ppafo.identification.trajectory.residuals import Residuals, coordinate_bounds
+from ppafo.identification.trajectory.residuals import coordinate_bounds
 from ppafo.identification.trajectory.result import TrajectoryFit
 from ppafo.identification.trajectory.search import descend, is_at_bound
 from ppafo.identification.trajectory.verdicts import interval_factor
@@ -107,12 +107,12 @@ def _valley(information: Floats, index: int, others: "np.ndarray[tuple[int], np.
 
 def _best_of_others(fit: TrajectoryFit, index: int, point: Floats) -> tuple[float, Floats]:
     """Return the least cost with one coordinate held, and where the others are then."""
-    residuals, search = fit.optimum.residuals, fit.problem.search
+    residuals, search = fit.optimum.residuals, replace(fit.problem.search, loss="linear")
     others = np.arange(len(point)) != index
-    held = _holding(residuals, index, float(point[index]))
-    prior = cost_of(residuals.of_priors(point), search.loss) - cost_of(held.of_priors(point[others]), search.loss)
+    held = residuals.holding({index: float(point[index])})
+    prior = _half_square(residuals.of_priors(point)) - _half_square(held.of_priors(point[others]))
     if not held.ranges:
-        return cost_of(residuals.of_data(point[None, :])[:, 0], search.loss) + prior, point[others]
+        return _half_square(residuals.of_data(point[None, :])[:, 0]) + prior, point[others]
     low, high = coordinate_bounds(held.ranges)
     start = np.clip(point[others], low, high)
     part = fit.uncertainty.curvature[np.ix_(others, others)]
@@ -120,20 +120,8 @@ def _best_of_others(fit: TrajectoryFit, index: int, point: Floats) -> tuple[floa
     return done.cost + prior, done.point
 
 
-def _holding(residuals: Residuals, index: int, coordinate: float) -> Residuals:
-    """Return the residuals of the other parameters, one being held in the scenarios that it acts in."""
-    item = residuals.ranges[index]
-    number = item.number(coordinate)
-
-    def held(prepared: Prepared) -> Prepared:
-        if not item.acts_in(prepared.label):
-            return prepared
-        if item.path == TIME_OFFSET:
-            return replace(prepared, time_offset=number)
-        return replace(prepared, scenario=with_numbers(prepared.scenario, {item.path: number}))
-
-    ranges = tuple(other for place, other in enumerate(residuals.ranges) if place != index)
-    return Residuals(tuple(held(prepared) for prepared in residuals.experiments), ranges)
+def _half_square(values: Floats) -> float:
+    return 0.5 * float(values @ values)
 
 
 def _crossing(item: Range, places: Floats, heights: Floats, threshold: float) -> float | None:

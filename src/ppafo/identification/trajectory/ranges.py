@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ppafo.errors import IdentificationError
+from ppafo.identification.trajectory.completion import scenario_of
 from ppafo.identification.trajectory.experiment import Experiment
 from ppafo.identification.trajectory.paths import TIME_OFFSET, declaration_of, full_path, number_at
 from ppafo.model.declaration import Quantity
@@ -19,6 +20,9 @@ LONGEST_TIME_OFFSET = 0.02
 _FURTHEST = 100.0
 _ADDED = frozenset({"friction", "motion", "initial", "supply"})
 """Sections whose numbers add up in the equations: their likelihood is normal in themselves, not in their logarithms."""
+
+_STATE = frozenset({"motion", "initial"})
+"""Sections that say how a run begins, which the recording may say better."""
 
 _SUPPLIES = {
     "supply.pressure": "plant.supply_pressure",
@@ -106,7 +110,7 @@ def range_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Ran
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]
     for experiment in experiments:
         _refuse_followed(parameter, path, experiment)
-    start = number_at(scenarios[0], path) if parameter.start is None else parameter.start
+    start = _usual_start(path, experiments[0]) if parameter.start is None else parameter.start
     is_ratio = start > 0.0 and quantity.minimum >= 0.0 and path.partition(".")[0] not in _ADDED
     scale = parameter.scale or ("log" if is_ratio else "linear")
     low, high = _default_bounds(path, quantity, start, scale)
@@ -123,10 +127,21 @@ def range_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Ran
     return Range(path, name, unit, scale, start, low, high, size, parameter.prior, parameter.recordings)
 
 
+def is_nuisance(item: Range) -> bool:
+    """Return whether a number belongs to one recording's beginning and is fitted only because nobody knows it."""
+    return bool(item.recordings) and (item.path == TIME_OFFSET or item.path.startswith("initial."))
+
+
 def reach_of(ranges: Sequence[Range]) -> float:
     """Return the largest time offset [s] among the bounds of parameters; 0 where none is fitted."""
     reaches = [max(abs(item.low), abs(item.high)) for item in ranges if item.path == TIME_OFFSET]
     return max(reaches, default=0.0)
+
+
+def _usual_start(path: str, experiment: Experiment) -> float:
+    """Return where a number begins that was given no start: what the recording says of the state, else the scenario."""
+    is_state = path.partition(".")[0] in _STATE
+    return number_at(scenario_of(experiment) if is_state else experiment.scenario, path)
 
 
 def _default_bounds(path: str, quantity: Quantity, start: float, scale: Scale) -> tuple[float, float]:

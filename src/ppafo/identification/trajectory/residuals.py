@@ -1,13 +1,15 @@
 """Weighted residuals and their Jacobian; all columns of differences run as lanes of one block per experiment."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.columns import numbers_in, trajectories
+from ppafo.identification.trajectory.paths import TIME_OFFSET, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, Prepared, refined
 from ppafo.identification.trajectory.ranges import Range
 
@@ -19,12 +21,24 @@ FIRST_STEP = 1.0e-3
 _TOUCH = 1.0e-9
 
 
+class Whitens(Protocol):
+    """A linear map that makes columns of residuals white."""
+
+    def of(self, values: Floats) -> Floats:
+        """Return columns (samples, columns) whitened."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """What is to be made small: (model - sample) / noise of all channels, then (coordinate - prior) / deviation."""
+    """What is to be made small: (model - sample) / noise of all channels, then (coordinate - prior) / deviation.
+
+    With ``whitening`` the former are made white by what is known of the noise of each sensor.
+    """
 
     experiments: tuple[Prepared, ...]
     ranges: tuple[Range, ...]
+    whitening: Whitens | None = None
 
     def of_data(self, points: Floats) -> Floats:
         """Return the residuals of the samples (samples, points) at points (points, coordinates); NaN if a run fails."""
@@ -34,7 +48,8 @@ class Residuals:
             for prepared, of_one in zip(self.experiments, signals, strict=True)
             for channel in prepared.channels
         ]
-        return np.concatenate(parts)
+        values = np.concatenate(parts)
+        return values if self.whitening is None else self.whitening.of(values)
 
     def of_priors(self, point: Floats) -> Floats:
         """Return the residuals of the priors, one for each parameter that has one."""
@@ -52,10 +67,22 @@ class Residuals:
         values = self.of_data(np.vstack([point + directions.T, point - directions.T, point]))
         return Neighbourhood(self, point, directions, values)
 
+    def holding(self, held: Mapping[int, float]) -> "Residuals":
+        """Return the residuals of the other parameters, some (by place) being held at a coordinate."""
+        names = {self.ranges[index]: self.ranges[index].number(at) for index, at in held.items()}
+
+        def with_held(prepared: Prepared) -> Prepared:
+            acting = {item.path: number for item, number in names.items() if item.acts_in(prepared.label)}
+            offset = acting.pop(TIME_OFFSET, prepared.time_offset)
+            return replace(prepared, scenario=with_numbers(prepared.scenario, acting), time_offset=offset)
+
+        ranges = tuple(item for place, item in enumerate(self.ranges) if place not in held)
+        return replace(self, experiments=tuple(with_held(one) for one in self.experiments), ranges=ranges)
+
     def with_finer_steps(self, point: Floats) -> "Residuals":
         """Return the residuals with the step of time divided as the numbers at a point need it."""
         finer = tuple(refined(item, numbers_in(item, self.ranges, point)) for item in self.experiments)
-        return Residuals(finer, self.ranges)
+        return replace(self, experiments=finer)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.information import ROBUST_SCALE, directions_for, precision, standard_errors
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.problem import Search
-from ppafo.identification.trajectory.ranges import Range
+from ppafo.identification.trajectory.ranges import Range, is_nuisance
 from ppafo.identification.trajectory.residuals import FIRST_STEP, Mask, Neighbourhood, Residuals, coordinate_bounds
 
 DRAWS_PER_START = 8
@@ -25,6 +25,7 @@ _TOLERANCES = (1.0e-4, 3.0e-8)
 _SETTLED = 0.05
 """A further stage that moves no coordinate by more than this share of its standard error is the last."""
 _WIDEST_DRAW = 1.5
+_NOTABLE = 1.0e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +43,9 @@ class Optimum:
 def optimum(residuals: Residuals, search: Search, tell: Callable[[str], None] = lambda _text: None) -> Optimum:
     """Return the best optimum of all starts; ``tell`` is called with what is being done."""
     best: Optimum | None = None
-    evaluations = 0
-    starts = _starts(residuals, search)
+    nested = _nested(residuals, search, tell)
+    evaluations = 0 if nested is None else nested.evaluations
+    starts = [*_starts(residuals, search), *([] if nested is None else [nested.point])]
     for number, start in enumerate(starts, start=1):
         least = "" if best is None else f", least misfit so far {best.cost:.6g}"
         tell(f"trajectory fit: start {number} of {len(starts)}{least}")
@@ -53,7 +55,9 @@ def optimum(residuals: Residuals, search: Search, tell: Callable[[str], None] = 
             best = found
     if best is None:
         raise IdentificationError("the model diverges at every start; look at start values and bounds (ppafo audit)")
-    return Optimum(best.residuals, best.point, best.cost, evaluations, best.information, best.has_converged)
+    is_beaten = nested is not None and nested.cost < best.cost * (1.0 - _NOTABLE)
+    has_converged = best.has_converged and not is_beaten
+    return Optimum(best.residuals, best.point, best.cost, evaluations, best.information, has_converged)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +102,26 @@ def descend(
         max_nfev=search.most_evaluations,
     )
     return Descent(done.x, float(done.cost), int(done.nfev), done.status > 0)
+
+
+def _nested(residuals: Residuals, search: Search, tell: Callable[[str], None]) -> Descent | None:
+    """Return where the search ends with all nuisances held at their start, as a start with them free.
+
+    A fit with more numbers that ends above one with fewer has not found its least. None where no nuisance is fitted, or
+    nothing else.
+    """
+    is_held = [is_nuisance(item) for item in residuals.ranges]
+    if not any(is_held) or all(is_held):
+        return None
+    point = np.array([item.coordinate(item.start) for item in residuals.ranges])
+    fewer = residuals.holding({index: float(point[index]) for index in np.flatnonzero(is_held).tolist()})
+    free = ~np.array(is_held)
+    if not np.isfinite(fewer.of_data(point[None, free])).all():
+        return None
+    tell("trajectory fit: with initial states and time offsets held")
+    found = descend(fewer, point[free], np.diag(np.full(int(free.sum()), FIRST_STEP)), search, _TOLERANCES[0])
+    point[free] = found.point
+    return Descent(point, found.cost, found.evaluations, found.has_converged)
 
 
 def is_at_bound(point: Floats, ranges: Sequence[Range]) -> Mask:

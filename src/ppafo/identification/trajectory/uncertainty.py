@@ -1,69 +1,78 @@
-"""How far estimates may be from the truth: covariance, and what the residuals say of the model."""
+"""How far estimates may be from the truth: their distribution, the noise it rests on, and the test of the model."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.identification.trajectory.channels import ChannelFit
-from ppafo.identification.trajectory.information import (
-    covariance,
-    curvature_and_spread,
-    dependence,
-    directions_for,
-    loss_weights,
-    sandwich,
-)
+from ppafo.identification.trajectory.information import covariance, data_information, prior_information
+from ppafo.identification.trajectory.misfit import Misfit, misfit_of
+from ppafo.identification.trajectory.mixture import Mixture
+from ppafo.identification.trajectory.posterior import drawn_posterior
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.problem import Search
-from ppafo.identification.trajectory.residuals import Neighbourhood
-from ppafo.identification.trajectory.search import Optimum, is_at_bound
+from ppafo.identification.trajectory.weighing import Sensor, Weighed
 
-_MUCH = 1.5
+_TOLD = 1.5
 
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """Covariance of the coordinates and the curvature of the cost from which it comes.
+    """Distribution of the coordinates about the point of the optimum, and what it is made of.
 
-    ``inflation`` [-] is the factor between the covariance and the inverse of the curvature: because the model does not
-    explain the samples to their noise, because residuals hang together; with a robust loss its median over all
-    parameters. ``chi_square`` [-] is the weighted mean square of the residuals over the noise, ``neighbours`` [-] the
-    mean correlation of neighbouring ones.
+    ``curvature`` is the information of the recordings with the noise as estimated; ``inflation`` [-] the median over
+    all coordinates of the variance over the inverse of that, because the noise is itself uncertain; ``widening`` [-]
+    how many times as wide the intervals are as white noise of the size from sample to sample would have them.
+    ``low`` and ``high`` are the ends of the intervals in coordinates, ``centre`` the means.
     """
 
+    mixture: Mixture
     covariance: Floats
     curvature: Floats
     inflation: float
-    chi_square: float
-    neighbours: float
+    widening: float
+    centre: Floats
+    low: Floats
+    high: Floats
+    sensors: tuple[Sensor, ...]
+    misfit: Misfit
 
     @property
     def residual_check(self) -> str:
-        """The residuals in half a sentence."""
-        size = np.sqrt(self.chi_square)
-        text = f"residuals are {size:.2f} times the noise, neighbours correlate {self.neighbours:+.2f}"
-        if self.inflation < _MUCH:
-            return text
-        return f"{text}, so the interval is {np.sqrt(self.inflation):.2g} times as wide as noise alone asks"
+        """What the intervals rest on, in half a sentence."""
+        names = dict.fromkeys(f"{one.channel} {one.in_words}" for one in self.sensors)
+        told = f"noise: {'; '.join(names)}"
+        if self.widening < _TOLD:
+            return told
+        return f"{told}; so the interval is {self.widening:.2g} times as wide as white noise alone asks"
 
 
-def uncertainty_of(found: Optimum, channels: Sequence[ChannelFit], search: Search) -> Uncertainty:
-    """Return the uncertainty at an optimum; with a robust loss the covariance is the sandwich."""
-    left = found.residuals.of_data(found.point[None, :])[:, 0]
-    weights = loss_weights(left, search.loss)
-    chi_square = float(np.sum(weights * left * left) / max(1, left.size - len(found.point)))
-    neighbours = float(np.mean([channel.autocorrelation for channel in channels]))
-    together = dependence(neighbours, left.size)
-    if search.loss == "linear":
-        factor = max(1.0, chi_square) * together
-        return Uncertainty(factor * covariance(found.information), found.information, factor, chi_square, neighbours)
-    curvature, spread = curvature_and_spread(_near(found), search.loss)
-    matrix = together * sandwich(curvature, spread)
-    ratios = np.diag(matrix) / np.diag(covariance(curvature))
-    return Uncertainty(matrix, curvature, float(np.median(ratios)), chi_square, neighbours)
-
-
-def _near(found: Optimum) -> Neighbourhood:
-    fixed = is_at_bound(found.point, found.residuals.ranges)
-    return found.residuals.around(found.point, directions_for(found.information, fixed))
+def uncertainty_of(found: Weighed, search: Search, low: Floats, high: Floats) -> Uncertainty:
+    """Return the uncertainty at an optimum whose noise is known; ``low`` and ``high`` bound the coordinates."""
+    point = found.optimum.point
+    kept = len(point)
+    mixture, shown = drawn_posterior(found.model, found.noises, kept, search.seed)
+    matrix, curvature = mixture.covariance, found.optimum.information
+    tail = 0.5 - 0.5 * search.confidence
+    ends = [
+        [
+            point[index] + mixture.quantile(index, share, low[index] - point[index], high[index] - point[index])
+            for index in range(kept)
+        ]
+        for share in (tail, 1.0 - tail)
+    ]
+    residuals = found.optimum.residuals
+    slopes = found.model.slopes[:, :kept]
+    white = data_information(slopes, np.ones(len(slopes))) + prior_information(residuals)
+    centre = np.clip(point + mixture.mean, low, high)
+    return Uncertainty(
+        mixture=mixture,
+        covariance=matrix,
+        curvature=curvature,
+        inflation=float(np.median(np.diag(matrix) / np.diag(covariance(curvature)))),
+        widening=float(np.sqrt(np.median(np.diag(matrix) / np.diag(covariance(white))))),
+        centre=np.clip(centre, ends[0], ends[1]),
+        low=np.array(ends[0]),
+        high=np.array(ends[1]),
+        sensors=found.sensors,
+        misfit=misfit_of(found, shown, search.seed),
+    )

@@ -26,10 +26,15 @@ _FROM_PRIOR = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a verdict is made of, in coordinates: point, information of data and priors, covariance, bounds, sources."""
+    """What a verdict is made of, in coordinates: point, information of data and priors, covariance, bounds, sources.
+
+    ``interval`` has the ends of the intervals. ``misfit`` says why the model is wrong, empty where it is not; ``alone``
+    names for each parameter the only channel that speaks of it, empty where several do.
+    """
 
     ranges: tuple[Range, ...]
     point: Floats
+    interval: tuple[Floats, Floats]
     information: Floats
     covariance: Floats
     correlation: Floats
@@ -38,6 +43,8 @@ class Evidence:
     prior_deviation: Floats
     inflation: float
     residual_check: str
+    misfit: str
+    alone: tuple[str, ...]
     sources: tuple[tuple[str, ...], ...]
     search: Search
 
@@ -46,8 +53,8 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
     """Return the estimate of one parameter."""
     item, at = evidence.ranges[index], float(evidence.point[index])
     half = half_width(evidence, index)
-    reach = min(half, _LARGEST_LOGARITHM) if item.scale == "log" else half
-    low, high = item.number(at - reach), item.number(at + reach)
+    furthest = _LARGEST_LOGARITHM if item.scale == "log" else math.inf
+    low, high = (item.number(float(np.clip(end[index], -furthest, furthest))) for end in evidence.interval)
     share = relative(evidence, index, half)
     verdict = _verdict(evidence, index, share)
     return Estimate(
@@ -65,7 +72,7 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
 
 def half_width(evidence: Evidence, index: int) -> float:
     """Return half the width of the interval, in coordinates."""
-    return interval_factor(evidence.search.confidence) * math.sqrt(float(evidence.covariance[index, index]))
+    return 0.5 * float(evidence.interval[1][index] - evidence.interval[0][index])
 
 
 def interval_factor(confidence: float) -> float:
@@ -75,10 +82,14 @@ def interval_factor(confidence: float) -> float:
 
 def relative(evidence: Evidence, index: int, half: float) -> float:
     """Return a half width in coordinates relative to the number; to its range where the search began at zero."""
-    item = evidence.ranges[index]
+    return relative_to_number(evidence.ranges[index], float(evidence.point[index]), half)
+
+
+def relative_to_number(item: Range, at: float, half: float) -> float:
+    """Return a half width in coordinates relative to the number at a coordinate, as ``relative`` does."""
     if item.scale == "log":
         return half
-    value = abs(item.number(float(evidence.point[index])))
+    value = abs(item.number(at))
     reference = max(value, item.size) if item.start == 0.0 else value
     return half * item.size / reference if reference > 0.0 else math.inf
 
@@ -102,6 +113,8 @@ def _verdict(evidence: Evidence, index: int, share: float) -> Verdict:
         return "at its bound"
     if _is_prior_alone(evidence, index) or share > evidence.search.weak:
         return "not identifiable"
+    if evidence.misfit:
+        return "holds for this model only"
     return "identified" if share <= evidence.search.identified else "weak"
 
 
@@ -117,8 +130,10 @@ def _explanation(evidence: Evidence, index: int, verdict: Verdict, share: float)
         "weak": _loose,
         "not identifiable": _loose,
         "at its bound": _bound,
+        "holds for this model only": _capped,
     }
-    return f"{sentences[verdict](evidence, index, share)}; {evidence.residual_check}."
+    said = sentences[verdict](evidence, index, share)
+    return f"{said}." if verdict == "holds for this model only" else f"{said}; {evidence.residual_check}."
 
 
 def _identified(evidence: Evidence, index: int, share: float) -> str:
@@ -132,9 +147,17 @@ def _loose(evidence: Evidence, index: int, share: float) -> str:
         return "The recordings add little to the prior, which decides the value"
     others, free = partners(evidence, index), relative(evidence, index, alone(evidence, index))
     if free > _FREED * share:
-        return f"The recordings hardly react to it: they fix it only to {_percent(share)}"
+        prior = "; no residual shows it, so it wants a prior" if share > evidence.search.weak else ""
+        return f"The recordings hardly react to it: they fix it only to {_percent(share)}{prior}"
     against = _names(others) if others else "several others at once"
     return f"It trades against {against}: fixed to {_percent(share)}, and to {_percent(free)} if these were known"
+
+
+def _capped(evidence: Evidence, index: int, share: float) -> str:
+    told = f"Fixed to {_percent(share)} if the model were right: {evidence.misfit}"
+    if not evidence.alone[index]:
+        return told
+    return f"{told}. Only {evidence.alone[index]} shows it, so nothing else here checks it: it wants a prior"
 
 
 def _bound(evidence: Evidence, index: int, _share: float) -> str:

@@ -40,7 +40,9 @@ def test_a_profile_agrees_with_the_interval_where_the_likelihood_is_normal(found
 def test_a_profile_is_lowest_at_the_estimate_and_rises_on_both_sides(found: TrajectoryFit) -> None:
     curve = profile(found, "valve.discharge_coefficient")
     middle = int(np.argmin(curve.rises))
-    assert curve.numbers[middle] == pytest.approx(found.estimate("valve.discharge_coefficient").value)
+    estimate = found.estimate("valve.discharge_coefficient")
+    # The profile is lowest at the optimum, the estimate is the mean over all noises that agree with the residuals.
+    assert curve.numbers[middle] == pytest.approx(estimate.value, abs=0.1 * estimate.half_width)
     assert np.all(np.diff(curve.rises[middle:]) > 0.0)
     assert np.all(np.diff(curve.rises[: middle + 1]) < 0.0)
 

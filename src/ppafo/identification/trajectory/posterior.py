@@ -1,0 +1,335 @@
+"""What recordings say of coordinates when the noise of each sensor is itself uncertain.
+
+The model is taken as linear around its optimum. Noise and coordinates are then drawn in turn, each given the other
+(Gibbs sampling): weights of samples where tails are heavy, coefficients of autoregressions, size and memory of drifts,
+levels. Given the noise the coordinates are normal, so that the whole is a mixture of normal distributions.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ppafo.identification.trajectory.mixture import FIXED, LEAST, SMALLEST_SHARE, Mixture, inverted, solved
+from ppafo.identification.trajectory.preparation import Floats
+from ppafo.identification.trajectory.sensor_noise import (
+    FREEDOMS,
+    LOG_RATIO,
+    SensorNoise,
+    drift_of,
+    errors_of,
+    longest_memory,
+    profiled,
+    regression_of,
+    sample_weights,
+    t_likelihood,
+)
+from ppafo.identification.trajectory.whitening import (
+    AutoRegression,
+    Drift,
+    Shape,
+    from_coefficients,
+    from_reflections,
+)
+
+CHAINS, DRAWS, SETTLING = 2, 100, 20
+_PROPOSALS, _SHOWN = 3, 10
+_STEP = 0.3
+_SHARE_OF_ERROR = 1.5
+_FEW, _LARGEST = 3, 0.99999
+"""Samples of an autoregression that is drawn with the columns left out, and its largest reflection coefficient."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinearModel:
+    """Slopes of the residuals of all samples and, as the last of ``columns``, the residuals themselves.
+
+    The first columns are the coordinates of the fit, counted from its point; then come those of hum. ``sensors`` has,
+    for each sensor, the places of its recordings among the samples. ``pull`` and ``precision`` (columns, columns) are
+    the gradient and the curvature of half the square of the priors' residuals.
+    """
+
+    columns: Floats
+    sensors: tuple[tuple[slice, ...], ...]
+    pull: Floats
+    precision: Floats
+
+    @property
+    def residuals(self) -> Floats:
+        """Residuals of the samples at the point."""
+        return self.columns[:, -1]
+
+    @property
+    def slopes(self) -> Floats:
+        """Slopes of the residuals."""
+        return self.columns[:, :-1]
+
+    def segments(self, values: Floats, sensor: int) -> list[Floats]:
+        """Return the samples of a sensor, recording by recording."""
+        return [values[place] for place in self.sensors[sensor]]
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseDraw:
+    """One draw of the noise of all sensors, the weights of their samples, and where it puts the mean of all columns."""
+
+    noises: tuple[SensorNoise, ...]
+    weights: tuple[tuple[Floats, ...], ...]
+    mean: Floats
+
+
+def drawn_posterior(
+    model: LinearModel,
+    noises: Sequence[SensorNoise],
+    kept: int,
+    seed: int,
+    chains: int = CHAINS,
+    count: int = DRAWS,
+) -> tuple[Mixture, tuple[NoiseDraw, ...]]:
+    """Return the distribution of the first ``kept`` columns with the noise drawn anew each time, and some draws."""
+    means, covariances, draws, chain = [], [], [], []
+    shown = []
+    for number in range(chains):
+        random = np.random.default_rng([seed, number])
+        states = [_State.of(noise, model, sensor) for sensor, noise in enumerate(noises)]
+        for turn in range(SETTLING + count):
+            states = _with_memory(model, states, random)
+            mean, covariance, root = _given_noise(model, states)
+            if turn >= SETTLING and turn % _SHOWN == 0:
+                noise, weights = tuple(one.noise for one in states), tuple(one.weights for one in states)
+                shown.append(NoiseDraw(noise, weights, mean))
+            draw = mean + root @ random.standard_normal(len(mean))
+            left = model.residuals + model.slopes @ draw
+            states = [_drawn(model, state, sensor, draw, left, random) for sensor, state in enumerate(states)]
+            if turn >= SETTLING:
+                means.append(mean[:kept])
+                covariances.append(covariance[:kept, :kept])
+                draws.append(draw[:kept])
+                chain.append(number)
+    parts = Mixture(np.array(means), np.array(covariances), np.array(draws), np.array(chain, dtype=np.intp))
+    return parts, tuple(shown)
+
+
+def whitened(model: LinearModel, noises: Sequence[SensorNoise], weights: Sequence[Sequence[Floats]]) -> Floats:
+    """Return the columns whitened by the noise of the sensors, of variance 1 each."""
+    found = np.zeros_like(model.columns)
+    for places, noise, parts in zip(model.sensors, noises, weights, strict=True):
+        for place, level, weight in zip(places, noise.levels, parts, strict=True):
+            found[place] = noise.shape.rows(model.columns[place], weight)[0] / level
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """The noise of one sensor as it is drawn now.
+
+    ``weights`` are those of its samples, ``products`` those of all whitened columns with each other (the residuals
+    last), ``spread`` the sum of the logarithms of what whitening divides by. A drift, or an autoregression of few
+    samples, has ``numbers`` and the ``step`` of their proposals.
+    """
+
+    noise: SensorNoise
+    weights: tuple[Floats, ...]
+    products: Floats
+    spread: float
+    numbers: Floats
+    step: Floats
+
+    @classmethod
+    def of(cls, noise: SensorNoise, model: LinearModel, sensor: int) -> "_State":
+        """Return the state in which a chain begins."""
+        segments = model.segments(model.residuals, sensor)
+        weights = tuple(sample_weights(noise, segments))
+        products = _products(model, noise, weights, sensor)
+        numbers = np.zeros(0) if noise.is_fixed else _numbers_of(noise.shape)
+        if not numbers.size:
+            return cls(noise, weights, *products, numbers, np.zeros((0, 0)))
+        scaled = [one / level for one, level in zip(segments, noise.levels, strict=True)]
+        step = (
+            _proposal(numbers, noise.shape.is_zeroed, scaled, weights)
+            if isinstance(noise.shape, Drift)
+            else np.diag(_SHARE_OF_ERROR * np.cosh(numbers) / math.sqrt(sum(len(one) for one in scaled)))
+        )
+        return cls(noise, weights, *products, numbers, step)
+
+
+def _numbers_of(shape: Shape) -> Floats:
+    """Return the numbers in which a shape is drawn with the columns left out; none for a long autoregression."""
+    if isinstance(shape, Drift):
+        return np.array([math.log(shape.ratio), -math.log(-math.log(shape.memory))])
+    last = [float(shape.predictors[stage, stage - 1]) for stage in range(1, shape.order + 1)]
+    return np.arctanh(last) if 0 < shape.order <= _FEW else np.zeros(0)
+
+
+def _shape_of(numbers: Floats, before: Shape, longest: float) -> tuple[Shape, float] | None:
+    """Return the shape with these numbers and the logarithm of its prior, None where the prior is 0.
+
+    The prior is even in the logarithms of a drift, and in the reflection coefficients of an autoregression.
+    """
+    if isinstance(before, Drift):
+        is_inside = LOG_RATIO[0] <= numbers[0] <= LOG_RATIO[1] and 0.0 <= numbers[1] <= longest
+        return (drift_of(numbers, before.is_zeroed), 0.0) if is_inside else None
+    reflections = np.tanh(numbers)
+    if np.abs(reflections).max() > _LARGEST:
+        return None
+    return from_reflections(reflections), float(np.sum(np.log1p(-np.square(reflections))))
+
+
+def _products(model: LinearModel, noise: SensorNoise, weights: Sequence[Floats], sensor: int) -> tuple[Floats, float]:
+    """Return the products of the whitened columns of a sensor, and the logarithm of what they were divided by."""
+    width = model.columns.shape[1]
+    products, spread = np.zeros((width, width)), 0.0
+    for place, level, weight in zip(model.sensors[sensor], noise.levels, weights, strict=True):
+        rows, spreads = noise.shape.rows(model.columns[place], weight)
+        products += rows.T @ rows / level**2
+        spread += float(np.sum(spreads))
+    return products, spread
+
+
+def _drawn(
+    model: LinearModel, state: _State, sensor: int, draw: Floats, left: Floats, random: np.random.Generator
+) -> _State:
+    """Return the noise of a sensor drawn anew, given a draw of the columns and what is ``left``; its drift stays."""
+    noise, segments = state.noise, model.segments(left, sensor)
+    if noise.is_fixed:
+        return state
+    if noise.is_shared and not noise.is_heavy and (isinstance(noise.shape, Drift) or noise.shape.order <= _FEW):
+        return _with_level(state, draw, sum(len(one) for one in segments), random)
+    scaled = [one / level for one, level in zip(segments, noise.levels, strict=True)]
+    weights = state.weights
+    if noise.is_heavy:
+        freedom, weights = _tails(noise, scaled, weights, random)
+        noise = replace(noise, freedom=freedom)
+    if isinstance(noise.shape, AutoRegression) and noise.shape.order > _FEW:
+        noise = replace(noise, shape=_regression(noise.shape, scaled, weights, random))
+    noise = _with_levels(noise, segments, weights, random)
+    products, spread = _products(model, noise, weights, sensor)
+    return replace(state, noise=noise, weights=weights, products=products, spread=spread)
+
+
+def _with_level(state: _State, draw: Floats, count: int, random: np.random.Generator) -> _State:
+    """Return the state with its one level drawn; the products of the columns have all that this needs."""
+    whole = np.append(draw, 1.0)
+    square = float(whole @ state.products @ whole)
+    ratio = math.sqrt(0.5 * max(square, LEAST) / random.gamma(0.5 * count))
+    noise = replace(state.noise, levels=state.noise.levels * ratio)
+    return replace(state, noise=noise, products=state.products / ratio**2)
+
+
+def _given_noise(model: LinearModel, states: Sequence[_State]) -> tuple[Floats, Floats, Floats]:
+    """Return mean, covariance and a root of it of the columns given the noise."""
+    products = np.sum([state.products for state in states], axis=0)
+    precision = products[:-1, :-1] + model.precision
+    covariance, root = inverted(precision)
+    return -solved(precision, products[:-1, -1] + model.pull), covariance, root
+
+
+def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random.Generator) -> list[_State]:
+    """Return the states with the numbers of every shape that has few drawn; the columns are left out of that.
+
+    Given the columns slow noise looks quicker than it is, for they have taken part of it, and would stay so for long.
+    """
+    found = list(states)
+    for sensor, state in enumerate(states):
+        if not state.numbers.size:
+            continue
+        others = np.sum([one.products for place, one in enumerate(found) if place != sensor], axis=0)
+        longest = longest_memory(model.segments(model.residuals, sensor))
+        here = _shape_of(state.numbers, state.noise.shape, longest)
+        likelihood = _without_columns(model, others + state.products) - state.spread + (here[1] if here else 0.0)
+        for _ in range(_PROPOSALS):
+            numbers = state.numbers + state.step @ random.standard_normal(len(state.numbers))
+            tried = _shape_of(numbers, state.noise.shape, longest)
+            if tried is None:
+                continue
+            noise = replace(state.noise, shape=tried[0])
+            products, spread = _products(model, noise, state.weights, sensor)
+            other = _without_columns(model, others + products) - spread + tried[1]
+            if math.log(random.random()) < other - likelihood:
+                moved = replace(state, noise=noise, products=products, spread=spread, numbers=numbers)
+                state, likelihood = moved, other  # noqa: PLW2901
+        found[sensor] = state
+    return found
+
+
+def _without_columns(model: LinearModel, products: Floats) -> float:
+    """Return the log likelihood of noise with all columns integrated out, but for a constant."""
+    precision = products[:-1, :-1] + model.precision
+    pull = products[:-1, -1] + model.pull
+    scale = np.sqrt(np.maximum(np.diag(precision), LEAST))
+    values, vectors = np.linalg.eigh(precision / np.outer(scale, scale))
+    kept = np.maximum(values, SMALLEST_SHARE * values[-1])
+    along = vectors.T @ (pull / scale)
+    size = float(np.sum(np.where(values > FIXED * values[-1], along * along / kept, 0.0)))
+    return 0.5 * (size - float(products[-1, -1]) - float(np.sum(np.log(kept)))) - float(np.sum(np.log(scale)))
+
+
+def _tails(
+    noise: SensorNoise, scaled: Sequence[Floats], weights: Sequence[Floats], random: np.random.Generator
+) -> tuple[float, tuple[Floats, ...]]:
+    """Return degrees of freedom and weights; the weights are left out when the former are drawn."""
+    errors = []
+    for one, weight in zip(scaled, weights, strict=True):
+        if isinstance(noise.shape, Drift):
+            errors.append(one - noise.shape.path(one, weight, random.standard_normal(len(one)))[0])
+        else:
+            errors.append(errors_of(noise.shape, one))
+    likelihoods = t_likelihood(np.concatenate(errors), FREEDOMS)
+    chances = np.exp(likelihoods - likelihoods.max())
+    freedom = float(random.choice(FREEDOMS, p=chances / chances.sum()))
+    return freedom, tuple(
+        random.gamma(0.5 * (freedom + 1.0), size=len(one)) * 2.0 / (freedom + np.square(one)) + LEAST for one in errors
+    )
+
+
+def _regression(
+    shape: AutoRegression, scaled: Sequence[Floats], weights: Sequence[Floats], random: np.random.Generator
+) -> AutoRegression:
+    """Return coefficients drawn given all but the first samples, which then accept them or not."""
+    mean, precision = regression_of(scaled, weights, shape.order)
+    found = from_coefficients(mean + inverted(precision)[1] @ random.standard_normal(shape.order))
+    if found is None:
+        return shape
+    gain = sum(
+        _first(found, one[: shape.order], weight[: shape.order])
+        - _first(shape, one[: shape.order], weight[: shape.order])
+        for one, weight in zip(scaled, weights, strict=True)
+    )
+    return found if math.log(random.random()) < gain else shape
+
+
+def _first(shape: AutoRegression, values: Floats, weights: Floats) -> float:
+    errors, spreads = shape.rows(values[:, None], weights)
+    return -0.5 * float(np.sum(errors * errors)) - float(np.sum(spreads))
+
+
+def _proposal(numbers: Floats, is_zeroed: bool, scaled: Sequence[Floats], weights: Sequence[Floats]) -> Floats:
+    """Return a root of the covariance of proposals, from the curvature of the likelihood of a drift."""
+
+    def at(first: float, second: float) -> float:
+        moved = numbers + _STEP * np.array([first, second])
+        return profiled(drift_of(moved, is_zeroed), scaled, weights)[0]
+
+    middle = at(0.0, 0.0)
+    cross = 0.25 * (at(1.0, 1.0) + at(-1.0, -1.0) - at(1.0, -1.0) - at(-1.0, 1.0))
+    along = [at(1.0, 0.0) + at(-1.0, 0.0) - 2.0 * middle, at(0.0, 1.0) + at(0.0, -1.0) - 2.0 * middle]
+    values, vectors = np.linalg.eigh(-np.array([[along[0], cross], [cross, along[1]]]) / _STEP**2)
+    return np.asarray(1.7 * vectors / np.sqrt(np.clip(values, 0.3, 1.0e4)))
+
+
+def _with_levels(
+    noise: SensorNoise, segments: Sequence[Floats], weights: Sequence[Floats], random: np.random.Generator
+) -> SensorNoise:
+    """Return the noise with its levels drawn, one for all recordings or one for each."""
+    sums = np.array(
+        [
+            float(np.sum(np.square(noise.shape.rows(one[:, None], weight)[0])))
+            for one, weight in zip(segments, weights, strict=True)
+        ]
+    )
+    counts = np.array([float(len(one)) for one in segments])
+    if noise.is_shared:
+        level = math.sqrt(0.5 * sums.sum() / random.gamma(0.5 * counts.sum()))
+        return replace(noise, levels=np.full(len(sums), level))
+    return replace(noise, levels=np.sqrt(0.5 * sums / random.gamma(0.5 * counts)))

@@ -1,0 +1,289 @@
+"""The noise of one sensor, from what its recordings leave unexplained: level, memory, drift, heavy tails.
+
+Autoregressions of up to 30 samples, their order by the corrected criterion of Akaike, and white noise upon an
+Ornstein-Uhlenbeck drift compete; each may have innovations with a t distribution. The least criterion wins.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.identification.trajectory.preparation import Floats
+from ppafo.identification.trajectory.whitening import (
+    AutoRegression,
+    Drift,
+    Shape,
+    from_coefficients,
+    from_reflections,
+    reflections_of,
+)
+
+FREEDOMS = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0])
+"""Degrees of freedom of a t distribution that are tried; more cannot be told from a normal one."""
+
+MOST_ORDER = 30
+_HEAVY_ORDERS = (0, 1, 2, 3, 5, 8, 12, 20)
+_SAMPLES_FOR_EACH = 8
+_HEAVY = 4.0
+"""Log likelihood that a t distribution must gain before tails are called heavy."""
+_UNEQUAL = 5.0
+"""Standard errors by which the levels of two recordings differ before each gets its own."""
+_ERROR_OF_LEVEL = 1.2
+_REWEIGHED = 6
+_LEAST = 1.0e-30
+LOG_RATIO = (-20.0, 12.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SensorNoise:
+    """Noise of a sensor: its shape, the level of each recording, degrees of freedom (infinite for normal tails).
+
+    ``levels`` are in units of the given or first estimated noise; all equal where ``is_shared``. ``is_fixed`` is noise
+    that was given and is not exceeded. ``likelihood`` and ``numbers`` are what the criterion is made of.
+    """
+
+    shape: Shape
+    levels: Floats
+    freedom: float = math.inf
+    is_shared: bool = True
+    is_fixed: bool = False
+    likelihood: float = 0.0
+    numbers: int = 1
+
+    @property
+    def is_heavy(self) -> bool:
+        """Whether its tails are heavier than normal ones."""
+        return math.isfinite(self.freedom)
+
+    def in_words(self, interval: float) -> str:
+        """Return what the noise is like; ``interval`` [s] is the time between two samples."""
+        tails = f", heavy tails (t with {self.freedom:.2g} degrees of freedom)" if self.is_heavy else ""
+        unequal = "" if self.is_shared else ", a level for each recording"
+        if isinstance(self.shape, Drift):
+            size, memory = math.sqrt(self.shape.stationary), -interval / math.log(self.shape.memory)
+            return f"white and a drift of {size:.2g} times its size over {memory:.2g} s{tails}{unequal}"
+        told = "white" if self.shape.order == 0 else f"autoregression of {self.shape.order}"
+        return f"{told}{tails}{unequal}"
+
+
+def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNoise:
+    """Return the noise that explains residuals of one sensor best; ``is_given`` says that its size is at least 1."""
+    whole = np.concatenate(segments)
+    white = from_reflections(np.zeros(0))
+    if float(np.mean(whole * whole)) < max(_LEAST, 1.0 if is_given else 0.0):
+        return SensorNoise(white, np.full(len(segments), 1.0 if is_given else math.sqrt(_LEAST)), is_fixed=True)
+    levels = _relative_levels(segments)
+    scaled = [one / level for one, level in zip(segments, levels, strict=True)]
+    is_shared = bool(np.all(levels == 1.0))
+    drift = max((_drift(scaled, is_zeroed) for is_zeroed in (False, True)), key=lambda one: one.likelihood)
+    candidates = [_autoregression(scaled), drift]
+    if any(_tails(one, scaled)[1] > _HEAVY for one in candidates):
+        candidates += [_heavy_autoregression(scaled, candidates[0]), _heavy_drift(scaled, drift)]
+    count = len(whole)
+    best = min(candidates, key=lambda one: _criterion(one.likelihood, one.numbers, count))
+    return SensorNoise(best.shape, best.levels * levels, best.freedom, is_shared, False, best.likelihood, best.numbers)
+
+
+def sample_weights(noise: SensorNoise, segments: Sequence[Floats]) -> list[Floats]:
+    """Return how much each sample counts [-]: 1 for normal noise, less where a heavy tail threw it far."""
+    if not noise.is_heavy:
+        return [np.ones(len(one)) for one in segments]
+    return [
+        _heavy_weights(noise.shape, one / level, noise.freedom)
+        for one, level in zip(segments, noise.levels, strict=True)
+    ]
+
+
+def errors_of(shape: Shape, segment: Floats) -> Floats:
+    """Return the whitened samples with all weights 1."""
+    return shape.rows(segment[:, None], np.ones(len(segment)))[0][:, 0]
+
+
+def t_likelihood(errors: Floats, freedoms: Floats) -> Floats:
+    """Return the log likelihood of errors under t distributions of scale 1, one for each of ``freedoms``."""
+    from scipy.special import gammaln
+
+    half = 0.5 * freedoms
+    constant = gammaln(half + 0.5) - gammaln(half) - 0.5 * np.log(freedoms * np.pi)
+    logs = np.log1p(np.square(errors)[:, None] / freedoms)
+    return np.asarray(len(errors) * constant - (half + 0.5) * logs.sum(axis=0))
+
+
+def lagged(segment: Floats, order: int) -> Floats:
+    """Return what a sample is predicted from, (samples after the first ``order``, order), the latest first."""
+    windows = np.lib.stride_tricks.sliding_window_view(segment[:-1], order)
+    return windows[:, ::-1]
+
+
+def profiled(shape: Shape, segments: Sequence[Floats], weights: Sequence[Floats]) -> tuple[float, float]:
+    """Return the log likelihood at the best common level, and that level."""
+    squares, logs, count = 0.0, 0.0, 0
+    for one, weight in zip(segments, weights, strict=True):
+        whitened, spread = shape.rows(one[:, None], weight)
+        squares += float(np.sum(whitened * whitened))
+        logs += float(np.sum(spread))
+        count += len(one)
+    variance = max(squares / count, _LEAST)
+    return -0.5 * count * (math.log(2.0 * math.pi * variance) + 1.0) - logs, math.sqrt(variance)
+
+
+def drift_of(numbers: Floats, is_zeroed: bool) -> Drift:
+    """Return the drift with these logarithms of ratio and of memory in samples."""
+    return Drift(math.exp(float(numbers[0])), math.exp(-math.exp(-float(numbers[1]))), is_zeroed)
+
+
+def longest_memory(segments: Sequence[Floats]) -> float:
+    """Return the logarithm of the longest memory [samples] of a drift that is tried."""
+    return math.log(50.0 * max(len(one) for one in segments))
+
+
+def _criterion(likelihood: float, numbers: int, count: int) -> float:
+    return -2.0 * likelihood + 2.0 * numbers * count / max(1.0, count - numbers - 1.0)
+
+
+def _of(shape: Shape, level: float, parts: int, likelihood: float, freedom: float = math.inf) -> SensorNoise:
+    numbers = shape.order + 1 + math.isfinite(freedom)
+    return SensorNoise(shape, np.full(parts, level), freedom, likelihood=likelihood, numbers=numbers)
+
+
+def _relative_levels(segments: Sequence[Floats]) -> Floats:
+    """Return the level of each recording over that of all; 1 where they do not differ for certain."""
+    if len(segments) == 1:
+        return np.ones(1)
+    reflections, _ = reflections_of(list(segments), min(1, min(len(one) for one in segments) - 2))
+    shape = from_reflections(reflections)
+    sizes = np.array([np.log(max(float(np.median(np.abs(errors_of(shape, one)))), _LEAST)) for one in segments])
+    errors = np.array([_ERROR_OF_LEVEL / math.sqrt(len(one)) for one in segments])
+    middle = np.average(sizes, weights=1.0 / errors**2)
+    differ = np.max(np.abs(sizes - middle) / errors)
+    return np.exp(sizes - middle) if differ > _UNEQUAL else np.ones(len(segments))
+
+
+def _autoregression(segments: list[Floats]) -> SensorNoise:
+    """Return the autoregression with normal innovations whose order has the least criterion."""
+    count, shortest = sum(len(one) for one in segments), min(len(one) for one in segments)
+    most = max(0, min(MOST_ORDER, count // _SAMPLES_FOR_EACH, shortest - 2))
+    reflections, left = reflections_of(segments, most)
+    scores = [_criterion(-0.5 * count * math.log(left[order]), order + 1, count) for order in range(most + 1)]
+    shape = from_reflections(reflections[: int(np.argmin(scores))])
+    likelihood, level = profiled(shape, segments, [np.ones(len(one)) for one in segments])
+    return _of(shape, level, len(segments), likelihood)
+
+
+def _drift(segments: list[Floats], is_zeroed: bool) -> SensorNoise:
+    """Return the drift of greatest likelihood, with white normal noise upon it."""
+    from scipy.optimize import minimize
+
+    ones, longest = [np.ones(len(one)) for one in segments], longest_memory(segments)
+
+    def cost(numbers: Floats) -> float:
+        return -profiled(drift_of(_within(numbers, longest), is_zeroed), segments, ones)[0] + _outside(numbers, longest)
+
+    grid = [np.array([ratio, memory]) for ratio in (-9.0, -6.0, -3.0, 0.0) for memory in (1.5, 3.5, 5.5)]
+    start = min(grid, key=cost)
+    found = minimize(cost, start, method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.02, "maxfev": 120})
+    shape = drift_of(_within(found.x, longest), is_zeroed)
+    likelihood, level = profiled(shape, segments, ones)
+    return _of(shape, level, len(segments), likelihood)
+
+
+def _within(numbers: Floats, longest: float) -> Floats:
+    return np.array([np.clip(numbers[0], *LOG_RATIO), np.clip(numbers[1], 0.0, longest)])
+
+
+def _outside(numbers: Floats, longest: float) -> float:
+    return float(np.sum(np.square(numbers[:2] - _within(numbers, longest))))
+
+
+def _tails(noise: SensorNoise, segments: Sequence[Floats]) -> tuple[float, float]:
+    """Return the best degrees of freedom of the innovations, and the log likelihood gained over normal ones."""
+    errors = np.concatenate([errors_of(noise.shape, one) for one in segments]) / noise.levels[0]
+    likelihoods, _ = _scaled_t(errors)
+    best = int(np.argmax(likelihoods))
+    normal = -0.5 * len(errors) * (math.log(2.0 * math.pi * float(np.mean(errors * errors))) + 1.0)
+    return float(FREEDOMS[best]), float(likelihoods[best] - normal)
+
+
+def _scaled_t(errors: Floats) -> tuple[Floats, Floats]:
+    """Return log likelihood and best scale for each of the degrees of freedom that are tried."""
+    squares = np.square(errors)[:, None]
+    variances = np.full(len(FREEDOMS), float(np.median(squares)) / 0.45 + _LEAST)
+    for _ in range(2 * _REWEIGHED):
+        variances = np.mean(squares * (FREEDOMS + 1.0) / (FREEDOMS + squares / variances), axis=0)
+    likelihoods = [
+        t_likelihood(errors / math.sqrt(variance), np.array([freedom]))[0] - 0.5 * len(errors) * math.log(variance)
+        for freedom, variance in zip(FREEDOMS, variances, strict=True)
+    ]
+    return np.array(likelihoods), np.sqrt(variances)
+
+
+def _heavy_autoregression(segments: list[Floats], normal: SensorNoise) -> SensorNoise:
+    """Return the autoregression with t innovations whose order has the least criterion."""
+    count, shortest = sum(len(one) for one in segments), min(len(one) for one in segments)
+    most = min(count // _SAMPLES_FOR_EACH, shortest - 2)
+    orders = sorted({order for order in (*_HEAVY_ORDERS, normal.shape.order) if order <= most})
+    found = [_heavy_of_order(segments, order) for order in orders]
+    return min(found, key=lambda one: _criterion(one.likelihood, one.numbers, count))
+
+
+def _heavy_of_order(segments: list[Floats], order: int) -> SensorNoise:
+    reflections, _ = reflections_of(segments, order)
+    shape = from_reflections(reflections)
+    for _ in range(_REWEIGHED):
+        likelihoods, levels = _scaled_t(np.concatenate([errors_of(shape, one) for one in segments]))
+        best = int(np.argmax(likelihoods))
+        if order == 0:
+            break
+        weights = [_heavy_weights(shape, one / levels[best], FREEDOMS[best]) for one in segments]
+        shape = from_coefficients(regression_of(segments, weights, order)[0]) or shape
+    logs = sum(float(np.sum(shape.rows(one[:, None], np.ones(len(one)))[1])) for one in segments)
+    return _of(shape, float(levels[best]), len(segments), float(likelihoods[best]) - logs, float(FREEDOMS[best]))
+
+
+def regression_of(segments: Sequence[Floats], weights: Sequence[Floats], order: int) -> tuple[Floats, Floats]:
+    """Return the coefficients of an autoregression by weighted least squares, and their precision at level 1."""
+    precision, product = np.zeros((order, order)), np.zeros(order)
+    for one, weight in zip(segments, weights, strict=True):
+        before, after = lagged(one, order), weight[order:]
+        precision += before.T @ (after[:, None] * before)
+        product += before.T @ (after * one[order:])
+    precision += _LEAST * np.eye(order)
+    return np.asarray(np.linalg.solve(precision, product), dtype=np.float64), precision
+
+
+def _heavy_drift(segments: list[Floats], normal: SensorNoise) -> SensorNoise:
+    """Return the drift upon which white noise has a t distribution, by a filter that sums normal distributions."""
+    from scipy.optimize import minimize
+
+    longest, white = longest_memory(segments), normal.shape
+    assert isinstance(white, Drift)
+
+    def cost(numbers: Floats) -> float:
+        shape = drift_of(_within(numbers, longest), white.is_zeroed)
+        level, freedom = math.exp(numbers[2]), 1.5 + math.exp(min(float(numbers[3]), 5.0))
+        total = sum(shape.heavy_likelihood(one, level, freedom) for one in segments)
+        return -total + _outside(numbers, longest)
+
+    memory = -math.log(-math.log(white.memory))
+    start = np.array([math.log(white.ratio) + 1.0, memory, math.log(normal.levels[0]) - 0.4, 0.7])
+    simplex = np.vstack([start, start + np.diag([1.0, 0.7, -0.4, 0.7])])
+    options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 220, "initial_simplex": simplex}
+    found = minimize(cost, start, method="Nelder-Mead", options=options)
+    freedom = 1.5 + math.exp(min(float(found.x[3]), 5.0))
+    likelihood = -cost(found.x)
+    return _of(
+        drift_of(_within(found.x, longest), white.is_zeroed), math.exp(found.x[2]), len(segments), likelihood, freedom
+    )
+
+
+def _heavy_weights(shape: Shape, segment: Floats, freedom: float) -> Floats:
+    """Return the expected precision of each sample; ``segment`` is over the level."""
+    if isinstance(shape, AutoRegression):
+        return np.asarray((freedom + 1.0) / (freedom + np.square(errors_of(shape, segment))))
+    weights, nothing = np.ones(len(segment)), np.zeros(len(segment))
+    for _ in range(_REWEIGHED):
+        path, spread = shape.path(segment, weights, nothing)
+        weights = (freedom + 1.0) / (freedom + np.square(segment - path) + spread)
+    return weights

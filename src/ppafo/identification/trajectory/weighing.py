@@ -1,0 +1,219 @@
+"""The search goes on with the noise of each sensor: whitened residuals, new slopes, until nothing moves any more."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ppafo.identification.trajectory.hum import hum_columns, hum_of, without_hum
+from ppafo.identification.trajectory.information import directions_for
+from ppafo.identification.trajectory.mixture import inverted, solved
+from ppafo.identification.trajectory.posterior import LinearModel, whitened
+from ppafo.identification.trajectory.preparation import Floats, Prepared
+from ppafo.identification.trajectory.residuals import Neighbourhood, coordinate_bounds, prior_coordinates
+from ppafo.identification.trajectory.search import Optimum, is_at_bound
+from ppafo.identification.trajectory.sensor_noise import SensorNoise, sample_weights, sensor_noise
+
+MOST_ROUNDS = 8
+ESTIMATED_ROUNDS = 2
+"""Rounds after which the noise stays as it is, so that the others can settle."""
+
+SETTLED = 0.03
+"""Share of a standard error below which a step is the last."""
+
+ROUGH = 0.5
+"""The same where no step lowers the cost, although the slopes say so."""
+
+_HALVINGS = 5
+_GAP = 3.0
+_ALIKE = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """One sensor: channel, time between samples [s], the places of its recordings, its noise and its hum [Hz].
+
+    ``weights`` are those of the samples, by recording. A recording with a gap counts as two; one sample between two is
+    left out.
+    """
+
+    channel: str
+    interval: float
+    places: tuple[slice, ...]
+    is_given: bool
+    noise: SensorNoise
+    weights: tuple[Floats, ...] = ()
+    hum: tuple[float, ...] = ()
+
+    @property
+    def in_words(self) -> str:
+        """What its noise is like."""
+        hum = "".join(f", hum at {frequency:.4g} Hz" for frequency in self.hum)
+        return f"{self.noise.in_words(self.interval)}{hum}"
+
+
+@dataclass(frozen=True, slots=True)
+class Whitening:
+    """Makes columns of residuals white: all of variance 1, without what hum explains."""
+
+    sensors: tuple[Sensor, ...]
+
+    def of(self, values: Floats) -> Floats:
+        """Return columns (samples, columns) whitened."""
+        found = np.zeros_like(values)
+        for sensor in self.sensors:
+            for place, level, weight in zip(sensor.places, sensor.noise.levels, sensor.weights, strict=True):
+                rows = sensor.noise.shape.rows(np.ascontiguousarray(values[place]), weight)[0] / level
+                if sensor.hum:
+                    columns = hum_columns(len(weight), [one * sensor.interval for one in sensor.hum])
+                    basis = np.linalg.qr(sensor.noise.shape.rows(columns, weight)[0])[0]
+                    rows = rows - basis @ (basis.T @ rows)
+                found[place] = rows
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """Where the search with noise ended: whitened optimum, its linear model (hum in it), sensors, and rounds."""
+
+    optimum: Optimum
+    model: LinearModel
+    sensors: tuple[Sensor, ...]
+    rounds: int
+
+    @property
+    def noises(self) -> tuple[SensorNoise, ...]:
+        """The noise of each sensor."""
+        return tuple(sensor.noise for sensor in self.sensors)
+
+
+def weighed(found: Optimum, given: Sequence[frozenset[str]]) -> Weighed:
+    """Return the optimum that the noise of each sensor makes of one that was found with white noise.
+
+    ``given`` has, for each experiment, the channels whose noise was given: it is not taken to be less.
+    """
+    residuals, point = found.residuals, found.point
+    fixed = is_at_bound(point, residuals.ranges)
+    near = residuals.around(point, directions_for(found.information, fixed))
+    sensors = _sensors(residuals.experiments, given)
+    for number in range(1, MOST_ROUNDS + 1):
+        sensors = tuple(_heard(one, near.of_data, number <= ESTIMATED_ROUNDS) for one in sensors)
+        model = _linear_model(near, sensors)
+        step, information = _step(near, model, sensors)
+        errors = np.sqrt(np.diag(inverted(information)[0]))
+        has_settled = bool(np.all(np.abs(step) <= SETTLED * errors))
+        if has_settled or number == MOST_ROUNDS:
+            break
+        directions = directions_for(information, is_at_bound(near.point + step, residuals.ranges))
+        further = _damped(near, step, directions, Whitening(sensors))
+        if further is None:
+            # Where the runs are rough no step lowers the cost any more: this is as near as one comes.
+            has_settled = bool(np.all(np.abs(step) <= ROUGH * errors))
+            break
+        near = further
+    whole = replace(residuals, whitening=Whitening(sensors))
+    optimum = Optimum(
+        residuals=whole,
+        point=near.point,
+        cost=_cost(near, Whitening(sensors)),
+        evaluations=found.evaluations + number,
+        information=information,
+        has_converged=found.has_converged and has_settled,
+    )
+    return Weighed(optimum, model, sensors, number)
+
+
+def _sensors(experiments: Sequence[Prepared], given: Sequence[frozenset[str]]) -> tuple[Sensor, ...]:
+    """Return the sensors: recordings of one channel, sampled alike, share one."""
+    found: dict[tuple[str, int, bool], list[slice]] = {}
+    intervals: dict[tuple[str, int, bool], float] = {}
+    first = 0
+    for prepared, known in zip(experiments, given, strict=True):
+        gaps = np.diff(prepared.time)
+        interval = float(np.median(gaps))
+        breaks = np.flatnonzero(gaps > _GAP * interval) + 1
+        ends = [0, *(int(place) for place in breaks), len(prepared.time)]
+        for channel in prepared.channels:
+            key = (channel.name, round(np.log(interval) / _ALIKE), channel.name in known)
+            intervals.setdefault(key, interval)
+            parts = [slice(first + start, first + end) for start, end in itertools.pairwise(ends)]
+            found.setdefault(key, []).extend(part for part in parts if part.stop - part.start > 1)
+            first += len(prepared.time)
+    white = sensor_noise([np.ones(2)])
+    return tuple(
+        Sensor(key[0], intervals[key], tuple(places), key[2], white) for key, places in found.items() if places
+    )
+
+
+def _heard(sensor: Sensor, residuals: Floats, is_estimated: bool) -> Sensor:
+    """Return the sensor with its noise and hum estimated from residuals, or with its weights alone."""
+    segments = [residuals[place] for place in sensor.places]
+    hum = tuple(one / sensor.interval for one in hum_of(segments)) if is_estimated else sensor.hum
+    quiet = [without_hum(one, [frequency * sensor.interval for frequency in hum]) for one in segments]
+    noise = sensor_noise(quiet, sensor.is_given) if is_estimated else sensor.noise
+    return replace(sensor, noise=noise, hum=hum, weights=tuple(sample_weights(noise, quiet)))
+
+
+def _linear_model(near: Neighbourhood, sensors: Sequence[Sensor]) -> LinearModel:
+    """Return the linear model at a point, with a column for each sinusoid of hum in each recording."""
+    residuals, count = near.of_data, len(near.point)
+    added = []
+    for sensor in sensors:
+        for place in sensor.places if sensor.hum else ():
+            columns = np.zeros((len(residuals), 2 * len(sensor.hum)))
+            columns[place] = hum_columns(place.stop - place.start, [one * sensor.interval for one in sensor.hum])
+            added.append(columns)
+    columns = np.hstack([near.jacobian_of_data(), *added, residuals[:, None]])
+    _, deviation, has = prior_coordinates(near.residuals.ranges)
+    pull, precision = np.zeros(columns.shape[1] - 1), np.zeros(columns.shape[1] - 1)
+    pull[:count][has] = near.residuals.of_priors(near.point) / deviation[has]
+    precision[:count] = 1.0 / np.square(deviation)
+    return LinearModel(columns, tuple(one.places for one in sensors), pull, np.diag(precision))
+
+
+def _step(near: Neighbourhood, model: LinearModel, sensors: Sequence[Sensor]) -> tuple[Floats, Floats]:
+    """Return the step to the least of the whitened cost inside the bounds, and the information of the coordinates."""
+    count = len(near.point)
+    rows = whitened(model, [one.noise for one in sensors], [one.weights for one in sensors])
+    products = rows.T @ rows
+    precision, pull = products[:-1, :-1] + model.precision, products[:-1, -1] + model.pull
+    step = -solved(precision, pull)[:count]
+    information = precision[:count, :count]
+    if len(pull) > count:
+        across = precision[:count, count:]
+        information = information - across @ inverted(precision[count:, count:])[0] @ across.T
+        pull = pull[:count] - across @ solved(precision[count:, count:], pull[count:])
+    low, high = coordinate_bounds(near.residuals.ranges)
+    if np.all((near.point + step >= low) & (near.point + step <= high)):
+        return step, information
+    return _inside(information, pull, low - near.point, high - near.point), information
+
+
+def _inside(information: Floats, pull: Floats, low: Floats, high: Floats) -> Floats:
+    """Return the step to the least of a quadratic cost between bounds."""
+    from scipy.optimize import lsq_linear
+
+    _, root = inverted(information)
+    upper = np.linalg.inv(root)
+    found = lsq_linear(upper, -root.T @ pull, bounds=(np.minimum(low, 0.0), np.maximum(high, 0.0) + 1.0e-15))
+    return np.asarray(found.x)
+
+
+def _damped(near: Neighbourhood, step: Floats, directions: Floats, whitening: Whitening) -> Neighbourhood | None:
+    """Return the neighbourhood after a step, halved until the cost does not rise; None where it always does."""
+    low, high = coordinate_bounds(near.residuals.ranges)
+    before = _cost(near, whitening)
+    for halving in range(_HALVINGS):
+        tried = near.residuals.around(np.clip(near.point + 0.5**halving * step, low, high), directions)
+        if _cost(tried, whitening) <= before * (1.0 + 1.0e-9):
+            return tried
+    return None
+
+
+def _cost(near: Neighbourhood, whitening: Whitening) -> float:
+    """Return half the sum of the whitened squares and of those of the priors; infinite where the run fails."""
+    if not np.isfinite(near.of_data).all():
+        return np.inf
+    left = whitening.of(near.of_data[:, None])
+    return 0.5 * float(np.sum(left * left) + np.sum(np.square(near.residuals.of_priors(near.point))))
