@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.columns import numbers_in, trajectories
-from ppafo.identification.trajectory.preparation import Floats, Prepared, refined
+from ppafo.identification.trajectory.columns import trajectories
+from ppafo.identification.trajectory.preparation import Floats, Prepared
 from ppafo.identification.trajectory.ranges import Range
 
 Mask = NDArray[np.bool_]
@@ -51,11 +51,6 @@ class Residuals:
         """Return the residuals at a point and one step away from it along each direction (the columns), all at once."""
         values = self.of_data(np.vstack([point + directions.T, point - directions.T, point]))
         return Neighbourhood(self, point, directions, values)
-
-    def with_finer_steps(self, point: Floats) -> "Residuals":
-        """Return the residuals with the step of time divided as the numbers at a point need it."""
-        finer = tuple(refined(item, numbers_in(item, self.ranges, point)) for item in self.experiments)
-        return Residuals(finer, self.ranges)
 
 
 @dataclass(frozen=True, slots=True)
