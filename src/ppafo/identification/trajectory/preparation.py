@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FEWEST_SAMPLES = 10
-FIT_TOLERANCE = 0.05
+FIT_TOLERANCE = 0.02
 """Error that a run of a fit is allowed over that of any other run; columns of differences keep to 1e-3 with it."""
 _FINER = 0.25
 _FITS = 1.0e-6
@@ -161,21 +161,25 @@ def _placed(prepared: Prepared, run: Run) -> Prepared:
     place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
     share = np.maximum(position - place, 0.0)
     share[share < _FITS] = 0.0
-    frozen = replace(run, record_every=every, step_count=records * every, needs_parts=True)
+    frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
     inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
     return replace(prepared, run=frozen, place=place, share=share, inputs=inputs)
 
 
-def _steps_between_samples(samples: Samples, step: float) -> int:
-    """Return the steps between two records: as many as between two samples, fewer where these are read in between."""
+def _steps_between_samples(samples: Samples, step: float) -> float:
+    """Return the steps between two records: as many as between two samples, fewer where these are read in between.
+
+    A share of a step where a whole one is too long to be read in between.
+    """
     every = max(1, round(float(np.min(np.diff(samples.time))) / step))
     position = samples.time / (step * every)
-    most = max(1, int(_read_interval(samples) / step * (1.0 + _FITS)))
-    if not bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0))):
-        return most
-    if samples.reach == 0.0:
+    is_aligned = bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0)))
+    if is_aligned and samples.reach == 0.0:
         return every
-    return max(count for count in range(1, most + 1) if every % count == 0)
+    most = _read_interval(samples) / step * (1.0 + _FITS)
+    if most < 1.0:
+        return 1.0 / math.ceil(1.0 / most)
+    return max(count for count in range(1, int(most) + 1) if every % count == 0) if is_aligned else int(most)
 
 
 def _read_interval(samples: Samples) -> float:
