@@ -62,7 +62,7 @@ def run_with(prepared: Prepared, numbers: Mapping[str, float]) -> Run:
             f"model of the valve; start above 0 and give a lower bound above 0"
         )
     plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
-    # The engine allows a share of the supply pressure; where that pressure is fitted, the error in pascals must not move.
+    # The engine allows a share of the supply pressure. Where that pressure is fitted, the error in pascals must stay.
     allowed = supplied_range(base.plant) / supplied_range(plant)
     return replace(
         base,
