@@ -51,7 +51,7 @@ def replay_recording(measured: Measured, device: Device, start: Start, motion: M
     """Run the model on the inputs of a recording and ``extra`` seconds longer, with the last inputs."""
     run = _planned(measured, device, start, extra)
     if motion == "measured":
-        run = replace(run, program=led_by_recording(run.program), path=(0.0, start.angle, 0.0))
+        run = replace(run, program=led_by_recording(run.program), path=(0.0, start.angle, 0.0), needs_parts=True)
     inputs = _inputs(measured, motion)
     given = step_inputs(inputs, device, run)
     if motion == "measured":
