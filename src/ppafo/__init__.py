@@ -44,7 +44,8 @@ if TYPE_CHECKING:
     from ppafo.studies.sweep.results import StudyResults, load_study_results
     from ppafo.studies.sweep.run import run_study
     from ppafo.studies.tuning import Tuning, list_tunings, load_tuning, tune
-    from ppafo.walking import compare_walks, list_walks, load_walk, walk, walk_population
+    from ppafo.walking import compare_walks, list_walks, load_walk, walk_population
+    from ppafo.walking.walk import walk
 
 __version__ = "0.1.0"
 

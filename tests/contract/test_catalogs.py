@@ -105,7 +105,7 @@ def test_profiles_stay_within_the_bounds_that_they_state_and_reach_them(kind: Pr
 def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
     name: str, model: ValveModel, settings: dict[str, float]
 ) -> None:
-    valve = model.prepare(settings, 1e-3)
+    valve = model.prepare(settings)
     for command in (-1.0, -0.3, 0.0, 0.4, 1.0):
         state = model.settle(valve, model.initial(), command, 0.0)
         openings = model.instant(valve, state, command)
@@ -115,7 +115,7 @@ def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
 
 @pytest.mark.parametrize(("name", "model", "settings"), valve_models())
 def test_valve_states_survive_the_way_through_rows(name: str, model: ValveModel, settings: dict[str, float]) -> None:
-    state = model.settle(model.prepare(settings, 1e-3), model.initial(), 0.6, 0.0)
+    state = model.settle(model.prepare(settings), model.initial(), 0.6, 0.0)
     assert rebuild(model.state, numbers(state)) == state, name
 
 

@@ -23,8 +23,8 @@ from ppafo.engine.program import Program
 
 Floats = NDArray[np.float64]
 
-STEPS_PER_CALL = 200_000
-"""Steps in one call of compiled code, a few tenths of a second."""
+STEPS_PER_CALL = 10_000
+"""Steps in one call of compiled code: some hundredths of a second, seconds where each step takes hundreds of parts."""
 
 VECTOR = 8
 """Lanes that the widest processors take at once; a block is a whole number of these."""

@@ -10,6 +10,8 @@ MASK = 0xFFFFFFFF
 DOUBLINGS = 12
 SMALLEST_SHARE = 0.5**DOUBLINGS
 TERMS = 9
+ARRIVAL = 40.0
+"""Time over the time constant of a sensor after which it has arrived to rounding."""
 
 
 class Measurement(NamedTuple):
@@ -51,7 +53,8 @@ class SensorState(NamedTuple):
 
 def faded(rate: float, step: float) -> tuple[float, float]:
     """exp(-rate step) and its mean over the step [-], by series at a small share of it, doubled up to the whole."""
-    small = -rate * step * SMALLEST_SHARE
+    whole = rate * step
+    small = -min(whole, ARRIVAL) * SMALLEST_SHARE
     term, kept, mean = 1.0, 1.0, 1.0
     for order in range(1, TERMS):
         term *= small / order
@@ -60,7 +63,7 @@ def faded(rate: float, step: float) -> tuple[float, float]:
     for _ in range(DOUBLINGS):
         mean *= 0.5 * (1.0 + kept)
         kept *= kept
-    return kept, mean
+    return kept, mean * ARRIVAL / max(whole, ARRIVAL)
 
 
 def follow(rate: float, step: float, shown: float, before: float, now: float) -> float:

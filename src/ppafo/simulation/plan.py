@@ -109,7 +109,7 @@ def _too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem
         duration, length, count = (at(number, run) for number in (scenario.duration, step, step_count))
         return (
             f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MOST_STEPS:.0e} are "
-            f"allowed: shorten the run, or look at what makes a chamber so fast"
+            "allowed: shorten the run or take a larger run.step"
         )
 
     return step_count > MOST_STEPS, line

@@ -74,17 +74,27 @@ def test_flow_function_falls_with_the_pressure_ratio_and_stays_within_0_and_1(ra
     assert slope <= 0.0
 
 
-@given(st.floats(0.001, 0.9985).filter(lambda ratio: abs(ratio - CURVE.critical_ratio) > 1e-4))
+TWICE_LINEAR = 1.0 - 2.0 * (1.0 - CURVE.linear_ratio)
+
+
+@given(st.floats(0.001, TWICE_LINEAR - 1e-5).filter(lambda ratio: abs(ratio - CURVE.critical_ratio) > 1e-4))
 def test_slope_is_the_derivative_of_the_flow_function(ratio: float) -> None:
     width = 1e-6
     numerical = (fitted_flow_function(ratio + width, CURVE) - fitted_flow_function(ratio - width, CURVE)) / (2 * width)
     assert fitted_flow_slope(ratio, CURVE)[1] == pytest.approx(numerical, rel=2e-4, abs=2e-6)
 
 
+@given(st.floats(TWICE_LINEAR + 1e-6, 1.0 - 1e-6))
+def test_slope_near_equal_pressures_is_that_of_the_chord_to_them(ratio: float) -> None:
+    chord = -fitted_flow_function(ratio, CURVE) / (1.0 - ratio)
+    assert fitted_flow_slope(ratio, CURVE)[1] == pytest.approx(chord, rel=1e-9)
+
+
 @given(pressures, pressures)
 def test_flow_slopes_are_derivatives_by_both_pressures(first: float, second: float) -> None:
     ratio = min(first, second) / max(first, second)
-    if min(abs(ratio - kink) for kink in (CURVE.critical_ratio, 0.999, 1.0)) < 1e-4:
+    is_chord = TWICE_LINEAR - 1e-4 < ratio < CURVE.linear_ratio + 1e-4
+    if is_chord or min(abs(ratio - kink) for kink in (CURVE.critical_ratio, 1.0)) < 1e-4:
         return
     _, by_first, by_second = orifice_flow_slopes(first, second, 1.0, CURVE)
     for derivative, move in ((by_first, (1.0, 0.0)), (by_second, (0.0, 1.0))):

@@ -1,10 +1,12 @@
 """The valves' own dynamics, against closed forms."""
 
+import cmath
 import math
+import random
 
 import pytest
 
-from ppafo.engine.scheme.parts import part_length
+from ppafo.engine.scheme.parts import until_jump
 from ppafo.model.valves import proportional, solenoid
 
 SPOOL = {"dead_band": 0.0, "delay": 0.0, "spool_frequency": 50.0, "spool_damping_ratio": 0.5, "slew_limit": 0.0}
@@ -20,23 +22,57 @@ def test_dead_band_hides_small_commands_and_leaves_full_command_full() -> None:
 @pytest.mark.parametrize("damping_ratio", [0.2, 0.7, 1.0, 2.5])
 def test_spool_step_is_exact_whatever_its_length(damping_ratio: float) -> None:
     settings = {**SPOOL, "spool_damping_ratio": damping_ratio}
-    fine, coarse = proportional.prepare_moving(settings, 1e-4), proportional.prepare_moving(settings, 4e-3)
+    valve = proportional.prepare_moving(settings)
     state = proportional.SpoolState(0.8, 0.1, 3.0)
     shares = []
     after = state
     for _ in range(40):
-        openings, after = proportional.advance_moving(fine, after, 0.8, 0.0, 1e-4)
+        openings, after = proportional.advance_moving(valve, after, 0.8, 0.0, 1e-4)
         shares.append(openings.source_1)
-    openings, at_once = proportional.advance_moving(coarse, state, 0.8, 0.0, 4e-3)
+    openings, at_once = proportional.advance_moving(valve, state, 0.8, 0.0, 4e-3)
     assert at_once.opening == pytest.approx(after.opening, rel=1e-9)
     assert at_once.rate == pytest.approx(after.rate, rel=1e-9)
     if damping_ratio >= 1.0:
         assert openings.source_1 == pytest.approx(sum(shares) / 40, rel=1e-9)
 
 
+def closed_spool_step(angular: float, damping_ratio: float, step: float) -> tuple[complex, ...]:
+    """The numbers of ``SpoolStep`` from the eigenvalues of the spool, with x'/w instead of x'; not near damping 1."""
+    root = cmath.sqrt(damping_ratio * damping_ratio - 1.0)
+    # The smaller eigenvalue from the product of both, because their sum loses it.
+    fast = (-damping_ratio - root) * angular * step
+    slow = (angular * step) ** 2 / fast
+
+    def of_matrix(at_slow: complex, at_fast: complex) -> tuple[complex, complex]:
+        by_rate = angular * step * (at_slow - at_fast) / (slow - fast)
+        return (slow * at_fast - fast * at_slow) / (slow - fast), by_rate
+
+    def mean(eigenvalue: complex) -> complex:
+        return (cmath.exp(eigenvalue) - 1.0) / eigenvalue
+
+    by_opening, by_rate = of_matrix(cmath.exp(slow), cmath.exp(fast))
+    rate_by_rate = by_opening - 2.0 * damping_ratio * by_rate
+    return by_opening, by_rate, -by_rate, rate_by_rate, *of_matrix(mean(slow), mean(fast))
+
+
+@pytest.mark.parametrize("decade", [-2, -1, 0, 1, 2, 3, 5])
+def test_spool_step_is_the_closed_form_for_any_frequency_damping_and_length(decade: int) -> None:
+    draw = random.Random(decade)
+    for _ in range(200):
+        angular, angle = 2.0 * math.pi * 10.0 ** draw.uniform(-1.0, 3.3), 10.0 ** (decade + draw.random())
+        damping = draw.choice([draw.uniform(0.05, 0.98), draw.uniform(1.02, 5.0)])
+        found = proportional.spool_step(angular, damping, angle / angular)
+        by_opening, by_rate, rate_by_opening, rate_by_rate, mean_by_opening, mean_by_rate = found
+        scaled = (by_opening, by_rate * angular, rate_by_opening / angular, rate_by_rate)
+        expected = closed_spool_step(angular, damping, angle / angular)
+        assert [*scaled, mean_by_opening, mean_by_rate * angular] == pytest.approx(
+            [number.real for number in expected], rel=0.0, abs=1e-12 if decade < 2 else 1e-11
+        )
+
+
 def test_spool_answers_a_step_as_a_second_order_system() -> None:
     settings = {**SPOOL, "spool_damping_ratio": 0.2}
-    valve = proportional.prepare_moving(settings, 1e-4)
+    valve = proportional.prepare_moving(settings)
     state, highest = proportional.closed_at_rest(), 0.0
     for _ in range(1000):
         _, state = proportional.advance_moving(valve, state, 0.5, 0.0, 1e-4)
@@ -46,7 +82,7 @@ def test_spool_answers_a_step_as_a_second_order_system() -> None:
 
 
 def test_slew_limit_bounds_the_rate_of_the_opening() -> None:
-    valve = proportional.prepare_moving({**SPOOL, "spool_frequency": 0.0, "slew_limit": 20.0}, 1e-3)
+    valve = proportional.prepare_moving({**SPOOL, "spool_frequency": 0.0, "slew_limit": 20.0})
     state = proportional.closed_at_rest()
     for _ in range(25):
         _, state = proportional.advance_moving(valve, state, 0.6, 0.0, 1e-3)
@@ -57,7 +93,7 @@ def run_pair(
     settings: dict[str, float], command_at: dict[float, float], until: float
 ) -> list[tuple[float, str, float]]:
     """Switchings (time, valve, position) of a pair whose command changes at given times."""
-    valve = solenoid.prepare_timed(settings, 1e-3)
+    valve = solenoid.prepare_timed(settings)
     state, command, time, seen = solenoid.both_off_long_ago(), 0.0, 0.0, []
     while time < until:
         command = command_at.get(round(time, 6), command)
@@ -88,24 +124,24 @@ def test_pulse_shorter_than_the_opening_delay_never_reaches_the_flow() -> None:
 
 
 def test_no_command_vents_both_chambers() -> None:
-    openings = solenoid.instant_ideal(solenoid.prepare_ideal({}, 1e-3), solenoid.both_off(), 0.0)
+    openings = solenoid.instant_ideal(solenoid.prepare_ideal({}), solenoid.both_off(), 0.0)
     assert openings == (0.0, 1.0, 0.0, 1.0)
 
 
 def test_command_above_zero_feeds_chamber_1_and_vents_chamber_2() -> None:
-    openings = solenoid.instant_ideal(solenoid.prepare_ideal({}, 1e-3), solenoid.both_off(), 1.0)
+    openings = solenoid.instant_ideal(solenoid.prepare_ideal({}), solenoid.both_off(), 1.0)
     assert openings == (1.0, 0.0, 0.0, 1.0)
 
 
 def parts_of_a_step(settings: dict[str, float], command: float, step: float) -> list[float]:
     """Lengths of the parts of a step that begins with a pair energised for chamber 1 long ago."""
-    valve = solenoid.prepare_timed(settings, step)
+    valve = solenoid.prepare_timed(settings)
     state = solenoid.settle_timed(valve, solenoid.both_off_long_ago(), 1.0, 0.0)
     state = solenoid.settle_timed(valve, state, 1.0, 0.5)
     time, remaining, lengths = 1.0, step, []
     while remaining > 0.0:
         args = (valve, state, command, time, remaining)
-        length = part_length(*args, solenoid.next_timed_event, solenoid.settle_timed)
+        length = until_jump(*args, solenoid.next_timed_event, solenoid.settle_timed)
         _, state = solenoid.advance_timed(valve, state, command, time, length)
         lengths.append(length)
         time, remaining = time + length, 0.0 if length == remaining else remaining - length

@@ -130,11 +130,18 @@ class _Solution:
         torque = vane_mode.torque_on_vane(plant, self.y[0], self.y[2], self.y[3])
         return vane_mode.mode_at_rest(plant, self.y[0], torque)
 
+    def is_thrown_at_its_stop(self) -> bool:
+        """True for a vane on a stop with an angular velocity into it; a root that is 0 at the start is no event."""
+        roots = self.roots(self.y)
+        return self.way != 0.0 and roots.second <= 0.0 < roots.first
+
     def solve(self) -> ReferenceResult:
         """Sample by sample from beginning to end."""
         run = self.run
         end = float(self.result.times[-1])
         sample = 0
+        if run.program.angle is None and self.is_thrown_at_its_stop():
+            self.change_mode()
         while self.time < end - SAME_TIME:
             self.control.decide(sample, self.time, self.present_signals())
             sample += 1

@@ -11,6 +11,7 @@ import numpy as np
 from ppafo.engine.lanes import Batch, BatchResult, run_batch
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.engine.scheme.pneumatics import supplied_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.paths import TIME_OFFSET, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, Prepared
@@ -61,9 +62,12 @@ def run_with(prepared: Prepared, numbers: Mapping[str, float]) -> Run:
             f"model of the valve; start above 0 and give a lower bound above 0"
         )
     plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
+    # The engine allows a share of the supply pressure. Where that pressure is fitted, the error in pascals must stay.
+    allowed = supplied_range(base.plant) / supplied_range(plant)
     return replace(
         base,
         plant=plant,
+        tolerance=base.tolerance * allowed,
         thermal=thermal_parameters(scenario),
         valve_orifice=exact_orifice(device.valve.orifice, device),
         leak_orifice=exact_orifice(device.actuator.leak, device),

@@ -51,7 +51,7 @@ def fit(problem: TrajectoryProblem, tell: Callable[[str], None] = lambda _text: 
 
 
 def residuals_of(problem: TrajectoryProblem) -> Residuals:
-    """Return the residuals of a problem, with the step divided as its start values need it."""
+    """Return the residuals of a problem."""
     ranges = ranges_of(problem)
     start = np.array([item.coordinate(item.start) for item in ranges])
     return Residuals(tuple(_prepared(item, ranges, start) for item in problem.experiments), ranges)

@@ -1,7 +1,7 @@
 """Makes an experiment ready for fitting: its samples with their noise, and one clock for all columns.
 
-The division of the step is taken from the start values and stays as it is while the search goes on, because a step
-that changes with the numbers would make the residual jump. ``refined`` takes it anew at other numbers.
+The step stays as it is while the search goes on. The parts in which the engine does it follow the numbers, though, and
+any other choice of them moves a run a little. Runs of a fit are allowed so little error that differences hardly see it.
 """
 
 import math
@@ -25,6 +25,9 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FEWEST_SAMPLES = 10
+FIT_TOLERANCE = 0.02
+"""Error that a run of a fit is allowed over that of any other run; columns of differences keep to 1e-3 with it."""
+_FINER = 0.25
 _FITS = 1.0e-6
 _SPREAD_OF_MEDIAN = 1.4826
 _KEPT = 3.0
@@ -96,8 +99,7 @@ class Prepared:
 def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float = 0.0) -> Prepared:
     """Return the experiment made ready.
 
-    ``numbers`` by path are the start values, which decide the step; ``reach`` [s] is the largest time offset that is
-    tried.
+    ``numbers`` by path are the start values; ``reach`` [s] is the largest time offset that is tried.
     """
     recording, said = experiment.recording, f"experiment '{experiment.label}'"
     inside = recording.time >= experiment.start - _FITS
@@ -114,20 +116,15 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
 
 
 def prepared_times(label: str, scenario: Scenario, samples: Samples, numbers: Mapping[str, float]) -> Prepared:
-    """Return samples of a scenario's run made ready, with the step that ``numbers`` by path need."""
+    """Return samples of a scenario's run made ready, at ``numbers`` by path."""
     return _planned(label, scenario, samples, numbers, None)
 
 
-def refined(prepared: Prepared, numbers: Mapping[str, float]) -> Prepared:
-    """Return the experiment with the step that ``numbers`` by path need, if that is shorter than the present one."""
-    run = plan_run(with_numbers(prepared.scenario, numbers))
-    return prepared if run.steps_per_sample <= prepared.run.steps_per_sample else _placed(prepared, run)
-
-
 def halved(prepared: Prepared, numbers: Mapping[str, float]) -> Prepared:
-    """Return the experiment with steps half as long, or shorter where ``numbers`` by path need it."""
+    """Return the experiment with steps half as long and a quarter of the allowed error."""
     scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
-    return _placed(prepared, plan_run(with_numbers(scenario, numbers)))
+    run = plan_run(with_numbers(scenario, numbers))
+    return _placed(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
 def noise_of(values: Floats) -> float:
@@ -150,7 +147,7 @@ def _planned(
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None,
 ) -> Prepared:
-    run = plan_run(with_numbers(scenario, numbers))
+    run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
     nowhere = np.zeros(samples.time.size)
     return _placed(Prepared(label, scenario, run, samples, nowhere.astype(np.intp), nowhere, recorded), run)
 
@@ -164,23 +161,27 @@ def _placed(prepared: Prepared, run: Run) -> Prepared:
     place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
     share = np.maximum(position - place, 0.0)
     share[share < _FITS] = 0.0
-    frozen = replace(run, record_every=every, step_count=records * every)
+    frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
     if recorded is not None and recorded.has(ANGLE) and isinstance(prepared.scenario.motion, FreeMotion):
         frozen = led_along(frozen, prepared.scenario.motion.angle)
     inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
     return replace(prepared, run=frozen, place=place, share=share, inputs=inputs)
 
 
-def _steps_between_samples(samples: Samples, step: float) -> int:
-    """Return the steps between two records: as many as between two samples, fewer where these are read in between."""
+def _steps_between_samples(samples: Samples, step: float) -> float:
+    """Return the steps between two records: as many as between two samples, fewer where these are read in between.
+
+    A share of a step where a whole one is too long to be read in between.
+    """
     every = max(1, round(float(np.min(np.diff(samples.time))) / step))
     position = samples.time / (step * every)
-    most = max(1, int(_read_interval(samples) / step * (1.0 + _FITS)))
-    if not bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0))):
-        return most
-    if samples.reach == 0.0:
+    is_aligned = bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0)))
+    if is_aligned and samples.reach == 0.0:
         return every
-    return max(count for count in range(1, most + 1) if every % count == 0)
+    most = _read_interval(samples) / step * (1.0 + _FITS)
+    if most < 1.0:
+        return 1.0 / math.ceil(1.0 / most)
+    return max(count for count in range(1, int(most) + 1) if every % count == 0) if is_aligned else int(most)
 
 
 def _read_interval(samples: Samples) -> float:

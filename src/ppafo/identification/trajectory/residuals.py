@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.columns import numbers_in, trajectories
+from ppafo.identification.trajectory.columns import trajectories
 from ppafo.identification.trajectory.paths import TIME_OFFSET, with_numbers
-from ppafo.identification.trajectory.preparation import Floats, Prepared, refined
+from ppafo.identification.trajectory.preparation import Floats, Prepared
 from ppafo.identification.trajectory.ranges import Range
 
 Mask = NDArray[np.bool_]
@@ -78,11 +78,6 @@ class Residuals:
 
         ranges = tuple(item for place, item in enumerate(self.ranges) if place not in held)
         return replace(self, experiments=tuple(with_held(one) for one in self.experiments), ranges=ranges)
-
-    def with_finer_steps(self, point: Floats) -> "Residuals":
-        """Return the residuals with the step of time divided as the numbers at a point need it."""
-        finer = tuple(refined(item, numbers_in(item, self.ranges, point)) for item in self.experiments)
-        return replace(self, experiments=finer)
 
 
 @dataclass(frozen=True, slots=True)

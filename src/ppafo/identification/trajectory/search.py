@@ -131,20 +131,17 @@ def is_at_bound(point: Floats, ranges: Sequence[Range]) -> Mask:
 
 
 def _refine(residuals: Residuals, start: Floats, search: Search) -> Optimum:
-    """Return the optimum from one start; steps of differences and of time follow the numbers, in stages."""
+    """Return the optimum from one start; steps of differences follow the numbers, in stages."""
     directions = np.diag(np.full(len(start), FIRST_STEP))
     evaluations = 0
     for stage in range(STAGES):
         found = descend(residuals, start, directions, search, _TOLERANCES[min(stage, 1)])
         evaluations += found.evaluations
         information, directions = _information(residuals, found.point, directions, search)
-        finer = residuals.with_finer_steps(found.point)
         moved = np.abs(found.point - start) / standard_errors(information)
         start = found.point
-        is_same = all(new is old for new, old in zip(finer.experiments, residuals.experiments, strict=True))
-        if is_same and stage > 0 and bool(np.all(moved <= _SETTLED)):
+        if stage > 0 and bool(np.all(moved <= _SETTLED)):
             break
-        residuals = finer
     return Optimum(residuals, found.point, found.cost, evaluations, information, found.has_converged)
 
 

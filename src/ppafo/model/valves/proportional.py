@@ -25,6 +25,8 @@ TINY = 1.0e-300
 DOUBLINGS = 12
 SMALLEST_STEP = 0.5**DOUBLINGS
 TERMS = 9
+ARRIVAL = 30.0
+"""Time over the slower time constant of a spool after which it has arrived to rounding."""
 
 
 class IdealProportional(NamedTuple):
@@ -199,8 +201,12 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
 
     Series of exp and of its mean at a small share of the step, doubled until they are those of the whole. A function
     of the matrix A of x and x'/w is ``p + q A``, so all of it is on pairs of numbers, without a library function.
+    Where a spool has long arrived the series would not converge; the step ends there, and only the mean goes on.
     """
-    small = angular * step * SMALLEST_STEP
+    slower = max(1.0 / damping_ratio, 2.0 * damping_ratio)
+    share = min(1.0, ARRIVAL * slower / max(angular * step, TINY))
+    moving = share * step
+    small = angular * moving * SMALLEST_STEP
     trace, determinant = -2.0 * damping_ratio * small, small * small
     # A^n = p + q A, term by term: the next is A times this one.
     p, q, exp_p, exp_q, mean_p, mean_q = 1.0, 0.0, 1.0, 0.0, 1.0, 0.0
@@ -218,15 +224,15 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
         squared = exp_q * exp_q
         exp_p, exp_q = exp_p * exp_p - determinant * squared, 2.0 * exp_p * exp_q + trace * squared
     # A is small times ((0, 1), (-1, -2 d)) for x and x'/w.
-    per_rate = step * SMALLEST_STEP
+    per_rate = moving * SMALLEST_STEP
     faster = angular * small
     return SpoolStep(
         exp_p,
         exp_q * per_rate,
         -exp_q * faster,
         exp_p + exp_q * trace,
-        mean_p,
-        mean_q * per_rate,
+        mean_p * share,
+        mean_q * per_rate * share,
     )
 
 

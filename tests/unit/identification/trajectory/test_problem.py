@@ -5,7 +5,7 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import Experiment, FreeParameter, Prior, TrajectoryProblem, fit
-from ppafo.identification.trajectory.preparation import noise_of, prepare, refined
+from ppafo.identification.trajectory.preparation import FIT_TOLERANCE, halved, noise_of, prepare
 from ppafo.identification.trajectory.problem import ranges_of
 from ppafo.simulation.simulate import simulate
 
@@ -109,11 +109,12 @@ def test_samples_off_the_grid_lie_between_two_records(experiment: Experiment) ->
     assert at == pytest.approx(recording.time, abs=1e-9)
 
 
-def test_the_step_gets_finer_where_a_smaller_chamber_needs_it_and_never_coarser(experiment: Experiment) -> None:
+def test_half_the_step_has_a_quarter_of_the_allowed_error_and_the_same_samples(experiment: Experiment) -> None:
     prepared = prepare(experiment, {})
-    finer = refined(prepared, {"actuator.dead_volume_1": 1.0e-6})
-    assert finer.run.steps_per_sample > prepared.run.steps_per_sample
-    assert refined(finer, {}) is finer
+    finer = halved(prepared, {"actuator.dead_volume_1": 1.0e-6})
+    assert (prepared.run.tolerance, finer.run.tolerance) == (FIT_TOLERANCE, 0.25 * FIT_TOLERANCE)
+    assert finer.run.step == pytest.approx(0.5 * prepared.run.step)
+    assert finer.time is prepared.time
 
 
 def test_the_initial_state_is_the_mean_of_the_samples_up_to_the_start(experiment: Experiment) -> None:

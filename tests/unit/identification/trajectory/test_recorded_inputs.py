@@ -51,8 +51,8 @@ def test_a_recorded_command_gives_the_run_that_the_controller_made(controlled: t
     residuals = residuals_of(TrajectoryProblem((FreeParameter("valve.discharge_coefficient"),), (followed,)))
     truth = np.array([[residuals.ranges[0].coordinate(residuals.ranges[0].start)]])
     (signals,) = trajectories(residuals.experiments, residuals.ranges, truth)
-    assert signals["angle"][:, 0] == pytest.approx(recording["angle"], abs=1e-9)
-    assert signals["pressure_1"][:, 0] == pytest.approx(recording["pressure_1"], rel=1e-9)
+    assert signals["angle"][:, 0] == pytest.approx(recording["angle"], abs=1e-5)
+    assert signals["pressure_1"][:, 0] == pytest.approx(recording["pressure_1"], rel=1e-5)
 
 
 def test_forty_runs_follow_the_same_command_as_one(controlled: tuple[Scenario, Recording]) -> None:
