@@ -136,12 +136,12 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     batches = []
     for clock, members in zip(clocks, groups, strict=True):
         own, ticks = _program_and_clock(program, clock)
-        ordered = members[_alike_together(run, members)] if own.is_adaptive and members.size > 1 else members
+        ordered = members[_alike_together(run, runs, members)] if own.is_adaptive and members.size > 1 else members
         batches.append((ordered, Batch(own, ticks, parameters[:, ordered], states[:, ordered])))
     return batches
 
 
-def _alike_together(run: Run, members: Members) -> Members:
+def _alike_together(run: Run, runs: int, members: Members) -> Members:
     """Order of some runs in which those beside each other do the same at about the same time.
 
     Lanes of a block wait for the slowest at every step. When a vane moves depends on how long the valve takes to move
@@ -149,7 +149,7 @@ def _alike_together(run: Run, members: Members) -> Members:
     """
     plant = run.plant
     gas = plant.dead_volume_1 + plant.dead_volume_2 + plant.volume_per_angle * (plant.angle_max - plant.angle_min)
-    duration = np.broadcast_to(gas / (plant.valve_conductance * plant.gas_product), members.max() + 1)
+    duration = np.broadcast_to(gas / (plant.valve_conductance * plant.gas_product), (runs,))
     return np.argsort(duration[members], kind="stable")
 
 

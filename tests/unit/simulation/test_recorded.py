@@ -10,9 +10,16 @@ from ppafo.parameters import apply_overrides, load_device, load_parameter_set
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.inputs import RecordedInputs, regular_interval, sample_period, step_inputs, supply_paths
+from ppafo.simulation.recorded.inputs import (
+    RecordedInputs,
+    between_stops,
+    regular_interval,
+    sample_period,
+    step_inputs,
+    supply_paths,
+)
 from ppafo.simulation.recorded.scenario import recorded_scenario, with_highest_supply
-from ppafo.simulation.recorded.start import Start, between_stops, samples_at_rest
+from ppafo.simulation.recorded.start import Start, samples_at_rest
 
 
 def recording(time: np.ndarray, command: np.ndarray, supply: np.ndarray) -> Recording:
