@@ -92,12 +92,10 @@ def _planned(measured: Measured, device: Device, start: Start, motion: Motion, e
     return replace(run, plant=plant, record_every=_record_every(run), step_count=samples * run.steps_per_sample)
 
 
-def _record_every(run: Run) -> float:
-    """Steps between two records, or a share of one; they divide a sample: the model is known at every regular one."""
-    most = _RECORD_INTERVAL / run.step * (1.0 + _WHOLE)
-    if most < 1.0:
-        return 1.0 / math.ceil(1.0 / most)
-    return max(count for count in range(1, int(most) + 1) if run.steps_per_sample % count == 0)
+def _record_every(run: Run) -> int:
+    """Steps between two records; they divide a sample, so that the model is known at every regular sample."""
+    most = max(1, int(_RECORD_INTERVAL / run.step * (1.0 + _WHOLE)))
+    return max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
 
 
 def _is_used(measured: Measured, name: str, motion: Motion) -> bool:

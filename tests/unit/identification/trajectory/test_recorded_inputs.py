@@ -186,7 +186,7 @@ def test_a_time_offset_can_be_held_in_a_profile(late: Experiment) -> None:
 
 def test_steps_that_are_long_for_the_noise_are_said(experiment: Experiment, step: Scenario) -> None:
     clean = simulate(dataclasses.replace(step, time_step=2e-5)).recording
-    noise = {"angle": 1e-6, "pressure_1": 2.0, "pressure_2": 2.0}
+    noise = {"angle": 2e-7, "pressure_1": 0.4, "pressure_2": 0.4}
     quiet = dataclasses.replace(experiment, recording=clean, noise=noise)
     remarks = fit(TrajectoryProblem((FLOW,), (quiet,))).remarks
     assert any("are long for so little noise" in remark for remark in remarks)
