@@ -11,7 +11,8 @@ from ppafo.engine.scheme.motion import FreePart, LedStep
 from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, StillGas
 from ppafo.engine.scheme.supply_lines import FedGas
-from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
+from ppafo.engine.scheme.thermal_flows import ThermalFlows
+from ppafo.engine.scheme.thermal_gas import ThermalGas
 from ppafo.engine.scheme.walking import WalkState, WalkStep
 from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
