@@ -87,9 +87,12 @@ def between_samples(rows: LaneRows) -> list[str]:
 
 def at_sample(rows: LaneRows, moment: str) -> list[str]:
     """What is done at a sample, if one is due at ``moment``, counted in steps."""
-    take = measure_sample(rows, moment) if rows.program.is_metered else RECORD
+    is_metered = rows.program.is_metered
+    take = measure_sample(rows, moment) if is_metered else RECORD
+    # A program without meters takes no more samples than there is room for.
+    last = "last_record" if is_metered else "record.shape[0] - 1"
     return [
-        f"if next_record <= last_record and due <= {moment} + {SAME_MOMENT!r}:",
+        f"if next_record <= {last} and due <= {moment} + {SAME_MOMENT!r}:",
         *indented(take),
         "    next_record += 1",
         "    due = next_record * interval",
