@@ -214,7 +214,8 @@ def test_a_folder_of_somebody_elses_is_refused_before_anything_runs(
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     assert main(["reproduce", "--out", str(tmp_path)]) == 2
     complaint = (
-        f"ppafo: {tmp_path}: is not empty and not a ppafo reproduction (it has no claims.json); choose another folder\n"
+        f"ppafo: --out {tmp_path}: is not empty and not a ppafo reproduction (it has no claims.json); "
+        "choose another folder\n"
     )
     assert capsys.readouterr().err == complaint
     assert {entry.name for entry in tmp_path.iterdir()} == {"notes.txt"}

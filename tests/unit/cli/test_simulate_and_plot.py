@@ -14,7 +14,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.simulation.result import Result, Status
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
+from ppafo.simulation.simulate import compile_model, simulate
 from ppafo.storage import read_result
 
 FILES = ["figure.png", "figure.svg", "recording.csv", "recording.nc", "run.json"]
@@ -188,6 +188,7 @@ sys.exit(main(["simulate", "step-response", "--out", sys.argv[1]]))
 
 @pytest.mark.skipif(os.name == "nt", reason="signals work differently there")
 def test_an_interrupt_while_writing_ends_with_130_and_leaves_nothing(tmp_path: Path) -> None:
+    compile_model("step-response")
     command = [sys.executable, "-c", HELD_UP, str(tmp_path / "step")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

@@ -109,10 +109,11 @@ def alone(evidence: Evidence, index: int) -> float:
 
 
 def _verdict(evidence: Evidence, index: int, share: float) -> Verdict:
-    if is_at_bound(evidence.point, evidence.ranges)[index]:
-        return "at its bound"
+    # A number that the data do not hold may end anywhere, at a bound too.
     if _is_prior_alone(evidence, index) or share > evidence.search.weak:
         return "not identifiable"
+    if is_at_bound(evidence.point, evidence.ranges)[index]:
+        return "at its bound"
     if evidence.misfit:
         return "holds for this model only"
     return "identified" if share <= evidence.search.identified else "weak"

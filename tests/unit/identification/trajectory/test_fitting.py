@@ -184,7 +184,8 @@ def test_an_initial_pressure_of_one_recording_is_found(experiment: Experiment) -
 def test_a_number_limited_to_one_recording_leaves_the_other_alone(
     experiment: Experiment, step: Scenario, recorded: Callable[..., Recording]
 ) -> None:
-    low = load_scenario("step-response", ["run.duration=0.35 s", "supply.pressure=45 psi_g", "name=low"])
+    start = f"initial.pressure_2={step.initial_pressure_2} Pa_a"
+    low = load_scenario("step-response", ["run.duration=0.35 s", "supply.pressure=45 psi_g", start, "name=low"])
     second = Experiment("low", step, recorded(low))
     supplies = tuple(FreeParameter("supply.pressure", recordings=(label,)) for label in ("step", "low"))
     found = fit(TrajectoryProblem(supplies, (experiment, second)))
