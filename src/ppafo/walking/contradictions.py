@@ -10,9 +10,8 @@ from ppafo.walking.planning import walking_valve
 
 _NEWTON, _RADIAN, _SECOND, _METRE, _PASCAL = "N", "rad", "s", "m", "Pa_a"
 
-COMPRESSION, COMPRESSION_IN_LINES = 1.3, 1.6
-"""Highest pressure in a chamber over that of the supply, with room: up to 1.2 in the shipped walks with constant
-supply pressures, up to 1.45 in those with lines, whose regulators let no gas back."""
+COMPRESSION = 1.6
+"""Highest pressure in a chamber over that of the supply, with room: up to 1.38 in the shipped walks."""
 
 
 def check_walk(configuration: Configuration, reading: Reading) -> None:
@@ -127,7 +126,7 @@ def _pressures(configuration: Configuration) -> Iterator[tuple[str, str]]:
     if not supply.atmospheric_pressure < settings["filled_pressure"] < lowest:
         fed = rounded(lowest, _PASCAL)
         yield "controller.filled_pressure", f"must be between atmosphere and supply, which are {atmosphere} and {fed}"
-    compressed = highest * (COMPRESSION if configuration.supply_lines is None else COMPRESSION_IN_LINES)
+    compressed = highest * COMPRESSION
     if settings["highest_pressure"] <= compressed:
         limit = rounded(compressed, _PASCAL)
         yield "controller.highest_pressure", f"a moving foot compresses a chamber to above it; must be above {limit}"

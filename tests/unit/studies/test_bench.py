@@ -274,7 +274,7 @@ def test_the_machine_says_its_cores_and_versions():
 
 
 def parsed(**changes):
-    given = {"quick": True, "check": False, "json": False, "out": None} | changes
+    given = {"command": "bench", "quick": True, "check": False, "json": False, "out": None} | changes
     return argparse.Namespace(**given)
 
 

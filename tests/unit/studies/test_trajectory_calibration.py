@@ -103,6 +103,7 @@ def test_the_command_writes_table_figure_and_fits(tmp_path: Path, capsys: pytest
         "ranks.png",
         "ranks.svg",
         "fits-fixed-2026.jsonl",
+        "ppafo.json",
     }
     assert main(words) == 1
     assert main(["coverage", "--noise", "wite"]) == 2

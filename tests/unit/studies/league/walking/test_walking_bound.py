@@ -33,7 +33,7 @@ def proportional(walks: dict[str, dict[str, float]]) -> WalkingBound:
     reached = {
         kind: Reached(found["lagged_error"], found["toe_height"], found["torque_lag"]) for kind, found in walks.items()
     }
-    higher = Reached(1.0, 0.01)
+    higher = Reached(1.0, 0.005)
     return small_bound("proportional", {**reached, "higher": higher, "lower": Reached(1.0, -0.02)})
 
 
