@@ -16,7 +16,7 @@ from ppafo.model.ports import admitted_flow
 
 GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
-ALLOWED_OF_PRESSURE = 4.0e-5
+ALLOWED_OF_PRESSURE = 2.5e-5
 """Error of one step over the pressure that matters; with it a run keeps to 1e-3 of the pressure range."""
 LEAST_PRESSURE = 0.02
 """The least pressure that matters, as a share of the atmosphere's."""
