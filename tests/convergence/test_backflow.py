@@ -31,7 +31,9 @@ def supplied_gas(run: Run) -> np.ndarray:
     assert agreement.worst_pressure <= LARGEST_PRESSURE, agreement
     assert agreement.worst_rms <= LARGEST_RMS, agreement
     supplied = plant_states(run, outcome)[:, 4]
-    np.testing.assert_allclose(supplied, reference.states[:, 4], rtol=1.0e-3, atol=1.0e-8)
+    # As the pressures, in shares of the range: the first gas that a resting chamber gives back is next to nothing.
+    drawn = float(np.abs(reference.states[:, 4]).max())
+    np.testing.assert_allclose(supplied, reference.states[:, 4], rtol=0.0, atol=max(1.0e-3 * drawn, 1.0e-8))
     return supplied
 
 
