@@ -26,7 +26,6 @@ READING_INTERVAL = 2.0
 REPETITIONS = 2
 SMALL_METER = 0.1
 """Range of the flow meter for the leak as a share [-] of that of the other."""
-_QUASI_STATIC_STEP = 1.0e-3
 
 
 def record_open_valve(request: Request) -> Outcome:
