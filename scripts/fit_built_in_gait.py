@@ -57,7 +57,7 @@ def table(path: Path) -> dict[str, np.ndarray]:
     return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
 
 
-def rounded(curve: Curve) -> Curve:
+def round_curve(curve: Curve) -> Curve:
     """Return the curve with as many digits as the fit deserves; what it still does not carry is left out."""
     cosines, sines = (tuple(round(value, DIGITS) for value in values) for values in (curve.cosines, curve.sines))
     return Curve(round(curve.mean, DIGITS), cosines, sines, round(curve.deviation, DIGITS))
@@ -75,22 +75,22 @@ def knee_way(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return forward, up
 
 
-def fitted_knee(path: Path, stride_time: float) -> dict[str, tuple[Curve, FitError]]:
+def fit_knee(path: Path, stride_time: float) -> dict[str, tuple[Curve, FitError]]:
     """Return both accelerations of the knee by name, and what the series leave of its way [m]."""
     found = {}
     for name, way in zip(KNEE, knee_way(path), strict=True):
         curve, error = fit_curve(way, HARMONICS[name])
-        found[name] = rounded(curve.derivative(stride_time).derivative(stride_time)), error
+        found[name] = round_curve(curve.derivative(stride_time).derivative(stride_time)), error
     return found
 
 
-def fitted(stride: Mapping[str, np.ndarray]) -> dict[str, tuple[Curve, FitError]]:
+def fit_stride(stride: Mapping[str, np.ndarray]) -> dict[str, tuple[Curve, FitError]]:
     """Return curve and error of the fit by name, in the units of the table and the signs of the package."""
     found = {}
     for name, (column, sign, zero) in COLUMNS.items():
         deviation = float(np.sqrt(np.mean(stride[f"{column}_sd"] ** 2)))
         curve, error = fit_curve(zero + sign * stride[column], HARMONICS[name], deviation)
-        found[name] = rounded(curve), error
+        found[name] = round_curve(curve), error
     return found
 
 
@@ -106,8 +106,8 @@ def built_in_gait(folder: Path) -> Gait:
     derived = folder / "falisse2019_derived"
     trials = table(derived / "falisse2019_s1_trials.csv")
     stride_time = round(float(trials["stride_time_s_est"].mean()), 4)
-    found = fitted(table(derived / "falisse2019_s1_1p33_stride.csv"))
-    found |= fitted_knee(folder / "falisse2019_subject1" / "IK_average_walking_FGC.mat", stride_time)
+    found = fit_stride(table(derived / "falisse2019_s1_1p33_stride.csv"))
+    found |= fit_knee(folder / "falisse2019_subject1" / "IK_average_walking_FGC.mat", stride_time)
     force = found["vertical_force"][0].mean
     units = {name: " deg" if name in ANGLES else " m" if name in KNEE else "" for name in found}
     errors = "; ".join(

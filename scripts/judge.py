@@ -20,10 +20,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from ppafo import load_scenario, scenario_from_dict
 from tests.judge.comparison import Verdict, verdict
 from tests.judge.draws import FAMILIES, Document, draw
-
-from ppafo import load_scenario, scenario_from_dict
 
 COLUMNS = (
     "draws",
@@ -51,7 +50,7 @@ def toml(content: Document, path: str = "") -> Iterator[str]:
             yield from toml(value, f"{path}{key}.")
 
 
-def told(case: Verdict) -> str:
+def description(case: Verdict) -> str:
     """One line of a verdict."""
     state = "determined" if case.is_determined else ("by a hair" if case.is_repeatable else "undetermined")
     return (
@@ -73,7 +72,7 @@ def row(cases: list[Verdict], above: int, seconds: float) -> str:
 
 
 def main() -> int:
-    """Judge the draws that were asked for; 1 where one is above the limits."""
+    """Judge the requested draws; 1 where one is above the limits."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=330, help="how many in all, over all families (default 330)")
     parser.add_argument("--seed", type=int, default=1, help="another seed, other draws (default 1)")
@@ -84,7 +83,7 @@ def main() -> int:
     asked = parser.parse_args()
     if asked.again is not None:
         case = verdict(load_scenario(asked.again))
-        print(told(case))
+        print(description(case))
         return int(case.is_wrong)
     families = asked.family or list(FAMILIES)
     found = 0
@@ -99,7 +98,7 @@ def main() -> int:
             if case.is_wrong:
                 asked.out.mkdir(parents=True, exist_ok=True)
                 file = asked.out / f"{family.replace(' ', '-')}-{asked.seed}-{number}.toml"
-                file.write_text(f"# {told(case)}\n" + "\n".join(toml(content)) + "\n", encoding="utf-8")
+                file.write_text(f"# {description(case)}\n" + "\n".join(toml(content)) + "\n", encoding="utf-8")
         above = sum(case.is_wrong for case in cases)
         print(f"{family:24}" + row(cases, above, time.perf_counter() - began), flush=True)
         found += above

@@ -2,13 +2,47 @@
 
 import dataclasses
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+from typing import Any, NoReturn
 
 import pytest
 
+from ppafo.engine import cache
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The option of ``make quick``."""
+    parser.addoption("--quick", action="store_true", help="skip a test as soon as it asks for a compiled model")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let no model be compiled where the tests are to be quick, and none be watched by coverage while it is."""
+    cache._run = _unwatched(cache._run)
+    if config.getoption("--quick"):
+        cache._imported = _skip_test
+
+
+def _unwatched(run: Callable[..., ModuleType]) -> Callable[..., ModuleType]:
+    """A function without the tracer of coverage: the compiler would take half as long again, and is not ours."""
+
+    def call(*arguments: Any) -> ModuleType:
+        tracer = sys.gettrace()
+        sys.settrace(None)
+        try:
+            return run(*arguments)
+        finally:
+            sys.settrace(tracer)
+
+    return call
+
+
+def _skip_test(name: str, source: str) -> NoReturn:
+    pytest.skip("needs a compiled model, and the tests are to be quick")
 
 
 @pytest.fixture

@@ -11,12 +11,16 @@ Everything below is loaded when it is first used, so that ``import ppafo`` is qu
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from ppafo.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from ppafo.errors import (
         DataError,
         IdentificationError,
+        KindError,
         ParameterError,
         PpafoError,
+        ProgramError,
         ScenarioError,
         SimulationError,
         StudyError,
@@ -29,25 +33,36 @@ if TYPE_CHECKING:
     from ppafo.parameters.audit import audit
     from ppafo.parameters.device import Device
     from ppafo.parameters.parts import Catalogue, Part, load_catalogue
+    from ppafo.questions.compare.solve import Comparison, compare
+    from ppafo.questions.design.file import load_design
+    from ppafo.questions.design.solve import Design, design
+    from ppafo.questions.endurance.solve import Endurance, endurance, endurance_of_walk
+    from ppafo.questions.find.solve import Found, find
+    from ppafo.questions.identify.solve import Identification, identify
+    from ppafo.questions.league.solve import League, league
+    from ppafo.questions.montecarlo.estimate import MonteCarlo
+    from ppafo.questions.montecarlo.solve import monte_carlo
+    from ppafo.questions.parts.solve import Parts, parts
+    from ppafo.questions.reproduce.solve import Reproduction, reproduce
+    from ppafo.questions.sensitivity.analyse import Sensitivity
+    from ppafo.questions.sensitivity.solve import sensitivity
+    from ppafo.questions.size.file import load_sizing
+    from ppafo.questions.size.solve import Sizing, size
+    from ppafo.questions.sweep.results import StudyResults, load_study_results
+    from ppafo.questions.sweep.solve import sweep
+    from ppafo.questions.tune.file import list_tunings, load_tuning
+    from ppafo.questions.tune.solve import Tuning, tune
+    from ppafo.questions.unreported.solve import infer_settings
+    from ppafo.questions.validate.solve import Validation, validate
     from ppafo.signals import Channel, Recording
     from ppafo.simulation.loading import list_scenarios, load_scenario, scenario_from_dict
     from ppafo.simulation.result import Result, Status
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import simulate, simulate_many
     from ppafo.storage import read_recording, read_result
-    from ppafo.studies.comparison import Comparison, compare
-    from ppafo.studies.design import Design, load_design, run_design
-    from ppafo.studies.monte_carlo import MonteCarlo, monte_carlo
-    from ppafo.studies.sensitivity import Sensitivity, sensitivity
-    from ppafo.studies.sizing import Sizing, load_sizing, run_sizing
-    from ppafo.studies.sweep.loading import list_studies, load_study
-    from ppafo.studies.sweep.results import StudyResults, load_study_results
-    from ppafo.studies.sweep.run import run_study
-    from ppafo.studies.tuning import Tuning, list_tunings, load_tuning, tune
+    from ppafo.studies.loading import list_studies, load_study
     from ppafo.walking import compare_walks, list_walks, load_walk, walk_population
     from ppafo.walking.walk import walk
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Catalogue",
@@ -56,16 +71,24 @@ __all__ = [
     "DataError",
     "Design",
     "Device",
+    "Endurance",
+    "Found",
     "Gait",
+    "Identification",
     "IdentificationError",
+    "KindError",
+    "League",
     "Measurement",
     "Metric",
     "MonteCarlo",
     "ParameterError",
     "ParameterSet",
     "Part",
+    "Parts",
     "PpafoError",
+    "ProgramError",
     "Recording",
+    "Reproduction",
     "Result",
     "Scenario",
     "ScenarioError",
@@ -77,11 +100,19 @@ __all__ = [
     "StudyResults",
     "Tuning",
     "UnitError",
+    "Validation",
     "apply_overrides",
     "audit",
     "compare",
     "compare_walks",
+    "design",
+    "endurance",
+    "endurance_of_walk",
     "evaluate",
+    "find",
+    "identify",
+    "infer_settings",
+    "league",
     "list_gaits",
     "list_scenarios",
     "list_sets",
@@ -100,16 +131,18 @@ __all__ = [
     "load_tuning",
     "load_walk",
     "monte_carlo",
+    "parts",
     "read_recording",
     "read_result",
-    "run_design",
-    "run_sizing",
-    "run_study",
+    "reproduce",
     "scenario_from_dict",
     "sensitivity",
     "simulate",
     "simulate_many",
+    "size",
+    "sweep",
     "tune",
+    "validate",
     "walk",
     "walk_population",
 ]
@@ -118,8 +151,10 @@ _HOMES = {
     "ppafo.errors": (
         "DataError",
         "IdentificationError",
+        "KindError",
         "ParameterError",
         "PpafoError",
+        "ProgramError",
         "ScenarioError",
         "SimulationError",
         "StudyError",
@@ -138,22 +173,40 @@ _HOMES = {
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("simulate", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
-    "ppafo.studies.sweep.loading": ("list_studies", "load_study"),
-    "ppafo.studies.sweep.results": ("StudyResults", "load_study_results"),
-    "ppafo.studies.sweep.run": ("run_study",),
-    "ppafo.studies.comparison": ("Comparison", "compare"),
-    "ppafo.studies.monte_carlo": ("MonteCarlo", "monte_carlo"),
-    "ppafo.studies.sensitivity": ("Sensitivity", "sensitivity"),
-    "ppafo.studies.tuning": ("Tuning", "list_tunings", "load_tuning", "tune"),
-    "ppafo.studies.design": ("Design", "load_design", "run_design"),
-    "ppafo.studies.sizing": ("Sizing", "load_sizing", "run_sizing"),
+    "ppafo.studies.loading": ("list_studies", "load_study"),
+    "ppafo.questions.sweep.results": ("StudyResults", "load_study_results"),
+    "ppafo.questions.sweep.solve": ("sweep",),
+    "ppafo.questions.identify.solve": ("Identification", "identify"),
+    "ppafo.questions.reproduce.solve": ("Reproduction", "reproduce"),
+    "ppafo.questions.compare.solve": ("Comparison", "compare"),
+    "ppafo.questions.design.file": ("load_design",),
+    "ppafo.questions.design.solve": ("Design", "design"),
+    "ppafo.questions.endurance.solve": ("Endurance", "endurance", "endurance_of_walk"),
+    "ppafo.questions.league.solve": ("League", "league"),
+    "ppafo.questions.find.solve": ("Found", "find"),
+    "ppafo.questions.montecarlo.estimate": ("MonteCarlo",),
+    "ppafo.questions.montecarlo.solve": ("monte_carlo",),
+    "ppafo.questions.parts.solve": ("Parts", "parts"),
+    "ppafo.questions.size.file": ("load_sizing",),
+    "ppafo.questions.size.solve": ("Sizing", "size"),
+    "ppafo.questions.sensitivity.analyse": ("Sensitivity",),
+    "ppafo.questions.sensitivity.solve": ("sensitivity",),
+    "ppafo.questions.unreported.solve": ("infer_settings",),
+    "ppafo.questions.validate.solve": ("Validation", "validate"),
+    "ppafo.questions.tune.file": ("list_tunings", "load_tuning"),
+    "ppafo.questions.tune.solve": ("Tuning", "tune"),
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk", "walk_population"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
+_RENAMED = {"run_design": "design", "run_sizing": "size", "run_study": "sweep"}
+"""Names of version 0.1 and what they are called now."""
+
 
 def __getattr__(name: str) -> Any:
     """Load a public name from its module the first time it is asked for."""
+    if name in _RENAMED:
+        raise AttributeError(f"ppafo.{name} is now called ppafo.{_RENAMED[name]}")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'ppafo' has no attribute '{name}'")
     value = getattr(importlib.import_module(_HOME_OF[name]), name)

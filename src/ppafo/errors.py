@@ -28,6 +28,14 @@ class SimulationError(PpafoError):
     """A run could not be carried out, for example because no model could be compiled."""
 
 
+class ProgramError(SimulationError):
+    """A law, valve, profile or meter cannot be compiled; the message begins with its file and line where it has one."""
+
+
+class KindError(PpafoError):
+    """A controller, valve, profile or metric of another package cannot be used."""
+
+
 class StudyError(PpafoError):
     """A study file asks for something that is not possible, or its results belong to another study."""
 
@@ -40,6 +48,16 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
     """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near."""
     near = difflib.get_close_matches(str(name), list(allowed), n=1, cutoff=0.6)
     return f", did you mean '{near[0]}'?" if near else ""
+
+
+def first_twice(names: Iterable[str]) -> str | None:
+    """Return the first name that was there before, None where all differ; quick for any number of names."""
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            return name
+        seen.add(name)
+    return None
 
 
 def one_line(text: object) -> str:

@@ -16,6 +16,7 @@ PRINTED_BY_PYTHON = {
     "compare.md": "256 True\n",
     "sensitivity.md": "['supply.pressure', 'actuator.torque_constant']\n",
     "monte-carlo.md": "True True\n",
+    "find-a-value.md": "495000.0 1\n",
     "tune.md": "True True {}\n",
 }
 

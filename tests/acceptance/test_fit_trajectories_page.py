@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def document(folder: Path) -> dict[str, Any]:
     """What the fit says of itself."""
-    found: dict[str, Any] = json.loads((folder / "identified" / "estimates.json").read_text())["trajectory"]
+    found: dict[str, Any] = json.loads((folder / "identified" / "identify.json").read_text())["trajectory"]
     return found
 
 

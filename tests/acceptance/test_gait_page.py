@@ -27,7 +27,10 @@ def test_the_commands_and_the_python_of_the_page_run(
     commands = [line for block in blocks("sh") for line in block.splitlines()]
     assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 6
     files = {path.name for path in (tmp_path / "out" / "my-gait").iterdir()}
-    assert files == {"my-gait.toml", "gait.json", "gait.png", "gait.svg", "ppafo.json"}
+    assert files == {
+        *("my-gait.toml", "gait.json", "gait.txt", "gait.png", "gait.svg"),
+        *("report.html", "ppafo.json"),
+    }
     assert "shank_angle" in read_opensim(tmp_path / "out" / "walk.sto").columns
     capsys.readouterr()
     names: dict[str, Any] = {}
@@ -53,4 +56,4 @@ def test_the_opensim_command_of_the_page_runs_on_the_real_files(
     names = {"walk_ik.mot": "subject01_walk1_ik.mot", "walk_grf.mot": "subject01_walk1_grf_15s.mot"}
     monkeypatch.chdir(tmp_path)
     assert main([str(folder / names[word]) if word in names else word for word in shlex.split(command)[1:]]) == 0
-    assert "stride time   1.229 s" in capsys.readouterr().out
+    assert "stride time  1.229 s" in capsys.readouterr().out

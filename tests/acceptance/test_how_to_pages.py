@@ -1,12 +1,14 @@
 """What the how-to pages on scenarios, controllers and valves show is run as it stands there."""
 
 import dataclasses
-import importlib.util
+import importlib
 import re
 import shlex
 import sys
 import textwrap
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Callable, Iterator
+from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,19 +17,19 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import main
-from ppafo.control import controllers
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.engine.compile_errors import mistake
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.model.command import VENT
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Valve
+from ppafo.parameters.loading import parse_parameter_set
 from ppafo.simulation.loading import parse_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import LedMotion
-from ppafo.simulation.schema import scenario_file
-from ppafo.walking.schema import walk_file
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
 
@@ -38,28 +40,43 @@ def blocks(page: str, language: str) -> list[str]:
     return [textwrap.dedent(text) for _, text in found]
 
 
-def module_of(text: str, name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """The module that a page tells to write, imported from a file as a real one is."""
-    file = folder / f"{name}.py"
-    file.write_text(text)
-    spec = importlib.util.spec_from_file_location(name, file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, name, module)
-    spec.loader.exec_module(module)
-    return module
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., ModuleType]]:
+    """Installs the module of a page as a package offers it, and imports it; forgotten at the end of the test."""
+    catalogues = [(kinds, set(kinds)) for kinds in (CONTROLLERS, WALKING_CONTROLLERS, VALVES)]
+    packages: set[str] = set()
+
+    def installed(module: str, text: str, entry_points: str) -> ModuleType:
+        package, name = module.split(".")
+        (tmp_path / package).mkdir(exist_ok=True)
+        (tmp_path / package / "__init__.py").touch()
+        (tmp_path / package / f"{name}.py").write_text(text)
+        about = tmp_path / f"{package}-1.0.dist-info"
+        about.mkdir(exist_ok=True)
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+        groups = tomllib.loads(entry_points)["project"]["entry-points"]
+        lines = [
+            f"[{group}]\n" + "".join(f"{key} = {value}\n" for key, value in groups[group].items()) for group in groups
+        ]
+        with (about / "entry_points.txt").open("a") as file:
+            file.writelines(lines)
+        monkeypatch.syspath_prepend(tmp_path)
+        packages.add(package)
+        return importlib.import_module(module)
+
+    yield installed
+    for kinds, names in catalogues:
+        for name in set(kinds) - names:
+            del kinds[name]
+    for name in [name for name in sys.modules if name.split(".")[0] in packages]:
+        del sys.modules[name]
 
 
 @pytest.fixture
-def hysteresis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    """The controller of the page, in the catalogue for the length of a test."""
-    text = blocks("add-a-controller.md", "python")[1]
-    module = module_of(text, "hysteresis", tmp_path, monkeypatch)
-    monkeypatch.setitem(CONTROLLERS, module.KIND.name, module.KIND)
-    scenario_file.cache_clear()
-    yield module
-    scenario_file.cache_clear()
+def hysteresis(install: Callable[..., ModuleType]) -> ModuleType:
+    """The controller of the page, installed for the length of a test."""
+    offered = blocks("add-a-controller.md", "toml")[1]
+    return install("my_laws.hysteresis", blocks("add-a-controller.md", "python")[2], offered)
 
 
 def test_the_scenario_of_the_page_loads_and_says_what_the_page_says() -> None:
@@ -87,11 +104,21 @@ def test_the_overrides_of_the_scenario_page_are_taken() -> None:
     assert scenario.device.valve_name == "solenoid"
 
 
+def test_the_section_that_a_command_of_the_scenario_page_adds_is_taken() -> None:
+    words = shlex.split(blocks("write-a-scenario.md", "sh")[1])
+    scenario = ppafo.load_scenario(words[2], [word for word in words[3:] if word != "--set"])
+    assert scenario.supply_lines is not None
+    assert scenario.supply_lines.droop_1 == 3.0e6
+    assert scenario.thermal is not None
+    assert scenario.thermal.heat_transfer_coefficient == 50.0
+
+
 def test_the_check_of_the_scenario_page_finds_what_the_page_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    words = shlex.split(blocks("write-a-scenario.md", "sh")[1].replace("\\\n", " "))
+    (command,) = (block for block in blocks("write-a-scenario.md", "sh") if "--check" in block)
+    words = shlex.split(command.replace("\\\n", " "))
     assert main(words[1:]) == 1
     printed = capsys.readouterr().out
     (shown,) = blocks("write-a-scenario.md", "text")
@@ -124,6 +151,33 @@ def test_the_python_controller_of_the_page_controls(capsys: pytest.CaptureFixtur
     command = names["result"].recording["command"]
     assert command.max() > 0.05
     assert abs(command[1:] - command[:-1]).max() <= 0.1 + 1e-12
+    exec(blocks("add-a-controller.md", "python")[1], names)
+    assert capsys.readouterr().out == "64\n"
+
+
+HOLDS, FILLS_1, FILLS_2 = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 1.0, 0.0)
+VENTS = (0.0, 1.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "command", "expected"),
+    [
+        ("proportional", 0.0, HOLDS),
+        ("proportional", 1.0, FILLS_1),
+        ("proportional", 0.25, (0.25, 0.0, 0.0, 0.25)),
+        ("proportional", -1.0, FILLS_2),
+        ("solenoid", 0.0, VENTS),
+        ("solenoid", 0.25, FILLS_1),
+        ("solenoid", -0.25, FILLS_2),
+        ("solenoid", VENT, VENTS),
+    ],
+)
+def test_a_valve_does_with_a_command_what_the_page_says(kind: str, command: float, expected: tuple[float, ...]) -> None:
+    settings = {item.name: item.default or 0.0 for item in VALVES[kind].quantities}
+    model = VALVES[kind].choose(settings)
+    valve = model.prepare(settings)
+    state = model.settle(valve, model.initial(), command, 0.0)
+    assert tuple(model.instant(valve, state, command)) == pytest.approx(expected)
 
 
 def test_the_controller_of_the_page_keeps_its_command_inside_the_band(hysteresis: ModuleType) -> None:
@@ -131,6 +185,22 @@ def test_the_controller_of_the_page_keeps_its_command_inside_the_band(hysteresis
     inside, above = Measurement(1.3, 1e5, 1e5, 2.2), Measurement(1.3, 1e5, 1e5, 2.4)
     assert hysteresis.update(parameters, state, 2.0, inside, 1e-3)[0] == 1.0
     assert hysteresis.update(parameters, state, 2.0, above, 1e-3)[0] == -1.0
+
+
+def test_the_message_on_the_controller_page_is_the_real_one() -> None:
+    (shown,) = blocks("add-a-controller.md", "text")
+    law = blocks("add-a-controller.md", "python")[2].replace("measurement.torque", "measurement.torqe").splitlines()
+    number = next(place for place, line in enumerate(law, 1) if "measurement.torqe" in line)
+    source = "\n".join(
+        [
+            "Measurement = namedtuple('Measurement', ['angle', 'torque'])",
+            f"# origin hysteresis.py: {number} {number + 1}",
+            "@njit",
+            law[number - 1].strip(),
+        ]
+    )
+    report = "Unknown attribute 'torqe' of type Measurement(float64 x 2)\n\nFile \"x.py\", line 4:"
+    assert f"my_laws/{mistake(report, source)}" == shown.strip()
 
 
 def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteresis: ModuleType) -> None:
@@ -143,26 +213,21 @@ def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteres
         "controller": {"kind": "hysteresis", "rate": "200 Hz", "band": "0.3 N m"},
         "reference": {"kind": "constant", "level": "2 N m"},
     }
-    assert 'kind = "hysteresis"' in blocks("add-a-controller.md", "toml")[0]
+    assert hysteresis.KIND.name not in set(CONTROLLERS)
     wide = ppafo.simulate(scenario_from_dict(content, ["controller.band=1 N m"]))
     narrow = ppafo.simulate(scenario_from_dict(content))
     assert hysteresis.KIND.name == narrow.scenario.control.kind
+    content["controller"] = tomllib.loads(blocks("add-a-controller.md", "toml")[0])["controller"]
+    by_module = ppafo.simulate(scenario_from_dict(content))
+    assert by_module.scenario.control.kind == "my_laws.hysteresis:KIND"
+    assert by_module.metrics == narrow.metrics
     assert 1 <= wide.metrics["switchings"].value < narrow.metrics["switchings"].value
 
 
-def test_the_controller_of_the_page_walks(
-    hysteresis: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "ppafo.control.controllers.hysteresis", hysteresis)
-    monkeypatch.setattr(controllers, "hysteresis", hysteresis, raising=False)
-    text = blocks("add-a-controller.md", "python")[2]
-    module = module_of(text, "event_hysteresis", tmp_path, monkeypatch)
-    monkeypatch.setitem(WALKING_CONTROLLERS, module.KIND.name, module.KIND)
-    walk_file.cache_clear()
-    try:
-        walked = ppafo.walk("proportional", 0.1, ["controller.kind=event_hysteresis", "controller.band=0.5 N m"])
-    finally:
-        walk_file.cache_clear()
+@pytest.mark.usefixtures("hysteresis")
+def test_the_controller_of_the_page_walks() -> None:
+    assert "controller.kind=hysteresis" in blocks("add-a-controller.md", "sh")[-1]
+    walked = ppafo.walk("proportional", 0.1, ["controller.kind=hysteresis", "controller.band=0.5 N m"])
     assert walked.status.is_completed
     assert "safe_state_time" not in walked.metrics
     assert walked.metrics["push_off_work"].value > 0.5
@@ -170,11 +235,26 @@ def test_the_controller_of_the_page_walks(
     assert set(command.round(12)) <= {-1.0, 0.0, 1.0, VENT}
 
 
-def test_the_valve_of_the_page_agrees_with_the_reference_solver(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    module = module_of(blocks("add-a-valve.md", "python")[0], "three_position", tmp_path, monkeypatch)
-    monkeypatch.setitem(VALVES, module.KIND.name, module.KIND)
+@pytest.fixture
+def three_position(install: Callable[..., ModuleType]) -> ModuleType:
+    """The valve of the page, installed for the length of a test."""
+    offered, _ = blocks("add-a-valve.md", "toml")
+    return install("my_valves.three_position", blocks("add-a-valve.md", "python")[0], offered)
+
+
+@pytest.mark.usefixtures("three_position")
+def test_the_parameter_set_of_the_page_has_its_valve() -> None:
+    shipped = (files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text()
+    valve = blocks("add-a-valve.md", "toml")[1]
+    for kind in ("three_position", "my_valves.three_position:KIND"):
+        text = shipped + "\n" + valve.replace('"three_position"', f'"{kind}"')
+        device = build_device(parse_parameter_set(text.encode(), "mine.toml"), "main")
+        assert device.valve.kind == kind
+        assert device.valve.settings == {"threshold": 0.3}
+
+
+@pytest.mark.usefixtures("three_position")
+def test_the_valve_of_the_page_agrees_with_the_reference_solver() -> None:
     task = ppafo.load_scenario("torque-task-solenoid", ["run.duration=0.3 s", "motion.kind=free"])
     valve = Valve("three_position", task.device.valve.orifice, {"threshold": 0.5})
     scenario = dataclasses.replace(task, device=dataclasses.replace(task.device, valve=valve))

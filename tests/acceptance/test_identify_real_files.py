@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.identification.identify import Identification, identify
+from ppafo.questions.identify.solve import Identification, identify
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "identify-from-raw-files.md"
 KNOWN_AREA = 5.1875e-4
@@ -113,4 +113,4 @@ def test_the_command_of_the_page_leaves_what_the_page_says(
     (raw_files / "problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
     assert main([str(raw_files / word) if word == "problem.toml" else word for word in words[1:]]) == 1
     made = {path.name for path in (tmp_path / "identified").iterdir()}
-    assert {"cylinder.toml", "estimates.json", "identify.txt", "static_torque.png"} <= made
+    assert {"cylinder.toml", "identify.json", "identify.txt", "static-torque.png"} <= made

@@ -1,4 +1,4 @@
-"""What the README shows runs as printed, and the numbers in it are those of a run."""
+"""What the README and the two pages that go on from it show runs as printed; their numbers are those of a run."""
 
 import re
 import shlex
@@ -6,16 +6,20 @@ from pathlib import Path
 
 import pytest
 
+from ppafo.answers.text import text_of
 from ppafo.cli.catalog import COMMANDS
 from ppafo.cli.main import build_parser, main
 from ppafo.engine.reference.agreement import compare_with_reference
-from ppafo.reporting.claims_table import claims_table
+from ppafo.questions.reproduce.solve import Reproduction, reproduce
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.studies.reproduction import Reproduction, reproduce
 
 ROOT = Path(__file__).parents[2]
-TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+ASKED, MEASURED_PAGE = (
+    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("what-you-can-ask.md", "accuracy-and-speed.md")
+)
+TEXT = "\n".join((README, ASKED, MEASURED_PAGE))
 CHECK_FAILED = 1
 MEASURED = {
     "step response (figure 7)": "step-response",
@@ -58,6 +62,11 @@ def test_the_python_of_the_readme_runs_as_printed(block: str, tmp_path: Path, mo
     assert [name for name in pictures if (tmp_path / name).stat().st_size < 10_000] == []
 
 
+def test_the_first_picture_comes_within_two_screens() -> None:
+    before = README.partition("![")[0].splitlines()
+    assert len(before) <= 50
+
+
 def test_there_are_three_lines_of_python() -> None:
     (block,) = blocks("python")
     assert len([line for line in block.splitlines() if line]) == 3
@@ -94,7 +103,9 @@ def test_the_make_targets_of_the_readme_exist() -> None:
 
 
 def test_the_table_of_claims_is_that_of_a_run(reproduction: Reproduction) -> None:
-    printed = {line.split()[0]: re.split(r" {2,}", line)[1:] for line in claims_table(reproduction.claims)[2:-2]}
+    printed = {
+        line.split()[0]: re.split(r" {2,}", line)[1:] for line in text_of(reproduction.answer()).splitlines()[1:-2]
+    }
     testable = {name: cells for name, cells in printed.items() if cells[-1] != "not testable"}
     assert shown_claims() == testable
 

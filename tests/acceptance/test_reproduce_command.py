@@ -6,16 +6,16 @@ import re
 import struct
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.reporting.reproduction_files import FILES
+from ppafo.progress import Report
+from ppafo.questions.reproduce import solve as study
+from ppafo.questions.reproduce.bench import bench_study
 from ppafo.storage import read_csv
-from ppafo.studies import reproduction as study
-from ppafo.studies.reproduction.bench import bench_study
 
 # Spelled out once more on purpose: other programs read these identifiers and this order.
 IDS = [
@@ -46,7 +46,7 @@ RECORDINGS = ("step-response", "torque-task-solenoid", "torque-task-proportional
 def few_completions() -> Iterator[None]:
     """As many completions of the torque task as a test needs; the command takes more."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("ppafo.studies.reproduction.study.COMPLETIONS", 1000)
+        patch.setattr("ppafo.questions.reproduce.solve.COMPLETIONS", 1000)
         yield
 
 
@@ -61,7 +61,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_folder_holds_report_claims_figures_and_recordings_and_nothing_else(out: Path) -> None:
     expected = {"report.html", "claims.json", *(f"{name}.csv" for name in RECORDINGS)}
     expected |= {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
-    assert {entry.name for entry in out.iterdir()} == expected == set(FILES)
+    assert {entry.name for entry in out.iterdir()} == expected | {"ppafo.json", "claims.txt"}
 
 
 def test_the_claims_file_has_every_claim_in_the_agreed_form(out: Path) -> None:
@@ -150,7 +150,11 @@ def missed_claims(monkeypatch: pytest.MonkeyPatch) -> None:
         dataclasses.replace(claim, value=3.3, verdict="contradicted") if claim.id == "co2_solenoid" else claim
         for claim in honest.claims
     )
-    monkeypatch.setattr(study, "reproduce", lambda *_: dataclasses.replace(honest, claims=claims))
+
+    def missing(overrides: Sequence[str], progress: Report) -> study.Reproduction:
+        return dataclasses.replace(honest, claims=claims, overrides=tuple(overrides))
+
+    monkeypatch.setattr(study, "reproduce", missing)
 
 
 def test_a_missed_window_is_named_and_makes_the_command_fail(
@@ -201,7 +205,7 @@ def test_a_place_that_cannot_be_written_is_refused_in_one_line(
 ) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     assert main(["reproduce", "--out", str(tmp_path / "file")]) == 2
-    assert capsys.readouterr().err.endswith("file: is a file; a ppafo reproduction needs a folder\n")
+    assert capsys.readouterr().err.endswith("file: is a file; a result of 'ppafo reproduce' needs a folder\n")
 
 
 def test_a_folder_of_somebody_elses_is_refused_before_anything_runs(
@@ -214,7 +218,7 @@ def test_a_folder_of_somebody_elses_is_refused_before_anything_runs(
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     assert main(["reproduce", "--out", str(tmp_path)]) == 2
     complaint = (
-        f"ppafo: --out {tmp_path}: is not empty and not a ppafo reproduction (it has no claims.json); "
+        f"ppafo: --out {tmp_path}: is not empty and not a result of 'ppafo reproduce' (it has no ppafo.json); "
         "choose another folder\n"
     )
     assert capsys.readouterr().err == complaint
@@ -226,7 +230,9 @@ def test_the_same_folder_is_taken_again_and_replaced_whole(tmp_path: Path) -> No
     assert main(["reproduce", "--out", str(folder), "--set", "reference.level=4 N m"]) == 0
     assert main(["reproduce", "--out", str(folder)]) == 0
     assert json.loads((folder / "claims.json").read_text(encoding="utf-8"))["overrides"] == []
-    assert {entry.name for entry in folder.iterdir()} == set(FILES)
+    figures = {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
+    written = {"report.html", "claims.json", "claims.txt", "ppafo.json", *(f"{name}.csv" for name in RECORDINGS)}
+    assert {entry.name for entry in folder.iterdir()} == written | figures
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 

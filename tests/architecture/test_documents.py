@@ -21,7 +21,10 @@ from ppafo.signals.channels import CHANNELS
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "ppafo"
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 PAPER_EQUATIONS = tuple(range(1, 15))
 
 GROUPS_OF_NUMBERS = (plant.PlantParameters, plant.PlantState, plant.Openings, sensors.Measurement)

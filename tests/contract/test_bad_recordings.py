@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.identification.bench.decay_motion import angle_of_decay
+from ppafo.identification.bench.decay import angle_of_decay
 
 AT = 37
 """Index of the sample that is spoilt."""
@@ -155,7 +155,7 @@ def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
         maps = mapped(table, whole)
         if name == "identify":
             head = 'schema_version = 1\nname = "twin"\ndevice.set = "ppafo2011"\n'
-            use = '[[procedure]]\nkind = "free_decay"\nrecordings = ["bench.csv"]\n'
+            use = '[[procedure]]\nkind = "free-decay"\nrecordings = ["bench.csv"]\n'
             problem = f'{head}{use}columns = "logger"\n{maps}' if through_map else head + use
             (tmp_path / "problem.toml").write_text(problem)
             words = ["identify", str(tmp_path / "problem.toml")]

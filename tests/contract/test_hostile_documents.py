@@ -16,19 +16,19 @@ from ppafo.gait.recorded.mapping import load_map
 from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.parts import load_catalogue
+from ppafo.questions.design.file import read_design_file
+from ppafo.questions.endurance.draw import read_walk_gas
+from ppafo.questions.endurance.file import load_bottle
+from ppafo.questions.size.file import read_sizing_file
+from ppafo.questions.sweep.results import load_study_results
+from ppafo.questions.tune.file import load_tuning
 from ppafo.rig.folder import check_rig_folder
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.storage.column_map import load_column_map
 from ppafo.storage.recordings import read_recording
 from ppafo.storage.result_folder import read_document
-from ppafo.studies.design.document import read_design_file
-from ppafo.studies.endurance.bottle import load_bottle
-from ppafo.studies.endurance.walked import read_walked
-from ppafo.studies.sizing.document import read_sizing_file
-from ppafo.studies.sweep.loading import load_study
-from ppafo.studies.sweep.results import load_study_results
-from ppafo.studies.tuning.loading import load_tuning
+from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk
 
 LOADERS: dict[str, Callable[[str], Any]] = {
@@ -133,7 +133,7 @@ def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path, ending: str
 
 FOLDERS: dict[str, Callable[[Path], Any]] = {
     "run.json": read_document,
-    "walk.json": read_walked,
+    "walk.json": read_walk_gas,
     "rig.json": lambda folder: check_rig_folder(folder, "step-response"),
     "study.json": load_study_results,
     "summary.json": load_study_results,

@@ -17,6 +17,7 @@ FOLDERS: dict[str, list[str]] = {
     "compare": ["step-response"],
     "sensitivity": ["torque-task-uncertainty"],
     "montecarlo": ["torque-task-uncertainty", "--metric", "rms_error"],
+    "find": ["step-response", "--vary", "supply.pressure=20..90 psi_g", "--such-that", "arrival_time <= 0.3 s"],
     "tune": ["pid-gains"],
     "walk": ["--minutes", "0.1"],
     "walk --wearers": ["--wearers", "2"],
@@ -36,13 +37,12 @@ FOLDERS: dict[str, list[str]] = {
     "audit": ["ppafo2011"],
     "schema": ["scenario"],
     "cache": [],
-    "bench": ["--quick"],
-    "coverage": ["--draws", "1"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
 
 FILES = {
     "plot": (["{result}"], "figure.png"),
+    "new scenario": (["mine"], "mine.toml"),
     "gait record": (["falisse2019-subject1", "--strides", "1"], "walk.csv"),
     "gait export": (["{result}"], "walk.sto"),
 }
@@ -110,7 +110,7 @@ def test_own_earlier_result_is_replaced_whole_and_holds_nothing_else(
     out.mkdir()
     assert main(words_of(name, out)) == 0
     first = contents(out)
-    (stray,) = [path for path in sorted(out.iterdir()) if path.name not in (MARK, "endurance.json")][:1]
+    (stray,) = [path for path in sorted(out.iterdir()) if path.name != MARK][:1]
     stray.write_text("an earlier one")
     assert main(words_of(name, out)) == 0
     assert set(contents(out)) == set(first)
@@ -152,7 +152,7 @@ def test_rig_adds_an_experiment_and_replaces_nothing_of_others(
     (out / "step-response.csv").write_text("mine")
     capsys.readouterr()
     assert main(["rig", "record", "step-response", "--out", str(out)]) == 2
-    assert "holds a step-response.csv that is not of the rig" in capsys.readouterr().err
+    assert "has a step-response.csv that is not of the rig" in capsys.readouterr().err
     assert (out / "step-response.csv").read_text() == "mine"
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.judge.simulator import judge
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.reference.agreement import chamber_pressures_of, plant_states
@@ -20,6 +19,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
+from tests.judge.simulator import judge
 
 K = 1.3
 PRODUCT = 8.314 * 298.0 / 0.044

@@ -3,11 +3,11 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from tests.judge.simulator import Answer, judge
 
 from ppafo.errors import PpafoError
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
+from tests.judge.simulator import Answer, judge
 
 LARGEST_ANGLE = 2.0e-4
 LARGEST_PRESSURE = 1.0e-3

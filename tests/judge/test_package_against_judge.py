@@ -7,15 +7,15 @@ impacts. ``mixed`` needs a program for nearly every draw, so only the command ru
 import dataclasses
 
 import pytest
-from tests.judge.comparison import away_from_impacts, columns, differences, verdict
-from tests.judge.draws import FAMILIES, draw
-from tests.judge.simulator import judge
 
 from ppafo.engine.reference.agreement import chamber_pressures_of
 from ppafo.engine.reference.solver import solve_reference
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
+from tests.judge.comparison import away_from_impacts, columns, differences, verdict
+from tests.judge.draws import FAMILIES, draw
+from tests.judge.simulator import judge
 
 SEED = 1
 DRAWS = 9

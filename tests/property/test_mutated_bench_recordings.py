@@ -18,7 +18,7 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
-from ppafo.identification.bench.gas_flow import GasAt
+from ppafo.identification.bench.flow_laws import GasAt
 from ppafo.identification.source import Source
 from ppafo.storage import read_csv
 from ppafo.storage.column_map import ColumnMap
@@ -26,24 +26,24 @@ from ppafo.storage.foreign import read_foreign
 
 CO2 = GasAt(0.044, 1.3, 298.0)
 RUNS = {
-    "static_torque": static_torque,
-    "free_decay": free_decay,
-    "open_valve_flow": lambda sources: open_valve_flow(sources, OpenValveFlowSettings(CO2)),
-    "valve_map": lambda sources: valve_map(sources, ValveMapSettings(CO2)),
-    "vane_leak": lambda sources: vane_leak(sources, VaneLeakSettings(CO2, 4e-5, 4e-5, 0.1)),
+    "static-torque": static_torque,
+    "free-decay": free_decay,
+    "open-valve-flow": lambda sources: open_valve_flow(sources, OpenValveFlowSettings(CO2)),
+    "valve-map": lambda sources: valve_map(sources, ValveMapSettings(CO2)),
+    "vane-leak": lambda sources: vane_leak(sources, VaneLeakSettings(CO2, 4e-5, 4e-5, 0.1)),
 }
 UNITS = {
-    "static_torque": {"time": "s", "torque": "N m", "pressure_difference": "psi_d", "direction": "-"},
-    "free_decay": {"time": "s", "angle": "deg", "angular_velocity": "deg/s"},
-    "open_valve_flow": {"time": "s", "upstream_pressure": "psi_g", "downstream_pressure": "psi_g", "mass_flow": "g/s"},
-    "valve_map": {
+    "static-torque": {"time": "s", "torque": "N m", "pressure_difference": "psi_d", "direction": "-"},
+    "free-decay": {"time": "s", "angle": "deg", "angular_velocity": "deg/s"},
+    "open-valve-flow": {"time": "s", "upstream_pressure": "psi_g", "downstream_pressure": "psi_g", "mass_flow": "g/s"},
+    "valve-map": {
         "time": "s",
         "command": "-",
         "mass_flow": "g/s",
         "upstream_pressure": "psi_g",
         "downstream_pressure": "psi_g",
     },
-    "vane_leak": {"time": "s", "pressure_1": "psi_g", "pressure_2": "psi_g"},
+    "vane-leak": {"time": "s", "pressure_1": "psi_g", "pressure_2": "psi_g"},
 }
 CELLS = st.sampled_from(
     ["", "nan", "inf", "-1", "1e300", "-1e-300", "0", "130", "1e9", "x", '"', "\0", "½", ",", "\n", "1_0", "#"]
@@ -53,18 +53,18 @@ CELLS = st.sampled_from(
 def columns(kind: str) -> list[np.ndarray]:
     """Numbers as that bench would give them, in the units of the file."""
     draw = np.random.default_rng(1)
-    if kind == "static_torque":
+    if kind == "static-torque":
         pressure = np.tile([10.0, 30.0, 50.0, 70.0, 70.0, 50.0, 30.0, 10.0], 3)
         way = np.tile([1.0] * 4 + [-1.0] * 4, 3)
         return [10.0 * np.arange(24.0), 0.1 * pressure - 0.45 * way + draw.normal(0.0, 0.02, 24), pressure, way]
-    if kind == "free_decay":
+    if kind == "free-decay":
         time = np.arange(60) * 0.02
         angle = 100.0 * (1.0 - np.exp(-2.0 * time)) - 10.0 * time + draw.normal(0.0, 0.1, 60)
         return [time, angle, 200.0 * np.exp(-2.0 * time) - 10.0 + draw.normal(0.0, 1.0, 60)]
-    if kind == "open_valve_flow":
+    if kind == "open-valve-flow":
         down = np.linspace(0.0, 48.0, 20)
         return [np.arange(20.0), np.full(20, 50.0), down, 4.0 * np.sqrt(1.0 - down / 50.0) + draw.normal(0.0, 0.02, 20)]
-    if kind == "valve_map":
+    if kind == "valve-map":
         command = np.concatenate([np.linspace(-1.0, 1.0, 15), np.linspace(1.0, -1.0, 15)])
         flow = 4.0 * command + draw.normal(0.0, 0.02, 30)
         return [np.arange(30.0), command, flow, np.full(30, 50.0), np.zeros(30)]
@@ -96,9 +96,9 @@ def test_the_recording_that_is_damaged_is_taken_as_it_is(tmp_path: Path, kind: s
 
 
 @given(st.sampled_from(sorted(RUNS)), st.floats(0.0, 1.0), st.integers(0, 60), CELLS, st.booleans())
-@example("free_decay", 0.5, 8, "1e300", True)
-@example("free_decay", 0.3984375, 1, "1e300", False)
-@example("vane_leak", 0.041015625, 3, "nan", False)
+@example("free-decay", 0.5, 8, "1e300", True)
+@example("free-decay", 0.3984375, 1, "1e300", False)
+@example("vane-leak", 0.041015625, 3, "nan", False)
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_damaged_recording_gives_numbers_or_one_line(
     tmp_path: Path, kind: str, place: float, length: int, cell: str, through_map: bool
@@ -124,7 +124,7 @@ def test_any_bytes_are_a_recording_or_one_line_that_names_the_file(
     path = tmp_path / "bench.csv"
     path.write_bytes(content)
     try:
-        recording = read(path, "vane_leak", through_map).recording
+        recording = read(path, "vane-leak", through_map).recording
     except PpafoError as error:
         assert str(error).startswith(str(path))
         assert "\n" not in str(error)

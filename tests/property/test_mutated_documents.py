@@ -14,22 +14,22 @@ from hypothesis import strategies as st
 from ppafo.errors import PpafoError
 from ppafo.gait.loading import load_gait
 from ppafo.parameters.parts import load_catalogue
+from ppafo.questions.design.file import load_design
+from ppafo.questions.endurance.file import load_bottle
+from ppafo.questions.size.file import load_sizing
+from ppafo.questions.tune.file import load_tuning
 from ppafo.rig.preset import load_preset
-from ppafo.studies.design import load_design
-from ppafo.studies.endurance.bottle import load_bottle
-from ppafo.studies.sizing import load_sizing
-from ppafo.studies.sweep.loading import load_study
-from ppafo.studies.tuning.loading import load_tuning
+from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk
 
 PACKAGE = resources.files("ppafo")
 FORMATS: dict[str, tuple[Callable[[str], Any], Traversable]] = {
     "study": (load_study, PACKAGE / "studies" / "library"),
-    "tuning": (load_tuning, PACKAGE / "studies" / "tuning" / "library"),
-    "design": (load_design, PACKAGE / "studies" / "design" / "designs"),
-    "size": (load_sizing, PACKAGE / "studies" / "sizing" / "sizings"),
+    "tuning": (load_tuning, PACKAGE / "questions" / "tune" / "library"),
+    "design": (load_design, PACKAGE / "questions" / "design" / "library"),
+    "size": (load_sizing, PACKAGE / "questions" / "size" / "library"),
     "walk": (load_walk, PACKAGE / "walking" / "configurations"),
-    "bottle": (load_bottle, PACKAGE / "studies" / "endurance" / "bottles"),
+    "bottle": (load_bottle, PACKAGE / "questions" / "endurance" / "bottles"),
     "parts": (load_catalogue, PACKAGE / "parameters" / "parts" / "catalogues"),
     "rig": (load_preset, PACKAGE / "rig" / "presets"),
     "gait": (load_gait, PACKAGE / "gait" / "normative"),

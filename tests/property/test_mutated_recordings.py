@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from ppafo.errors import PpafoError
 from ppafo.parameters import load_device
 from ppafo.storage.column_map import ColumnMap
+from ppafo.validation.agreement import ReplaySettings, compare_recording
 from ppafo.validation.measured import read_measured
-from ppafo.validation.validate import MOTIONS, ReplaySettings, compare_recording
+from ppafo.validation.replay import MOTIONS
 
 DEVICE = load_device("ppafo2011")
 HEADER = "time [s],command [-],supply_pressure [psi_g],angle [deg],pressure_1 [psi_g],pressure_2 [psi_g]"

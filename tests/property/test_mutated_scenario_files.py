@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from ppafo.control.catalog import PROFILES
 from ppafo.errors import PpafoError
 from ppafo.simulation.loading import list_scenarios, parse_scenario
+from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
 FILE = "damaged.toml"
@@ -123,8 +124,7 @@ def start_angle(scenario: Scenario) -> float:
     if isinstance(scenario.motion, FreeMotion):
         return scenario.motion.angle
     profile = scenario.motion.profile
-    kind = PROFILES[profile.kind]
-    angle: float = kind.value(kind.parameters(**profile.settings), 0.0)[0]
+    angle: float = PROFILES[profile.kind].value(profile_parameters(profile), 0.0)[0]
     return angle
 
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from ppafo.studies.reproduction import Claim, Reproduction, reproduce
+from ppafo.questions.reproduce.claim import Claim
+from ppafo.questions.reproduce.solve import Reproduction, reproduce
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory import Search, TrajectoryFit, fit
-from ppafo.studies.trajectory import (
+from benchmarks.intervals import (
     EIGHT_PARAMETERS,
     Coverage,
     Planted,
@@ -21,6 +19,8 @@ from ppafo.studies.trajectory import (
     planted_problem,
     two_step_responses,
 )
+from ppafo.errors import IdentificationError
+from ppafo.identification.trajectory import Search, TrajectoryFit, fit
 
 REPETITIONS, STRAY_REPETITIONS = 10, 5
 UNLIKELY = 1.0e-4
@@ -63,7 +63,7 @@ def test_only_the_dynamic_friction_is_weak_and_it_says_against_what_it_trades(fo
     verdicts = {estimate.path: estimate.verdict for estimate in found.estimates}
     assert verdicts.pop("friction.dynamic_torque") == "weak"
     assert set(verdicts.values()) == {"identified"}
-    assert "trades against friction.viscous_damping" in found.estimate("friction.dynamic_torque").explanation
+    assert "trades off against friction.viscous_damping" in found.estimate("friction.dynamic_torque").explanation
 
 
 def test_the_fit_leaves_nothing_but_noise(found: TrajectoryFit) -> None:

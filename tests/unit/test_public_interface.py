@@ -1,12 +1,16 @@
 """``import ppafo``: small, quick, and everything in it works."""
 
 import importlib
+import runpy
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 import ppafo
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_every_public_name_can_be_had_and_is_listed() -> None:
@@ -20,6 +24,13 @@ def test_a_name_that_does_not_exist_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="module 'ppafo' has no attribute 'simulated'"):
         _ = ppafo.simulated
     assert not hasattr(ppafo, "nothing_of_the_kind")
+
+
+@pytest.mark.parametrize(("old", "new"), [("run_sizing", "size"), ("run_design", "design")])
+def test_a_renamed_name_says_the_new_one(old: str, new: str) -> None:
+    with pytest.raises(AttributeError, match=f"ppafo.{old} is now called ppafo.{new}"):
+        getattr(ppafo, old)
+    assert callable(getattr(ppafo, new))
 
 
 def test_importing_the_package_loads_nothing_heavy() -> None:
@@ -38,3 +49,17 @@ def test_three_lines_give_a_result_and_a_plot() -> None:
     result = ppafo.simulate("step-response")
     assert result.status.kind == "completed"
     assert len(result.plot().axes) == 5
+
+
+def test_names_and_signatures_are_those_that_were_recorded() -> None:
+    written = runpy.run_path(str(ROOT / "scripts" / "public_api.py"))["public_api"]()
+    recorded = (ROOT / "tests" / "snapshots" / "public-api.txt").read_text(encoding="utf-8")
+    assert written.splitlines() == recorded.splitlines(), (
+        "if it is meant: python scripts/public_api.py, then CHANGELOG.md"
+    )
+
+
+def test_the_record_of_the_interface_lists_every_public_name() -> None:
+    recorded = (ROOT / "tests" / "snapshots" / "public-api.txt").read_text(encoding="utf-8").splitlines()
+    heads = [line.removeprefix("class ").partition("(")[0] for line in recorded if line[:1].isalpha()]
+    assert sorted(heads) == ppafo.__all__

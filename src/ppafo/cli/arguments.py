@@ -9,7 +9,14 @@ from typing import NoReturn, final
 from ppafo.cli.output import flush_output
 from ppafo.errors import PpafoError, nearest_name
 
+_BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
+"""What argparse makes of an ArgumentTypeError."""
+
 _NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
+
+
+RENAMED = {"--most-failed": "--maximum-failed", "--most": "--maximum"}
+"""Options of version 0.1 and what they are called now."""
 
 
 class UsageError(PpafoError):
@@ -22,7 +29,10 @@ class CommandParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise the message of argparse as an error of one line that names the help to look at."""
-        raise UsageError(f"{message}; '{self.prog} --help' shows what belongs here")
+        bad_value = _BAD_VALUE.fullmatch(message)
+        if bad_value is not None:
+            raise UsageError(f"{bad_value[1]} {bad_value[2]}")
+        raise UsageError(f"{message.removeprefix('argument ')}; '{self.prog} --help' shows what belongs here")
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
         """End the process after ``--help`` or ``--version``, once their text has really been written."""
@@ -38,8 +48,13 @@ class CommandParser(argparse.ArgumentParser):
         return found
 
 
-def check_command(word: str | None, known: Sequence[str]) -> None:
-    """Refuse a word in the place of the command that names none; argparse would list them without the nearest."""
+def check_command(word: str | None, known: Sequence[str], moved: Mapping[str, str]) -> None:
+    """Refuse a word in the place of the command that names none; argparse would list them without the nearest.
+
+    ``moved`` has, for each command of earlier versions, what does the same in a checkout of the repository.
+    """
+    if word is not None and word in moved:
+        raise UsageError(f"'{word}' is no longer a command of the package: run {moved[word]} in a checkout of ppafo")
     if word is not None and word not in known:
         hint = nearest_name(word, known)
         raise UsageError(f"there is no command '{word}'{hint}; known are {', '.join(known)}")
@@ -50,6 +65,8 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
     known = sorted(parser.options())
     for word in takewhile(lambda word: word != "--", words):
         name = word.partition("=")[0]
+        if name in RENAMED and name not in known and RENAMED[name] in known:
+            raise UsageError(f"{name} is now called {RENAMED[name]}")
         if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
             raise UsageError(f"there is no option '{name}'{_nearest_option(name, known)}; here are {', '.join(known)}")
 

@@ -40,10 +40,9 @@ def _warm(why_not: str) -> None:
         raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
     load_compiler()
     from ppafo.simulation.loading import list_scenarios
-    from ppafo.simulation.simulate import compile_model
+    from ppafo.simulation.simulate import compile_models
 
-    for name in list_scenarios():
-        compile_model(name)
+    compile_models(list_scenarios())
 
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:

@@ -1,29 +1,58 @@
-"""The subcommands and what each does, in the order of the help. Module ``ppafo.cli.NAME`` holds each one."""
+"""The subcommands and what each does. Module ``ppafo.cli.NAME`` holds each one."""
+
+from ppafo.questions.catalogue import QUESTIONS
 
 COMMANDS: dict[str, str] = {
-    "reproduce": "run the paper's experiments and report against its claims",
+    "reproduce": QUESTIONS["reproduce"],
     "simulate": "run a scenario and write its recording, metrics and figure",
-    "unreported": "what the paper's results imply about the settings that it does not print",
-    "sweep": "run a study: many runs, a row for each, resumable",
-    "compare": "hold configurations against each other, over an uncertain device too",
-    "sensitivity": "say which uncertain value matters: Morris or Sobol indices",
-    "montecarlo": "draw until a statistic is known well enough",
-    "tune": "search gains for a goal under constraints, robust where asked",
-    "walk": "walk with the device, without it, and as the healthy gait would have it",
-    "league": "rank every controller on a task, with the best that is possible",
-    "validate": "hold a parameter set against recordings, channel by channel",
+    "unreported": QUESTIONS["unreported"],
+    "sweep": QUESTIONS["sweep"],
+    "compare": QUESTIONS["compare"],
+    "sensitivity": QUESTIONS["sensitivity"],
+    "montecarlo": QUESTIONS["montecarlo"],
+    "find": QUESTIONS["find"],
+    "tune": QUESTIONS["tune"],
+    "walk": QUESTIONS["walk"],
+    "league": QUESTIONS["league"],
+    "validate": QUESTIONS["validate"],
     "rig": "record synthetic bench data on the virtual test rig",
-    "identify": "bench recordings in, parameter set with uncertainty out",
-    "coverage": "how often the intervals of a trajectory fit hold, under ten kinds of noise",
+    "identify": QUESTIONS["identify"],
     "gait": "list, show and import gaits; export recordings for OpenSim",
-    "endurance": "how long a bottle of gas lasts for a gas use, and why it ends",
-    "design": "find the parts and settings that no others beat in error, gas and mass",
-    "size": "torque profile and hours of use in, smallest valve, pressure and bottle out",
-    "plot": "draw a result folder again",
+    "endurance": QUESTIONS["endurance"],
+    "design": QUESTIONS["design"],
+    "size": QUESTIONS["size"],
+    "new": "write an input file to start from: a template, or a copy of one of the package",
+    "plot": "draw what a folder of results holds again",
     "sets": "list parameter sets, or show one with the source of every value",
-    "parts": "list real parts with the origin of every figure",
+    "parts": QUESTIONS["parts"],
     "audit": "check a parameter set for contradictions",
     "cache": "show, compile or remove the compiled models of this computer",
     "schema": "print the JSON Schema of a file format",
-    "bench": "measure speed against other solvers in the same run",
 }
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "the paper": ("reproduce", "unreported"),
+    "your device": ("new", "simulate", "plot", "sets", "parts", "audit"),
+    "from bench to model": ("rig", "identify", "validate"),
+    "decide": (
+        "sweep",
+        "compare",
+        "sensitivity",
+        "montecarlo",
+        "find",
+        "tune",
+        "design",
+        "size",
+        "endurance",
+        "league",
+    ),
+    "walk": ("walk", "gait"),
+    "tools": ("cache", "schema"),
+}
+"""The commands as the help shows them, by what somebody has come for."""
+
+MOVED: dict[str, str] = {
+    "bench": "'python -m benchmarks' or 'make bench'",
+    "coverage": "'python scripts/interval_coverage.py'",
+}
+"""Commands that the package had once, and what does the same in a checkout of the repository."""

@@ -10,10 +10,9 @@ from ppafo.cli.output import (
     add_output_arguments,
     check_new_file,
     check_output,
+    deliver_answer,
     print_result,
-    write_files,
 )
-from ppafo.cli.quick_imports import load_drawing
 from ppafo.errors import DataError, UnitError
 
 if TYPE_CHECKING:
@@ -63,7 +62,7 @@ def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--low-pass", metavar="FREQUENCY", help="smooth the curves, such as '6 Hz'; not unless given")
     parser.add_argument("--least-strides", metavar="N", default="2", help="refuse fewer whole strides; default 2")
     parser.add_argument("--name", metavar="NAME", default="imported-gait", help="name of the gait and of its file")
-    parser.add_argument("--title", metavar="TEXT", default="", help="one line on who walks how")
+    parser.add_argument("--title", metavar="TEXT", default="", help="one line: who walks, and how")
     add_output_arguments(parser)
 
 
@@ -138,16 +137,9 @@ def _quantity(option: str, text: str, si_unit: str) -> float:
 
 
 def _deliver(gait: "Gait", imported: "ImportedGait | None", parsed: argparse.Namespace) -> int:
-    from ppafo.reporting.gait_files import gait_document, gait_files, gait_table
+    from ppafo.gait.answer import gait_answer
 
-    lines = gait_table(gait, imported)
-    if parsed.out is not None:
-        load_drawing()
-        files = gait_files(gait, imported)
-        write_files(parsed, files)
-        lines.append(f"written: {parsed.out} ({', '.join(files)})")
-    print_result("\n".join(lines), gait_document(gait, imported), parsed.json)
-    return EXIT_GOOD
+    return deliver_answer(gait_answer(gait, imported), parsed)
 
 
 def _record(parsed: argparse.Namespace) -> int:

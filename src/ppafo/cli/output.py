@@ -6,10 +6,14 @@ import os
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ppafo.cli.quick_imports import load_drawing
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, reason
+
+if TYPE_CHECKING:
+    from ppafo.answers import Answer
 
 EXIT_GOOD = 0
 EXIT_CHECK_FAILED = 1
@@ -73,6 +77,29 @@ def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.
         contents = {f"{name}.txt": text, f"{name}.json": json_text(document)}
         write_files(parsed, {file: f"{content}\n".encode() for file, content in contents.items()})
     print_result(text, document, parsed.json)
+
+
+def deliver_answer(answer: "Answer", parsed: argparse.Namespace, filled: str | None = None) -> int:
+    """Write an answer where asked, print it as text or JSON, and return the exit code.
+
+    ``filled`` is a folder that has the files already.
+    """
+    from ppafo.answers.text import text_of
+
+    text, folder = text_of(answer), filled
+    if filled is None and parsed.out is not None:
+        load_drawing()
+        from ppafo.answers.writing import files_of
+
+        write_files(parsed, files_of(answer))
+        folder = str(parsed.out)
+    if folder is not None:
+        from ppafo.answers.writing import REPORT
+
+        text += f"\n\nreport: {folder}/{REPORT}"
+    document = answer.data if folder is None else {**answer.data, "folder": folder}
+    print_result(text, document, parsed.json)
+    return EXIT_GOOD if answer.passed else EXIT_CHECK_FAILED
 
 
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:

@@ -1,15 +1,27 @@
-"""``ppafo plot DIR``: draws a saved result again, without running it again."""
+"""``ppafo plot DIR``: draws what a folder of results holds again, without running anything again."""
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ppafo.cli.output import EXIT_GOOD, add_json_argument, check_new_file, print_result
-from ppafo.errors import DataError
+from ppafo.cli.quick_imports import load_drawing
+from ppafo.errors import DataError, reason
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_FIGURE = "figure"
+_FORMATS = ("png", "svg")
+_PICTURES = (".png", ".gif")
+_END = 5.0
+"""Of a walk the last seconds are drawn, some strides: a minute of them is a black bar."""
+_NAMED = 6
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("folder", metavar="DIR", type=Path, help="a result folder")
+    parser.add_argument("folder", metavar="DIR", type=Path, help="a folder that a command of ppafo has written")
     add_json_argument(parser)
     parser.add_argument(
         "--out", metavar="FILE", type=Path, help="a .png, .svg or .pdf file; default figure.png and figure.svg in DIR"
@@ -17,23 +29,88 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Draw the figure and write it."""
-    from ppafo.reporting.figures import FIGURE_FORMATS, figure_files, stored_figure
-    from ppafo.reporting.style import rendered
-    from ppafo.storage import read_result
+    """Draw the figures of the folder and write them; where the folder has its figures already, say which."""
+    from ppafo.answers.recording_figure import FIGURE_FORMATS
+    from ppafo.answers.style import rendered
     from ppafo.storage.files import write_file
+    from ppafo.storage.owned_folder import add_to_marked_folder
 
     if parsed.out is not None and parsed.out.suffix.removeprefix(".") not in FIGURE_FORMATS:
         allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
         raise DataError(f"--out {parsed.out}: the name must end in one of {allowed}")
     if parsed.out is not None:
         check_new_file(parsed.out)
-    figure = stored_figure(read_result(parsed.folder))
-    if parsed.out is None:
-        contents = {parsed.folder / name: content for name, content in figure_files(figure).items()}
+    names = _names(parsed.folder)
+    load_drawing()
+    drawn = _drawn(parsed.folder, names)
+    if not drawn:
+        return _say_what_is_there(parsed, names)
+    if parsed.out is not None:
+        (content,) = rendered(next(iter(drawn.values())), [parsed.out.suffix.removeprefix(".")]).values()
+        written = [str(write_file(parsed.out, content))]
     else:
-        (content,) = rendered(figure, [parsed.out.suffix.removeprefix(".")]).values()
-        contents = {parsed.out: content}
-    written = [str(write_file(path, content)) for path, content in contents.items()]
+        files = {
+            f"{stem}.{form}": content
+            for stem, figure in drawn.items()
+            for form, content in rendered(figure, _FORMATS).items()
+        }
+        add_to_marked_folder(parsed.folder, files)
+        written = [str(parsed.folder / name) for name in files]
     print_result(f"written: {', '.join(written)}", {"files": written}, parsed.json)
+    return EXIT_GOOD
+
+
+def _names(folder: Path) -> list[str]:
+    """Return the names of what is in the folder, in order."""
+    if not folder.is_dir():
+        raise DataError(f"{folder}: is not a folder")
+    try:
+        return sorted(entry.name for entry in folder.iterdir())
+    except OSError as error:
+        raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
+
+
+def _drawn(folder: Path, names: list[str]) -> "dict[str, Figure]":
+    """Return figures by the stem of their files: of a run, a walk, a study or recordings of the rig; none of others."""
+    from ppafo.answers.recording_figure import recording_figure, stored_figure
+    from ppafo.questions.sweep.manifest import MANIFEST
+    from ppafo.questions.sweep.results import load_study_results
+    from ppafo.rig.folder import RIG_FILE
+    from ppafo.storage import read_recording, read_result
+    from ppafo.storage.owned_folder import MARK
+    from ppafo.storage.result_folder import NETCDF_FILE, RUN_FILE
+
+    if RUN_FILE in names:
+        return {_FIGURE: stored_figure(read_result(folder))}
+    if MANIFEST in names:
+        return {_FIGURE: load_study_results(folder).plot()}
+    if RIG_FILE in names:
+        tables = [name for name in names if name.endswith(".csv")]
+        return {name.removesuffix(".csv"): recording_figure(read_recording(folder / name)) for name in tables}
+    if NETCDF_FILE in names and MARK in names:
+        recording = read_recording(folder / NETCDF_FILE)
+        end = float(recording.time[-1])
+        remark = f"the last {_END:g} s of {end:.4g} s" if recording.duration > _END else ""
+        return {_FIGURE: recording_figure(recording.between(end - _END, end), recording.label, remark)}
+    return {}
+
+
+def _say_what_is_there(parsed: argparse.Namespace, names: list[str]) -> int:
+    """Say which figures a folder of ppafo has and which file to open; DataError where the folder is another."""
+    from ppafo.storage.owned_folder import MARK, marking_command
+
+    if MARK not in names:
+        raise DataError(f"{parsed.folder}: is not a folder of results of ppafo")
+    command = marking_command(parsed.folder)
+    pictures = [name for name in names if name.endswith(_PICTURES)]
+    page = next((name for name in names if name.endswith(".html")), None)
+    shown = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
+    has = f"has its figures ({shown})" if pictures else "has no figures"
+    opened = page or next((name for name in names if name.endswith(".txt")), MARK)
+    said = f"{parsed.folder}: the result of 'ppafo {command}' {has}; open {parsed.folder / opened}"
+    if parsed.out is not None:
+        raise DataError(f"--out {parsed.out}: nothing is drawn anew: {said}")
+    print_result(
+        said, {"files": [], "command": command, "figures": pictures, "open": str(parsed.folder / opened)}, parsed.json
+    )
     return EXIT_GOOD

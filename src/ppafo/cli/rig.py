@@ -67,9 +67,9 @@ def _list(parsed: argparse.Namespace) -> int:
 def _record(parsed: argparse.Namespace) -> int:
     load_compiler()
     from ppafo.rig.folder import check_rig_folder, write_rig_recording
-    from ppafo.rig.record import NOTICE, chosen_experiment, record
+    from ppafo.rig.record import NOTICE, find_experiment, record
 
-    chosen_experiment(parsed.experiment)
+    find_experiment(parsed.experiment)
     seed = _whole_number(parsed.seed)
     with named_option():
         check_rig_folder(parsed.out, parsed.experiment)

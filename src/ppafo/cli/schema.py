@@ -9,18 +9,18 @@ from ppafo.errors import DataError, nearest_name
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.schema",
     "scenario": "ppafo.simulation.schema",
-    "study": "ppafo.studies.sweep.declaration",
-    "tuning": "ppafo.studies.tuning.declaration",
+    "study": "ppafo.studies.declaration",
+    "tuning": "ppafo.questions.tune.file",
     "parts": "ppafo.parameters.parts.schema",
-    "design": "ppafo.studies.design.document",
-    "size": "ppafo.studies.sizing.document",
+    "design": "ppafo.questions.design.file",
+    "size": "ppafo.questions.size.file",
     "walk": "ppafo.walking.schema",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.column_map",
     "rig": "ppafo.rig.schema",
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",
-    "bottle": "ppafo.studies.endurance.declaration",
+    "bottle": "ppafo.questions.endurance.file",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 

@@ -72,7 +72,7 @@ def _simulated(scenario: "Scenario") -> "Result":
 
 def _save(result: "Result", check: "Check | None", folder: Path) -> None:
     load_drawing()
-    from ppafo.reporting.figures import figure_files
+    from ppafo.answers.recording_figure import figure_files
 
     checked = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
     result.save(folder, {**figure_files(result.plot()), **checked})
@@ -90,13 +90,13 @@ def _list(parsed: argparse.Namespace) -> int:
 
 
 def _text(result: "Result", check: "Check | None", folder: Path) -> str:
-    from ppafo.reporting.metrics_table import metrics_table, shown_check
+    from ppafo.answers.shown_metrics import metrics_lines
 
     head = f"{result.scenario.name}: {result.status.kind}"
-    checked = [] if check is None else [repr(shown_check(check)), ""]
+    checked = [] if check is None else [repr(check), ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
-    return "\n".join([head, "", *metrics_table(result.metrics), "", *checked, f"written: {folder} ({written})"])
+    return "\n".join([head, "", *metrics_lines(result.metrics), "", *checked, f"written: {folder} ({written})"])
 
 
 def _document(result: "Result", check: "Check | None", folder: Path) -> dict[str, Any]:

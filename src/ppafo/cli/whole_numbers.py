@@ -4,14 +4,17 @@ import math
 
 from ppafo.cli.arguments import UsageError
 
+_MOST_DIGITS = 40
+"""A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
+
 
 def whole_number(text: str | None, option: str) -> int | None:
     """Return a whole number from 0 on, None where the option was not given."""
     if text is None:
         return None
     digits = text.replace("_", "").replace(",", "")
-    if not digits.isascii() or not digits.isdecimal():
-        raise UsageError(f"{option} {text}: must be a whole number, 0 or more")
+    if not digits.isascii() or not digits.isdecimal() or len(digits) > _MOST_DIGITS:
+        raise UsageError(f"{option} {text}: must be a whole number, 0 or more, of at most {_MOST_DIGITS} digits")
     return int(digits)
 
 

@@ -1,4 +1,4 @@
-"""The controllers and profiles that a scenario can name. To add one: a module and one line here."""
+"""The controllers and profiles that a scenario can name. To add one here: a module and one line."""
 
 from ppafo.control.controllers import (
     constant,
@@ -13,10 +13,13 @@ from ppafo.control.controllers import (
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import constant as constant_profile
 from ppafo.control.profiles import ramp_hold, sine, tabulated
+from ppafo.kinds import Kinds
 
-CONTROLLERS: dict[str, ControllerKind] = {
-    kind.name: kind
-    for kind in (
+CONTROLLERS: Kinds[ControllerKind] = Kinds(
+    "ppafo.controllers",
+    "controller",
+    ControllerKind,
+    (
         constant.KIND,
         on_off.KIND,
         on_off_dead_zone.KIND,
@@ -25,9 +28,12 @@ CONTROLLERS: dict[str, ControllerKind] = {
         sliding_mode.KIND,
         damped_proportional.KIND,
         feedback_linearisation.KIND,
-    )
-}
+    ),
+)
 
-PROFILES: dict[str, ProfileKind] = {
-    kind.name: kind for kind in (constant_profile.KIND, ramp_hold.KIND, sine.KIND, tabulated.KIND)
-}
+PROFILES: Kinds[ProfileKind] = Kinds(
+    "ppafo.profiles",
+    "profile",
+    ProfileKind,
+    (constant_profile.KIND, ramp_hold.KIND, sine.KIND, tabulated.KIND),
+)

@@ -15,6 +15,11 @@ class ControllerKind:
     ``parameters`` is a NamedTuple class whose numbers, those of nested ones in their place, are the quantities in
     order; ``initial`` is the start of the state, a NamedTuple of floats or of further ones. ``update(parameters, state,
     reference, measurement, period)`` returns the command from -1 to 1 and the next state, once every ``period`` [s].
+    At a command of 0 a proportional valve is closed and both chambers hold their gas; a solenoid pair vents both.
+
+    ``restart(state, wanted, goes_on)`` is the state of a torque law while a task of a gait goes on (1) and where
+    another one begins (0), at a torque wanted [N m]; without it the law begins anew there. A law that
+    ``only_switches`` asks for full openings or none, so that it fits a pair of solenoid valves in walking.
     """
 
     name: str
@@ -24,6 +29,8 @@ class ControllerKind:
     parameters: type
     initial: Any
     update: Callable[..., Any]
+    restart: Callable[..., Any] | None = None
+    only_switches: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,4 +59,8 @@ class PythonController(Protocol):
         """Forget everything; called once before the run."""
 
     def update(self, time: float, reference: float, measurement: Measurement) -> float:
-        """Return the command from -1 to 1 at a time [s], for a reference [N m] and a measurement."""
+        """Return the command from -1 to 1 at a time [s], for a reference [N m] and a measurement.
+
+        Above 0 chamber 1 is joined to the supply and chamber 2 to the atmosphere, below 0 the other way round. At 0 a
+        proportional valve is closed and both chambers hold their gas; a solenoid pair vents both.
+        """

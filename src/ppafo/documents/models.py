@@ -1,11 +1,23 @@
 """The pieces of which the layouts of files are made: strict tables, values that may be left out, unions of kinds."""
 
-from typing import Annotated, Any, Union
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, Union
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from ppafo.documents.problems import first_problem
+from ppafo.documents.toml_text import TomlKind, label
+
+Model = TypeVar("Model", bound=BaseModel)
 
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
 """What the name of a set or scenario looks like."""
+
+STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+"""What is true of every table of a file: no other keys, no other types, finite numbers."""
+
+Text = Annotated[str, Field(min_length=1)]
+Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 
 _CONFIG = ConfigDict(strict=True, extra="forbid", frozen=True)
 
@@ -24,6 +36,16 @@ def optional(annotation: Any, description: str) -> Any:
 def one_of(models: list[Any]) -> Any:
     """Return the union of tables that are told apart by their ``kind``."""
     return Annotated[Union[tuple(models)], Field(discriminator="kind")]  # noqa: UP007
+
+
+def read_model(kind: TomlKind, model: type[Model], name_or_path: str | Path) -> tuple[Model, str]:
+    """Return a file by its name in the package or by its path, and what messages call it; the kind's error if wrong."""
+    file = label(str(name_or_path))
+    document = kind.parse(kind.read(name_or_path), file)
+    try:
+        return model.model_validate(document), file
+    except ValidationError as error:
+        raise kind.error(f"{file}: {first_problem(error.errors(include_url=False), model)}") from error
 
 
 def published_schema(model: type[BaseModel], title: str) -> dict[str, Any]:

@@ -126,7 +126,7 @@ _TEMPLATES = {
     "missing": "'{path}' is missing",
     "union_tag_not_found": "'{path}.kind' is missing",
     "string_type": "{path} = {value} must be a text in quotation marks",
-    "string_pattern_mismatch": "{path} = {value} must consist of small letters, digits, '-' and '_'",
+    "string_pattern_mismatch": "{path} = {value} must consist of lower-case letters, digits, '-' and '_'",
 }
 _SENTENCES: dict[str, Callable[[_Spot, ErrorDetails], str]] = {
     "extra_forbidden": _unknown_key,

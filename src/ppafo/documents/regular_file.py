@@ -17,7 +17,10 @@ def read_regular_file(path: Path, most: int | None = None) -> bytes:
         raise OSError(None, "it is a device or a pipe, not a regular file")
     if most is None or found.st_size <= most:
         with path.open("rb") as file:
-            content = file.read() if most is None else file.read(most + 1)
+            # Python takes the room for as much as is asked for; what grows meanwhile, or states no size, is read on.
+            content = file.read(found.st_size + 1)
+            if len(content) > found.st_size:
+                content += file.read() if most is None else file.read(most + 1 - len(content))
         if most is None or len(content) <= most:
             return content
     raise OSError(None, f"it is larger than {most / 1e6:g} MB, the most that is read of such a file")

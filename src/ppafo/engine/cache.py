@@ -17,13 +17,18 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
 
 from ppafo.documents.regular_file import read_regular_file
+from ppafo.engine.compile_errors import mistake
+from ppafo.engine.compile_times import SECONDS_FILE, announced, counted, expected_seconds
+from ppafo.engine.program_lock import LOCK, one_process
+from ppafo.engine.shared_functions import compile_text, run_text
+from ppafo.engine.source_text import without_origins
 from ppafo.errors import reason
 
 logger = logging.getLogger("ppafo")
@@ -38,7 +43,7 @@ MOST_BYTES = 500_000_000
 _PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
 """What the name of a program looks like; beside it, one of an earlier release, which lay in several files."""
 
-_ASIDE = re.compile(r"\.writing-[0-9a-f]{16}")
+_ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{_PROGRAM.pattern}")
 _LONGEST_ASIDE = 86400.0
 _CHECKSUMS = "checksums.json"
 _KEPT, _NOT_KEPT = "cache=True", "cache=False"
@@ -69,11 +74,32 @@ def cache_folder() -> Path | None:
 
 
 def load_generated(kind: str, source: str) -> ModuleType:
-    """Import the module with this source, from the cache where it is there and whole."""
-    name = f"ppafo_{kind}_{hashlib.sha256(source.encode()).hexdigest()[:24]}"
+    """Import the module with this source, from the cache where it is there and whole.
+
+    ProgramError where it cannot be compiled, in terms of the file that the function at fault was written in.
+    """
+    name = _name(kind, source)
     # A second thread must not get a module of which only the beginning has run.
     with _LOADING:
         return sys.modules[name] if name in sys.modules else _imported(name, source)
+
+
+def load_all(kind: str, sources: Iterable[str]) -> None:
+    """Import the modules with these sources; what is said of those that are compiled counts them."""
+    with _LOADING:
+        folder = cache_folder()
+        missing = [source for source in dict.fromkeys(sources) if not _is_there(_name(kind, source), folder)]
+        for number, source in enumerate(missing, 1):
+            with counted(number, len(missing)):
+                load_generated(kind, source)
+
+
+def _name(kind: str, source: str) -> str:
+    return f"ppafo_{kind}_{hashlib.sha256(without_origins(source).encode()).hexdigest()[:24]}"
+
+
+def _is_there(name: str, folder: Path | None) -> bool:
+    return name in sys.modules or (folder is not None and os.path.lexists(folder / f"{name}-{_machine()}"))
 
 
 def refusal(folder: Path | None) -> str:
@@ -89,7 +115,7 @@ def refusal(folder: Path | None) -> str:
         with contextlib.suppress(FileExistsError):
             folder.mkdir(mode=0o700)
         found = folder.lstat()
-        above = [place.stat() for place in folder.resolve().parents]
+        above = [place.stat() for place in Path(os.path.realpath(folder)).parents]
     except (OSError, ValueError) as error:
         return f"{folder} cannot be made: {reason(error)}"
     whose = _why_not_private(folder, found, above)
@@ -158,7 +184,8 @@ def _imported(name: str, source: str) -> ModuleType:
     if module is not None:
         return module
     try:
-        return _compiled_and_kept(kept, name, source)
+        with one_process(kept):
+            return _kept_module(kept, name, source) or _compiled_and_kept(kept, name, source)
     except OSError as error:
         logger.warning("ppafo: the compiled model is not kept in %s: %s", folder, reason(error))
         return _compiled_in_memory(name, source)
@@ -173,7 +200,7 @@ def _kept_module(kept: Path, name: str, source: str) -> ModuleType | None:
         _remove(kept)
         return None
     try:
-        module = _run(name, source, kept / f"{name}.py")
+        module = _run(name, source, kept / f"{name}.py", run_text)
         os.utime(kept)
     except OSError:  # another process has removed it in this instant, or the disk is full
         return sys.modules.get(name)
@@ -187,8 +214,10 @@ def _compiled_and_kept(kept: Path, name: str, source: str) -> ModuleType:
         aside.mkdir(mode=0o700)
         path = aside / f"{name}.py"
         path.write_text(source, encoding="utf-8")
-        with _told(f"kept in {kept.parent}"):
-            module = _run(name, source, path)
+        start = time.perf_counter()
+        with announced(expected_seconds(source, _named(kept.parent, _PROGRAM)), f"kept in {kept.parent}"):
+            module = _run(name, source, path, compile_text)
+        (aside / SECONDS_FILE).write_text(f"{time.perf_counter() - start:.2f}", encoding="ascii")
         (aside / _CHECKSUMS).write_text(json.dumps(_checksums(aside), indent=2), encoding="utf-8")
         with contextlib.suppress(OSError):  # another process was quicker, with the same program
             aside.rename(kept)
@@ -202,30 +231,25 @@ def _compiled_and_kept(kept: Path, name: str, source: str) -> ModuleType:
 
 
 def _compiled_in_memory(name: str, source: str) -> ModuleType:
-    with _told("not kept"):
-        return _run(name, source.replace(_KEPT, _NOT_KEPT), Path(f"<{name}>"))
+    with announced(expected_seconds(source, ()), "not kept"):
+        return _run(name, source.replace(_KEPT, _NOT_KEPT), Path(f"<{name}>"), compile_text)
 
 
-@contextlib.contextmanager
-def _told(where: str) -> Iterator[None]:
-    """Say that a program is being compiled, and at the end how long that took and where it is."""
-    logger.warning("ppafo: compiling a model for this computer; this takes some seconds ...")
-    start = time.perf_counter()
-    yield
-    logger.warning("ppafo: compiled in %.1f s and %s", time.perf_counter() - start, where)
-
-
-def _run(name: str, source: str, path: Path) -> ModuleType:
+def _run(name: str, source: str, path: Path, execute: Callable[[str, str, ModuleType], None]) -> ModuleType:
     """Return the module made by running its source; Python's own compiled file, which may be damaged, is not asked."""
     module = ModuleType(name)
     module.__file__ = str(path)
-    code = compile(source, str(path), "exec")
     sys.modules[name] = module
+    from numba.core.errors import NumbaError
+
     try:
         with _numba_files_beside_source():
             if path.is_absolute():
                 _check_numba_can_write(path.parent / "__pycache__")
-            exec(code, module.__dict__)  # the text that was generated here
+            execute(source, str(path), module)
+    except NumbaError as error:
+        del sys.modules[name]
+        raise mistake(str(error), source) from None
     except BaseException:
         del sys.modules[name]
         raise
@@ -268,9 +292,19 @@ def _is_whole(kept: Path) -> bool:
     """Tell whether a program's folder is as it was written, file by file."""
     try:
         stated = json.loads(read_regular_file(kept / _CHECKSUMS))
-        return not kept.is_symlink() and bool(stated) and stated == _checksums(kept)
+        return _is_own(kept) and bool(stated) and stated == _checksums(kept)
     except (OSError, ValueError, RecursionError):
         return False
+
+
+def _is_own(kept: Path) -> bool:
+    """Tell whether a program and all in it is this user's: one that came while others could write stays theirs."""
+    found = [place.lstat() for place in (kept, *kept.rglob("*"))]
+    if not hasattr(os, "geteuid"):
+        return stat.S_ISDIR(found[0].st_mode)
+    is_whose = all(item.st_uid in (0, os.geteuid()) for item in found)
+    folders = [item for item in found if stat.S_ISDIR(item.st_mode)]
+    return is_whose and found[0] in folders and not any(item.st_mode & _WRITTEN_BY_OTHERS for item in folders)
 
 
 def _checksums(folder: Path) -> dict[str, str]:

@@ -46,13 +46,15 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     add, program = rows.add, rows.program
     pressures = add(chamber_pressures_in_one_division)
     wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]"
+    thermal = ("thermal", "masses") if program.is_thermal else ()
+    warm = [f"thermal.temperature * (state.mass_{chamber} / masses.mass_{chamber})" for chamber in (1, 2)]
     return [
-        *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference")],
+        *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal)],
         f"pressure_1, pressure_2 = {pressures}(plant, state.angle, state.mass_1, state.mass_2)",
         f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
         f"wanted = {wanted if program.has_reference else '0.0'}",
         f"sample = {add(Sample)}(float(next_record), state.angle, state.angular_velocity, pressure_1, "
-        "pressure_2, torque, result.command, wanted)",
+        f"pressure_2, torque, result.command, wanted, {', '.join(warm if thermal else ['0.0', '0.0'])})",
     ]
 
 

@@ -1,5 +1,6 @@
 """The rows of one program in a lane block, and the lines that load and store them."""
 
+import re
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, final
@@ -17,6 +18,9 @@ FIRST_CACHE = 48 * 1024
 
 OWN_ROWS = 4
 """Rows of the parts of a step: length of a part, time before it and after its begin [s], error of its gas [-]."""
+
+_LOAD = re.compile(r"(?P<group>\w+) = (\(\)|\w+\([\w(), \[\]]*\))")
+"""Line that makes a group from cells alone; anything that it may call instead has no other effect either."""
 
 
 @lru_cache(maxsize=64)
@@ -82,5 +86,14 @@ def indented(lines: list[str], levels: int = 1) -> list[str]:
 
 
 def over_lanes(lines: list[str]) -> list[str]:
-    """A loop over all lanes of the block."""
-    return ["for lane in range(width):", *indented(lines)]
+    """A loop over all lanes of the block, without loads that nothing in it asks for: they take time to compile."""
+    kept: list[str] = []
+    asked: set[str] = set()
+    for line in reversed(lines):
+        load = _LOAD.fullmatch(line)
+        words = re.findall(r"\w+", line)
+        # A line that names its own group again, as in least = min(least, x), gathers over the lanes for what follows.
+        if load is None or load["group"] in asked or words.count(load["group"]) > 1:
+            kept.append(line)
+            asked.update(words)
+    return ["for lane in range(width):", *indented(kept[::-1])]

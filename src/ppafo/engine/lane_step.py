@@ -56,6 +56,20 @@ def parted_step(rows: LaneRows) -> list[str]:
         f"        longest = max(longest, {rows.remaining})",
         "    if longest == 0.0:",
         "        break",
+        "else:",
+        *indented(over_lanes(give_up(rows))),
+    ]
+
+
+def give_up(rows: LaneRows) -> list[str]:
+    """Lines that end a run whose step is not done after ``MOST_PARTS``: it failed where it is, and hurries on."""
+    failure, cause = rows.cells["result.failure_time"], rows.cells["result.too_many_parts"]
+    return [
+        rows.load("timing"),
+        f"time = step_index * timing.step + {rows.before}",
+        f"gives_up = {rows.remaining} > 0.0 and {failure} > time",
+        f"{cause} = 1.0 if gives_up else {cause}",
+        f"{failure} = time if gives_up else {failure}",
     ]
 
 
@@ -92,6 +106,8 @@ def measure(rows: LaneRows) -> list[str]:
         if program.angle is None:
             lines.append(f"begun, until = {add(motion.begin_part)}(plant, state, until)")
             lines += rows.keep("begun")
+    else:
+        lines.append("until = remaining if result.failure_time <= time else until")
     return [*lines, f"{rows.length} = until", f"{rows.remaining} = remaining"]
 
 
@@ -105,7 +121,8 @@ def phases(rows: LaneRows) -> list[list[str]]:
     if not is_free:
         return [*before, [*feed(rows), *finish(rows)]]
     error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
-    loaded = [rows.load("begun"), rows.load("change"), f"gas_error = {rows.error}"]
+    loaded = [rows.load("begun"), rows.load("change")]
+    loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
     return [*before, [*feed(rows), *rows.keep("change"), *error], [*loaded, *finish(rows)]]
 
 
@@ -161,49 +178,62 @@ def begin_gas(rows: LaneRows) -> str:
     """The first stage of the gas."""
     program, add = rows.program, rows.add
     given = f"port_1, port_2, length, {add(program.valve.port_flow_slopes)}"
+    if program.has_lines:
+        begun = f"state, masses, next_angle, {given}" if program.is_thermal else f"state, next_angle, {given}"
+        if program.is_thermal:
+            return f"gas = {add(supply_lines.begin_fed_thermal_gas)}(plant, thermal, lines, line_state, {begun})"
+        return f"gas = {add(supply_lines.begin_fed_gas)}(plant, lines, line_state, {begun})"
     if program.is_thermal:
         return f"gas = {add(thermal_gas.begin_thermal_gas)}(plant, thermal, state, masses, next_angle, {given})"
     if program.is_held:
         return f"gas = {add(pneumatics.begin_still_gas)}(plant, state, {given})"
-    if program.has_lines:
-        return f"gas = {add(supply_lines.begin_fed_gas)}(plant, lines, line_state, state, next_angle, {given})"
     return f"gas = {add(pneumatics.begin_moving_gas)}(plant, state, next_angle, {given})"
 
 
 def feed(rows: LaneRows) -> list[str]:
     """The second stage: the gas of the step, and in parts that may be refused the error of the gas."""
     program, add = rows.program, rows.add
-    lines = [*rows.load_first_stage(), connect(rows, "gas.lines.after")]
     flow = add(program.valve.port_flow)
-    if program.has_lines:
-        given = f"port_1, port_2, length, {flow}"
-        given_2 = f"port_2, length, {flow}"
-        return [
-            *lines,
-            f"change = {add(pneumatics.end_moving_gas)}(plant, gas.chambers, {given})",
-            f"line_state = {add(supply_lines.end_lines)}(plant, lines, line_state, gas, change, {given_2})",
-            *rows.store("line_state"),
-        ]
+    gas = "gas.chambers" if program.has_lines else "gas"
+    is_still = program.is_held and not program.has_lines
+    given = f"port_1, port_2, {flow}"
     if program.is_thermal:
-        lines += [f"second = {add(thermal_gas.second_thermal_stage)}(plant, thermal, gas, port_1, port_2, {flow})"]
-        lines += [f"change = {add(thermal_gas.thermal_change)}(plant, thermal, gas, second, length)"]
-        error = f"{add(thermal_gas.thermal_error)}(plant, gas, second, length)"
-        shifted = f"{add(thermal_gas.thermal_opening_error)}(plant, gas, shift, length)"
+        second = f"{add(thermal_gas.second_thermal_stage)}(plant, thermal, {gas}, {given})"
+        change = f"{add(thermal_gas.thermal_change)}(plant, thermal, {gas}, second, length)"
+        error = f"{add(thermal_gas.thermal_error)}(plant, {gas}, second, length)"
+        shifted = f"{add(thermal_gas.thermal_opening_error)}(plant, {gas}, shift, length)"
     else:
-        still = "gas" if program.is_held else "gas.still"
-        stage = pneumatics.second_still_stage if program.is_held else pneumatics.second_moving_stage
+        still = gas if is_still else f"{gas}.still"
         next_angle = "state.angle" if program.is_held else "begun.next_angle"
-        lines += [f"second = {add(stage)}(plant, gas, port_1, port_2, {flow})"]
-        change = pneumatics.still_change if program.is_held else pneumatics.moving_change
-        lines += [f"change = {add(change)}(plant, {still}, second, length)"]
+        stage = pneumatics.second_still_stage if is_still else pneumatics.second_moving_stage
+        second = f"{add(stage)}(plant, {gas}, {given})"
+        whole = pneumatics.still_change if is_still else pneumatics.moving_change
+        change = f"{add(whole)}(plant, {still}, second, length)"
         error = f"{add(pneumatics.gas_error)}(plant, {still}, second, {next_angle}, length)"
         shifted = f"{add(pneumatics.opening_error)}(plant, {still}, shift, {next_angle}, length)"
+    lines = [*rows.load_first_stage(), connect(rows, "gas.lines.after")]
+    lines += [f"second = {second}", f"change = {change}", *feed_lines(rows)]
     if not program.is_adaptive:
         return lines
+    if program.has_lines:
+        error = f"max({error}, {add(supply_lines.line_error)}(plant, lines, gas.lines.after, next_lines))"
     moves = program.valve.shift
     if moves is not None:
         lines += [rows.load("next_valve"), f"shift = {add(moves)}(valve_state, next_valve)"]
     return [*lines, f"gas_error = {error}" + (f" + {shifted}" if moves else "")]
+
+
+def feed_lines(rows: LaneRows) -> list[str]:
+    """Lines that bring regulators and lines to the end of the step, kept apart where it may be refused."""
+    program, add = rows.program, rows.add
+    if not program.has_lines:
+        return []
+    end = supply_lines.end_thermal_lines if program.is_thermal else supply_lines.end_lines
+    before, moved = ("plant, thermal", "second") if program.is_thermal else ("plant", "change")
+    given = f"{before}, lines, line_state, gas, {moved}, port_2, length, {add(program.valve.port_flow)}"
+    if program.is_adaptive:
+        return [f"next_lines = {add(end)}({given})", *rows.keep("next_lines")]
+    return [f"line_state = {add(end)}({given})", *rows.store("line_state")]
 
 
 def finish(rows: LaneRows) -> list[str]:
@@ -218,6 +248,7 @@ def finish(rows: LaneRows) -> list[str]:
     return [
         *lines,
         rows.load("next_valve"),
+        *([rows.load("next_lines")] if program.has_lines else []),
         "error = max(error, gas_error) / timing.tolerance",
         f"error = error if {positive(rows)} else {parts.MOST_ERROR!r}",
         f"refused = {add(parts.is_refused)}(error, length) and not result.failure_time <= time",
@@ -252,7 +283,12 @@ def end_motion(rows: LaneRows) -> list[str]:
     if program.walks:
         follow = rows.cells["gait_sensors.follow_rate"]
         given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, next_gait, length"
-        return [rows.load("next_gait"), f"after, walk = {add(walking.end_walk)}({given})", *rows.store("walk")]
+        lines = [rows.load("next_gait"), f"after, walk = {add(walking.end_walk)}({given})", *rows.store("walk")]
+        if program.is_thermal:
+            assumed = f"{add(walking.next_angle)}(plant, walk_before, begun)"
+            lines.insert(1, "walk_before = walk")
+            lines.append(f"after = {add(thermal_gas.after_motion)}(plant, thermal, after, {assumed}, after.angle)")
+        return lines
     if program.angle is None:
         lines = [f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, length)"]
         if program.is_thermal:
@@ -270,6 +306,7 @@ def store_all(rows: LaneRows, flag: str) -> list[str]:
         lines += rows.store("masses", "warmed", flag)
     if rows.program.is_adaptive:
         lines += rows.store("valve_state", "next_valve", flag)
+        lines += rows.store("line_state", "next_lines", flag) if rows.program.has_lines else []
     return lines
 
 
@@ -277,6 +314,7 @@ def positive(rows: LaneRows) -> str:
     """Condition that no mass is lost; false for what is no number."""
     names = ["after.mass_1", "after.mass_2"]
     names += ["warmed.mass_1", "warmed.mass_2"] if rows.program.is_thermal else []
+    names += ["next_lines.mass_1", "next_lines.mass_2"] if rows.program.has_lines else []
     return " and ".join(f"{name} > 0.0" for name in names)
 
 

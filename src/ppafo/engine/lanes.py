@@ -7,7 +7,7 @@ through the same instructions and no lane sees another.
 import math
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,10 +16,11 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.cache import load_generated
+from ppafo.engine.cache import load_all, load_generated
 from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lane_source import SAME_MOMENT, lane_source
+from ppafo.engine.lane_source import INLINE, SAME_MOMENT, write_lanes
 from ppafo.engine.program import Program
+from ppafo.engine.source_text import SourceCollector
 
 Floats = NDArray[np.float64]
 
@@ -80,10 +81,41 @@ class BatchResult:
     record: Floats
 
 
-@lru_cache(maxsize=64)
 def load_program(program: Program) -> ModuleType:
-    """The compiled module of a program, from the disk cache where it is there."""
-    return load_generated("lanes", lane_source(program))
+    """The compiled module of a program, from the disk cache where it is there.
+
+    A program is written anew where a number or function that it was made from stands for something else by now.
+    """
+    return loaded(_current_source(program))
+
+
+def load_programs(programs: Iterable[Program]) -> None:
+    """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
+    chosen = dict.fromkeys(programs)
+    if len(chosen) > 1:
+        load_all("lanes", map(_current_source, chosen))
+
+
+def _current_source(program: Program) -> str:
+    """The source of a program, written anew where it is out of date."""
+    collector, source = written(program)
+    if collector.is_current():
+        return source
+    written.cache_clear()
+    return written(program)[1]
+
+
+@lru_cache(maxsize=64)
+def written(program: Program) -> tuple[SourceCollector, str]:
+    """What a program is made from, and its source."""
+    collector = SourceCollector(INLINE)
+    return collector, write_lanes(program, collector)
+
+
+@lru_cache(maxsize=64)
+def loaded(source: str) -> ModuleType:
+    """The module of a source."""
+    return load_generated("lanes", source)
 
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:

@@ -10,7 +10,7 @@ from ppafo.engine.scheme.ankle_torque import DeviceShare
 from ppafo.engine.scheme.motion import FreePart, LedStep
 from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, StillGas
-from ppafo.engine.scheme.supply_lines import FedGas
+from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
 from ppafo.engine.scheme.thermal_flows import ThermalFlows
 from ppafo.engine.scheme.thermal_gas import ThermalGas
 from ppafo.engine.scheme.walking import WalkState, WalkStep
@@ -38,10 +38,14 @@ class LaneTiming(NamedTuple):
 
 
 class LaneResult(NamedTuple):
-    """Command in force [-], first time [s] at which a run left what is possible (huge where it did not)."""
+    """Command in force [-], first time [s] at which a run left what is possible (huge where it did not).
+
+    ``too_many_parts`` is 1 where it failed because a step was cut into more parts than are made of one.
+    """
 
     command: float
     failure_time: float
+    too_many_parts: float
 
 
 class NoParameters(NamedTuple):
@@ -57,7 +61,7 @@ class Program:
     ``slow_sensors`` True a bandwidth and ``late_signals`` True a delay. ``late_commands`` True adds a dead time before
     the valve. ``is_thermal`` True gives the gas an energy balance instead of a constant temperature. ``walks`` True
     puts the device on a walking leg, whose foot is free or where the ground and a gait lead it (``angle`` is None then;
-    its sensors are its own). ``has_lines`` True feeds a walking device from lines behind regulators instead of constant
+    its sensors are its own). ``has_lines`` True feeds the device from lines behind regulators instead of constant
     pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded samples
     lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names channels
     that are kept at some of them.
@@ -146,9 +150,11 @@ class Program:
         """Groups of numbers that the first stage of a step hands to the later phases, in order."""
         free = WalkStep if self.walks else FreePart
         begun = free if self.angle is None else (NoParameters if self.is_held else LedStep)
-        isothermal = StillGas if self.is_held else (FedGas if self.has_lines else MovingGas)
+        fed, free_gas = (FedThermalGas, ThermalGas) if self.is_thermal else (FedGas, MovingGas)
+        still = self.is_held and not self.is_thermal
+        gas = fed if self.has_lines else (StillGas if still else free_gas)
+        change = ThermalFlows if self.is_thermal else GasChange
         _, shown, _ = get_type_hints(self.valve.connect).values()
-        gas, change = (ThermalGas, ThermalFlows) if self.is_thermal else (isothermal, GasChange)
         return {
             **({"next_gait": GaitNow} if self.walks else {}),
             "begun": begun,
@@ -156,4 +162,5 @@ class Program:
             "shown": shown,
             **({"change": change} if self.angle is None else {}),
             **({"next_valve": self.valve.state} if self.is_adaptive else {}),
+            **({"next_lines": LineState} if self.is_adaptive and self.has_lines else {}),
         }

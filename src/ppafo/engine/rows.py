@@ -1,23 +1,37 @@
 """How NamedTuples of floats lie in the rows of a lane block: one row for each number, nested ones flattened."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from ppafo.engine.source_text import is_row
+from ppafo.engine.composed_names import is_row
 
 
-def leaf_paths(row: type, prefix: str) -> list[str]:
-    """Attribute paths of all numbers in a NamedTuple class (or a float), in order, each beginning with ``prefix``."""
-    if not is_row(row):
+def members(row: Any) -> list[tuple[str, Any]]:
+    """What a NamedTuple class or a tuple of a fixed length is made of: how each is got at (``.name``, ``[3]``), and it.
+
+    A field that is such a tuple is declared as ``Annotated[tuple[float, ...], 16]``, of floats or of NamedTuples.
+    """
+    if is_row(row):
+        hints = get_type_hints(row, include_extras=True)
+        return [(f".{name}", hints[name]) for name in row._fields]
+    if get_origin(row) is Annotated:
+        items, length = get_args(row)
+        return [(f"[{number}]", get_args(items)[0]) for number in range(length)]
+    return []
+
+
+def is_number(row: Any) -> bool:
+    """True for the type of a single number, false for a NamedTuple or a tuple."""
+    return not is_row(row) and get_origin(row) is not Annotated
+
+
+def leaf_paths(row: Any, prefix: str) -> list[str]:
+    """Paths of all numbers in a NamedTuple class (or a float), in order, each beginning with ``prefix``: ``a.b[3]``."""
+    if is_number(row):
         return [prefix]
-    paths = []
-    hints = get_type_hints(row)
-    for name in row._fields:  # type: ignore[attr-defined]
-        path = f"{prefix}.{name}"
-        paths += leaf_paths(hints[name], path) if is_row(hints[name]) else [path]
-    return paths
+    return [path for way, inner in members(row) for path in leaf_paths(inner, f"{prefix}{way}")]
 
 
 def row_numbers(groups: Mapping[str, type]) -> dict[str, int]:
@@ -26,21 +40,14 @@ def row_numbers(groups: Mapping[str, type]) -> dict[str, int]:
     return {path: number for number, path in enumerate(paths)}
 
 
-def row_expression(row: type, path: str, cells: dict[str, str], name_of: Callable[[type], str]) -> str:
+def row_expression(row: Any, path: str, cells: dict[str, str], name_of: Callable[[type], str]) -> str:
     """Source text that makes a NamedTuple (or a float) from the cells that hold its numbers; an empty one is ``()``."""
-    if not is_row(row):
+    if is_number(row):
         return cells[path]
-    fields = row._fields  # type: ignore[attr-defined]
-    if not fields:
+    inner = [row_expression(kind, f"{path}{way}", cells, name_of) for way, kind in members(row)]
+    if not inner:
         return "()"
-    hints = get_type_hints(row)
-    inner = [
-        row_expression(hints[name], f"{path}.{name}", cells, name_of)
-        if is_row(hints[name])
-        else cells[f"{path}.{name}"]
-        for name in fields
-    ]
-    return f"{name_of(row)}({', '.join(inner)})"
+    return f"{name_of(row)}({', '.join(inner)})" if is_row(row) else f"({', '.join(inner)},)"
 
 
 def leaves(row: Any) -> list[Any]:
@@ -75,7 +82,8 @@ def rebuilt(row: type, values: Iterable[Any]) -> Any:
     return _rebuild(row, iter(values))
 
 
-def _rebuild(row: type, values: Any) -> Any:
-    hints = get_type_hints(row)
-    fields = row._fields  # type: ignore[attr-defined]
-    return row(*[_rebuild(hints[name], values) if is_row(hints[name]) else next(values) for name in fields])
+def _rebuild(row: Any, values: Any) -> Any:
+    if is_number(row):
+        return next(values)
+    inner = [_rebuild(kind, values) for _, kind in members(row)]
+    return row(*inner) if is_row(row) else tuple(inner)

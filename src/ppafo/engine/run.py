@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lanes import Batch, BatchResult, Clock, run_batch
+from ppafo.engine.lane_step import MOST_PARTS
+from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.rows import table
@@ -26,7 +27,11 @@ Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
 
 NEVER_FAILED = 1.0e300
-NO_ENERGY = (0.0, 0.0, 0.0, 0.0)
+TOO_MANY_PARTS = (
+    f"a step was cut into {MOST_PARTS:,} parts and was still not done: try a smaller run.step, and look at the delays "
+    "of the valve, the inertia and the volumes (ppafo audit)"
+)
+"""Remedy for a run that ``LaneResult.too_many_parts`` ended."""
 WHOLE = 1.0e-9
 
 
@@ -110,7 +115,9 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     program = run.program
     command_steps, command_lag = whole_and_rest(run.command_delay, run.step)
     signal_steps, signal_lag = whole_and_rest(run.signal_delay, run.step)
-    timing = LaneTiming(run.step, run.period, command_lag, signal_lag, run.tolerance)
+    timing = LaneTiming(
+        step=run.step, period=run.period, command_lag=command_lag, signal_lag=signal_lag, tolerance=run.tolerance
+    )
     plant, valve = [run.plant, run.thermal], [run.valve]
     walk, walk_states = _walk_groups(run.walk)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
@@ -118,8 +125,8 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
-    masses = ThermalState(run.initial.mass_1, run.initial.mass_2, *NO_ENERGY) if program.is_thermal else NoParameters()
-    result = LaneResult(0.0, NEVER_FAILED)
+    masses = begun_masses(run.initial) if program.is_thermal else NoParameters()
+    result = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
     further = [*walk_states, *line_states, settled_sensors(run)]
     states = table(
         [result, Pace(run.step), run.initial, masses, program.valve.initial(), controller_state, *further], runs
@@ -161,6 +168,18 @@ def _program_and_clock(program: Program, counts: Floats) -> tuple[Program, Clock
     return own, Clock(int(step_count), int(steps_per_sample), every, int(signal_delay), int(command_delay))
 
 
+def begun_masses(initial: PlantState) -> ThermalState:
+    """True masses of gas at the reference temperature, and no energy yet."""
+    return ThermalState(
+        mass_1=initial.mass_1,
+        mass_2=initial.mass_2,
+        supplied_content=0.0,
+        vented_content=0.0,
+        heat_content=0.0,
+        gas_work=0.0,
+    )
+
+
 def settled_sensors(run: Run) -> SensorState | NoParameters:
     """Slow sensors that show what is true at the start of a run; nothing where there are none."""
     if not run.program.slow_sensors:
@@ -191,6 +210,7 @@ def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchR
     for index, batch in enumerate(batches):
         groups.setdefault((batch.program, batch.clock), []).append(index)
     results: dict[int, BatchResult] = {}
+    load_programs(program for program, _ in groups)
     for (program, clock), members in groups.items():
         parameters = np.concatenate([batches[index].parameters for index in members], axis=1)
         states = np.concatenate([batches[index].states for index in members], axis=1)

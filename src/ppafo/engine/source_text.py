@@ -1,32 +1,54 @@
 """Collects pure functions, with all they call, into the text of one stand-alone compiled module.
 
 The text holds everything that decides the machine code, so its hash names the module: a second start finds the
-compiled code on disk, and a change anywhere in the physics gives another name and is compiled anew.
+compiled code on disk, and a change anywhere in the physics gives another name and is compiled anew. What would run
+otherwise than in Python is refused, in terms of the file that it was written in.
 """
 
 import ast
-import builtins
 import inspect
+import re
 import textwrap
-import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from types import CodeType, FunctionType, ModuleType
+from typing import Any, Generic, NamedTuple
 
-from ppafo.errors import SimulationError
+from ppafo.engine.composed_names import Composer, is_row
+from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
+from ppafo.errors import ProgramError, one_line
 
-ALLOWED_MODULES = ("math",)
+ORIGIN = "# origin"
+"""Beginning of the line before each function that says which lines of which file it was made from."""
 
 
-def is_row(candidate: object) -> bool:
-    """True for a NamedTuple class."""
-    return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")
+class Read(NamedTuple):
+    """A name that was looked up while composing, and what it stood for."""
+
+    scope: Mapping[str, Any]
+    name: str
+    value: Any
+
+
+class Made(NamedTuple):
+    """A function as it was when it was composed."""
+
+    function: Any
+    code: CodeType
+    defaults: tuple[Any, ...] | None
+    named_defaults: dict[str, Any]
 
 
 def emitted_name(item: Any) -> str:
     """Name that a function or NamedTuple class gets in the generated module: its module path and its own name."""
-    path = item.__module__.removeprefix("ppafo.").replace(".", "_")
-    return f"{path}_{item.__qualname__}"
+    module = item.__module__ or ""
+    path = module.removeprefix("ppafo.") if module.startswith("ppafo.") else f"foreign.{module}"
+    return re.sub(r"\W", "_", f"{path}_{item.__qualname__}")
+
+
+def without_origins(source: str) -> str:
+    """The text without the lines that say where its functions stand: what decides the machine code."""
+    return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))
 
 
 @dataclass(slots=True)
@@ -35,87 +57,168 @@ class SourceCollector:
 
     decorator: str
     definitions: dict[str, str] = field(default_factory=dict)
+    owners: dict[str, Any] = field(default_factory=dict)
+    reads: list[Read] = field(default_factory=list)
+    functions: list[Made] = field(default_factory=list)
 
     def add(self, item: Callable[..., Any] | type) -> str:
         """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
+        if not is_row(item):
+            check_is_plain(item)
         name = emitted_name(item)
-        if name in self.definitions:
+        owner = self.owners.setdefault(name, item)
+        if owner is item and name in self.definitions:
             return name
-        if isinstance(item, type):
-            self.definitions[name] = self._row_text(item, name)
-        else:
-            text = self._function_text(item, name)
-            self.definitions[name] = f"{self.decorator}\n{text}"
+        if owner is not item:
+            self._check_is_the_same(item, owner, name)
+            return name
+        text = _row_text(item, name) if isinstance(item, type) else self._function_text(item, name)
+        self.definitions[name] = text
         return name
 
     def text(self) -> str:
         """All definitions, callees first."""
         return "\n\n\n".join(self.definitions.values())
 
-    def _row_text(self, row: type, name: str) -> str:
-        fields = row._fields  # type: ignore[attr-defined]
-        return f"{name} = namedtuple({name!r}, {list(fields)!r})"
+    def is_current(self) -> bool:
+        """True while every name and function that was composed is what it was then."""
+        return all(read.scope.get(read.name, read) is read.value for read in self.reads) and all(
+            made.function.__code__ is made.code
+            and made.function.__defaults__ is made.defaults
+            and (made.function.__kwdefaults__ or {}) == made.named_defaults
+            for made in self.functions
+        )
 
-    def _function_text(self, function: Callable[..., Any], name: str) -> str:
-        tree = _parsed(function)
-        tree.name = name
-        tree.returns = None
-        tree.decorator_list = []
-        for argument in tree.args.args:
+    def _check_is_the_same(self, item: Any, owner: Any, name: str) -> None:
+        """Refuse a second thing of the same name, unless it is the same text, as after a module was loaded anew."""
+        text = _row_text(item, name) if isinstance(item, type) else self._function_text(item, name)
+        if without_origins(text) != without_origins(self.definitions.get(name, "")):
+            raise ProgramError(
+                f"{place_of(item)}: '{item.__module__}.{item.__qualname__}' and "
+                f"'{owner.__module__}.{owner.__qualname__}' at {place_of(owner)} both get the name '{name}' in the "
+                f"compiled model; give one of them another name"
+            )
+
+    def _function_text(self, function: Any, name: str) -> str:
+        tree = parsed(function)
+        file = function.__code__.co_filename
+        made = Made(function, function.__code__, function.__defaults__, dict(function.__kwdefaults__ or {}))
+        if any(known.function is function for known in self.functions):
+            raise refusal(file, tree, f"'{function.__name__}' calls itself, which is not compiled")
+        self.functions.append(made)
+        composer = Composer(function, self.add, self._note)
+        arguments = tree.args
+        for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
             argument.annotation = None
-        if ast.get_docstring(tree) is not None:
-            tree.body = tree.body[1:]
-        local = set(function.__code__.co_varnames)
-        renamed = _Renamer(self, function, local).visit(tree)
-        return ast.unparse(ast.fix_missing_locations(renamed))
+        # What Python calls the function with, whatever the text of the default stands for by now.
+        arguments.defaults = [composer.literal(value, tree, "a default") for value in made.defaults or ()]
+        arguments.kw_defaults = [
+            composer.literal(made.named_defaults[item.arg], tree, "a default")
+            if item.arg in made.named_defaults
+            else None
+            for item in arguments.kwonlyargs
+        ]
+        body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
+        tree.name, tree.returns = name, None
+        tree.body = [composer.visit(statement) for statement in body]
+        lines = " ".join(map(str, [tree.lineno, *_line_numbers(tree.body), (tree.end_lineno or tree.lineno) + 1]))
+        text = ast.unparse(tree)
+        return f"{ORIGIN} {one_line(file)}: {lines}\n{self.decorator}\n{text}"
+
+    def _note(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
+        self.reads.append(Read(scope, name, value))
 
 
-def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
+def check_is_plain(function: Any) -> None:
+    """Refuse what is no plain function: its source text would not be what Python runs."""
+    name = getattr(function, "__qualname__", None) or repr(function)
+    if type(function) is not FunctionType:
+        if not callable(function):
+            raise ProgramError(f"cannot compile {name}: it is no function")
+        if type(function).__module__ == "builtins" and type(function).__name__ == "builtin_function_or_method":
+            raise ProgramError(f"cannot compile {name}: its source text is not available")
+        raise ProgramError(f"cannot compile {name}: it must be a plain function defined with 'def'")
+    where = place_of(function)
+    if hasattr(function, "__wrapped__"):
+        raise ProgramError(f"{where}: '{name}' is wrapped by a decorator, which is not compiled; take it off")
+    if function.__closure__:
+        names = ", ".join(f"'{item}'" for item in function.__code__.co_freevars)
+        raise ProgramError(
+            f"{where}: '{name}' uses {names} of the function around it, which is not compiled; make it a parameter"
+        )
+
+
+def place_of(item: Any) -> str:
+    """File and line of a function, the module of anything else."""
+    code = getattr(item, "__code__", None)
+    return f"module {item.__module__}" if code is None else place(code.co_filename, code.co_firstlineno)
+
+
+def parsed(function: FunctionType) -> ast.FunctionDef:
+    """The definition of a plain function with the lines of its file; refused where it is not what Python runs."""
+    code = function.__code__
+    file, name = code.co_filename, function.__qualname__
     try:
         text = textwrap.dedent(inspect.getsource(function))
     except (OSError, TypeError) as error:
-        raise SimulationError(f"cannot compile {function!r}: its source text is not available ({error})") from error
-    node = ast.parse(text).body[0]
-    if not isinstance(node, ast.FunctionDef):
-        raise SimulationError(f"cannot compile {function!r}: it must be a plain function defined with 'def'")
-    return node
+        reason = f"its source text is not available ({error})"
+        raise ProgramError(f"cannot compile {name}: {reason}") from error
+    try:
+        tree = ast.parse("\n" * (code.co_firstlineno - 1) + text).body[0]
+    except SyntaxError as error:
+        raise refusal(file, code.co_firstlineno, f"the source text of '{name}' cannot be read alone") from error
+    if not isinstance(tree, ast.FunctionDef) or tree.name != code.co_name:
+        raise refusal(file, code.co_firstlineno, f"'{name}' must be a plain function defined with 'def'")
+    if tree.decorator_list:
+        raise refusal(file, tree, f"'{name}' is decorated, which is not compiled; take the decorator off")
+    check_grammar(tree, file)
+    if _shape(code) not in (_shape(item) for item in _code_of(tree, function)):
+        changed = "is not what its source text says; the file has changed since it was loaded: start again"
+        raise refusal(file, tree, f"'{name}' {changed}")
+    check_flow(tree, file, code.co_varnames)
+    return tree
 
 
-class _Renamer(ast.NodeTransformer):
-    """Replaces every global name by a literal, a generated name or an allowed module."""
+def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType]:
+    """The code that Python makes of a definition: it calls what is in a module otherwise where it sees the import."""
+    names = function.__code__.co_names
+    modules = [name for name in names if isinstance(function.__globals__.get(name), ModuleType)]
+    imports = [ast.parse(f"import {name}").body[0] for name in modules]
+    for before in (imports, []):
+        module = compile(ast.Module([*before, tree], []), "<source>", "exec", dont_inherit=True)
+        yield next(item for item in module.co_consts if isinstance(item, CodeType) and item.co_name == tree.name)
 
-    def __init__(self, collector: SourceCollector, function: Callable[..., Any], local: set[str]) -> None:
-        self.collector = collector
-        self.function = function
-        self.local = local
 
-    def visit_Name(self, node: ast.Name) -> ast.expr:
-        if node.id in self.local:
-            return node
-        scope = self.function.__globals__
-        if node.id not in scope:
-            if hasattr(builtins, node.id):
-                return node
-            raise SimulationError(f"cannot compile {self.function.__qualname__}: it uses the unknown name '{node.id}'")
-        value = scope[node.id]
-        if isinstance(value, types.ModuleType) and value.__name__ in ALLOWED_MODULES:
-            return node
-        return self._stand_in(value, node.id, node.ctx)
+def _shape(code: CodeType) -> tuple[Any, ...]:
+    """What a code object computes, without the places of its lines and its docstring."""
+    constants = [(type(item), repr(item)) for item in code.co_consts if not isinstance(item, str)]
+    return code.co_code, code.co_names, code.co_varnames, code.co_argcount, code.co_kwonlyargcount, constants
 
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Replace ``module.name`` of a module of this package."""
-        module = self.function.__globals__.get(node.value.id) if isinstance(node.value, ast.Name) else None
-        is_global = isinstance(node.value, ast.Name) and node.value.id not in self.local
-        if is_global and isinstance(module, types.ModuleType) and module.__name__ not in ALLOWED_MODULES:
-            return self._stand_in(getattr(module, node.attr), f"{module.__name__}.{node.attr}", node.ctx)
-        return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
 
-    def _stand_in(self, value: Any, name: str, context: ast.expr_context) -> ast.expr:
-        if isinstance(value, bool | int | float):
-            return ast.Constant(value)
-        if isinstance(value, types.FunctionType) or is_row(value):
-            return ast.Name(self.collector.add(value), context)
-        raise SimulationError(
-            f"cannot compile {self.function.__qualname__}: '{name}' is not a number, a plain function, "
-            f"a NamedTuple or the module {' or '.join(ALLOWED_MODULES)}"
+def _row_text(row: Any, name: str) -> str:
+    """The NamedTuple class without what numbers have no use for; refused where that would change what it does."""
+    own = vars(row)
+    others = [base for base in row.__bases__[1:] if base is not Generic]
+    if row.__bases__[0] is not tuple or others:
+        raise ProgramError(
+            f"{row.__module__}.{row.__qualname__} must be a NamedTuple itself, not a class made from one"
         )
+    meanings = {item for item, value in own.items() if item.startswith("__") and isinstance(value, FunctionType)}
+    meanings -= set(vars(Read)) | {"__str__", "__format__"}
+    if meanings:
+        given = ", ".join(sorted(meanings))
+        raise ProgramError(f"{row.__module__}.{row.__qualname__} gives {given} a meaning, which is not compiled")
+    return f"{name} = namedtuple({name!r}, {list(row._fields)!r})"
+
+
+def _line_numbers(body: list[ast.stmt]) -> Iterator[int]:
+    """Line in its file of each line that ``ast.unparse`` writes for some statements."""
+    for statement in body:
+        yield statement.lineno
+        if isinstance(statement, ast.If | ast.For | ast.While):
+            yield from _line_numbers(statement.body)
+            otherwise = statement.orelse
+            is_elif = isinstance(statement, ast.If) and len(otherwise) == 1 and isinstance(otherwise[0], ast.If)
+            if otherwise and not is_elif:
+                yield otherwise[0].lineno
+            yield from _line_numbers(otherwise)

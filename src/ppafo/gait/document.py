@@ -45,17 +45,17 @@ def gait_file() -> type[BaseModel]:
     stride = {
         "time": (text, Field(description="from one heel strike to the next of the same foot, such as '1.04 s'")),
         "time_deviation": optional(text, "its standard deviation between strides"),
-        "stance_share": (text, Field(description="share of the stride until toe-off, such as '62 percent'")),
+        "stance_share": (text, Field(description="fraction of the stride until toe-off, such as '62 percent'")),
         "stance_share_deviation": optional(text, "its standard deviation between strides"),
         "count": (Annotated[int, Field(ge=0)], Field(0, description="number of strides behind the curves; 0: unknown")),
     }
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=100)),
-        "title": (str, Field("", description="one line on who walks how")),
+        "title": (str, Field("", description="one line: who walks, and how")),
         "origin": (Literal["measured", "synthetic"], Field(description="synthetic: made by a model, nobody walked so")),
         "source": (Annotated[str, Field(min_length=1)], Field(description="where the numbers come from")),
-        "notes": (str, Field("", description="what else should be known")),
+        "notes": (str, Field("", description="further remarks")),
         "subject": (table("Subject", subject), Field(description="the wearer")),
         "stride": (table("Stride", stride), Field(description="times of the stride")),
     }
@@ -79,7 +79,7 @@ def _curve_table(name: str, unit: str) -> type[BaseModel]:
             "unit": (units, Field(description="unit of every number of this curve")),
             "mean": (number, Field(description="mean over the stride")),
             "cosine": (series, Field(description="amplitudes of the cosines, first harmonic first")),
-            "sine": (series, Field(description="amplitudes of the sines, as many")),
+            "sine": (series, Field(description="amplitudes of the sines, as many as of the cosines")),
             "deviation": (
                 Annotated[number, Field(ge=0.0)],
                 Field(0.0, description="standard deviation between strides, root mean square over the stride"),

@@ -135,7 +135,7 @@ class Gait:
         if not (self.body_mass > 0.0 and self.stride_time > 0.0 and 0.0 < self.stance_share < 1.0):
             raise DataError(
                 f"gait '{self.name}': body mass {self.body_mass:g} kg and stride time {self.stride_time:g} s must be "
-                f"above 0, and the stance share {self.stance_share:g} between 0 and 1"
+                f"above 0, and the stance fraction {self.stance_share:g} between 0 and 1"
             )
 
     @property

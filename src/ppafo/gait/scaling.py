@@ -19,7 +19,7 @@ def speed_range(gait: Gait) -> tuple[float, float]:
 
     Downwards it ends at 1.03 m/s too, for a gait that was recorded faster.
     """
-    recorded = _recorded(gait)
+    recorded = _recorded_speed(gait)
     lowest = (1.0 - LARGEST_CHANGE) * recorded
     return max(lowest, min(recorded, SLOWEST_CONSTANT_WALK_RATIO)), (1.0 + LARGEST_CHANGE) * recorded
 
@@ -31,7 +31,7 @@ def at_speed(gait: Gait, speed: float) -> Gait:
     moments per mass, force in body weights and stance share stay as recorded, so only a small change is allowed. So
     does the way of the knee about its mean speed; its acceleration goes with 1/T^2.
     """
-    recorded = _recorded(gait)
+    recorded = _recorded_speed(gait)
     low, high = speed_range(gait)
     if not (math.isfinite(speed) and low * (1.0 - 1e-9) <= speed <= high * (1.0 + 1e-9)):
         raise DataError(
@@ -50,7 +50,7 @@ def at_speed(gait: Gait, speed: float) -> Gait:
     )
 
 
-def _recorded(gait: Gait) -> float:
+def _recorded_speed(gait: Gait) -> float:
     speed = gait.recorded_speed or gait.walking_speed
     if speed is None:
         raise DataError(f"gait '{gait.name}' has no walking speed, so it cannot be scaled; give one when importing it")

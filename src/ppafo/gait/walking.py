@@ -7,13 +7,13 @@ from ppafo.gait.gait import CURVES, Gait
 from ppafo.signals import Channel, Recording
 
 _RATE = 200.0
-_MOST_STRIDES = 100_000
+_MAXIMUM_STRIDES = 100_000
 
 
 def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:
     """Return so many equal strides at about ``rate`` samples a second, marked synthetic; SI units, package signs."""
-    if not 1 <= strides <= _MOST_STRIDES:
-        raise DataError(f"{strides} strides cannot be recorded; choose 1 to {_MOST_STRIDES}")
+    if not 1 <= strides <= _MAXIMUM_STRIDES:
+        raise DataError(f"{strides} strides cannot be recorded; choose 1 to {_MAXIMUM_STRIDES}")
     per_stride = max(10, round(rate * gait.stride_time))
     phase = np.arange(strides * per_stride + 1) / per_stride
     one = np.arange(per_stride) / per_stride

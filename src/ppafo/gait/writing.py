@@ -40,14 +40,14 @@ def _lines(gait: Gait) -> Iterator[str]:
 def _series(curve: Curve, si_unit: str) -> Iterator[str]:
     unit = WRITTEN_UNITS.get(si_unit, si_unit)
 
-    def written(value: float) -> str:
+    def number_text(value: float) -> str:
         return repr(float(f"{from_si(value, plain_unit(unit), plain_unit(si_unit)):.{_DIGITS}g}"))
 
     yield f"unit = {_text(unit)}"
-    yield f"mean = {written(curve.mean)}"
-    yield f"cosine = [{', '.join(map(written, curve.cosines))}]"
-    yield f"sine = [{', '.join(map(written, curve.sines))}]"
-    yield f"deviation = {written(curve.deviation)}"
+    yield f"mean = {number_text(curve.mean)}"
+    yield f"cosine = [{', '.join(map(number_text, curve.cosines))}]"
+    yield f"sine = [{', '.join(map(number_text, curve.sines))}]"
+    yield f"deviation = {number_text(curve.deviation)}"
 
 
 def _text(text: str) -> str:

@@ -1,4 +1,4 @@
-"""An estimate: one value of a parameter set, with its interval and a verdict in words."""
+"""An estimate, one value of a parameter set with interval and verdict, and what is asked before and after a fit."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Verdict = Literal[
 ]
 """What the recordings say about a value.
 
-Only the first is said where the model explains the recordings. The first three are fit to be used in a parameter set,
+Only the first is given where the model explains the recordings. The first three are fit to be used in a parameter set,
 the second and the third as fitted values that nobody should take for the device's own.
 """
 
@@ -25,7 +25,7 @@ _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only", "weak")
 
 WORTH_TELLING = 1.05
-"""Widening of an interval from which the law is said to miss the recordings."""
+"""Widening of an interval from which the law is reported to miss the recordings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +56,10 @@ class Estimate:
         if self.verdict not in _VERDICTS:
             raise IdentificationError(f"'{self.verdict}' is not a verdict; allowed are {', '.join(_VERDICTS)}")
         if not 0.0 < self.confidence < 1.0:
-            raise IdentificationError(f"a confidence lies between 0 and 1, not {self.confidence!r}")
+            raise IdentificationError(f"a confidence must lie between 0 and 1, not {self.confidence!r}")
         if self.is_usable and not (math.isfinite(self.value) and self.low <= self.value <= self.high):
             raise IdentificationError(
-                f"{self.path}: a value called '{self.verdict}' lies inside its interval, "
+                f"{self.path}: a value called '{self.verdict}' must lie inside its interval, "
                 f"not {self.value!r} in {self.low!r} to {self.high!r}"
             )
 
@@ -90,3 +90,21 @@ class Estimate:
     def relative_half_width(self) -> float:
         """Half the width of the interval over the size of the value [-]; infinite where the value is zero."""
         return self.half_width / abs(self.value) if self.value else math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A question that the residuals answer: its name, whether the answer is good, and the answer in words."""
+
+    name: str
+    holds: bool
+    statement: str
+
+
+@dataclass(frozen=True, slots=True)
+class Prospect:
+    """What recordings can give or cannot, known before anything is fitted: its name, whether, and why in words."""
+
+    name: str
+    can_be_had: bool
+    statement: str

@@ -14,7 +14,7 @@ from ppafo.parameters.parameter_set import (
     ParameterSet,
     atmospheric_pressure,
     has_one_pressure,
-    shown,
+    number_text,
 )
 from ppafo.parameters.provenance import Entry
 from ppafo.units import from_si
@@ -64,7 +64,9 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
         from_si(number, unit, si_unit, atmosphere) for number in (estimate.value, estimate.low, estimate.high)
     )
     was = (
-        "the set had no value" if before is None else f"the set had {shown(before)} ({before.origin}: {before.source})"
+        "the set had no value"
+        if before is None
+        else f"the set had {number_text(before)} ({before.origin}: {before.source})"
     )
     interval = f"{estimate.confidence:.0%} interval {low:.6g} to {high:.6g} {unit}".rstrip()
     entry = Entry(
@@ -113,3 +115,12 @@ def _device_problem(parameter_set: ParameterSet, valve: str | None) -> str:
     except ParameterError as error:
         return str(error)
     return ""
+
+
+def in_set_unit(number: float, path: str, si_unit: str, parameter_set: ParameterSet) -> tuple[float, str]:
+    """Return a number of a path in the unit that the set has for it, and this unit; as it is where the set has none."""
+    entry, quantity = parameter_set.numbers.get(path), parameter_set.declared().get(path)
+    if entry is None or quantity is None or entry.unit == si_unit:
+        return number, si_unit
+    si = fitting_unit(entry.unit, quantity)
+    return from_si(number, entry.unit, si, atmospheric_pressure(parameter_set)), entry.unit

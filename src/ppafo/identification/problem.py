@@ -4,33 +4,34 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from ppafo.documents.models import NAME, one_of, published_schema
 from ppafo.documents.problems import first_problem
 from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name, reason
-from ppafo.identification.trajectory.section import TrajectorySection
+from ppafo.identification.trajectory.section import STRICT, Text, TrajectorySection
 from ppafo.storage.column_map import ColumnMap
 
-_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-_Text = Annotated[str, Field(min_length=1)]
-_Recordings = Annotated[tuple[_Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
+_Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
 _Columns = Annotated[
-    _Text | None, Field(description="name of a column map; without one the file has units in its header")
+    Text | None, Field(description="name of a column map; without one the file has units in its header")
 ]
-_Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="of the intervals; 0.95 unless given")]
+_Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals; default 0.95")]
 _Calibration = Annotated[
     float, Field(ge=0.0, lt=0.5, description="relative uncertainty of the sensors' gain, at the same confidence")
 ]
-_Start = Annotated[_Text | None, Field(description="first time to use, such as '2 s'")]
-_End = Annotated[_Text | None, Field(description="last time to use, such as '8 s'")]
-_Gas = Annotated[_Text | None, Field(description="species of the gas on the bench; the set's unless given")]
+_Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
+_End = Annotated[Text | None, Field(description="last time to use, such as '8 s'")]
+_Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: that of the set")]
 _Temperature = Annotated[
-    _Text | None, Field(description="of the gas on the bench, such as '17 degC'; the set's unless given")
+    Text | None, Field(description="temperature of the gas on the bench, such as '17 degC'; default: that of the set")
 ]
-_Valve = Annotated[_Text | None, Field(description="name of the set's valve; the chosen one unless given")]
+_Valve = Annotated[Text | None, Field(description="name of a valve of the set; default: the chosen one")]
+
+PROCEDURES = ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak")
+"""Kinds of procedures in the recommended order."""
 
 _FILE = TomlKind(
     "identification problem", "identification", resources.files("ppafo.identification"), IdentificationError
@@ -40,9 +41,9 @@ _FILE = TomlKind(
 class StaticTorqueProblem(BaseModel):
     """Static torque over rising and falling pressure: torque constant and static friction."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    kind: Literal["static_torque"]
+    kind: Literal["static-torque"]
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
@@ -52,24 +53,26 @@ class StaticTorqueProblem(BaseModel):
 class FreeDecayProblem(BaseModel):
     """Free decay after an impulse: viscous damping and Coulomb friction."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    kind: Literal["free_decay"]
+    kind: Literal["free-decay"]
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
     calibration: _Calibration = 0.0
     start: _Start = None
     end: _End = None
-    inertia: Annotated[_Text | None, Field(description="'8.4 g m^2', or 'unknown'; the set's unless given")] = None
+    inertia: Annotated[
+        Text | None, Field(description="such as '8.4 g m^2', or 'unknown'; default: that of the set")
+    ] = None
 
 
 class OpenValveFlowProblem(BaseModel):
     """Flow through the fully open valve: Cd, or C and b of ISO 6358."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    kind: Literal["open_valve_flow"]
+    kind: Literal["open-valve-flow"]
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
@@ -77,15 +80,17 @@ class OpenValveFlowProblem(BaseModel):
     gas: _Gas = None
     temperature: _Temperature = None
     valve: _Valve = None
-    law: Annotated[Literal["orifice", "iso6358"], Field(description="the form in which the set gets it")] = "orifice"
+    law: Annotated[Literal["orifice", "iso6358"], Field(description="form in which it is written into the set")] = (
+        "orifice"
+    )
 
 
 class VaneLeakProblem(BaseModel):
     """Closed chambers losing pressure: the law of the leak, and its area where it is an orifice."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    kind: Literal["vane_leak"]
+    kind: Literal["vane-leak"]
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
@@ -94,17 +99,17 @@ class VaneLeakProblem(BaseModel):
     temperature: _Temperature = None
     start: _Start = None
     end: _End = None
-    angle: Annotated[_Text | None, Field(description="vane angle, from which the set's volumes follow")] = None
-    volume_1: Annotated[_Text | None, Field(description="volume of chamber 1 with its line, such as '40 cm^3'")] = None
-    volume_2: Annotated[_Text | None, Field(description="volume of chamber 2 with its line")] = None
+    angle: Annotated[Text | None, Field(description="vane angle, from which the set's volumes follow")] = None
+    volume_1: Annotated[Text | None, Field(description="volume of chamber 1 with its line, such as '40 cm^3'")] = None
+    volume_2: Annotated[Text | None, Field(description="volume of chamber 2 with its line")] = None
 
 
 class ValveMapProblem(BaseModel):
     """Command against flow: dead band, gain, saturation, hysteresis."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    kind: Literal["valve_map"]
+    kind: Literal["valve-map"]
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
@@ -117,12 +122,12 @@ class ValveMapProblem(BaseModel):
 class DeviceProblem(BaseModel):
     """The set to start from, its valve, and changes to it."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    set: Annotated[_Text, Field(description="name of a parameter set, or a path relative to this file")]
+    set: Annotated[Text, Field(description="name of a parameter set, or a path relative to this file")]
     valve: _Valve = None
     overrides: Annotated[
-        tuple[_Text, ...], Field(strict=False, description="changes to the set, kept in the new one")
+        tuple[Text, ...], Field(strict=False, description="changes to the set, kept in the new one")
     ] = ()
 
 
@@ -133,7 +138,7 @@ _KINDS = [StaticTorqueProblem, FreeDecayProblem, OpenValveFlowProblem, VaneLeakP
 class ProblemFile(BaseModel):
     """A problem file, as it is written."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100, description="name of the new parameter set")]
@@ -160,7 +165,7 @@ def load_problem(path: str | Path) -> ProblemFile:
 
 def parse_problem(content: bytes, file: str) -> ProblemFile:
     """Return the problem in the bytes of a TOML file; ``file`` is what messages call it."""
-    document = _FILE.parse(content, file)
+    document = _with_hyphens(_FILE.parse(content, file))
     try:
         problem = ProblemFile.model_validate(document)
     except ValidationError as error:
@@ -174,6 +179,21 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
             known = ", ".join(problem.columns) or "none"
             raise IdentificationError(f"{file}: {place}: there is no column map '{name}'{hint}; there are {known}")
     return problem
+
+
+def _with_hyphens(document: dict[str, Any]) -> dict[str, Any]:
+    """Return the document with the kinds of its procedures as they are spelled today; 0.1 wrote ``static_torque``."""
+    procedures = document.get("procedure")
+    if not isinstance(procedures, list):
+        return document
+    return {**document, "procedure": [_with_hyphen(item) for item in procedures]}
+
+
+def _with_hyphen(procedure: object) -> object:
+    kind = procedure.get("kind") if isinstance(procedure, dict) else None
+    if not isinstance(procedure, dict) or not isinstance(kind, str) or kind.replace("_", "-") not in PROCEDURES:
+        return procedure
+    return {**procedure, "kind": kind.replace("_", "-")}
 
 
 def _column_maps(problem: ProblemFile) -> list[tuple[str, str]]:

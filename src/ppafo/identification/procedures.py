@@ -10,23 +10,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.errors import IdentificationError, UnitError, nearest_name
-from ppafo.identification.bench.beforehand import (
-    data_prospects,
-    decay_prospects,
-    flow_prospects,
-    leak_prospects,
-    map_prospects,
-    static_prospects,
-)
-from ppafo.identification.bench.free_decay import FreeDecaySettings, free_decay
-from ppafo.identification.bench.gas_flow import GasAt
+from ppafo.identification.bench.flow_laws import GasAt
+from ppafo.identification.bench.free_decay import FreeDecaySettings, decay_prospects, free_decay
+from ppafo.identification.bench.inputs import data_prospects
 from ppafo.identification.bench.leak_samples import VaneLeakSettings
-from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, open_valve_flow
+from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, flow_prospects, open_valve_flow
 from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_torque
-from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
-from ppafo.identification.bench.vane_leak import vane_leak
-from ppafo.identification.check import Prospect
+from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_prospects, static_torque
+from ppafo.identification.bench.valve_map import ValveMapSettings, map_prospects, valve_map
+from ppafo.identification.bench.vane_leak import leak_prospects, vane_leak
+from ppafo.identification.estimate import Prospect
 from ppafo.identification.problem import (
     FreeDecayProblem,
     OpenValveFlowProblem,
@@ -40,7 +33,6 @@ from ppafo.model.gas import SPECIES
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
 from ppafo.units import parse_quantity, to_si
 
-RECOMMENDED_ORDER = ("static_torque", "free_decay", "open_valve_flow", "valve_map", "vane_leak")
 UNKNOWN = "unknown"
 _COLDEST, _HOTTEST = 150.0, 600.0
 
@@ -60,7 +52,7 @@ class Setting:
             raise IdentificationError(f"{self.place}: needs {path}, which {self.parameter_set.file} does not have")
         return value
 
-    def given(self, name: str, text: str | None, unit: str) -> float | None:
+    def quantity(self, name: str, text: str | None, unit: str) -> float | None:
         """Return a quantity of the problem file [unit], None where it was left out."""
         if text is None:
             return None
@@ -84,7 +76,7 @@ class Setting:
 
     def _temperature(self, text: str | None) -> tuple[float, float]:
         """Return the gas temperature [K] and half the width of its interval [K], which one that is given has not."""
-        given = self.given("temperature", text, "K")
+        given = self.quantity("temperature", text, "K")
         if given is None:
             return self.number("gas.temperature"), self.half_width("gas.temperature", "K")
         if not _COLDEST <= given <= _HOTTEST:
@@ -100,7 +92,7 @@ class Setting:
             return 0.0
         return to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
 
-    def valve_named(self, name: str | None) -> str:
+    def valve_path(self, name: str | None) -> str:
         """Return the path of a valve in the set, ``valves.main``."""
         return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
 
@@ -114,7 +106,7 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
 def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:
     """Return first and last time [s] that a procedure uses of its recordings."""
     texts = {name: getattr(problem, name, None) for name in ("start", "end")}
-    first, last = (setting.given(name, text, "s") for name, text in texts.items())
+    first, last = (setting.quantity(name, text, "s") for name, text in texts.items())
     return -math.inf if first is None else first, math.inf if last is None else last
 
 
@@ -129,7 +121,7 @@ def _static_torque(problem: StaticTorqueProblem, _setting: Setting) -> StaticTor
 
 
 def _free_decay(problem: FreeDecayProblem, setting: Setting) -> FreeDecaySettings:
-    start, end = (setting.given(name, getattr(problem, name), "s") for name in ("start", "end"))
+    start, end = (setting.quantity(name, getattr(problem, name), "s") for name in ("start", "end"))
     inertia, half_width, source = _inertia(problem, setting)
     return FreeDecaySettings(start, end, inertia, half_width, source, problem.confidence, problem.calibration)
 
@@ -139,7 +131,7 @@ def _inertia(problem: FreeDecayProblem, setting: Setting) -> tuple[float | None,
     if problem.inertia == UNKNOWN:
         return None, 0.0, ""
     if problem.inertia is not None:
-        value = setting.given("inertia", problem.inertia, "kg m^2")
+        value = setting.quantity("inertia", problem.inertia, "kg m^2")
         if value is None or value <= 0.0:
             raise IdentificationError(f"{setting.place}: inertia = {problem.inertia!r} must be above zero")
         return value, 0.0, "given in the problem"
@@ -151,19 +143,19 @@ def _inertia(problem: FreeDecayProblem, setting: Setting) -> tuple[float | None,
 
 
 def _open_valve_flow(problem: OpenValveFlowProblem, setting: Setting) -> OpenValveFlowSettings:
-    path = setting.valve_named(problem.valve)
+    path = setting.valve_path(problem.valve)
     area = number_in_si(setting.parameter_set, f"{path}.area")
     gas, sure = setting.gas(problem.gas, problem.temperature), (problem.confidence, problem.calibration)
     return OpenValveFlowSettings(gas, problem.law, area, path, *sure)
 
 
 def _valve_map(problem: ValveMapProblem, setting: Setting) -> ValveMapSettings:
-    gas, path = setting.gas(problem.gas, problem.temperature), setting.valve_named(problem.valve)
+    gas, path = setting.gas(problem.gas, problem.temperature), setting.valve_path(problem.valve)
     return ValveMapSettings(gas, path, problem.confidence, problem.calibration)
 
 
 def _vane_leak(problem: VaneLeakProblem, setting: Setting) -> VaneLeakSettings:
-    start, end = (setting.given(name, getattr(problem, name), "s") for name in ("start", "end"))
+    start, end = (setting.quantity(name, getattr(problem, name), "s") for name in ("start", "end"))
     volume_1, volume_2 = _volumes(problem, setting)
     forms = ("discharge_coefficient", "critical_ratio")
     coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
@@ -182,11 +174,11 @@ def _vane_leak(problem: VaneLeakProblem, setting: Setting) -> VaneLeakSettings:
 
 def _volumes(problem: VaneLeakProblem, setting: Setting) -> tuple[float | None, float | None]:
     """Return both volumes [m^3]: as given, else from the angle and the set, equations (4), (5); None where unknown."""
-    given = [setting.given(name, getattr(problem, name), "m^3") for name in ("volume_1", "volume_2")]
+    given = [setting.quantity(name, getattr(problem, name), "m^3") for name in ("volume_1", "volume_2")]
     for name, volume in zip(("volume_1", "volume_2"), given, strict=True):
         if volume is not None and volume <= 0.0:
             raise IdentificationError(f"{setting.place}: {name} = {getattr(problem, name)!r} must be above zero")
-    angle = setting.given("angle", problem.angle, "rad")
+    angle = setting.quantity("angle", problem.angle, "rad")
     if angle is None:
         return given[0], given[1]
     names = ("angle_min", "angle_max", "volume_per_angle", "dead_volume_1", "dead_volume_2")
@@ -207,9 +199,9 @@ class _Procedure:
 
 
 _PROCEDURES = {
-    "static_torque": _Procedure(_static_torque, static_prospects, static_torque),
-    "free_decay": _Procedure(_free_decay, decay_prospects, free_decay),
-    "open_valve_flow": _Procedure(_open_valve_flow, flow_prospects, open_valve_flow),
-    "valve_map": _Procedure(_valve_map, map_prospects, valve_map),
-    "vane_leak": _Procedure(_vane_leak, leak_prospects, vane_leak),
+    "static-torque": _Procedure(_static_torque, static_prospects, static_torque),
+    "free-decay": _Procedure(_free_decay, decay_prospects, free_decay),
+    "open-valve-flow": _Procedure(_open_valve_flow, flow_prospects, open_valve_flow),
+    "valve-map": _Procedure(_valve_map, map_prospects, valve_map),
+    "vane-leak": _Procedure(_vane_leak, leak_prospects, vane_leak),
 }

@@ -3,9 +3,11 @@
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
+from pathlib import Path
 
 from ppafo.signals import Recording
+from ppafo.storage.files import read_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +28,11 @@ class Source:
         return self.reference or self.recording.label
 
 
+def source_of(path: Path, recording: Recording) -> Source:
+    """Return a recording with the name and the hash of the file that it was read from; DataError if that is gone."""
+    return Source(recording, f"{path.name} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
+
+
 def traces(sources: tuple[Source, ...]) -> tuple[str, ...]:
     """Return what an estimate from these recordings names as its origin."""
     return tuple(source.trace for source in sources)
@@ -43,17 +50,30 @@ class Use:
     last: float
 
     def overlaps(self, other: "Use") -> bool:
-        """Whether both use samples of one time in one channel, should they be the same recording."""
-        return self.first < other.last and other.first < self.last and bool(self.channels & other.channels)
+        """Whether both use samples of one time in one channel, should they be the same recording.
+
+        Without channels all of them count.
+        """
+        is_alike = not (self.channels and other.channels) or bool(self.channels & other.channels)
+        return is_alike and self.first < other.last and other.first < self.last
 
 
-def used_twice(uses: Iterable[Use]) -> str:
+def double_use(uses: Iterable[Use]) -> str:
     """Return why some samples would count twice, an empty text where none do.
 
     Recordings are the same where the hash of their numbers is, under whatever names their files go.
     """
-    known = [(use, _digest(use.recording)) for use in uses]
-    for (one, digest), (other, second) in combinations(known, 2):
+    return _shared_samples(combinations([(use, _digest(use.recording)) for use in uses], 2))
+
+
+def common_use(ones: Iterable[Use], others: Iterable[Use]) -> str:
+    """Return why some samples would count twice, once in each of two groups of uses; an empty text where none do."""
+    first, second = ([(use, _digest(use.recording)) for use in group] for group in (ones, others))
+    return _shared_samples(product(first, second))
+
+
+def _shared_samples(pairs: Iterable[tuple[tuple[Use, str], tuple[Use, str]]]) -> str:
+    for (one, digest), (other, second) in pairs:
         if digest == second and one.overlaps(other):
             return (
                 f"{one.by} ({one.trace}) and {other.by} ({other.trace}) are the same recording, sha256 {digest[:12]} "

@@ -1,12 +1,13 @@
 """Every metric by name. To add one: a function and its MetricKind in a module of this folder, listed in METRICS."""
 
+from ppafo.kinds import Kinds
 from ppafo.metrics import gas, motion, switching, tracking
 from ppafo.metrics.metric import Metric, MetricKind
 from ppafo.signals import Recording
 
-METRICS: dict[str, MetricKind] = {
-    kind.name: kind for kind in (*tracking.METRICS, *gas.METRICS, *switching.METRICS, *motion.METRICS)
-}
+METRICS: Kinds[MetricKind] = Kinds(
+    "ppafo.metrics", "metric", MetricKind, (*tracking.METRICS, *gas.METRICS, *switching.METRICS, *motion.METRICS)
+)
 
 
 def evaluate(recording: Recording) -> dict[str, Metric]:

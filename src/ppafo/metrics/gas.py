@@ -46,6 +46,11 @@ def largest_pressure(recording: Recording) -> float:
     return float(max(np.max(recording["pressure_1"]), np.max(recording["pressure_2"])))
 
 
+def lowest_temperature(recording: Recording) -> float:
+    """Lowest temperature of the gas in either chamber [K]."""
+    return float(min(np.min(recording["temperature_1"]), np.min(recording["temperature_2"])))
+
+
 def mechanical_work(recording: Recording) -> float:
     """Work of the actuator on the vane [J]: integral of torque over angle, which is torque times speed over time.
 
@@ -83,6 +88,27 @@ def update_largest_pressure(state: LargestPressure, course: Course, sample: Samp
 
 
 LARGEST_PRESSURE = MeterKind("largest_pressure", LargestPressure, start_largest_pressure, update_largest_pressure)
+
+
+class LowestTemperature(NamedTuple):
+    """Lowest temperature of the gas in either chamber [K]."""
+
+    temperature: float
+
+
+def start_lowest_temperature(course: Course, sample: Sample) -> LowestTemperature:
+    """The lower temperature of the first sample."""
+    return LowestTemperature(min(sample.temperature_1, sample.temperature_2))
+
+
+def update_lowest_temperature(state: LowestTemperature, course: Course, sample: Sample) -> LowestTemperature:
+    """The lowest one of that and both temperatures of the next sample."""
+    return LowestTemperature(min(state.temperature, sample.temperature_1, sample.temperature_2))
+
+
+LOWEST_TEMPERATURE = MeterKind(
+    "lowest_temperature", LowestTemperature, start_lowest_temperature, update_lowest_temperature
+)
 
 
 class Work(NamedTuple):
@@ -127,6 +153,12 @@ def read_largest_pressure(readings: Readings) -> Floats:
     return pressure
 
 
+def read_lowest_temperature(readings: Readings) -> Floats:
+    """``lowest_temperature`` [K]; nan for gas without an energy balance."""
+    temperature: Floats = readings.meters[LOWEST_TEMPERATURE.name].temperature
+    return temperature if set(ENERGIES) <= set(readings.gains) else np.full_like(temperature, np.nan)
+
+
 def read_mechanical_work(readings: Readings) -> Floats:
     """``mechanical_work`` [J]."""
     work: Floats = readings.meters[WORK.name].work
@@ -153,6 +185,7 @@ ENERGIES = ("supplied_enthalpy", "vented_enthalpy", "wall_heat", "gas_work", "ga
 _MOTION = ("torque", "angle")
 _EFFORT = ("torque", "angle", "supplied_mass")
 _PRESSURES = ("pressure_1", "pressure_2")
+_TEMPERATURES = ("temperature_1", "temperature_2")
 
 METRICS = (
     MetricKind(
@@ -198,6 +231,15 @@ METRICS = (
         largest_pressure,
         read_largest_pressure,
         (LARGEST_PRESSURE,),
+    ),
+    MetricKind(
+        "lowest_temperature",
+        "K",
+        "lowest temperature of the gas in either chamber, of a gas with an energy balance",
+        _TEMPERATURES,
+        lowest_temperature,
+        read_lowest_temperature,
+        (LOWEST_TEMPERATURE,),
     ),
     MetricKind(
         "mechanical_work",

@@ -35,6 +35,11 @@ def peak_error(recording: Recording) -> float:
     return float(np.max(np.abs(recording["reference"] - recording["torque"])))
 
 
+def final_error(recording: Recording) -> float:
+    """Absolute difference of reference and torque at the last sample [N m]."""
+    return float(abs(recording["reference"][-1] - recording["torque"][-1]))
+
+
 class SquaredError(NamedTuple):
     """Squared error at the last sample [N^2 m^2]; trapezoidal sums of it before the hold and on it, one a sample."""
 
@@ -84,6 +89,25 @@ def update_peak_error(state: PeakError, course: Course, sample: Sample) -> PeakE
 PEAK_ERROR = MeterKind("peak_error", PeakError, start_peak_error, update_peak_error)
 
 
+class FinalError(NamedTuple):
+    """Absolute error of the last sample so far [N m]."""
+
+    error: float
+
+
+def start_final_error(course: Course, sample: Sample) -> FinalError:
+    """The error of the first sample."""
+    return FinalError(abs(sample.reference - sample.torque))
+
+
+def update_final_error(state: FinalError, course: Course, sample: Sample) -> FinalError:
+    """The error of the next sample."""
+    return FinalError(abs(sample.reference - sample.torque))
+
+
+FINAL_ERROR = MeterKind("final_error", FinalError, start_final_error, update_final_error)
+
+
 def read_rms_error(readings: Readings) -> Floats:
     """``rms_error`` [N m]."""
     squares = readings.meters[SQUARED_ERROR.name]
@@ -108,6 +132,12 @@ def read_peak_error(readings: Readings) -> Floats:
     return error
 
 
+def read_final_error(readings: Readings) -> Floats:
+    """``final_error`` [N m]."""
+    error: Floats = readings.meters[FINAL_ERROR.name].error
+    return error
+
+
 _RMS = "root-mean-square torque error"
 
 METRICS = (
@@ -120,5 +150,14 @@ METRICS = (
     ),
     MetricKind(
         "peak_error", "N m", "largest torque error, either sign", _NEEDED, peak_error, read_peak_error, (PEAK_ERROR,)
+    ),
+    MetricKind(
+        "final_error",
+        "N m",
+        "torque error at the end, without its sign",
+        _NEEDED,
+        final_error,
+        read_final_error,
+        (FINAL_ERROR,),
     ),
 )

@@ -6,13 +6,17 @@ exponential does not; here such a function is called as it is, once for each com
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+Number = TypeVar("Number", float, NDArray[np.float64])
+"""A float, or an array of them: what a function of plain arithmetic takes and gives back."""
+Result = TypeVar("Result")
 
-def over_runs(function: Callable[..., Any], *arguments: Any) -> Any:
+
+def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
     """Result of a function of floats; where an argument is an array (runs,), every number of it is one too.
 
     The function returns a float or a tuple, nested ones and NamedTuples among them, of the same shape for all runs.
@@ -21,10 +25,11 @@ def over_runs(function: Callable[..., Any], *arguments: Any) -> Any:
     if not varied:
         return function(*arguments)
     distinct, places = _distinct(varied)
-    return _gathered([function(*_filled(arguments, values)) for values in distinct], places)
+    gathered: Result = _gathered([function(*_filled(arguments, values)) for values in distinct], places)
+    return gathered
 
 
-def root(number: Any) -> Any:
+def root(number: Number) -> Number:
     """Square root of a number or of each in a column."""
     return np.sqrt(number) if isinstance(number, np.ndarray) else math.sqrt(number)
 

@@ -36,7 +36,7 @@ def specific_gas_constant(universal_gas_constant: float, molar_mass: float) -> f
 
 def critical_pressure_ratio(heat_capacity_ratio: float) -> float:
     """Downstream over upstream pressure [-] at and below which flow is choked; the inverse of the paper's 1.832."""
-    return over_runs(_critical_ratio, heat_capacity_ratio)  # type: ignore[no-any-return]
+    return over_runs(_critical_ratio, heat_capacity_ratio)
 
 
 def _critical_ratio(k: float) -> float:
@@ -46,7 +46,7 @@ def _critical_ratio(k: float) -> float:
 def choked_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
     """C1 [s/m] of equation (6), with the exponent (k + 1)/(k - 1); ``gas_constant`` is the specific one."""
     power = over_runs(_choked_power, heat_capacity_ratio)
-    return root(heat_capacity_ratio / (gas_constant * temperature) * power)  # type: ignore[no-any-return]
+    return root(heat_capacity_ratio / (gas_constant * temperature) * power)
 
 
 def _choked_power(k: float) -> float:

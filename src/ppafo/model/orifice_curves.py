@@ -63,7 +63,7 @@ def sonic_conductance_mass(sonic_conductance: float, gas_constant: float, temper
     air_constant = 1.0e5 / (STANDARD_REFERENCE_DENSITY_AIR * STANDARD_REFERENCE_TEMPERATURE)
     warmth = root(STANDARD_REFERENCE_TEMPERATURE / temperature)
     same_gas = sonic_conductance * STANDARD_REFERENCE_DENSITY_AIR * warmth
-    return same_gas * root(air_constant / gas_constant)  # type: ignore[no-any-return]
+    return same_gas * root(air_constant / gas_constant)
 
 
 def _gaps(critical_ratio: float) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
+from ppafo.model.columns import Number
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.ports import BlendedPort, SinglePort
 from ppafo.model.vane import actuator_torque, gravity_torque, net_driving_torque
@@ -57,10 +58,12 @@ class ThermalParameters(NamedTuple):
     """Gas with an energy balance: heat capacity ratio [-], and what the walls give, h a (k - 1)/R [kg/(s m^3)].
 
     ``h`` is the heat transfer coefficient, ``a`` the wall's area over the volume, ``R`` the specific gas constant.
+    ``temperature`` is that of the walls and the source [K], at which ``PlantState`` counts the gas.
     """
 
     heat_capacity_ratio: float
     wall_exchange: float
+    temperature: float
 
 
 class ThermalState(NamedTuple):
@@ -87,14 +90,14 @@ class Openings(NamedTuple):
     vent_2: float
 
 
-def chamber_volumes(plant: PlantParameters, angle: float) -> tuple[float, float]:
+def chamber_volumes(plant: PlantParameters, angle: Number) -> tuple[Number, Number]:
     """Volumes of both chambers [m^3] at an angle [rad]. Equations (4), (5)."""
     volume_1 = chamber_1_volume(angle, plant.angle_min, plant.volume_per_angle, plant.dead_volume_1)
     volume_2 = chamber_2_volume(angle, plant.angle_max, plant.volume_per_angle, plant.dead_volume_2)
     return volume_1, volume_2
 
 
-def chamber_pressures(plant: PlantParameters, angle: float, mass_1: float, mass_2: float) -> tuple[float, float]:
+def chamber_pressures(plant: PlantParameters, angle: Number, mass_1: Number, mass_2: Number) -> tuple[Number, Number]:
     """Absolute pressures of both chambers [Pa]. Equation (3)."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
     pressure_1 = chamber_pressure(mass_1, volume_1, plant.gas_product)

@@ -6,10 +6,9 @@ and on any number of threads.
 
 from typing import NamedTuple
 
+from ppafo.model.turns import DOUBLINGS, SMALLEST_SHARE, TERMS
+
 MASK = 0xFFFFFFFF
-DOUBLINGS = 12
-SMALLEST_SHARE = 0.5**DOUBLINGS
-TERMS = 9
 ARRIVAL = 40.0
 """Time over the time constant of a sensor after which it has arrived to rounding."""
 

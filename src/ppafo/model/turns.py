@@ -1,6 +1,12 @@
-"""Sine and cosine of an angle in turns, written so that they run in many lanes at once."""
+"""Functions of an angle or a decay as short series, written so that they run in many lanes at once."""
 
 TURN = 6.283185307179586
+
+DOUBLINGS = 12
+"""A function of a whole step is summed at a share of it, and doubled so often up to the whole."""
+SMALLEST_SHARE = 0.5**DOUBLINGS
+TERMS = 9
+"""Terms of such a series, with the one of order 0."""
 
 
 def sine_and_cosine(turns: float) -> tuple[float, float]:

@@ -1,5 +1,7 @@
 """The vane with the foot plate: torques and acceleration. Equations (1) and (2)."""
 
+from ppafo.model.columns import Number
+
 QUARTER_TURN = 1.5707963267948966
 
 
@@ -8,7 +10,7 @@ def actuator_torque(pressure_1: float, pressure_2: float, torque_constant: float
     return torque_constant * (pressure_1 - pressure_2)
 
 
-def gravity_torque(angle: float, largest_torque: float) -> float:
+def gravity_torque(angle: Number, largest_torque: float) -> Number:
     """Torque [N m] that gravity takes from the vane (it is subtracted in equation (1)), for an upright shank.
 
     The foot plate is level at 90 deg, where gravity pulls the toes down with ``largest_torque`` = m g l, that is in
@@ -17,8 +19,7 @@ def gravity_torque(angle: float, largest_torque: float) -> float:
     """
     slope = angle - QUARTER_TURN
     square = slope * slope
-    cosine = 1.0 / 479001600.0
-    cosine = cosine * square - 1.0 / 3628800.0
+    cosine = 1.0 / 479001600.0 * square - 1.0 / 3628800.0
     cosine = cosine * square + 1.0 / 40320.0
     cosine = cosine * square - 1.0 / 720.0
     cosine = cosine * square + 1.0 / 24.0

@@ -26,7 +26,7 @@ from ppafo.parameters.parameter_set import (
     atmospheric_pressure,
     chosen_valve,
     entry_in_si,
-    shown,
+    number_text,
     with_second_pressure,
 )
 
@@ -63,7 +63,7 @@ def _reader(parameter_set: ParameterSet) -> Callable[[str], float]:
 
     def read(path: str) -> float:
         entry = parameter_set.numbers[path]
-        given = f"{parameter_set.file}: {path} = {shown(entry)}"
+        given = f"{parameter_set.file}: {path} = {number_text(entry)}"
         try:
             value = entry_in_si(entry, declared[path], atmosphere)
         except UnitError as error:
@@ -175,5 +175,5 @@ def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
 def _check_consistent(parameter_set: ParameterSet, device: Device) -> None:
     for path, relation, other, holds in consistency(device):
         if not holds:
-            given, limit = shown(parameter_set.numbers[path]), shown(parameter_set.numbers[other])
+            given, limit = number_text(parameter_set.numbers[path]), number_text(parameter_set.numbers[other])
             raise ParameterError(f"{parameter_set.file}: {path} = {given} must be {relation} {other} = {limit}")

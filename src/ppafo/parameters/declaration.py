@@ -47,13 +47,13 @@ ACTUATOR = (
     Quantity("restitution", "", "rebound speed over impact speed at a stop", minimum=0.0, maximum=1.0),
 )
 FRICTION = (
-    Quantity("static_torque", "N m", "largest friction torque at rest", minimum=0.0, maximum=1e4),
+    Quantity("static_torque", "N m", "maximum friction torque at rest", minimum=0.0, maximum=1e4),
     Quantity("dynamic_torque", "N m", "friction torque in motion", minimum=0.0, maximum=1e4),
     Quantity("viscous_damping", "N m s/rad", "friction torque per angular velocity", minimum=0.0, maximum=1e4),
 )
 FOOT_PLATE = (
     Quantity("inertia", "kg m^2", "inertia about the ankle", minimum=0.0, maximum=1e3, minimum_allowed=False),
-    Quantity("gravity_torque", "N m", "largest gravity torque about the ankle, m g l", minimum=0.0, maximum=1e4),
+    Quantity("gravity_torque", "N m", "maximum gravity torque about the ankle, m g l", minimum=0.0, maximum=1e4),
 )
 SUPPLY = (
     Quantity("pressure", "Pa_a", "regulated pressure to chamber 1", minimum=1e3, maximum=1e8),
@@ -72,7 +72,7 @@ REPORTED = (
     Quantity("smallest_angle", "rad", "smallest angle that was used or measured"),
     Quantity("largest_angle", "rad", "largest angle that was used or measured"),
     Quantity("other_supply_pressure", "Pa_a", "a second supply pressure used in experiments"),
-    Quantity("demanded_torque", "N m", "largest torque that a task asks for"),
+    Quantity("demanded_torque", "N m", "maximum torque that a task requires"),
 )
 REPORTED_FORMULA = "choked_flow_exponent"
 REPORTED_OF_A_VALVE = (
@@ -113,10 +113,10 @@ def quantities(valve_kinds: Mapping[str, str]) -> Mapping[str, Quantity]:
 
 @functools.lru_cache(maxsize=32)
 def _by_path(valve_kinds: tuple[tuple[str, str], ...]) -> Mapping[str, Quantity]:
-    return MappingProxyType({quantity.name: quantity for quantity in _declared(valve_kinds)})
+    return MappingProxyType({quantity.name: quantity for quantity in _declare(valve_kinds)})
 
 
-def _declared(valve_kinds: Iterable[tuple[str, str]]) -> Iterator[Quantity]:
+def _declare(valve_kinds: Iterable[tuple[str, str]]) -> Iterator[Quantity]:
     for section, members in SECTIONS.items():
         yield from (_at(section, member) for member in members)
     for name, kind in valve_kinds:

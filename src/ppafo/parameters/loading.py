@@ -10,12 +10,13 @@ from pydantic import BaseModel, ValidationError
 from ppafo.documents.problems import first_problem
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import apply_overrides
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve
 from ppafo.parameters.provenance import Entry, FlagEntry, TextEntry
-from ppafo.parameters.schema import PARAMETER_FILE
+from ppafo.parameters.schema import parameter_file
 from ppafo.units import check_unit
 
 _FILE = TomlKind("parameter set", "parameters", resources.files("ppafo.parameters") / "sets", ParameterError)
@@ -43,17 +44,27 @@ def load_parameter_set(name_or_path: str | Path) -> ParameterSet:
 def parse_parameter_set(content: bytes, file: str) -> ParameterSet:
     """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it."""
     document = _FILE.parse(content, file)
+    _find_valves(document)
     try:
-        parsed = PARAMETER_FILE.model_validate(document)
+        parsed = parameter_file().model_validate(document)
     except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), PARAMETER_FILE)
+        problem = first_problem(error.errors(include_url=False), parameter_file())
         raise ParameterError(f"{file}: {problem}") from error
-    parameter_set = _flattened(parsed, file)
+    parameter_set = _flatten(parsed, file)
     _check(parameter_set)
     return parameter_set
 
 
-def _flattened(parsed: Any, file: str) -> ParameterSet:
+def _find_valves(document: dict[str, Any]) -> None:
+    """Load the kinds of valves that a set names, where they are those of other packages."""
+    valves = document.get("valves")
+    for valve in valves.values() if isinstance(valves, dict) else ():
+        kind = valve.get("kind") if isinstance(valve, dict) else None
+        if isinstance(kind, str):
+            VALVES.get(kind)
+
+
+def _flatten(parsed: Any, file: str) -> ParameterSet:
     leaves = dict(_leaves(parsed, ""))
     return ParameterSet(
         file=file,

@@ -13,8 +13,8 @@ from ppafo.parameters.parameter_set import (
     atmospheric_pressure,
     chosen_valve,
     entry_in_si,
+    entry_text,
     has_one_pressure,
-    written,
 )
 from ppafo.parameters.provenance import Entry, FlagEntry, TextEntry
 from ppafo.units import split_quantity
@@ -139,7 +139,7 @@ _CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}
 def _before(parameter_set: ParameterSet, path: str) -> str:
     """Return what stood at the path, so that an override never hides the value it replaces."""
     entry = parameter_set.entries().get(path)
-    return f"the set has {written(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"
+    return f"the set has {entry_text(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"
 
 
 def _other_form(path: str) -> frozenset[str]:

@@ -52,7 +52,7 @@ class ParameterSet:
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
-    """Return the name of the valve to use: the one asked for, else the set's default."""
+    """Return the name of the valve to use: the requested one, else the set's default."""
     name = valve or parameter_set.default_valve
     if name not in parameter_set.valve_kinds:
         known = ", ".join(parameter_set.valve_kinds)
@@ -120,13 +120,13 @@ def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
         return base_value(entry.value, entry.unit)
 
 
-def shown(entry: Entry) -> str:
+def number_text(entry: Entry) -> str:
     """Return an entry's value and unit as a person would write them."""
     return format_quantity(entry.value, entry.unit)
 
 
-def written(entry: Entry | TextEntry | FlagEntry) -> str:
+def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
     """Return any entry's value as a person would write it: a number with its unit, a text, true or false."""
     if isinstance(entry, Entry):
-        return shown(entry)
+        return number_text(entry)
     return str(entry.value).lower() if isinstance(entry, FlagEntry) else entry.value

@@ -1,5 +1,7 @@
 """The layout of a parameter set file, built from the declarations, so that a value is declared in one place only."""
 
+import functools
+import re
 from types import GenericAlias
 from typing import Any, Literal
 
@@ -26,7 +28,7 @@ def _section(name: str, quantities: tuple[Quantity, ...], extra: dict[str, Any] 
 
 def _valve_section(kind: str) -> Any:
     return _section(
-        f"{kind.capitalize()}Valve",
+        f"{re.sub(r'[^A-Za-z0-9_]', '_', kind.capitalize())}Valve",
         declaration.ORIFICE + VALVES[kind].quantities,
         {"kind": (Literal[kind], Field(description=VALVES[kind].summary))},
     )
@@ -51,7 +53,13 @@ def _sections() -> dict[str, Any]:
     }
 
 
-def _parameter_file() -> type[BaseModel]:
+def parameter_file() -> type[BaseModel]:
+    """Return the model of a parameter set file, for the valves that are loaded."""
+    return _parameter_file(tuple(VALVES.items()))
+
+
+@functools.lru_cache(maxsize=4)
+def _parameter_file(_kinds: Any) -> type[BaseModel]:
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME)),
@@ -59,7 +67,7 @@ def _parameter_file() -> type[BaseModel]:
         "citation": optional(Citation, "where the set was published"),
         "notes": (str, ""),
         "completed_by": (str, Field("", description="name of a set that completes this one")),
-        "default_valve": (str, Field(description="name of the valve that a device has unless told otherwise")),
+        "default_valve": (str, Field(description="name of the valve that a device has by default")),
         "accepted": (list[Accepted], Field(default_factory=list, description="contradictions kept for a reason")),
     }
     fields |= {name: optional(model, f"section {name}") for name, model in _sections().items()}
@@ -70,9 +78,7 @@ def _parameter_file() -> type[BaseModel]:
     return table("ParameterFile", fields)
 
 
-PARAMETER_FILE = _parameter_file()
-
-
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a parameter set file."""
-    return published_schema(PARAMETER_FILE, "ppafo parameter set")
+    """Return the JSON Schema of a parameter set file, with the valves of all packages."""
+    VALVES.load_all()
+    return published_schema(parameter_file(), "ppafo parameter set")

@@ -13,18 +13,28 @@ GAS = (
     Quantity(
         "supply_temperature_difference", "K", "supplied gas above the set's temperature", minimum=-80.0, maximum=80.0
     ),
-    Quantity("real_gas_share", "", "share of the gas's second virial coefficient, 0: ideal", minimum=0.0, maximum=1.0),
+    Quantity(
+        "real_gas_share", "", "fraction of the gas's second virial coefficient, 0: ideal", minimum=0.0, maximum=1.0
+    ),
 )
 SUPPLY = (
     Quantity("droop", "Pa s/kg", "fall of a regulated pressure per mass flow", minimum=0.0, maximum=1e9),
     Quantity(
-        "recovery_time", "s", "time constant with which a regulator falls and recovers", minimum=0.0, maximum=10.0
+        "recovery_time",
+        "s",
+        "time constant with which the regulated pressure falls and recovers",
+        minimum=0.0,
+        maximum=10.0,
     ),
 )
 LINE = (
-    Quantity("volume", "m^3", "each line's share of the dead volume, 0 for none", minimum=0.0, maximum=1e-2),
+    Quantity("volume", "m^3", "volume of each line, a part of the dead volume, 0 for none", minimum=0.0, maximum=1e-2),
     Quantity(
-        "area", "m^2", "area of an orifice between line and chamber that loses as much", minimum=0.0, maximum=1e-2
+        "area",
+        "m^2",
+        "area of an orifice between line and chamber with the same pressure loss",
+        minimum=0.0,
+        maximum=1e-2,
     ),
     Quantity("discharge_coefficient", "", "discharge coefficient of that orifice", minimum=0.0, maximum=2.0),
     Quantity("delay", "s", "time that a wave needs through the line, added to the command", minimum=0.0, maximum=0.1),
@@ -60,7 +70,7 @@ LEAK = (
         maximum=1e-8,
     ),
 )
-SAMPLING = (Quantity("rate", "Hz", "samples that are recorded in a second", minimum=1.0, maximum=1e5),)
+SAMPLING = (Quantity("rate", "Hz", "samples recorded per second", minimum=1.0, maximum=1e5),)
 
 
 def _sensor(unit: str, what: str) -> tuple[Quantity, ...]:

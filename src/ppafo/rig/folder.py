@@ -51,7 +51,7 @@ def _check_own(folder: Path, name: str) -> None:
     if present and RIG_FILE not in present:
         raise DataError(f"{folder}: is not empty and has no recordings of the rig ({RIG_FILE}); choose another folder")
     if name in present and name not in earlier:
-        raise DataError(f"{folder}: holds a {name} that is not of the rig; move it or choose another folder")
+        raise DataError(f"{folder}: has a {name} that is not of the rig; move it or choose another folder")
 
 
 def _earlier(folder: Path) -> dict[str, Any]:

@@ -25,7 +25,7 @@ def real_device(device: Device, preset: Preset) -> Device:
     given = {name for name in added if device.valve.settings.get(name, 0.0) != 0.0 and name != "spool_damping_ratio"}
     kept = {name: value for name, value in added.items() if name not in given}
     valve = replace(device.valve, settings={**device.valve.settings, **kept})
-    leak = _scaled(device.actuator.leak, preset.values["leak.conductance_factor"])
+    leak = _scale(device.actuator.leak, preset.values["leak.conductance_factor"])
     return replace(device, valve=valve, actuator=replace(device.actuator, leak=leak))
 
 
@@ -41,7 +41,7 @@ def rig_plant(plant: PlantParameters, preset: Preset) -> PlantParameters:
     return plant._replace(dead_volume_1=plant.dead_volume_1 - line, dead_volume_2=plant.dead_volume_2 - line)
 
 
-def _scaled(orifice: Orifice | SonicOrifice, factor: float) -> Orifice | SonicOrifice:
+def _scale(orifice: Orifice | SonicOrifice, factor: float) -> Orifice | SonicOrifice:
     if isinstance(orifice, SonicOrifice):
         return replace(orifice, sonic_conductance=orifice.sonic_conductance * factor)
     return replace(orifice, area=orifice.area * factor)

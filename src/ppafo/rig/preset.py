@@ -58,16 +58,16 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
     ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``.
     """
     file = label(str(name_or_path))
-    preset = _parsed(_FILE.parse(_FILE.read(name_or_path), file), file)
+    preset = _parse(_FILE.parse(_FILE.read(name_or_path), file), file)
     for override in overrides:
         path, separator, text = (part.strip() for part in one_line(override).partition("="))
         if not separator or not path.startswith(PREFIX) or not text:
             raise ParameterError(f"override '{one_line(override)}' is not of the form {PREFIX}PATH=VALUE")
-        preset = _overridden(preset, path.removeprefix(PREFIX), text)
+        preset = _override(preset, path.removeprefix(PREFIX), text)
     return preset
 
 
-def _overridden(preset: Preset, path: str, text: str) -> Preset:
+def _override(preset: Preset, path: str, text: str) -> Preset:
     if path not in PATHS:
         raise ParameterError(
             f"override '{PREFIX}{path}={text}': the rig has no value '{path}'{nearest_name(path, PATHS)}"
@@ -79,7 +79,7 @@ def _overridden(preset: Preset, path: str, text: str) -> Preset:
     return preset.changed(path, value, "override")
 
 
-def _parsed(document: dict[str, Any], file: str) -> Preset:
+def _parse(document: dict[str, Any], file: str) -> Preset:
     """Check keys, units and ranges of a document; every value must be there."""
     if not document:
         raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints what belongs in it")

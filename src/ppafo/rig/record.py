@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import ppafo
 from ppafo.errors import ParameterError, nearest_name, one_line
 from ppafo.parameters.device import Device
 from ppafo.rig.catalog import EXPERIMENTS, Experiment
@@ -13,6 +12,7 @@ from ppafo.rig.preset import PREFIX, Preset, load_preset
 from ppafo.rig.request import Outcome, Request
 from ppafo.signals.recording import Recording
 from ppafo.simulation.document import UNITS, plain
+from ppafo.version import __version__
 
 LARGEST_SEED = 2**32 - 1
 DEFAULT_DEVICE = "ppafo2011"
@@ -43,17 +43,17 @@ def record(
     ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (experiments in
     time) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). SimulationError where the extra ``reference`` is missing.
     """
-    chosen = chosen_experiment(experiment)
+    chosen = find_experiment(experiment)
     check_seed(seed)
     words = tuple(overrides)
     of_preset = tuple(item for item in words if item.strip().startswith(PREFIX))
     others = tuple(item for item in words if item not in of_preset)
-    used = _changed(preset, of_preset) if isinstance(preset, Preset) else load_preset(preset, of_preset)
+    used = _refuse_overrides(preset, of_preset) if isinstance(preset, Preset) else load_preset(preset, of_preset)
     outcome = chosen.record(Request(used, seed, device, valve, others))
     return RigRecording(outcome.recording, outcome.device, _truth(chosen, used, seed, device, words, outcome))
 
 
-def chosen_experiment(name: str) -> Experiment:
+def find_experiment(name: str) -> Experiment:
     """Return the experiment of this name."""
     if name not in EXPERIMENTS:
         hint = nearest_name(name, EXPERIMENTS)
@@ -67,7 +67,7 @@ def check_seed(seed: int) -> None:
         raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
 
 
-def _changed(preset: Preset, overrides: tuple[str, ...]) -> Preset:
+def _refuse_overrides(preset: Preset, overrides: tuple[str, ...]) -> Preset:
     if overrides:
         raise ParameterError(f"override '{overrides[0]}': change a preset object itself, with Preset.changed")
     return preset
@@ -79,7 +79,7 @@ def _truth(
     return {
         "notice": NOTICE,
         "units": UNITS,
-        "version": ppafo.__version__,
+        "version": __version__,
         "experiment": experiment.name,
         "summary": experiment.summary,
         "seed": seed,

@@ -16,16 +16,16 @@ class PresetValue(BaseModel):
 
     value: float = Field(description="the number, in the unit beside it")
     unit: str = Field(description="unit of the number, such as 'mm^2'; empty for a plain number")
-    reason: str = Field(min_length=1, description="why it is what it is: a source, or what was chosen")
+    reason: str = Field(min_length=1, description="reason for the number: a source, or why it was chosen")
 
 
-def _described(quantity: Quantity) -> str:
+def _description(quantity: Quantity) -> str:
     return f"{quantity.summary} [{quantity.unit or '-'}]"
 
 
 def _section(name: str, quantities: tuple[Quantity, ...]) -> type[BaseModel]:
     title = "".join(part.capitalize() for part in name.split("_"))
-    return table(title, {item.name: (PresetValue, Field(description=_described(item))) for item in quantities})
+    return table(title, {item.name: (PresetValue, Field(description=_description(item))) for item in quantities})
 
 
 def json_schema() -> dict[str, Any]:
@@ -33,7 +33,7 @@ def json_schema() -> dict[str, Any]:
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(description="name of the preset")),
-        "title": (str, Field(description="what bench it stands for, in one line")),
+        "title": (str, Field(description="which test bench it represents, in one line")),
         "notes": (str, Field(description="what is on, what is off, and where the values come from")),
     }
     fields |= {name: (_section(name, members), Field()) for name, members in SECTIONS.items()}

@@ -115,21 +115,22 @@ class _Rig:
         return numbers(valve.rates(self.run.valve, state, self.command))
 
     def place_vane(self, t: float, y: Floats) -> None:
-        """Put the angle into the inputs, and the rate of a vane that is led."""
+        """Put the angle into the inputs, and the rate of a vane whose angle is prescribed."""
         path = self.run.program.angle
         self.inputs[ANGLE], self.inputs[RATE] = (y[0], 0.0) if path is None else path.value(self.run.path, t)[:2]
 
     def root_function(self) -> Any:
-        """Two root functions that belong to the present mode; none for a vane that is led."""
+        """Two root functions that belong to the present mode; none for a vane whose angle is prescribed."""
         if not self.is_free:
             return None
 
-        def roots(t: float, y: Floats, events: Floats) -> None:
+        def write_roots(t: float, y: Floats, events: Floats) -> None:
             events[:] = self.roots(t, y)
 
-        roots.terminal = [True, True]  # type: ignore[attr-defined]
-        roots.direction = [-1, -1]  # type: ignore[attr-defined]
-        return roots
+        function: Any = write_roots
+        function.terminal = [True, True]
+        function.direction = [-1, -1]
+        return function
 
     def roots(self, t: float, y: Floats) -> vane_mode.Roots:
         """Distance from breakaway, or from standstill and the stop ahead."""
@@ -184,7 +185,7 @@ class _Rig:
         """What the sensors read now; the noise is that of the last recorded sample's time."""
         times, sensors = self.given.sample_times, self.given.sensors
         index = max(0, int(np.searchsorted(times, self.time + SAME_TIME, side="right")) - 1)
-        seen = seen_signals(self.given, self.led(self.y, self.time), self.look(self.time, self.y)[:2])
+        seen = seen_signals(self.given, self.prescribe_angle(self.y, self.time), self.look(self.time, self.y)[:2])
         names = ("angle", "pressure_1", "pressure_2")
         angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, seen, strict=True))
         return Measurement(angle, first, second, actuator_torque(first, second, self.plant.torque_constant))
@@ -230,12 +231,12 @@ class _Rig:
         while self.recorded < times.size and times[self.recorded] < end - 2 * SAME_TIME:
             moment, index = float(times[self.recorded]), self.recorded
             state = self.y if solution is None else solution.y[np.argmin(np.abs(solution.t - moment))]
-            self.result.states[index] = self.led(state, moment)
+            self.result.states[index] = self.prescribe_angle(state, moment)
             self.result.pressures[index] = self.look(moment, np.ascontiguousarray(state))[:2]
             self.result.commands[index] = self.decided
             self.recorded += 1
 
-    def led(self, state: Floats, time: float) -> Floats:
+    def prescribe_angle(self, state: Floats, time: float) -> Floats:
         """The unknowns of ``RigState`` with the prescribed angle put in, where there is one."""
         unknowns = np.array(state[:UNKNOWNS])
         if not self.is_free and self.run.program.angle is not None:

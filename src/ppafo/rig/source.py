@@ -38,17 +38,17 @@ _READ = 'types.Array(float64, 1, "C", readonly=True)'
 _COMPILED = f'@njit(void({_READ}, float64[::1], float64[::1], float64[::1], float64), cache=True, error_model="numpy")'
 
 
-class Compiled(NamedTuple):
+class RigProgram(NamedTuple):
     """``fill(y, slopes, parameters, inputs, way)`` and ``show(y, seen, parameters, inputs, way)``."""
 
     fill: Callable[..., None]
     show: Callable[..., None]
 
 
-def compiled() -> Compiled:
+def compiled() -> RigProgram:
     """Return the compiled right-hand side and view of the rig."""
     module = load_generated("rig", rig_source())
-    return Compiled(module.fill, module.show)
+    return RigProgram(module.fill, module.show)
 
 
 @functools.cache

@@ -10,7 +10,10 @@ from typing import Any, NamedTuple
 
 
 class Sample(NamedTuple):
-    """One sample of a recording: its number from 0, and channels in SI units; a run without reference has 0 there."""
+    """One sample of a recording: its number from 0, and channels in SI units.
+
+    A run without reference has 0 there, gas without an energy balance has 0 for its temperatures.
+    """
 
     number: float
     angle: float
@@ -20,6 +23,8 @@ class Sample(NamedTuple):
     torque: float
     command: float
     reference: float
+    temperature_1: float
+    temperature_2: float
 
 
 class Course(NamedTuple):

@@ -175,7 +175,7 @@ def _check_time(recording: Recording) -> None:
     if stalled.size:
         index = int(stalled[0]) + 1
         raise DataError(
-            f"{recording.label}: time must grow from sample to sample, but {time[index]:g} s (sample {index + 1}) "
+            f"{recording.label}: time must increase from sample to sample, but {time[index]:g} s (sample {index + 1}) "
             f"follows {time[index - 1]:g} s"
         )
 

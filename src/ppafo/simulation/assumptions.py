@@ -7,7 +7,7 @@ from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.declaration import RELIEVING_PATH
-from ppafo.parameters.parameter_set import written as written_entry
+from ppafo.parameters.parameter_set import entry_text
 from ppafo.simulation.declaration import quantities, value_at
 from ppafo.simulation.overriding import device_paths, scenario_paths, split_override
 from ppafo.simulation.reading import Reading, written
@@ -62,7 +62,7 @@ def _device_value(hardware: Hardware, path: str) -> str | None:
     entry = hardware.parameter_set.entries().get(full)
     quantity = hardware.parameter_set.declared().get(full)
     if entry is not None:
-        return written_entry(entry)
+        return entry_text(entry)
     if path == RELIEVING_PATH:
         return "false"
     return None if quantity is None else _default(quantity)

@@ -17,17 +17,16 @@ from ppafo.simulation.declaration import (
     PRESSURE_WORDS,
     SEED,
     SENSORS,
-    THERMAL,
-    THERMAL_GAS,
     TORQUE_LEVEL,
     controller_settings,
     kind_at,
     value_at,
 )
+from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.motion import read_motion, read_profile
 from ppafo.simulation.overriding import Changed
 from ppafo.simulation.reading import Reading, written
-from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors, Thermal
+from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors
 
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
@@ -69,9 +68,10 @@ def build_scenario(given: Given, changed: Changed) -> Scenario:
         control=_control(reading, clock.period),
         reference=read_profile(reading, "reference", TORQUE_LEVEL) if "reference" in document else _NOTHING_TO_FOLLOW,
         sensors=_sensors(reading, clock),
-        assumptions=read_assumptions(before, reading, hardware, given.overrides),
+        assumptions=(*read_assumptions(before, reading, hardware, given.overrides), *assumed_lines(reading)),
         origin=Origin(given.path, document["device"]["set"], hardware.valve, given.overrides, given.content),
-        thermal=_thermal(reading),
+        thermal=read_thermal(reading),
+        supply_lines=read_supply_lines(reading, device),
     )
 
 
@@ -124,13 +124,6 @@ def _initial_pressure(reading: Reading, chamber: int, supply: Supply) -> float:
 def _control(reading: Reading, period: float) -> Control:
     kind = kind_at(reading.document, "controller")
     return Control(kind, reading.section("controller", controller_settings(kind)), period)
-
-
-def _thermal(reading: Reading) -> Thermal | None:
-    if kind_at(reading.document, "gas_model") != THERMAL:
-        return None
-    values = reading.section("gas_model", THERMAL_GAS)
-    return Thermal(values["heat_transfer_coefficient"], values["wall_area_per_volume"])
 
 
 def _sensors(reading: Reading, clock: Clock) -> Sensors:

@@ -4,10 +4,12 @@ A loop with coarse sensors or repeated impacts may amplify a difference that nob
 Then its metrics are those of one run among many, and a check says so.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ppafo.answers.shown_metrics import metric_change, metric_level
+from ppafo.answers.text import aligned
 from ppafo.simulation.document import plain
 
 MOVE = 1.0e-7
@@ -92,21 +94,12 @@ class Check:
         return " ".join([f"Not determined by this run: {' Nor: '.join(found)}", *parting])
 
     def __repr__(self) -> str:
-        """Return the table of all changes, the time at which the runs part and the sentence."""
-        rows = [*self.metrics, *self.courses]
-        names = list(rows[0].changes) if rows else []
-        cells = [["", "value", "", *names, ""], *([*_cells(row, names)] for row in rows)]
-        widths = [max(len(line[column]) for line in cells) for column in range(len(cells[0]))]
-        table = [
-            "  ".join(
-                f"{cell:{'<' if column in (0, 2) else '>'}{width}}"
-                for column, (cell, width) in enumerate(zip(line, widths, strict=True))
-            ).rstrip()
-            for line in cells
-        ]
-        return "\n".join(
-            [f"Check of '{self.scenario}': what changes in runs that should be the same", *table, "", self.sentence]
-        )
+        """Return the table of all changes in the units that people are shown, and the sentence."""
+        names = list(self.metrics[0].changes) if self.metrics else []
+        rows = [_cells(row, names, metric_level) for row in self.metrics]
+        rows += [_cells(row, names, metric_change) for row in self.courses]
+        head = f"Check of '{self.scenario}': what changes in runs that should be the same"
+        return "\n".join([head, *aligned([["", "value", *names, ""], *rows]), "", self.sentence])
 
     def document(self) -> dict[str, Any]:
         """Return the check as data that JSON can hold, in SI units."""
@@ -119,7 +112,7 @@ class Check:
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document, **judged}
 
 
-def _cells(row: Changed, names: list[str]) -> list[str]:
-    changes = [f"{row.changes[name]:+.1e}" if row.changes[name] else "0" for name in names]
-    mark = "" if row.is_determined else "not determined"
-    return [row.name, f"{row.value:.4g}", row.unit.replace("-", ""), *changes, mark]
+def _cells(row: Changed, names: list[str], level: Callable[[float, str], tuple[float, str]]) -> list[str]:
+    value, unit = level(row.value, row.unit)
+    changes = [f"{metric_change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names]
+    return [row.name, f"{value:.4g} {unit}".rstrip(), *changes, "" if row.is_determined else "not determined"]

@@ -9,7 +9,10 @@ from dataclasses import replace
 from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.errors import KindError, ScenarioError
+from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity
+from ppafo.simulation import supply_line
 
 LARGEST_SEED = 2**32 - 1
 PLAIN = ("", "1")
@@ -64,7 +67,18 @@ TORQUE_LEVEL = Quantity("level", "N m", "", None, -1.0e4, 1.0e4)
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
 MOTIONS = ("free", "held", "led")
-SECTIONS = ("device", "run", "motion", "initial", "controller", "reference", "sensors", "gas_model", "assumed")
+SECTIONS = (
+    "device",
+    "run",
+    "motion",
+    "initial",
+    "controller",
+    "reference",
+    "sensors",
+    "gas_model",
+    supply_line.SECTION,
+    "assumed",
+)
 TEXTS = ("name", "description", "device.set", "device.valve")
 
 
@@ -101,13 +115,28 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
         "sensors": (*SENSORS, SEED),
         "gas_model": gas_settings(kind_at(document, "gas_model")),
     }
-    return {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
+    found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
+    return found | supply_line.paths() if supply_line.SECTION in document else found
 
 
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
     kinds = ["motion.kind", "controller.kind", "reference.kind", "gas_model.kind"]
     return (*TEXTS, *kinds, *(["motion.profile.kind"] if kind_at(document, "motion") == "led" else []))
+
+
+def find_kinds(document: Mapping[str, Any], file: str) -> None:
+    """Load the kinds that a document names, where they are those of other packages; ``file`` is for the message."""
+    sections: tuple[tuple[str, Kinds[Any]], ...] = (
+        ("controller", CONTROLLERS),
+        ("reference", PROFILES),
+        ("motion.profile", PROFILES),
+    )
+    for section, kinds in sections:
+        try:
+            kinds.get(kind_at(document, section))
+        except KindError as error:
+            raise ScenarioError(f"{file}: {section}.kind: {error}") from error
 
 
 def kind_at(document: Mapping[str, Any], section: str) -> str:

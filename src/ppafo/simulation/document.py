@@ -1,15 +1,12 @@
-"""Scenarios and results as plain data for ``run.json``: numbers in SI units, nothing left to look up elsewhere."""
+"""Scenarios as plain data for ``run.json``: numbers in SI units, nothing left to look up elsewhere."""
 
 import dataclasses
 import math
 import numbers
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ppafo.simulation.scenario import Scenario
-
-if TYPE_CHECKING:
-    from ppafo.simulation.result import Result
 
 UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques in N m"
 
@@ -17,19 +14,9 @@ UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
     """Return the whole scenario with every number of the device, in SI units, as data that JSON can hold."""
     document: dict[str, Any] = plain(scenario)
+    lines = scenario.supply_lines
+    document["supply_lines"] = None if lines is None else plain(lines._asdict())
     return {"units": UNITS, **document}
-
-
-def result_document(result: "Result") -> dict[str, Any]:
-    """Return what ``run.json`` says of a result, beside what storage adds to it."""
-    return {
-        "status": plain(result.status),
-        "metrics": {name: plain(metric) for name, metric in result.metrics.items()},
-        "versions": dict(result.versions),
-        "seed": result.scenario.sensors.seed,
-        "engine": plain(result.engine),
-        "scenario": scenario_document(result.scenario),
-    }
 
 
 def plain(value: Any) -> Any:

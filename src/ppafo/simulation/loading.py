@@ -14,6 +14,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet
 from ppafo.simulation.building import Given, build_scenario
+from ppafo.simulation.declaration import find_kinds
 from ppafo.simulation.overriding import apply_overrides
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.schema import scenario_file
@@ -61,10 +62,12 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()
 
 def _scenario(given: Given) -> Scenario:
     """Check the keys of the file itself, put the overrides in, and then ask for all that is needed."""
+    find_kinds(given.content, given.file)
     if given.overrides:
         wrong = [item for item in _problems(given.content) if not is_gap(item)]
         _refuse(wrong, given.file)
     changed = apply_overrides(given.content, given.overrides, given.file)
+    find_kinds(changed.document, given.file)
     _refuse(_problems(changed.document), given.file)
     return build_scenario(given, changed)
 

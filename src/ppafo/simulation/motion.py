@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from ppafo.control.catalog import PROFILES
+from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
@@ -54,7 +55,7 @@ def profile_problem(
 def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tuple[float, float]]:
     """Yield times and angles [rad]: those that the engine asks for, and the crests between them."""
     kind = PROFILES[profile.kind]
-    parameters = kind.parameters(*(profile.settings[item.name] for item in kind.quantities))
+    parameters = rebuilt(kind.parameters, [profile.settings[item.name] for item in kind.quantities])
     count = max(1, min(MOST_CHECKED_TIMES, round(duration / step)))
     for number in range(count + 1):
         time = duration * number / count

@@ -9,12 +9,14 @@ from typing import Any
 
 from ppafo.control.controllers import constant
 from ppafo.model.declaration import Quantity
+from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SECTIONS, SONIC_FORM
 from ppafo.parameters.device import Orifice, SonicOrifice
 from ppafo.parameters.parameter_set import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.simulation import declaration
 from ppafo.simulation.scenario import FreeMotion, LedMotion, Scenario
+from ppafo.simulation.supply_line import LINES, SECTION
 
 HELD_ANGLE = "motion.angle"
 TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "controller.period")
@@ -83,7 +85,8 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     if isinstance(scenario.motion, LedMotion):
         motion = {"kind": "led", "profile": {"kind": scenario.motion.profile.kind}}
     controller = {"kind": scenario.control.kind}
-    gas = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
+    gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
+    gas |= {} if scenario.supply_lines is None else {SECTION: {}}
     if scenario.control.kind == constant.KIND.name:
         return {"motion": motion, "controller": controller, **gas}
     return {"motion": motion, "controller": controller, "reference": {"kind": scenario.reference.kind}, **gas}
@@ -105,6 +108,8 @@ def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
     if section == "valve":
         is_orifice = name in _names(scenario.device.valve.orifice)
         return ("device", "valve", "orifice" if is_orifice else "settings", name)
+    if section.startswith(f"{SECTION}."):
+        return ("supply_lines", f"{name}_{1 + LINES.index(section.removeprefix(f'{SECTION}.'))}")
     return {
         "motion": ("motion", name),
         "motion.profile": ("motion", "profile", "settings", name),
@@ -124,4 +129,6 @@ def _replaced(node: Any, parts: tuple[str, ...], number: Any) -> Any:
     if isinstance(node, Mapping):
         return {**node, parts[0]: _replaced(node[parts[0]], inside, number) if inside else number}
     inner = _replaced(getattr(node, parts[0]), inside, number) if inside else number
+    if isinstance(node, SupplyLines):
+        return node._replace(**{parts[0]: inner})
     return replace(node, **{parts[0]: inner})

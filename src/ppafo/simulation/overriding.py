@@ -10,7 +10,7 @@ from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
-from ppafo.simulation import declaration
+from ppafo.simulation import declaration, supply_line
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _SEED = "sensors.seed"
@@ -60,7 +60,7 @@ def split_override(override: str) -> tuple[str, str]:
 
 def scenario_paths(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return every path of the scenario that an override can set, for the kinds that the document names."""
-    return (*declaration.texts(document), *declaration.quantities(document))
+    return (*declaration.texts(document), *(declaration.quantities(document) | supply_line.paths()))
 
 
 def device_paths() -> tuple[str, ...]:

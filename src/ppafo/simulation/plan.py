@@ -1,7 +1,8 @@
-"""From a scenario to a run: step sizes, rows of parameters, initial gas."""
+"""From settings to a run, of a scenario or a walk: step sizes, rows of parameters, initial gas."""
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,18 +13,19 @@ from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.refinement import is_slow
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import Run
+from ppafo.engine.run import Lines, Run, Walk
 from ppafo.errors import ScenarioError
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.columns import at, first, larger, over_runs, smaller, whole
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_volumes
+from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters, SensorRates
 from ppafo.model.thermal import wall_exchange
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, LedMotion, ProfileChoice, Scenario
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, LedMotion, ProfileChoice, Scenario, Thermal
 
 MOST_STEPS = 1.0e9
 WHOLE = 1.0e-9
@@ -41,6 +43,95 @@ def plan_run(scenario: Scenario) -> Run:
     return run
 
 
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """What any run is made of, scenario or walk; numbers in SI units, which may be arrays (runs,).
+
+    Without a ``path`` the vane is free; without a ``controller`` the caller sets the command. ``thermal`` and
+    ``supply_lines`` None stand for gas that keeps its temperature and for constant supply pressures.
+    """
+
+    device: Device
+    valve: ValveModel
+    controller: ControllerKind | None
+    settings: Mapping[str, Any]
+    reference: ProfileChoice
+    path: ProfileChoice | None
+    sensors: SensorParameters
+    has_ideal_sensors: bool
+    thermal: Thermal | None
+    supply_lines: SupplyLines | None
+    signal_delay: Any = 0.0
+    sensor_rates: SensorRates | NoParameters = field(default_factory=NoParameters)
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """Length of a step [s], how many there are, how many to a sample of the controller and of the recording.
+
+    ``needs_parts`` is true where the error decides about the parts of a step.
+    """
+
+    step: Any
+    step_count: Any
+    steps_per_sample: Any
+    record_every: Any
+    needs_parts: Any
+
+
+StepRule = Callable[[PlantParameters], Steps]
+Start = Callable[[PlantParameters], PlantState]
+
+
+def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: Start, walk: Walk | None = None) -> Run:
+    """Return the run of some pieces: ``rule`` says how it is stepped, ``start`` where it begins, ``walk`` adds a leg.
+
+    Every law, valve, motion, gas and supply goes with every other here.
+    """
+    settings = pieces.device.valve.settings
+    delay = pieces.valve.command_delay(settings)
+    plant = fed_plant(plant, pieces.supply_lines)
+    steps = rule(plant)
+    program = Program(
+        valve=pieces.valve,
+        reference=PROFILES[pieces.reference.kind],
+        controller=pieces.controller,
+        angle=None if pieces.path is None else PROFILES[pieces.path.kind],
+        ideal_sensors=pieces.has_ideal_sensors,
+        late_commands=first(delay) > 0.0,
+        late_signals=first(pieces.signal_delay) > 0.0,
+        is_thermal=pieces.thermal is not None,
+        walks=walk is not None,
+        has_lines=pieces.supply_lines is not None,
+        slow_sensors=isinstance(pieces.sensor_rates, SensorRates),
+        is_adaptive=bool(first(steps.needs_parts)),
+        samples_inside=bool(first(steps.record_every % 1.0)),
+    )
+    return Run(
+        program=program,
+        plant=plant,
+        thermal=thermal_parameters(pieces.thermal, pieces.device),
+        valve_orifice=exact_orifice(pieces.device.valve.orifice, pieces.device),
+        leak_orifice=exact_orifice(pieces.device.actuator.leak, pieces.device),
+        initial=start(plant),
+        valve=prepared_valve(pieces.valve, settings),
+        controller=() if pieces.controller is None else controller_parameters(pieces.controller, pieces.settings),
+        reference=profile_parameters(pieces.reference),
+        path=() if pieces.path is None else profile_parameters(pieces.path),
+        sensors=pieces.sensors,
+        step=steps.step,
+        step_count=steps.step_count,
+        steps_per_sample=steps.steps_per_sample,
+        record_every=steps.record_every,
+        signal_delay=pieces.signal_delay,
+        command_delay=delay,
+        needs_parts=steps.needs_parts,
+        walk=walk,
+        lines=filled_lines(plant, pieces.supply_lines),
+        sensor_rates=pieces.sensor_rates,
+    )
+
+
 def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     """The run of a scenario, and what may be wrong with it; any number in both may be an array (runs,).
 
@@ -48,51 +139,38 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     """
     device, motion, control = scenario.device, scenario.motion, scenario.control
     plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
-    settings = device.valve.settings
-    valve = VALVES[device.valve.kind].choose({name: first(value) for name, value in settings.items()})
-    delay = valve.command_delay(settings)
     in_lanes = control.kind != PYTHON_CONTROLLER
-    controller = CONTROLLERS[control.kind] if in_lanes else None
+    pieces = Pieces(
+        device=device,
+        valve=VALVES[device.valve.kind].choose({name: first(value) for name, value in device.valve.settings.items()}),
+        controller=CONTROLLERS[control.kind] if in_lanes else None,
+        settings=control.settings,
+        reference=scenario.reference,
+        path=None if isinstance(motion, FreeMotion) else motion.profile,
+        sensors=sensor_parameters(scenario),
+        has_ideal_sensors=has_ideal_sensors(scenario),
+        thermal=scenario.thermal,
+        supply_lines=scenario.supply_lines,
+        signal_delay=scenario.sensors.delay,
+        sensor_rates=sensor_rates(scenario),
+    )
+    run = compose_run(
+        pieces, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
+    )
+    return run, (_too_many_steps(scenario, run.step, run.step_count),)
+
+
+def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
+    """The steps of a scenario: the largest that divides a sample of its controller, in parts where the error asks."""
     steps_per_sample = larger(1, whole(np.ceil(scenario.control.period / scenario.time_step - WHOLE)))
     step = scenario.control.period / steps_per_sample
-    needs_parts = is_adaptive(scenario, plant, step)
-    record_every = nearly_whole(scenario.output_interval / step)
-    program = Program(
-        valve=valve,
-        reference=PROFILES[scenario.reference.kind],
-        controller=controller,
-        angle=None if isinstance(motion, FreeMotion) else PROFILES[motion.profile.kind],
-        ideal_sensors=has_ideal_sensors(scenario),
-        late_commands=first(delay) > 0.0,
-        late_signals=first(scenario.sensors.delay) > 0.0,
-        is_thermal=scenario.thermal is not None,
-        slow_sensors=any(first(bandwidth) > 0.0 for bandwidth in scenario.sensors.bandwidths),
-        is_adaptive=bool(first(needs_parts)),
-        samples_inside=bool(first(record_every % 1.0)),
-    )
-    step_count = whole(np.ceil(scenario.duration / step - WHOLE))
-    run = Run(
-        program=program,
-        plant=plant,
-        thermal=thermal_parameters(scenario),
-        valve_orifice=exact_orifice(device.valve.orifice, device),
-        leak_orifice=exact_orifice(device.actuator.leak, device),
-        initial=initial_state(scenario, plant),
-        valve=prepared_valve(valve, settings),
-        controller=() if controller is None else controller_parameters(controller, control.settings),
-        reference=profile_parameters(scenario.reference),
-        path=() if isinstance(motion, FreeMotion) else profile_parameters(motion.profile),
-        sensors=sensor_parameters(scenario),
+    return Steps(
         step=step,
-        step_count=step_count,
+        step_count=whole(np.ceil(scenario.duration / step - WHOLE)),
         steps_per_sample=steps_per_sample,
-        record_every=record_every,
-        signal_delay=scenario.sensors.delay,
-        command_delay=delay,
-        needs_parts=needs_parts,
-        sensor_rates=sensor_rates(scenario) if program.slow_sensors else NoParameters(),
+        record_every=nearly_whole(scenario.output_interval / step),
+        needs_parts=is_adaptive(scenario, plant, step),
     )
-    return run, (_too_many_steps(scenario, step, step_count),)
 
 
 def prepared_valve(valve: ValveModel, settings: Mapping[str, float]) -> Any:
@@ -115,15 +193,34 @@ def _too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem
     return step_count > MOST_STEPS, line
 
 
-def thermal_parameters(scenario: Scenario) -> ThermalParameters | NoParameters:
+def thermal_parameters(walls: Thermal | None, device: Device) -> ThermalParameters | NoParameters:
     """How the gas takes up heat, where it has an energy balance."""
-    if scenario.thermal is None:
+    if walls is None:
         return NoParameters()
-    gas, walls = scenario.device.gas, scenario.thermal
+    gas = device.gas
     exchange = wall_exchange(
         walls.heat_transfer_coefficient, walls.area_per_volume, gas.heat_capacity_ratio, gas.specific_gas_constant
     )
-    return ThermalParameters(gas.heat_capacity_ratio, exchange)
+    return ThermalParameters(
+        heat_capacity_ratio=gas.heat_capacity_ratio, wall_exchange=exchange, temperature=gas.temperature
+    )
+
+
+def fed_plant(plant: PlantParameters, lines: SupplyLines | None) -> PlantParameters:
+    """The plant behind its lines: these take back what a chamber pushes out, whether or not their regulators do."""
+    return plant if lines is None else plant._replace(relieving=1.0)
+
+
+def filled_lines(plant: PlantParameters, lines: SupplyLines | None) -> Lines | None:
+    """Both lines at the pressures that their regulators are set to, and nothing let through yet; None without lines."""
+    if lines is None:
+        return None
+    initial = LineState(
+        mass_1=chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product),
+        mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
+        regulated_mass=0.0,
+    )
+    return Lines(lines, initial)
 
 
 def has_ideal_sensors(scenario: Scenario) -> bool:
@@ -135,17 +232,21 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
     """Noise and quantisation as the engine takes them."""
     sensors = scenario.sensors
     return SensorParameters(
-        sensors.angle_noise,
-        sensors.pressure_noise,
-        sensors.angle_quantum,
-        sensors.pressure_quantum,
-        sensors.seed,
+        angle_noise=sensors.angle_noise,
+        pressure_noise=sensors.pressure_noise,
+        angle_quantum=sensors.angle_quantum,
+        pressure_quantum=sensors.pressure_quantum,
+        seed=sensors.seed,
     )
 
 
-def sensor_rates(scenario: Scenario) -> SensorRates:
-    """How fast the sensors follow; bandwidths may be arrays (runs,)."""
-    return SensorRates(*(2.0 * math.pi * bandwidth for bandwidth in scenario.sensors.bandwidths))
+def sensor_rates(scenario: Scenario) -> SensorRates | NoParameters:
+    """How fast the sensors follow, where one has a bandwidth; bandwidths may be arrays (runs,)."""
+    sensors = scenario.sensors
+    if not any(first(bandwidth) > 0.0 for bandwidth in sensors.bandwidths):
+        return NoParameters()
+    turn = 2.0 * math.pi
+    return SensorRates(angle=turn * sensors.angle_bandwidth, pressure=turn * sensors.pressure_bandwidth)
 
 
 def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> Any:
@@ -153,10 +254,10 @@ def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> 
     return rebuilt(kind.parameters, [settings[item.name] for item in kind.quantities])
 
 
-def profile_parameters(choice: ProfileChoice) -> tuple[float, ...]:
-    """The NamedTuple of a profile."""
-    parameters: tuple[float, ...] = PROFILES[choice.kind].parameters(**choice.settings)
-    return parameters
+def profile_parameters(choice: ProfileChoice) -> Any:
+    """The NamedTuple of a profile, nested ones filled in the order of its quantities; settings may be arrays."""
+    kind = PROFILES[choice.kind]
+    return rebuilt(kind.parameters, [choice.settings[item.name] for item in kind.quantities])
 
 
 def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> np.ndarray:
@@ -171,6 +272,8 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
 
     For arrays (runs,) in the scenario an array of truth values.
     """
+    if scenario.supply_lines is not None:
+        return True
     if not isinstance(scenario.motion, LedMotion) or scenario.motion.profile.kind != "constant":
         return True
     lowest, highest = angle_range(scenario, plant)
@@ -196,7 +299,8 @@ def angle_range(scenario: Scenario, plant: PlantParameters) -> tuple[float, floa
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
     """Lowest and highest value of a profile."""
     kind = PROFILES[choice.kind]
-    lowest, highest = over_runs(lambda *values: kind.bounds(kind.parameters(*values)), *profile_parameters(choice))
+    numbers = [choice.settings[item.name] for item in kind.quantities]
+    lowest, highest = over_runs(lambda *values: kind.bounds(rebuilt(kind.parameters, values)), *numbers)
     return lowest, highest
 
 
@@ -206,12 +310,21 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     if isinstance(motion, FreeMotion):
         angle, rate = motion.angle, motion.angular_velocity
     else:
-        kind, parameters = PROFILES[motion.profile.kind], profile_parameters(motion.profile)
-        angle, rate, _ = over_runs(lambda *values: kind.value(kind.parameters(*values), 0.0), *parameters)
+        kind = PROFILES[motion.profile.kind]
+        numbers = [motion.profile.settings[item.name] for item in kind.quantities]
+        angle, rate, _ = over_runs(lambda *values: kind.value(rebuilt(kind.parameters, values), 0.0), *numbers)
     volume_1, volume_2 = chamber_volumes(plant, angle)
     mass_1 = chamber_mass(scenario.initial_pressure_1, volume_1, plant.gas_product)
     mass_2 = chamber_mass(scenario.initial_pressure_2, volume_2, plant.gas_product)
-    return PlantState(angle, rate, mass_1, mass_2, 0.0, 0.0, 0.0)
+    return PlantState(
+        angle=angle,
+        angular_velocity=rate,
+        mass_1=mass_1,
+        mass_2=mass_2,
+        supplied_mass=0.0,
+        vented_mass=0.0,
+        leaked_mass=0.0,
+    )
 
 
 def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifice:

@@ -1,14 +1,15 @@
 """What a run gives back: the recording, its metrics, and how the run ended."""
 
+import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.simulation.check import Check
-from ppafo.simulation.document import result_document, scenario_document
+from ppafo.simulation.document import plain, scenario_document
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage import dataset_of, write_result
 
@@ -53,7 +54,7 @@ class Result:
 
     def plot(self) -> "Figure":
         """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` writes it."""
-        from ppafo.reporting.figures import recording_figure
+        from ppafo.answers.recording_figure import recording_figure
 
         remark = "" if self.status.is_completed else self.status.message
         atmosphere = self.scenario.device.supply.atmospheric_pressure
@@ -64,9 +65,21 @@ class Result:
 
         SimulationError for a run that diverged, and for a Python controller that gives another run each time.
         """
-        from ppafo.simulation.checking import check_result
+        # A check runs the scenario again, which makes results: a name here, an import there.
+        checking = importlib.import_module("ppafo.simulation.checking")
+        check: Check = checking.check_result(self)
+        return check
 
-        return check_result(self)
+    def to_dict(self) -> dict[str, Any]:
+        """Return what ``run.json`` says of a result, beside what storage adds to it, as plain data in SI units."""
+        return {
+            "status": plain(self.status),
+            "metrics": {name: plain(metric) for name, metric in self.metrics.items()},
+            "versions": dict(self.versions),
+            "seed": self.scenario.sensors.seed,
+            "engine": plain(self.engine),
+            "scenario": scenario_document(self.scenario),
+        }
 
     def dataset(self) -> "xarray.Dataset":
         """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON."""
@@ -77,4 +90,4 @@ class Result:
 
         The folder is complete or not there; an earlier result in it is replaced. Returns the folder.
         """
-        return write_result(folder, self.recording, result_document(self), attachments or {})
+        return write_result(folder, self.recording, self.to_dict(), attachments or {})

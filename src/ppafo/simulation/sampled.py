@@ -1,39 +1,61 @@
 """Runs a controller that is any Python object, sample by sample, on the same lanes."""
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.lane_control import SIGNALS
-from ppafo.engine.lanes import BatchResult, LaneBlock, load_program
+from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, load_program
+from ppafo.engine.metering import group_of
 from ppafo.engine.rows import row_numbers
-from ppafo.engine.run import Run, batch_of
+from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
 from ppafo.model.vane import actuator_torque
 
 
-def run_sampled(run: Run, controller: PythonController) -> BatchResult:
-    """Run with a Python controller; SimulationError where it returns no finite number."""
-    batch = batch_of(run)
-    block = LaneBlock(load_program(batch.program), batch.clock, batch.parameters, batch.states)
-    rows = state_row_numbers(run)
+def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
+    """Run a batch of one with a Python controller; SimulationError where it returns no finite number."""
+    program, clock = batch.program, batch.clock
+    block = LaneBlock(load_program(program), clock, batch.parameters, batch.states, len(program.traced))
+    reference, step = _group(batch, "reference"), _group(batch, "timing").step
+    see = _sight(batch, block)
+    command_row = row_numbers(program.state_rows())["result.command"]
     controller.reset()
-    for sample in range(math.ceil(run.step_count / run.steps_per_sample)):
-        first_step = sample * run.steps_per_sample
-        time = first_step * run.step
-        wanted = run.program.reference.value(run.reference, time)[0]
-        command = controller.update(time, wanted, _seen(run, block, rows, sample))
-        block.states[rows["result.command"]] = _checked(command, controller, time)
-        block.advance(min(run.steps_per_sample, run.step_count - first_step))
+    for sample in range(math.ceil(clock.step_count / clock.steps_per_sample)):
+        first_step = sample * clock.steps_per_sample
+        time = first_step * step
+        wanted = program.reference.value(reference, time)[0]
+        command = controller.update(time, wanted, see(sample))
+        block.states[command_row] = _checked(command, controller, time)
+        block.advance(min(clock.steps_per_sample, clock.step_count - first_step))
     return block.result()
+
+
+def run_in_turn(batch: Batch, controller: PythonController, take: Callable[[slice, BatchResult], None]) -> None:
+    """Run the runs of a batch one after the other, and give each result away as ``run_blocks`` does: some 30 ms each.
+
+    An object has one state, so that it cannot be in charge of two runs at a time.
+    """
+    for run in range(batch.states.shape[1]):
+        one = slice(run, run + 1)
+        alone = Batch(batch.program, batch.clock, batch.parameters[:, one], batch.states[:, one])
+        take(one, run_sampled(alone, controller))
 
 
 def state_row_numbers(run: Run) -> dict[str, int]:
     """Row of each number of the state, by its path such as ``state.angle``."""
     return row_numbers(run.program.state_rows())
+
+
+def _group(batch: Batch, name: str) -> Any:
+    """The NamedTuple of a group of parameters of the one run, with floats."""
+    values: Any = batch.parameters[:, 0].tolist()
+    return group_of(name, batch.program.parameter_rows(), values)
 
 
 def _checked(command: object, controller: PythonController, time: float) -> float:
@@ -44,19 +66,26 @@ def _checked(command: object, controller: PythonController, time: float) -> floa
     return max(-1.0, min(1.0, float(command)))
 
 
-def _seen(run: Run, block: LaneBlock, rows: dict[str, int], sample: int) -> Measurement:
-    """What the controller sees: the present, or what late sensors looked at."""
-    if run.program.late_signals and sample > 0:
-        angle, pressure_1, pressure_2 = block.late_signals(sample * run.steps_per_sample)[:, 0]
-    elif run.program.slow_sensors:
-        shown = block.states[:, 0]
-        angle, pressure_1, pressure_2 = (float(shown[rows[f"sensor_state.{name}"]]) for name in SIGNALS)
-    else:
+def _sight(batch: Batch, block: LaneBlock) -> Callable[[int], Measurement]:
+    """What the controller sees at a sample: the present, or what late sensors looked at."""
+    program, per_sample = batch.program, batch.clock.steps_per_sample
+    rows = row_numbers(program.state_rows())
+    plant, sensors = _group(batch, "plant"), _group(batch, "sensors")
+
+    def see(sample: int) -> Measurement:
         state = block.states[:, 0]
-        angle = float(state[rows["state.angle"]])
-        masses = float(state[rows["state.mass_1"]]), float(state[rows["state.mass_2"]])
-        pressure_1, pressure_2 = chamber_pressures(run.plant, angle, *masses)
-    if run.program.ideal_sensors:
-        torque = actuator_torque(pressure_1, pressure_2, run.plant.torque_constant)
-        return Measurement(angle, pressure_1, pressure_2, torque)
-    return measure(run.sensors, angle, pressure_1, pressure_2, run.plant.torque_constant, sample)
+        if program.late_signals and sample > 0:
+            angle, pressure_1, pressure_2 = block.late_signals(sample * per_sample)[:, 0]
+        elif program.slow_sensors:
+            angle, pressure_1, pressure_2 = (float(state[rows[f"sensor_state.{name}"]]) for name in SIGNALS)
+        else:
+            angle = float(state[rows["state.angle"]])
+            masses = float(state[rows["state.mass_1"]]), float(state[rows["state.mass_2"]])
+            pressure_1, pressure_2 = chamber_pressures(plant, angle, *masses)
+        if program.ideal_sensors:
+            return Measurement(
+                angle, pressure_1, pressure_2, actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+            )
+        return measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
+
+    return see

@@ -11,6 +11,7 @@ from typing import Any
 
 from ppafo.control.kind import PythonController
 from ppafo.errors import ScenarioError
+from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
 
 PYTHON_CONTROLLER = "python"
@@ -143,7 +144,8 @@ class Scenario:
 
     Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
     ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
-    reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, as in the paper.
+    reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
+    pressures are constant, both as in the paper.
     """
 
     name: str
@@ -161,6 +163,7 @@ class Scenario:
     assumptions: tuple[Assumption, ...]
     origin: Origin
     thermal: Thermal | None = None
+    supply_lines: SupplyLines | None = None
 
     def __repr__(self) -> str:
         """Return name, device, valve, motion, controller and duration, a line each."""

@@ -5,6 +5,7 @@ which keys there can be.
 """
 
 import functools
+import re
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, WithJsonSchema
@@ -12,7 +13,7 @@ from pydantic import BaseModel, Field, WithJsonSchema
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.documents.models import NAME, one_of, optional, published_schema, table
 from ppafo.model.declaration import Quantity
-from ppafo.simulation import declaration
+from ppafo.simulation import declaration, supply_line
 
 _LONGEST_NAME = 100
 _STARTS_WITH_NUMBER = r"^\s*[+-]?(\d|\.\d)"
@@ -50,18 +51,17 @@ def kind_field(kind: str, summary: str) -> dict[str, Any]:
 
 def titled(name: str) -> str:
     """Return a name as that of a model: ``ramp_hold`` as ``RampHold``."""
-    return "".join(part.capitalize() for part in name.split("_"))
+    return "".join(part.capitalize() for part in re.split(r"\W|_", name))
 
 
 def _profile(prescribed: Quantity, purpose: str) -> Any:
     return one_of(
         [
             table(
-                f"{titled(kind.name)}{purpose}",
-                kind_field(kind.name, kind.summary)
-                | quantity_fields(declaration.profile_settings(kind.name, prescribed)),
+                f"{titled(name)}{purpose}",
+                kind_field(name, kind.summary) | quantity_fields(declaration.profile_settings(name, prescribed)),
             )
-            for kind in PROFILES.values()
+            for name, kind in PROFILES.items()
         ]
     )
 
@@ -87,15 +87,16 @@ def _controller() -> Any:
     return one_of(
         [
             table(
-                f"{titled(kind.name)}Controller",
-                kind_field(kind.name, kind.summary) | sampling | quantity_fields(kind.quantities),
+                f"{titled(name)}Controller",
+                kind_field(name, kind.summary) | sampling | quantity_fields(kind.quantities),
             )
-            for kind in CONTROLLERS.values()
+            for name, kind in CONTROLLERS.items()
         ]
     )
 
 
-def _gas_model() -> Any:
+def gas_model_table() -> Any:
+    """Return the section that says how the gas in the chambers behaves."""
     warm = "the gas warms and cools: energy balance, heat through the walls"
     return one_of(
         [
@@ -105,6 +106,15 @@ def _gas_model() -> Any:
             table("ThermalGas", kind_field(declaration.THERMAL, warm) | quantity_fields(declaration.THERMAL_GAS)),
         ]
     )
+
+
+def supply_line_table() -> Any:
+    """Return the section of the regulators and lines that feed the device."""
+    fields = {
+        line: optional(table(f"{titled(line)}Line", quantity_fields(supply_line.line_quantities(line))), f"{line} line")
+        for line in supply_line.LINES
+    }
+    return table("SupplyLine", fields)
 
 
 def device_fields() -> dict[str, Any]:
@@ -121,9 +131,13 @@ def _sensors() -> dict[str, Any]:
     return quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
 
 
-@functools.cache
 def scenario_file() -> type[BaseModel]:
-    """Return the model of a scenario file, for the controllers and profiles that are in the catalogues."""
+    """Return the model of a scenario file, for the controllers and profiles that are loaded."""
+    return _scenario_file(*(tuple(kinds.items()) for kinds in (CONTROLLERS, PROFILES)))
+
+
+@functools.lru_cache(maxsize=4)
+def _scenario_file(*_kinds: Any) -> type[BaseModel]:
     words = tuple(declaration.PRESSURE_WORDS)
     reference = _profile(declaration.TORQUE_LEVEL, "Reference")
     initial = table("Initial", quantity_fields(declaration.INITIAL, words))
@@ -138,12 +152,17 @@ def scenario_file() -> type[BaseModel]:
         "controller": (_controller(), Field(description="what sets the valve")),
         "reference": optional(reference, "torque that the controller follows; 0 N m unless given"),
         "sensors": optional(table("Sensors", _sensors()), "what the controller sees; ideal unless given"),
-        "gas_model": optional(_gas_model(), "how the gas in the chambers behaves; isothermal unless given"),
+        "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
+        supply_line.SECTION: optional(
+            supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
+        ),
         "assumed": (dict[str, str], Field(default_factory=dict, description="values that no source gives, and why")),
     }
     return table("ScenarioFile", fields)
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scenario file."""
+    """Return the JSON Schema of a scenario file, with the controllers and profiles of all packages."""
+    CONTROLLERS.load_all()
+    PROFILES.load_all()
     return published_schema(scenario_file(), "ppafo scenario")

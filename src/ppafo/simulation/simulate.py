@@ -1,25 +1,27 @@
 """Runs a scenario and gathers what came of it."""
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-import ppafo
-from ppafo.engine.lanes import BatchResult, Floats, load_program
-from ppafo.engine.run import NEVER_FAILED, Run, run_together
+from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
+from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.metrics.catalog import evaluate
 from ppafo.model.friction import sliding_friction
 from ppafo.model.plant import chamber_pressures
+from ppafo.model.regulator import LineState, line_pressures
 from ppafo.model.thermal import energy_per_content
 from ppafo.model.vane import gravity_torque
+from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.result import Result, Status
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import LedMotion, Scenario
+from ppafo.version import __version__
 
 OPEN_LOOP = "constant"
 """The controller that follows no reference: its recordings have none, so that no tracking error is made of it."""
@@ -43,7 +45,7 @@ def simulate(scenario: Scenario | str | Path, overrides: Sequence[str] = ()) -> 
 def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
     """Results of runs of one scenario, as planned or with other numbers; a Python controller has them in turn."""
     custom = scenario.control.custom
-    outcomes = run_together(runs) if custom is None else [run_sampled(run, custom) for run in runs]
+    outcomes = run_together(runs) if custom is None else [run_sampled(batch_of(run), custom) for run in runs]
     return [_result(scenario, run, outcome) for run, outcome in zip(runs, outcomes, strict=True)]
 
 
@@ -65,13 +67,13 @@ def _result(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     status = _status(outcome, record, rows, times)
     kept = times < (np.inf if status.time is None else status.time)
     kept[0] = True
-    recording = _recording(scenario, run, times[kept], record[kept], rows)
+    recording = _recording(scenario, run, times[kept], {path: record[kept, row] for path, row in rows.items()})
     return Result(
         scenario=scenario,
         recording=recording,
         metrics=evaluate(recording),
         status=status,
-        versions={"ppafo": ppafo.__version__, "python": platform.python_version(), "numpy": np.__version__},
+        versions={"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
         engine={"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample},
     )
 
@@ -87,15 +89,13 @@ def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: F
         f"{name.replace('_', ' ')} {last[rows[f'state.{name}']]:.4g} {unit}"
         for name, unit in (("angle", "rad"), ("angular_velocity", "rad/s"), ("mass_1", "kg"), ("mass_2", "kg"))
     )
-    return Status("diverged", time, f"diverged at t = {time:.6g} s (before that: {state}); {REMEDY}")
+    remedy = TOO_MANY_PARTS if outcome.states[rows["result.too_many_parts"], 0] else REMEDY
+    return Status("diverged", time, f"diverged at t = {time:.6g} s (before that: {state}); {remedy}")
 
 
-def _recording(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: dict[str, int]) -> Recording:
-    def row(path: str) -> Floats:
-        return record[:, rows[path]]
-
-    angle, rate = row("state.angle"), row("state.angular_velocity")
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, row("state.mass_1"), row("state.mass_2"))  # type: ignore[arg-type]
+def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Recording:
+    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
+    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
     torque = run.plant.torque_constant * np.subtract(pressure_1, pressure_2)
     channels = {
         "angle": (angle, "rad"),
@@ -103,39 +103,46 @@ def _recording(scenario: Scenario, run: Run, times: Floats, record: Floats, rows
         "pressure_1": (pressure_1, "Pa"),
         "pressure_2": (pressure_2, "Pa"),
         "torque": (torque, "N m"),
-        "command": (row("result.command"), "-"),
-        "supplied_mass": (row("state.supplied_mass"), "kg"),
-        "vented_mass": (row("state.vented_mass"), "kg"),
-        "leaked_mass": (row("state.leaked_mass"), "kg"),
+        "command": (rows["result.command"], "-"),
+        "supplied_mass": (rows["state.supplied_mass"], "kg"),
+        "vented_mass": (rows["state.vented_mass"], "kg"),
+        "leaked_mass": (rows["state.leaked_mass"], "kg"),
         "external_torque": (_external_torque(scenario, run, times, angle, rate, torque), "N m"),
-        "mass_1": (row("state.mass_1"), "kg"),
-        "mass_2": (row("state.mass_2"), "kg"),
+        "mass_1": (rows["state.mass_1"], "kg"),
+        "mass_2": (rows["state.mass_2"], "kg"),
     }
     if scenario.control.kind != OPEN_LOOP:
         channels["reference"] = (profile_values(scenario.reference, times)[0], "N m")
-    if run.program.is_thermal:
-        channels |= _thermal_channels(scenario, run, record, rows)
+    channels |= gas_channels(scenario.device.gas, run, rows)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(scenario.name, times, values, kind="simulated")
 
 
-def _thermal_channels(
-    scenario: Scenario, run: Run, record: Floats, rows: dict[str, int]
-) -> dict[str, tuple[Floats, str]]:
-    """True masses, temperatures and energies of gas with an energy balance."""
-    channels = {}
+def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
+    """Return what a run records of its gas beside pressures, with units, from its rows (samples,) by path.
+
+    Line pressures and what came through the bottle's regulator where there are lines; true masses, temperatures and
+    energies where the gas has an energy balance.
+    """
+    found: dict[str, tuple[Floats, str]] = {}
+    if run.lines is not None:
+        lines = LineState(*(rows[f"line_state.{name}"] for name in LineState._fields))  # type: ignore[arg-type]
+        line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)
+        found |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
+        found["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")
+    if not run.program.is_thermal:
+        return found
     for chamber in (1, 2):
-        mass = record[:, rows[f"masses.mass_{chamber}"]]
-        warmth = record[:, rows[f"state.mass_{chamber}"]] / mass
-        channels[f"mass_{chamber}"] = (mass, "kg")
-        channels[f"temperature_{chamber}"] = (scenario.device.gas.temperature * warmth, "K")
-    per_content = energy_per_content(run.plant.gas_product, scenario.device.gas.heat_capacity_ratio)
-    content = record[:, rows["state.mass_1"]] + record[:, rows["state.mass_2"]]
-    channels["gas_energy"] = (per_content * content, "J")
+        mass = rows[f"masses.mass_{chamber}"]
+        warmth = rows[f"state.mass_{chamber}"] / mass
+        found[f"mass_{chamber}"] = (mass, "kg")
+        found[f"temperature_{chamber}"] = (gas.temperature * warmth, "K")
+    per_content = energy_per_content(run.plant.gas_product, gas.heat_capacity_ratio)
+    found["gas_energy"] = (per_content * (rows["state.mass_1"] + rows["state.mass_2"]), "J")
     for name, row in (("supplied_enthalpy", "supplied"), ("vented_enthalpy", "vented"), ("wall_heat", "heat")):
-        channels[name] = (per_content * record[:, rows[f"masses.{row}_content"]], "J")
-    channels["gas_work"] = (record[:, rows["masses.gas_work"]], "J")
-    return channels
+        found[name] = (per_content * rows[f"masses.{row}_content"], "J")
+    found["gas_work"] = (rows["masses.gas_work"], "J")
+    return found
 
 
 def _external_torque(
@@ -147,11 +154,14 @@ def _external_torque(
         return np.full(times.size, plant.external_torque)
     acceleration = profile_values(scenario.motion.profile, times)[2]
     friction = np.array([sliding_friction(float(value), plant.dynamic_torque) for value in rate])
-    gravity = gravity_torque(angle, plant.gravity_torque)  # type: ignore[arg-type]
+    gravity = gravity_torque(angle, plant.gravity_torque)
     return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
 
 
-def compile_model(scenario: Scenario | str | Path) -> None:
-    """Compile the model of a scenario into the cache, unless it is there; nothing is run."""
-    chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
-    load_program(plan_run(chosen).program)
+def compile_models(scenarios: Iterable[Scenario | str | Path]) -> None:
+    """Compile the models of scenarios into the cache, unless they are there; nothing is run."""
+    chosen = [item if isinstance(item, Scenario) else load_scenario(item) for item in scenarios]
+    programs = [plan_run(item).program for item in chosen]
+    load_programs(programs)
+    for program in programs:
+        load_program(program)

@@ -29,7 +29,7 @@ class MappedChannel(BaseModel):
     ] = None
     constant: Annotated[_Text | None, Field(description="instead of a column: one value, such as '1 bar_a'")] = None
     unit: Annotated[str, Field(description="unit of the value, such as 'bar_g'; '-' for a plain number")] = "-"
-    sign: Annotated[Literal[1, -1], Field(description="-1 where the file counts the other way")] = 1
+    sign: Annotated[Literal[1, -1], Field(description="-1 where the file has the opposite sign")] = 1
     factor: Annotated[float, Field(description="unit per number, for a sensor's volts")] = 1.0
     offset: Annotated[float, Field(description="added after the factor, in unit")] = 0.0
     times: Annotated[_Text | None, Field(description="a quantity to multiply by, such as a lever arm '0.13 m'")] = None
@@ -53,10 +53,10 @@ class ColumnMap(BaseModel):
     model_config = _STRICT
 
     delimiter: Annotated[
-        Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what parts columns")
+        Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what separates columns")
     ] = "comma"
     decimal: Annotated[Literal["point", "comma"], Field(description="decimal mark")] = "point"
-    encoding: Annotated[Literal["utf-8", "latin-1"], Field(description="how the text is encoded")] = "utf-8"
+    encoding: Annotated[Literal["utf-8", "latin-1"], Field(description="encoding of the text")] = "utf-8"
     header: Annotated[bool, Field(description="whether a line names the columns")] = True
     skip_lines: Annotated[int, Field(ge=0, description="lines before the header, or before the first row")] = 0
     skip_rows: Annotated[int, Field(ge=0, description="rows of numbers to leave out at the start")] = 0
@@ -85,7 +85,7 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
         raise DataError(f"{file}: {first_problem(error.errors(include_url=False), ColumnMaps)}") from error
     known = ", ".join(maps)
     if name is None and len(maps) > 1:
-        raise DataError(f"{file}: has several column maps; say which one as {file}:NAME; there are {known}")
+        raise DataError(f"{file}: has several column maps; name one as {file}:NAME; there are {known}")
     if name is not None and name not in maps:
         raise DataError(f"{file}: there is no column map '{name}'{nearest_name(name, maps)}; there are {known}")
     return maps[name or next(iter(maps))]

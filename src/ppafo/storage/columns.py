@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.errors import DataError, UnitError
+from ppafo.errors import DataError, UnitError, first_twice
 from ppafo.signals import CHANNELS
 from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.signals.recording import Floats
@@ -38,7 +38,7 @@ def parse_header(cells: list[str]) -> list[Column]:
     names = [column.name for column in columns]
     if names[0] != TIME:
         raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'")
-    twice = next((name for name in names if names.count(name) > 1), None)
+    twice = first_twice(names)
     if twice is not None:
         raise DataError(f"there are two columns '{twice}'")
     return columns
@@ -48,7 +48,7 @@ def _column(cell: str) -> Column:
     match = _HEADER.fullmatch(cell)
     if match is None:
         shown = cell if len(cell) <= 40 else f"{cell[:36]} ..."
-        raise DataError(f"the header must name columns as 'name [unit]', parted by commas; '{shown}' is none")
+        raise DataError(f"the header must name columns as 'name [unit]', separated by commas; '{shown}' is not one")
     return Column(match[1], match[2])
 
 
@@ -60,7 +60,7 @@ def check_clock(time: Floats, lines: Sequence[int]) -> None:
         word = "stands still" if time[index] == time[index - 1] else "goes backwards"
         raise DataError(
             f"line {lines[index]}, column '{TIME}': the clock {word}: {time[index]:.9g} s follows "
-            f"{time[index - 1]:.9g} s; time must grow from sample to sample"
+            f"{time[index - 1]:.9g} s; time must increase from sample to sample"
         )
 
 

@@ -8,7 +8,9 @@ import difflib
 import io
 import math
 import re
+from array import array
 from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -65,11 +67,14 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
     lines = _lines(path)
     first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
     try:
-        rows = _without_blank_end(list(csv.reader(lines[first:], strict=True)))
-        if len(rows) < 2:
-            raise DataError("has a header but no samples" if rows else "has no header")
-        columns = parse_header(rows[0])
-        values = _table(rows, first)
+        rows = csv.reader(islice(lines, first, None), strict=True)
+        header = next(rows, [])
+        if not header and not any(lines[first:]):
+            raise DataError("has no header")
+        columns = parse_header(header)
+        values = _table(header, rows, first)
+        if not len(values):
+            raise DataError("has a header but no samples")
         check_clock(values[:, 0], range(first + 2, first + 2 + len(values)))
         time, *channels = (_channel(column, values[:, index], atmosphere) for index, column in enumerate(columns))
         named = {column.name: channel for column, channel in zip(columns[1:], channels, strict=True)}
@@ -95,40 +100,36 @@ def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
 
 def _lines(path: str | Path) -> list[str]:
     content = read_bytes(path)
+    if b"\0" in content:
+        raise DataError(f"{path}: is not a text file (byte {content.index(0)} is zero)")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DataError(f"{path}: is not a text file in UTF-8 (byte {error.start})") from error
-    if "\0" in text:
-        raise DataError(f"{path}: is not a text file (byte {text.index(chr(0))} is zero)")
     if not text.endswith(("\n", "\r")):
         raise DataError(f"{path}: the last line has no end: the file is cut off, or lacks its final line break")
     return text.splitlines()
 
 
-def _without_blank_end(rows: list[list[str]]) -> list[list[str]]:
-    filled = next((count for count in range(len(rows), 0, -1) if rows[count - 1]), 0)
-    return rows[:filled]
-
-
-def _table(rows: list[list[str]], skipped: int) -> Floats:
-    """Return the numbers below the header, row by row."""
-    header, *samples = rows
-    table = np.empty((len(samples), len(header)))
-    for index, row in enumerate(samples):
-        line = skipped + index + 2
+def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats:
+    """Return the numbers below the header, row by row: the texts of a large file take many times its room."""
+    numbers, blank = array("d"), None
+    for line, row in enumerate(rows, start=skipped + 2):
+        if not row:
+            blank = blank or line
+            continue
+        if blank is not None:
+            raise DataError(f"line {blank} has 0 values for {len(header)} columns")
         if len(row) != len(header):
             raise DataError(f"line {line} has {len(row)} values for {len(header)} columns")
         try:
-            table[index] = [float(cell) for cell in row]
+            values = [float(cell) for cell in row]
         except ValueError as error:
             raise _no_number(header, row, line) from error
-        if _UNDERSCORE in "".join(row):
+        if _UNDERSCORE in "".join(row) or not all(map(math.isfinite, values)):
             raise _no_number(header, row, line)
-    wrong = np.flatnonzero(~np.isfinite(table).all(axis=1))
-    if wrong.size:
-        raise _no_number(header, samples[wrong[0]], skipped + int(wrong[0]) + 2)
-    return table
+        numbers.extend(values)
+    return np.array(numbers).reshape(-1, len(header))
 
 
 def _no_number(header: list[str], row: list[str], line: int) -> DataError:

@@ -1,6 +1,8 @@
 """Bytes to and from disk: a file or a folder is written whole beside its place, then renamed, or not at all."""
 
 import contextlib
+import errno
+import os
 import secrets
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
@@ -11,6 +13,9 @@ from ppafo.errors import DataError, reason
 
 LEFT_ASIDE = ".writing-"
 """Part of the name of a file that is being written; one that is still there was left by a process that was killed."""
+
+_CURRENT_FOLDER, _EXCHANGE = -100, 2
+"""``AT_FDCWD`` and ``RENAME_EXCHANGE`` of Linux."""
 
 MOST_BYTES_RECORDED = 2_000_000_000
 """More than this is no recording that is read: an hour at 1 kHz with twenty channels stays below it, as text too."""
@@ -30,7 +35,7 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES_RECORDED) -> bytes:
 def write_file(path: str | Path, content: bytes) -> Path:
     """Write a file, replacing an earlier one; folders are made if need be. Returns the path."""
     target = Path(path)
-    with _written_errors(target), _made(target.parent):
+    with _write_errors(target), _make_folder(target.parent):
         aside = _sibling(target, "writing")
         try:
             aside.write_bytes(content)
@@ -42,7 +47,7 @@ def write_file(path: str | Path, content: bytes) -> Path:
 
 def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
     """Write files into a folder, replacing those of the same names: all of them aside first, then renamed."""
-    with _written_errors(folder), _made(folder):
+    with _write_errors(folder), _make_folder(folder):
         _check_no_folder(folder, contents)
         aside = _sibling(folder / "files", "writing")
         try:
@@ -57,8 +62,8 @@ def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
     """Make ``folder`` hold exactly these files; an earlier folder stays as it was until the new one is whole."""
-    with _written_errors(folder), _made(folder.resolve().parent):
-        target = folder.resolve()
+    target = _real(folder)
+    with _write_errors(folder), _make_folder(target.parent):
         aside = _sibling(target, "writing")
         try:
             aside.mkdir()
@@ -71,13 +76,17 @@ def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 def check_folder_can_be_replaced(folder: Path) -> None:
     """Refuse a folder beside which nothing can be written, by trying; nothing is left of the trial."""
-    with _written_errors(folder), _made(folder.resolve().parent):
-        _try_folder(_sibling(folder.resolve(), "trial"))
+    target = _real(folder)
+    with _write_errors(folder), _make_folder(target.parent):
+        trial = _sibling(target, "trial")
+        _try_folder(trial)
+        if target.is_dir():
+            _try_renaming(target, trial)
 
 
 def check_files_can_be_added(folder: Path, names: Iterable[str]) -> None:
     """Refuse a folder into which files of these names cannot be written, by trying; nothing is left of the trial."""
-    with _written_errors(folder), _made(folder):
+    with _write_errors(folder), _make_folder(folder):
         _check_no_folder(folder, names)
         _try_folder(_sibling(folder / "files", "trial"))
 
@@ -90,8 +99,35 @@ def _try_folder(trial: Path) -> None:
             trial.rmdir()
 
 
+def _try_renaming(folder: Path, trial: Path) -> None:
+    """Refuse a folder that cannot be renamed: a mount point, another user's in a sticky folder, one of a lower layer.
+
+    Nothing is renamed onto a folder that holds a file; what else stands in the way is reported before that.
+    """
+    try:
+        trial.mkdir()
+        (trial / "file").touch()
+        folder.rename(trial)
+    except OSError as error:
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+            why = f"the folder itself cannot be replaced ({reason(error)}); choose a new folder in it"
+            raise OSError(None, why) from error
+    else:
+        trial.rename(folder)
+    finally:
+        shutil.rmtree(trial, ignore_errors=True)
+
+
+def _real(folder: Path) -> Path:
+    """Return the path without links; ``Path.resolve`` raises an error that is no OSError where links go in a circle."""
+    try:
+        return Path(os.path.realpath(folder))
+    except ValueError as error:
+        raise DataError(f"{folder}: cannot be written: {reason(error)}") from error
+
+
 @contextlib.contextmanager
-def _made(folder: Path) -> Iterator[None]:
+def _make_folder(folder: Path) -> Iterator[None]:
     """Make a folder and those above it; at the end the new ones that hold nothing go away again."""
     new = [place for place in (folder, *folder.parents) if not place.exists()]
     nearest = folder if folder.exists() else new[-1].parent
@@ -114,9 +150,14 @@ def _check_no_folder(folder: Path, names: Iterable[str]) -> None:
 
 
 def _swap(new: Path, target: Path) -> None:
-    """Rename ``new`` to ``target``; a folder that was there goes aside first and comes back if that fails."""
+    """Rename ``new`` to ``target``; a folder that was there is ``new`` afterwards, or is removed.
+
+    Where both cannot change places in one step the old one goes aside first, and comes back if the second step fails.
+    """
     if not target.exists():
         new.rename(target)
+        return
+    if _exchange(new, target):
         return
     old = _sibling(target, "replaced")
     try:
@@ -128,13 +169,24 @@ def _swap(new: Path, target: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
+def _exchange(one: Path, other: Path) -> bool:
+    """Tell whether two folders have changed places in one step: Linux can that, on most of its file systems."""
+    import ctypes
+
+    try:
+        rename = ctypes.CDLL(None).renameat2
+    except (AttributeError, OSError, TypeError):
+        return False
+    return bool(rename(_CURRENT_FOLDER, os.fsencode(one), _CURRENT_FOLDER, os.fsencode(other), _EXCHANGE) == 0)
+
+
 def _sibling(target: Path, purpose: str) -> Path:
     """Return a path beside ``target``, on the same disk, that nothing has yet."""
     return target.with_name(f".{target.name}.{purpose}-{secrets.token_hex(4)}")
 
 
 @contextlib.contextmanager
-def _written_errors(path: Path) -> Iterator[None]:
+def _write_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError) as error:

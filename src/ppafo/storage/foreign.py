@@ -108,7 +108,7 @@ def _channel(name: str, item: MappedChannel, decimal: str, names: list[str], row
     index = _index(name, item, names, len(rows[0][1]))
     column = names[index] if names else str(index + 1)
     numbers = np.array([_number(row[index], item.thousands, decimal, column, line) for line, row in rows])
-    return _converted(name, item, numbers, atmosphere)
+    return _convert(name, item, numbers, atmosphere)
 
 
 def _constant(name: str, text: str, count: int, atmosphere: float) -> Channel:
@@ -150,7 +150,7 @@ def _number(cell: str, thousands: str | None, decimal: str, column: str, line: i
     return value
 
 
-def _converted(name: str, item: MappedChannel, numbers: Floats, atmosphere: float) -> Channel:
+def _convert(name: str, item: MappedChannel, numbers: Floats, atmosphere: float) -> Channel:
     """Return the channel in SI; the quantity that it is multiplied by brings its own unit."""
     from ppafo.units import split_quantity
 

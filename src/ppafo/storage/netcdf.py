@@ -92,13 +92,13 @@ def _own_variables(file: Any) -> dict[str, Any]:
         raise DataError(f"there is no variable '{TIME}'")
     for name in names:
         if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-            raise DataError(f"'{name}' is a link; a recording holds its numbers itself")
+            raise DataError(f"'{name}' is a link; a recording must contain its numbers itself")
     variables = {name: file[name] for name in names}
     for name, variable in variables.items():
         if len(getattr(variable, "shape", None) or ()) != 1 or variable.dtype.kind not in _NUMBERS:
             raise DataError(f"'{name}' must be numbers over '{TIME}' alone")
         if variable.is_virtual or variable.external:
-            raise DataError(f"the numbers of '{name}' lie in another file; a recording holds its numbers itself")
+            raise DataError(f"the numbers of '{name}' lie in another file; a recording must contain its numbers itself")
     return variables
 
 
@@ -114,11 +114,11 @@ def _check_sizes(variables: Mapping[str, Any], file_bytes: int) -> None:
             wanted += math.prod(variable.chunks) * variable.dtype.itemsize
     if wanted > max(_ALWAYS_ALLOWED, _MOST_GROWTH * file_bytes):
         raise DataError(
-            f"asks for {wanted / 1e6:,.0f} MB of memory, the file has {file_bytes / 1e6:.2g} MB; "
-            f"a recording asks for at most {_MOST_GROWTH} times its file"
+            f"requires {wanted / 1e6:,.0f} MB of memory, the file has {file_bytes / 1e6:.2g} MB; "
+            f"a recording requires at most {_MOST_GROWTH} times its file"
         )
     for name, variable in variables.items():
-        _check_stored(name, variable)
+        _check_chunks(name, variable)
 
 
 def _check_filters(name: str, variable: Any) -> None:
@@ -127,10 +127,10 @@ def _check_filters(name: str, variable: Any) -> None:
     filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
     after = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
     if not set(filters) <= _FILTERS or not set(after) <= {_FLETCHER}:
-        raise DataError(f"'{name}' is packed in a way that is not read; save it with gzip, or not packed")
+        raise DataError(f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed")
 
 
-def _check_stored(name: str, variable: Any) -> None:
+def _check_chunks(name: str, variable: Any) -> None:
     """Refuse values that nobody wrote, and chunks that unpack to more than they say."""
     size, chunks = variable.size, variable.chunks
     if chunks is None:
@@ -150,7 +150,7 @@ def _check_stored(name: str, variable: Any) -> None:
         except zlib.error:
             grown = False  # not packed after all, or damaged: the library says so
         if grown or stored.size > 2 * most:
-            raise DataError(f"'{name}' unpacks to more than it says")
+            raise DataError(f"'{name}' expands to more than it states")
 
 
 def _channel(name: str, variable: Any) -> Channel:

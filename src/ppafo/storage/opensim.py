@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError, first_twice, one_line
 from ppafo.signals import Recording
 from ppafo.signals.channels import TIME
 from ppafo.signals.recording import Floats
@@ -83,9 +83,9 @@ def _header(lines: list[str]) -> _Header:
         match = _COUNT.match(line.strip())
         if match is not None:
             counts[match[1].lower()] = _whole(match[2], match[1], number)
-        said = _said_degrees(line, number)
+        said = _states_degrees(line, number)
         if said is not None and in_degrees is not None and said != in_degrees:
-            raise DataError(f"line {number}: the header says degrees and radians; correct the one that is wrong")
+            raise DataError(f"line {number}: the header states degrees and radians; correct the one that is wrong")
         in_degrees = in_degrees if said is None else said
     first = lines[0].strip()
     name = first.removeprefix("name ").strip() if end > 0 and first else "unnamed"
@@ -101,7 +101,7 @@ def _whole(text: str, key: str, number: int) -> int:
     return int(text)
 
 
-def _said_degrees(line: str, number: int) -> bool | None:
+def _states_degrees(line: str, number: int) -> bool | None:
     match = _DEGREES.match(line.strip())
     if match is not None:
         word = match[1].lower()
@@ -127,13 +127,13 @@ def _check_labels(labels: list[str], number: int, header: _Header) -> None:
         raise DataError(
             f"line {number}: the first column must be '{TIME}', it is {one_line(labels[0])[:_LONGEST_SHOWN]!r}"
         )
-    twice = next((label for label in labels if labels.count(label) > 1), None)
+    twice = first_twice(labels)
     if twice is not None:
         raise DataError(f"line {number}: there are two columns {twice!r}; rename or remove one")
     if "" in labels:
         raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
     if header.width is not None and header.width != len(labels):
-        raise DataError(f"line {number} names {len(labels)} columns, the header says {header.width}")
+        raise DataError(f"line {number} names {len(labels)} columns, the header states {header.width}")
 
 
 def _cells(line: str) -> list[str]:
@@ -153,7 +153,7 @@ def _rows(lines: list[str], first: int, labels: list[str], header: _Header) -> F
         raise DataError("has labels but no rows")
     if header.rows is not None and header.rows != count:
         raise DataError(
-            f"has {count} rows, its header says {header.rows}: the file is cut off or was edited; "
+            f"has {count} rows, its header states {header.rows}: the file is cut off or was edited; "
             "get it again, or correct the header"
         )
     table = np.empty((count, len(labels)))

@@ -6,12 +6,13 @@ A folder that is taken ends up with exactly the new files; until they are all wr
 import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ppafo.documents.json_text import json_document, json_text
 from ppafo.errors import DataError, one_line, reason
-from ppafo.storage.files import check_folder_can_be_replaced, read_bytes, replace_folder
+from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_bytes, replace_folder
 
 _MOST_BYTES_WRITTEN = 16_000_000
 """No document of ours comes near; one repeats what a scenario file of at most 1 MB says, but not sixteen times."""
@@ -23,11 +24,13 @@ class FolderKind:
     """What a command writes: what messages call it, the file by which it is recognised, the names of all its files.
 
     ``files_of(folder)`` gives the names that an earlier run may have left; DataError where the mark is somebody else's.
+    ``earlier_files_of`` gives those of an earlier version that had another mark, none where there is no such result.
     """
 
     noun: str
     mark: str
     files_of: Callable[[Path], Collection[str]]
+    earlier_files_of: Callable[[Path], Collection[str]] = lambda _folder: ()
 
 
 MARK = "ppafo.json"
@@ -36,23 +39,72 @@ MARK = "ppafo.json"
 _FORMAT = "ppafo files"
 
 
+_FIGURES = ("figure-3-identification", "figure-7-step-response", "figure-8-torque-task", "unreported-settings")
+_EXPERIMENTS = ("step-response", "torque-task-solenoid", "torque-task-proportional")
+_UNMARKED: dict[str, dict[str, tuple[str, ...]]] = {
+    "reproduce": {
+        "claims.json": (
+            "report.html",
+            *(f"{name}.csv" for name in _EXPERIMENTS),
+            *(f"{name}.{ending}" for name in _FIGURES for ending in ("png", "svg")),
+        )
+    },
+    "endurance": {"endurance.json": ("endurance.md", "bottle.csv", "endurance.png", "endurance.svg")},
+    "walk": {"walk.json": (), "wearers.json": ()},
+}
+"""Commands whose folders of version 0.1 have another mark: its name, and the files beside it that it does not list."""
+
+
 def marked_folder(command: str) -> FolderKind:
     """Return the kind of folder that a command writes which marks it by ``MARK``."""
 
     def files_of(folder: Path) -> set[str]:
+        if marking_command(folder) != command:
+            raise DataError(f"{folder}: is not a result of 'ppafo {command}' (see {MARK}); choose another folder")
         document = read_json(folder / MARK)
-        if not isinstance(document, dict) or document.get("format") != _FORMAT or document.get("command") != command:
-            raise DataError(f"{folder}: is not a result of 'ppafo {command}' ({MARK} says so); choose another folder")
         files = document.get("files")
         return {MARK, *map(str, files if isinstance(files, list) else ())}
 
-    return FolderKind(f"result of 'ppafo {command}'", MARK, files_of)
+    return FolderKind(f"result of 'ppafo {command}'", MARK, files_of, partial(_unmarked_files, command=command))
+
+
+def marking_command(folder: Path) -> str:
+    """Return the command that ``MARK`` in a folder names, empty where it is not one of ours."""
+    document = read_json(folder / MARK)
+    is_own = isinstance(document, dict) and document.get("format") == _FORMAT
+    return str(document.get("command", "")) if is_own else ""
+
+
+def add_to_marked_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files into a folder, replacing those of the same names; where it has ``MARK``, they are listed in it."""
+    command = marking_command(folder) if (folder / MARK).is_file() else ""
+    mark = {}
+    if command:
+        files = sorted({*contents, *marked_folder(command).files_of(folder)} - {MARK})
+        mark = {MARK: f"{json_text(_mark(command, files))}\n".encode()}
+    add_files(folder, {**contents, **mark})
+
+
+def _mark(command: str, files: Collection[str]) -> dict[str, Any]:
+    return {"format": _FORMAT, "schema_version": 1, "command": command, "files": sorted(files)}
+
+
+def _unmarked_files(folder: Path, command: str) -> set[str]:
+    """Return the names in a folder that version 0.1 of a command wrote; none where it did not."""
+    for mark, beside in _UNMARKED.get(command, {}).items():
+        document = read_json(folder / mark) if (folder / mark).is_file() else None
+        is_own = isinstance(document, dict) and (
+            document.get("format") == f"ppafo {mark.removesuffix('.json')}" or isinstance(document.get("claims"), list)
+        )
+        if isinstance(document, dict) and is_own:
+            listed = document.get("files")
+            return {mark, *beside, *map(str, listed if isinstance(listed, list) else ())}
+    return set()
 
 
 def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: str) -> None:
     """Make a folder hold exactly these files and ``MARK``, where it is absent, empty or that command's own."""
-    document = {"format": _FORMAT, "schema_version": 1, "command": command, "files": sorted(contents)}
-    marked = {**contents, MARK: f"{json_text(document)}\n".encode()}
+    marked = {**contents, MARK: f"{json_text(_mark(command, contents))}\n".encode()}
     write_owned_folder(folder, marked, marked_folder(command))
 
 
@@ -86,9 +138,9 @@ def _check_own(folder: Path, kind: FolderKind) -> None:
         raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
     if not present:
         return
-    if kind.mark not in present:
+    own = kind.files_of(folder) if kind.mark in present else kind.earlier_files_of(folder)
+    if not own:
         raise DataError(f"{folder}: is not empty and not a {kind.noun} (it has no {kind.mark}); choose another folder")
-    own = kind.files_of(folder)
     foreign = sorted(name for name in present if name not in own or (folder / name).is_dir())
     if foreign:
         shown = ", ".join(foreign[:_NAMED]) + (", ..." if len(foreign) > _NAMED else "")

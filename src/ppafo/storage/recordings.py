@@ -1,8 +1,5 @@
 """A recording from wherever it is: a NetCDF file, a CSV file or a result folder."""
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,14 +9,10 @@ from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.netcdf import read_netcdf
 from ppafo.storage.result_folder import CSV_FILE, RUN_FILE, read_document, read_result
+from ppafo.storage.trial_reading import check_can_be_read
 
 WALK_RECORDING = "recording.nc"
 """What the folder of a walk has in place of a result."""
-
-
-_READING = "import sys; from ppafo.storage.netcdf import read_netcdf; read_netcdf(sys.argv[1])"
-_MOST_SECONDS, _BYTES_PER_SECOND = 30.0, 5e6
-"""How long reading may take: what a start takes on a busy computer, and as long as a slow disk needs for the file."""
 
 
 def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
@@ -47,19 +40,7 @@ def _of_strangers(path: Path) -> Recording:
 
     The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.
     """
-    if sys.executable and path.is_file():
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        words = [sys.executable, "-P", "-c", _READING, str(path)]  # -P: nothing of the working folder is imported
-        most = _MOST_SECONDS + path.stat().st_size / _BYTES_PER_SECOND
-        nothing = subprocess.DEVNULL
-        try:
-            code = subprocess.run(
-                words, env=environment, stdin=nothing, stdout=nothing, stderr=nothing, timeout=most, check=False
-            ).returncode
-        except subprocess.TimeoutExpired as error:
-            raise DataError(f"{path}: is damaged: the HDF5 library comes to no end with it") from error
-        if code < 0:
-            raise DataError(f"{path}: is damaged: the HDF5 library crashes on it")
+    check_can_be_read(path, "ppafo.storage.netcdf", "read_netcdf", "h5py")
     return read_netcdf(path)
 
 

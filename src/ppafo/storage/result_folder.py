@@ -95,7 +95,7 @@ def read_document(folder: str | Path) -> dict[str, Any]:
         version = document.get("schema_version")
         raise DataError(f"{path}: has schema_version {version!r}, this version of ppafo reads {SCHEMA_VERSION}")
     if not isinstance(document.get("recording"), dict) or not isinstance(document.get("files"), list):
-        raise DataError(f"{path}: does not say what its recording and its files are")
+        raise DataError(f"{path}: does not state what its recording and its files are")
     return document
 
 

@@ -1,1 +1,1 @@
-"""Named studies: many runs, one question, the same answer every time."""
+"""What the questions with random draws share: study files, distributions, draws, runs, intervals."""

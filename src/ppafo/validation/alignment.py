@@ -4,14 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.errors import DataError, UnitError, one_line
 from ppafo.signals.recording import Floats
-from ppafo.units import parse_quantity
 
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
 
-LARGEST_LIMIT = 1.0
 _SHIFTS = 81
 _MOST_SAMPLES = 4000
 _LEAST_GAIN = 25.0
@@ -19,7 +16,7 @@ _LEAST_GAIN = 25.0
 _SMALLEST_GAIN = 1.0e-12
 """Gain below which two curves are the same to the accuracy of the engine."""
 _RESOLUTION = 0.02
-"""Share of a sample below which a delay counts as none."""
+"""Fraction of a sample below which a delay counts as none."""
 _GOLDEN = 0.6180339887498949
 _REFINEMENTS = 30
 _AT_LIMIT = 0.99
@@ -35,7 +32,7 @@ class Curve:
     model_values: Floats
     full_range: float
 
-    def shifted(self, delay: float, times: Floats) -> Floats:
+    def shift(self, delay: float, times: Floats) -> Floats:
         """The model, ``delay`` [s] later, at some times; before its first and after its last value it stands still."""
         return np.interp(times - delay, self.model_times, self.model_values)
 
@@ -48,27 +45,16 @@ class Delay:
     is_at_limit: bool
 
     @property
-    def taken_out(self) -> float:
+    def correction(self) -> float:
         """The delay [s] to correct for; 0 at the limit, where the best fit is no delay of a sensor any more."""
         return 0.0 if self.is_at_limit else self.value
 
 
-def parse_limit(text: str) -> float:
-    """Return the largest delay to look for [s] from a text such as ``20 ms``."""
-    try:
-        limit = parse_quantity(text, "s")
-    except UnitError as error:
-        raise DataError(f"longest delay '{one_line(text)}': {error}") from error
-    if not 0.0 <= limit <= LARGEST_LIMIT:
-        raise DataError(f"longest delay '{one_line(text)}': must be from 0 to {LARGEST_LIMIT:g} s")
-    return limit
-
-
-def estimated_delay(curves: "list[Curve]", limit: float) -> Delay:
+def estimate_delay(curves: "list[Curve]", limit: float) -> Delay:
     """The delay, at most ``limit`` [s] either way, that brings the channels together best, each in its full range."""
     if limit <= 0.0 or not curves:
         return Delay(0.0, is_at_limit=False)
-    thinned = [_thinned(curve) for curve in curves]
+    thinned = [_thin(curve) for curve in curves]
     shifts = np.linspace(-limit, limit, _SHIFTS).tolist()
     best = int(np.argmin([_cost(thinned, shift) for shift in shifts]))
     value = _minimum(thinned, shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)])
@@ -77,7 +63,7 @@ def estimated_delay(curves: "list[Curve]", limit: float) -> Delay:
     return Delay(value, abs(value) > _AT_LIMIT * limit)
 
 
-def _thinned(curve: Curve) -> Curve:
+def _thin(curve: Curve) -> Curve:
     """The curve with no more measured samples than the search needs."""
     step = -(-curve.times.size // _MOST_SAMPLES)
     return replace(curve, times=curve.times[::step], values=curve.values[::step])
@@ -86,7 +72,7 @@ def _thinned(curve: Curve) -> Curve:
 def _cost(curves: "list[Curve]", delay: float) -> float:
     """Mean squared error over all samples and channels, in full ranges [-]."""
     means = [
-        float((((curve.shifted(delay, curve.times) - curve.values) / curve.full_range) ** 2).mean()) for curve in curves
+        float((((curve.shift(delay, curve.times) - curve.values) / curve.full_range) ** 2).mean()) for curve in curves
     ]
     return sum(means) / len(means)
 

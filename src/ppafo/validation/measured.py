@@ -20,7 +20,7 @@ from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.validation.compared import ANGLE, COMPARED, PRESSURE_1, PRESSURE_2
 
-FEWEST_SAMPLES = 10
+MINIMUM_SAMPLES = 10
 """Fewer are a few readings and no course in time."""
 
 _REMARKED_GAP = 3.0
@@ -55,10 +55,10 @@ def read_measured(path: str | Path, device: Device, columns: ColumnMap | None = 
     else:
         recording = read_foreign(place, columns, atmosphere=atmosphere)
     content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
-    return checked(recording, device, str(path), hashlib.sha256(content).hexdigest())
+    return check_recording(recording, device, str(path), hashlib.sha256(content).hexdigest())
 
 
-def checked(recording: Recording, device: Device, file: str, sha256: str = "") -> Measured:
+def check_recording(recording: Recording, device: Device, file: str, sha256: str = "") -> Measured:
     """Return a recording as evidence with its remarks, or refuse it in one line that begins with ``file``."""
     _check_length(recording, file)
     unknown = _check_names(recording, file)
@@ -73,9 +73,9 @@ def checked(recording: Recording, device: Device, file: str, sha256: str = "") -
 
 def _check_length(recording: Recording, file: str) -> None:
     count = len(recording)
-    if count < FEWEST_SAMPLES:
+    if count < MINIMUM_SAMPLES:
         noun = "sample" if count == 1 else "samples"
-        raise DataError(f"{file}: has {count} {noun}; at least {FEWEST_SAMPLES} are needed to see a course in time")
+        raise DataError(f"{file}: has {count} {noun}; at least {MINIMUM_SAMPLES} are needed")
 
 
 def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
@@ -92,7 +92,7 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
         raise DataError(f"{file}: there is no channel '{COMMAND}', which the replay needs; there are {names}")
     if not any(name in recording for name in COMPARED):
         raise DataError(f"{file}: has none of the channels to compare: {', '.join(COMPARED)}")
-    return tuple(f"channel '{name}' is not known and was not used" for name in unknown)
+    return tuple(f"channel '{name}' is not known and was ignored" for name in unknown)
 
 
 def _check_size(recording: Recording, device: Device, file: str) -> None:
@@ -131,7 +131,7 @@ def _above_supply(file: str, name: str, level: float, supply: float, device: Dev
     shown = [f"{from_si(p, 'psi_g', 'Pa_a', device.supply.atmospheric_pressure):.4g} psi_g" for p in (level, supply)]
     owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
     remedy = "check both sensors" if is_recorded else f'record it, or give --set "supply.pressure={shown[0]}"'
-    return f"{file}: '{name}' stands at {shown[0]}, above {owner}, {shown[1]}: {remedy}"
+    return f"{file}: '{name}' stays at {shown[0]}, above {owner}, {shown[1]}: {remedy}"
 
 
 def supply_gauge(recording: Recording, device: Device) -> float:
@@ -147,14 +147,14 @@ def _check_change(recording: Recording, device: Device, file: str) -> None:
     if gauge <= 0.0:
         owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"
         raise DataError(
-            f"{file}: {owner} is not above the atmosphere, so that there is no full range to compare pressures with"
+            f"{file}: {owner} is not above the atmosphere, so there is no full range to compare pressures with"
         )
     compared = [name for name in COMPARED if name in recording]
     shares = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
     if max(shares) < _LEAST_CHANGE:
         raise DataError(
             f"{file}: nothing happens in it: {', '.join(compared)} change by less than {_LEAST_CHANGE:.0%} of full "
-            "range, so that it cannot tell a good model from a bad one"
+            "range, so it cannot tell a good model from a bad one"
         )
 
 
@@ -166,7 +166,7 @@ def _gap_remarks(recording: Recording) -> tuple[str, ...]:
         return ()
     first = float(recording.time[int(np.argmax(gaps > _REMARKED_GAP * usual))])
     noun = "gap" if count == 1 else "gaps"
-    return (f"{count} {noun} in time, the first after {first:.6g} s; inputs were carried across",)
+    return (f"{count} {noun} in time, the first after {first:.6g} s; inputs were held across",)
 
 
 def _constant_remarks(recording: Recording) -> tuple[str, ...]:

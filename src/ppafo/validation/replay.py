@@ -1,6 +1,7 @@
-"""The model on the inputs of a recording: command, supply pressure and external torque, or the recorded angle."""
+"""The model on the inputs of a recording, from its first state: command, supply, external torque or recorded angle."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -8,8 +9,8 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.engine.replay import replay
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of
-from ppafo.errors import DataError, SimulationError
+from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of
+from ppafo.errors import DataError, SimulationError, UnitError, nearest_name, one_line
 from ppafo.model.plant import chamber_pressures
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
@@ -20,17 +21,20 @@ from ppafo.simulation.recorded.inputs import (
     EXTERNAL_TORQUE,
     SUPPLY,
     RecordedInputs,
+    between_stops,
     led_along,
     sample_period,
     step_inputs,
 )
 from ppafo.simulation.recorded.scenario import held_at, recorded_scenario, with_highest_supply
-from ppafo.simulation.recorded.start import Start
+from ppafo.simulation.recorded.start import Start, samples_at_rest
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.validation.compared import ANGLE
+from ppafo.units import parse_quantity
+from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
 from ppafo.validation.measured import Measured
 
 Motion = Literal["free", "measured", "held"]
+MOTIONS: tuple[Motion, ...] = ("free", "measured", "held")
 
 MOST_STEPS = 20_000_000
 _WHOLE = 1.0e-9
@@ -49,18 +53,19 @@ class Replayed:
 
 def replay_recording(measured: Measured, device: Device, start: Start, motion: Motion, extra: float) -> Replayed:
     """Run the model on the inputs of a recording and ``extra`` seconds longer, with the last inputs."""
-    run = _planned(measured, device, start, motion, extra)
+    run = _plan(measured, device, start, motion, extra)
     if motion == "measured":
         run = led_along(run, start.angle)
     inputs = _inputs(measured, motion)
     outcome = replay(batch_of(run), step_inputs(inputs, device, run))
-    failed = float(outcome.states[state_row_numbers(run)["result.failure_time"], 0])
+    rows = state_row_numbers(run)
+    failed = float(outcome.states[rows["result.failure_time"], 0])
     if failed < NEVER_FAILED or not np.isfinite(outcome.record).all():
         until = min(failed, run.step * run.step_count)
-        raise SimulationError(
-            f"{measured.file}: the model diverged {until:.6g} s after the first sample; look at the volumes, the "
-            "inertia and the valve of the set (ppafo audit)"
-        )
+        remedy = "check the volumes, the inertia and the valve of the set (ppafo audit)"
+        if outcome.states[rows["result.too_many_parts"], 0]:
+            remedy = TOO_MANY_PARTS
+        raise SimulationError(f"{measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}")
     return Replayed(_recording(measured, run, outcome.record[:, :, 0]), run.step, inputs.names)
 
 
@@ -74,7 +79,7 @@ def _inputs(measured: Measured, motion: Motion) -> RecordedInputs:
     return RecordedInputs(measured.recording, names, float(measured.recording.time[0]))
 
 
-def _planned(measured: Measured, device: Device, start: Start, motion: Motion, extra: float) -> Run:
+def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extra: float) -> Run:
     """The run of a free or a held vane; the steps of a free one are fine enough for a led one too."""
     recording = measured.recording
     duration = recording.duration + max(extra, sample_period(recording.time))
@@ -84,7 +89,7 @@ def _planned(measured: Measured, device: Device, start: Start, motion: Motion, e
     if run.step_count > MOST_STEPS:
         raise DataError(
             f"{measured.file}: {duration:.4g} s would take {run.step_count} steps of {run.step:.2g} s, at most "
-            f"{MOST_STEPS} are allowed; cut the recording into parts"
+            f"{MOST_STEPS} are allowed; split the recording into parts"
         )
     supply = device.supply
     plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)
@@ -106,7 +111,7 @@ def _is_used(measured: Measured, name: str, motion: Motion) -> bool:
 def _recording(measured: Measured, run: Run, record: Floats) -> Recording:
     rows = state_row_numbers(run)
     angle, masses = record[:, rows["state.angle"]], (record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]])
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, *masses)  # type: ignore[arg-type]
+    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, *masses)
     difference = np.subtract(pressure_1, pressure_2)
     channels = {
         "angle": (angle, "rad"),
@@ -120,3 +125,48 @@ def _recording(measured: Measured, run: Run, record: Floats) -> Recording:
     times = measured.recording.time[0] + interval * np.arange(record.shape[0], dtype=np.float64)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"{measured.recording.label}, replayed", times, values, kind="simulated")
+
+
+_UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
+_EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2: "pressure_2=50 psi_g"}
+
+
+def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
+    """Return initial values in SI by channel from texts such as ``pressure_1=0 psi_g``."""
+    values = {}
+    for text in texts:
+        name, _, value = (part.strip() for part in text.partition("="))
+        if name not in _UNITS:
+            hint = nearest_name(name, _UNITS)
+            raise DataError(
+                f"initial value '{one_line(text)}': give {', '.join(_UNITS)}{hint}, as '{_EXAMPLES[ANGLE]}'"
+            )
+        try:
+            values[name] = parse_quantity(value, _UNITS[name], atmosphere)
+        except UnitError as error:
+            raise DataError(f"initial value '{one_line(text)}': {error}") from error
+    return values
+
+
+def initial_in_fixed_volume(device: Device, given: Mapping[str, float]) -> dict[str, float]:
+    """Return where the replay of a fixed volume starts beside its pressure, which nothing else touches."""
+    beside = {ANGLE: device.actuator.angle_min, PRESSURE_2: device.supply.atmospheric_pressure}
+    return {**given, **beside}
+
+
+def start_of(measured: Measured, device: Device, given: Mapping[str, float]) -> Start:
+    """Return where the replay of a recording starts; ``given`` values [SI] go before those of the recording."""
+    count = samples_at_rest(measured.recording)
+    values = {name: given[name] if name in given else _first(measured, name, count) for name in _UNITS}
+    rate = _first(measured, "angular_velocity", count) if measured.has("angular_velocity") else 0.0
+    angle = float(between_stops(np.array([values[ANGLE]]), device, measured.file)[0])
+    return Start(angle, rate, values[PRESSURE_1], values[PRESSURE_2])
+
+
+def _first(measured: Measured, name: str, count: int) -> float:
+    if not measured.has(name):
+        raise DataError(
+            f"{measured.file}: there is no channel '{name}' to start from; give its initial value, --initial "
+            f'"{_EXAMPLES[name]}"'
+        )
+    return float(np.mean(measured.recording[name][:count]))

@@ -5,13 +5,10 @@ from dataclasses import dataclass, replace
 
 from ppafo.control.walking import off
 from ppafo.metrics import Metric
-from ppafo.signals.recording import Floats
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.followed_gait import gait_timing, landing_phase
-from ppafo.walking.posture import ankle_path
-from ppafo.walking.strides import PHASES
+from ppafo.walking.followed_gait import landing_phase
 from ppafo.walking.walk import Progress, WalkResult, silent, walk
-from ppafo.walking.walk_metrics import healthy_positive_work, lowest_toes
+from ppafo.walking.walk_metrics import healthy_positive_work, healthy_toe_height, lowest_toes
 
 Say = Callable[[str], None]
 
@@ -58,13 +55,6 @@ def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:
         work = healthy_positive_work(configuration)
         found["push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
     return found
-
-
-def healthy_toe_height(configuration: Configuration) -> Floats:
-    """Toes of the healthy gait over the ground [m] at ``PHASES``."""
-    gait = configuration.gait
-    path = ankle_path(gait, gait_timing(gait), configuration.wearer)
-    return path.toe_height(PHASES % 1.0, gait.shank_angle.sampled(PHASES), gait.ankle_angle.sampled(PHASES))
 
 
 def _landing_rate(configuration: Configuration) -> float:

@@ -9,6 +9,7 @@ from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.device import Device
+from ppafo.simulation.scenario import Thermal
 from ppafo.walking.wearer import Wearer
 
 
@@ -16,7 +17,8 @@ from ppafo.walking.wearer import Wearer
 class Configuration:
     """One device on one wearer; ``settings`` of the controller in SI, ``period`` and ``step`` in seconds.
 
-    ``supply_lines`` are the lines behind its regulators, None where the supply pressures are constant.
+    ``supply_lines`` are the lines behind its regulators, None where the supply pressures are constant. ``thermal`` is
+    how the gas takes up heat, None where it keeps its temperature.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
 
@@ -35,6 +37,7 @@ class Configuration:
     file: str
     overrides: tuple[str, ...]
     supply_lines: SupplyLines | None = None
+    thermal: Thermal | None = None
 
     @property
     def has_ideal_sensors(self) -> bool:

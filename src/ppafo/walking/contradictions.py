@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from ppafo.control.walking.catalog import FITS_ON_OFF_VALVES
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.simulation.reading import Reading, rounded
 from ppafo.walking.configuration import Configuration
@@ -56,9 +56,9 @@ def _segments(configuration: Configuration) -> Iterator[tuple[str, str]]:
 
 
 def _valve(configuration: Configuration) -> Iterator[tuple[str, str]]:
-    name, valve = configuration.controller.name, configuration.device.valve.kind
-    if valve != "proportional" and name not in FITS_ON_OFF_VALVES:
-        fitting = " or ".join(sorted(FITS_ON_OFF_VALVES))
+    valve = configuration.device.valve.kind
+    if valve != "proportional" and not configuration.controller.only_switches:
+        fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
         remedy = f"take device.valve 'proportional', or controller.kind {fitting}"
         yield "controller.kind", f"opens its valve by degrees, which a {valve} valve cannot: {remedy}"
 

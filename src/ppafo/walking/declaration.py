@@ -1,9 +1,9 @@
 """Every value that a walk file can hold beside those of its controller and its wearer."""
 
-from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.control.walking.catalog import walking_controllers
 from ppafo.model.declaration import Quantity
-from ppafo.simulation.declaration import PERIOD, RATE, SENSORS
-from ppafo.walking.supply_line import LINES, SECTION, line_quantities
+from ppafo.simulation import supply_line
+from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, THERMAL_GAS
 from ppafo.walking.wearer import WEARER
 
 LARGEST_SEED = 2**32 - 1
@@ -38,7 +38,8 @@ FAULT_KINDS = {"frozen": "shows its last value", "stuck": "shows one reading"}
 
 def controller_settings(kind: str) -> tuple[Quantity, ...]:
     """Return the settings of a walking controller, none where it is unknown."""
-    return WALKING_CONTROLLERS[kind].quantities if kind in WALKING_CONTROLLERS else ()
+    known = walking_controllers()
+    return known[kind].quantities if kind in known else ()
 
 
 def quantities(controller: str) -> dict[str, Quantity]:
@@ -48,11 +49,10 @@ def quantities(controller: str) -> dict[str, Quantity]:
         "controller": (RATE, PERIOD, *controller_settings(controller)),
         "sensors": (*WALK_SENSORS, *BANDWIDTHS, SEED),
         "run": (STEP,),
+        "gas_model": THERMAL_GAS,
     }
     found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
     for sensor in FAULTY:
         found[f"faults.{sensor}.time"] = FAULT_TIME
         found[f"faults.{sensor}.reading"] = READINGS[sensor]
-    for line in LINES:
-        found |= {f"{SECTION}.{line}.{item.name}": item for item in line_quantities(line)}
-    return found
+    return found | supply_line.paths()

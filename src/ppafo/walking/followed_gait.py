@@ -31,7 +31,7 @@ EVENT_PHASES = np.linspace(0.0, 1.0, 1001)[150:]
 CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
 """Shares of the swing between which the toes must clear the ground."""
 
-ZERO = Series(*(0.0,) * 17)
+ZERO = Series(**dict.fromkeys(Series._fields, 0.0))
 
 
 def gait_series(gait: Gait) -> GaitSeries:

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.control.walking.catalog import load_walking_controller, walking_controllers
 from ppafo.documents.problems import first_problem
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
@@ -19,7 +19,8 @@ from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters import apply_overrides, build_device, load_parameter_set
 from ppafo.parameters.device import Device
-from ppafo.simulation.declaration import PERIOD, RATE, kind_at, value_at
+from ppafo.simulation.declaration import ISOTHERMAL, PERIOD, RATE, kind_at, value_at
+from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.overriding import device_paths, is_of_device, split_override
 from ppafo.simulation.reading import Reading
 from ppafo.walking.configuration import NEVER, Configuration
@@ -37,18 +38,17 @@ from ppafo.walking.declaration import (
     quantities,
 )
 from ppafo.walking.schema import walk_file
-from ppafo.walking.supply_line import assumed_lines, supply_lines
 from ppafo.walking.wearer import WEARER, Wearer
 
-_FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
+FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 _TURN = 2.0 * math.pi
-_TEXTS = ("gait", "device.valve", "controller.kind", *(f"faults.{sensor}.kind" for sensor in FAULTY))
+_TEXTS = ("gait", "device.valve", "controller.kind", "gas_model.kind", *(f"faults.{sensor}.kind" for sensor in FAULTY))
 DEFAULT_PERIOD = 1.0e-3
 
 
 def list_walks() -> tuple[str, ...]:
     """Return the names of the walk configurations that come with the package."""
-    return _FILE.names()
+    return FILE.names()
 
 
 def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str | Path | None = None) -> Configuration:
@@ -59,7 +59,8 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
-    document = _changed(_FILE.parse(_FILE.read(name_or_path), file), given, file)
+    document = _changed(FILE.parse(FILE.read(name_or_path), file), given, file)
+    load_walking_controller(kind_at(document, "controller"))
     try:
         walk_file().model_validate(document)
     except ValidationError as error:
@@ -67,7 +68,7 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
         raise ScenarioError(f"{file}: {problem}") from error
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
-    kind = WALKING_CONTROLLERS[kind_at(document, "controller")]
+    kind = walking_controllers()[kind_at(document, "controller")]
     device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
     configuration = Configuration(
         name=document["name"],
@@ -81,10 +82,12 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
         gait_sensors=_gait_sensors(reading),
         period=_period(reading),
         step=reading.number("run.step", STEP),
-        assumed=dict(document.get("assumed", {})) | assumed_lines(reading),
+        assumed=dict(document.get("assumed", {}))
+        | {item.path: f"{item.value}, {item.note}" for item in assumed_lines(reading)},
         file=str(name_or_path),
         overrides=given,
-        supply_lines=supply_lines(reading, device),
+        supply_lines=read_supply_lines(reading, device),
+        thermal=read_thermal(reading),
     )
     check_walk(configuration, reading)
     return configuration
@@ -95,6 +98,7 @@ def _changed(document: dict[str, Any], overrides: tuple[str, ...], file: str) ->
     changed = copy.deepcopy(document)
     for override in overrides:
         path, text = split_override(override)
+        load_walking_controller(text if path == "controller.kind" else kind_at(changed, "controller"))
         known = (*quantities(kind_at(changed, "controller")), *_TEXTS)
         if path in known:
             _set(changed, path, text)
@@ -109,12 +113,14 @@ def _set(document: dict[str, Any], path: str, text: str) -> None:
     table = document
     for part in section.split(".") if section else ():
         table = table.setdefault(part, {})
+    if path == "gas_model.kind" and text == ISOTHERMAL:
+        table.clear()
     if path == "controller.kind" and table.get("kind") != text:
         kept = {item.name for item in (RATE, PERIOD, *controller_settings(text))}
         for key in set(table) - kept:
             del table[key]
     table.pop({"controller.rate": "period", "controller.period": "rate"}.get(path, ""), None)
-    table[name] = int(text) if path == "sensors.seed" and text.isdecimal() else text
+    table[name] = int(text) if path == "sensors.seed" and text.isdecimal() and len(text) < 20 else text
 
 
 def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device:
@@ -136,27 +142,27 @@ def _gait(name: str | Path, folder: Path, relative: bool) -> Gait:
 def _sensors(reading: Reading) -> SensorParameters:
     values = reading.section("sensors", WALK_SENSORS)
     return SensorParameters(
-        values["angle_noise"],
-        values["pressure_noise"],
-        values["angle_resolution"],
-        values["pressure_resolution"],
-        reading.number("sensors.seed", SEED),
+        angle_noise=values["angle_noise"],
+        pressure_noise=values["pressure_noise"],
+        angle_quantum=values["angle_resolution"],
+        pressure_quantum=values["pressure_resolution"],
+        seed=reading.number("sensors.seed", SEED),
     )
 
 
 def _gait_sensors(reading: Reading) -> GaitSensors:
     values = reading.section("sensors", WALK_SENSORS)
-    faults = [_fault(reading, sensor) for sensor in FAULTY]
+    faults = {f"{sensor}_fault": _fault(reading, sensor) for sensor in FAULTY}
     return GaitSensors(
-        _TURN * values["force_bandwidth"],
-        values["force_noise"],
-        values["force_resolution"],
-        values["lost_share"],
-        _memory(reading, ANGLE_BANDWIDTH),
-        _memory(reading, PRESSURE_BANDWIDTH),
-        values["angle_lost_share"],
-        values["pressure_lost_share"],
-        *faults,
+        follow_rate=_TURN * values["force_bandwidth"],
+        force_noise=values["force_noise"],
+        force_quantum=values["force_resolution"],
+        lost_share=values["lost_share"],
+        angle_memory=_memory(reading, ANGLE_BANDWIDTH),
+        pressure_memory=_memory(reading, PRESSURE_BANDWIDTH),
+        angle_lost_share=values["angle_lost_share"],
+        pressure_lost_share=values["pressure_lost_share"],
+        **faults,
     )
 
 
@@ -172,9 +178,10 @@ def _fault(reading: Reading, sensor: str) -> Fault:
     section = f"faults.{sensor}"
     kind = kind_at(reading.document, section)
     if not kind:
-        return Fault(NEVER, 0.0, 0.0)
+        return Fault(time=NEVER, holds=0.0, reading=0.0)
     time = reading.number(f"{section}.time", FAULT_TIME)
-    return Fault(time, 1.0 if kind == "frozen" else 0.0, reading.number(f"{section}.reading", READINGS[sensor]))
+    shown = reading.number(f"{section}.reading", READINGS[sensor])
+    return Fault(time=time, holds=1.0 if kind == "frozen" else 0.0, reading=shown)
 
 
 def _period(reading: Reading) -> float:

@@ -3,11 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ControllerKind
-from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.refinement import filling_time
-from ppafo.engine.run import Lines, Run, Walk
+from ppafo.engine.run import Run, Walk
 from ppafo.engine.scheme.ankle_torque import DeviceShare, foot_direction
 from ppafo.engine.scheme.walking import NO_CLEARANCE, WalkState
 from ppafo.gait import Gait
@@ -17,19 +15,23 @@ from ppafo.model.gait import gait_at
 from ppafo.model.gait_sensors import GaitSensors
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle
 from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
-from ppafo.model.regulator import LineState, SupplyLines
+from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves import dump
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import controller_parameters, exact_orifice
+from ppafo.simulation.plan import Pieces, Steps, compose_run
+from ppafo.simulation.scenario import ProfileChoice, Thermal
 from ppafo.walking.followed_gait import gait_series, gait_timing, heel_lever
 from ppafo.walking.wearer import Wearer
 
 ANGLES = (math.radians(60.0), math.radians(115.0))
 """Angles that the ankle keeps to in walking; the step is made for the chambers between them."""
+
+NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
+"""A controller of walking makes its own."""
 
 STEPS_PER_FILLING = 15.0
 """Steps while the fastest of these chambers fills: at 1 kHz metrics then are good to 1 % (docs/decisions/0008)."""
@@ -52,59 +54,47 @@ class WalkPlan:
     step: float = 1.0e-3
     record_interval: float = 1.0e-3
     supply_lines: SupplyLines | None = None
+    thermal: Thermal | None = None
 
 
 def plan_walk(plan: WalkPlan) -> Run:
     """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
     leg = plan.wearer.leg()._replace(heel_lever=heel_lever(plan.gait, plan.wearer))
-    bare = _fed_plant(plan)
-    plant = with_leg(bare, leg)
+    bare = plant_parameters(plan.device)
     walk = _walk(plan, leg, bare)
-    valve, settings = walking_valve(plan.device.valve), plan.device.valve.settings
-    delay = valve.command_delay(settings)
+    pieces = Pieces(
+        device=plan.device,
+        valve=walking_valve(plan.device.valve),
+        controller=plan.controller,
+        settings=plan.settings,
+        reference=NO_REFERENCE,
+        path=None,
+        sensors=plan.sensors,
+        has_ideal_sensors=plan.has_ideal_sensors,
+        thermal=plan.thermal,
+        supply_lines=plan.supply_lines,
+    )
+    return compose_run(
+        pieces,
+        with_leg(bare, leg),
+        lambda plant: walk_steps(plan, plant),
+        lambda plant: vented(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
+        walk,
+    )
+
+
+def walk_steps(plan: WalkPlan, plant: PlantParameters) -> Steps:
+    """The steps of a walk: whole ones that follow the gas, as many to a sample of the controller as that asks for."""
     coarse = max(1, math.ceil(plan.period / plan.step - 1.0e-9))
-    steps = coarse * _parts(plant, plan.supply_lines, plan.period / coarse)
+    steps = coarse * _parts(plan, plant, plan.period / coarse)
     step = plan.period / steps
     record_every = max(1, round(plan.record_interval / step))
-    return Run(
-        program=_program(plan, valve, delay > 0.0),
-        plant=plant,
-        thermal=NoParameters(),
-        valve_orifice=exact_orifice(plan.device.valve.orifice, plan.device),
-        leak_orifice=exact_orifice(plan.device.actuator.leak, plan.device),
-        initial=vented(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
-        valve=valve.prepare(settings),
-        controller=controller_parameters(plan.controller, plan.settings),
-        reference=PROFILES["constant"].parameters(0.0),
-        path=(),
-        sensors=plan.sensors,
+    return Steps(
         step=step,
         step_count=math.ceil(plan.duration / (step * record_every) - 1.0e-9) * record_every,
         steps_per_sample=steps,
         record_every=record_every,
-        signal_delay=0.0,
-        command_delay=delay,
-        walk=walk,
-        lines=None if plan.supply_lines is None else Lines(plan.supply_lines, full_lines(plant, plan.supply_lines)),
-    )
-
-
-def _fed_plant(plan: WalkPlan) -> PlantParameters:
-    """The device; the lines between regulator and valve, where there are any, take back what a chamber pushes out."""
-    plant = plant_parameters(plan.device)
-    return plant if plan.supply_lines is None else plant._replace(relieving=1.0)
-
-
-def _program(plan: WalkPlan, valve: ValveModel, late_commands: bool) -> Program:
-    return Program(
-        valve=valve,
-        reference=PROFILES["constant"],
-        controller=plan.controller,
-        angle=None,
-        ideal_sensors=plan.has_ideal_sensors,
-        late_commands=late_commands,
-        walks=True,
-        has_lines=plan.supply_lines is not None,
+        needs_parts=False,
     )
 
 
@@ -115,19 +105,43 @@ def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
     foot = foot_direction(start.shank, start.ankle)
     return Walk(
         leg=leg,
-        share=DeviceShare(bare.inertia, bare.viscous_damping, bare.gravity_torque / leg.gravity),
+        share=DeviceShare(
+            inertia=bare.inertia,
+            viscous_damping=bare.viscous_damping,
+            mass_moment=bare.gravity_torque / leg.gravity,
+        ),
         gait=gait,
         timing=timing,
         sensors=plan.gait_sensors,
-        initial=WalkState(HEEL, 0.0, start, foot, *(0.0,) * 5, NO_CLEARANCE, *(0.0,) * 6),
+        initial=WalkState(
+            contact=HEEL,
+            offset=0.0,
+            now=start,
+            foot=foot,
+            external_torque=0.0,
+            heel_force=0.0,
+            toe_force=0.0,
+            toes_first=0.0,
+            slap_rate=0.0,
+            clearance=NO_CLEARANCE,
+            strides=0.0,
+            landings=0.0,
+            toe_landings=0.0,
+            slap_rates=0.0,
+            clearances=0.0,
+            push_off_work=0.0,
+        ),
     )
 
 
-def _parts(plant: PlantParameters, lines: SupplyLines | None, step: float) -> int:
+def _parts(plan: WalkPlan, plant: PlantParameters, step: float) -> int:
     """Parts of a step [s] that follow the chambers at the angles of walking, and the lines that feed them."""
     volume = min(chamber_volumes(plant, ANGLES[0])[0], chamber_volumes(plant, ANGLES[1])[1])
+    lines = plan.supply_lines
     volume = volume if lines is None else min(volume, lines.volume_1, lines.volume_2)
-    return max(1, math.ceil(step * STEPS_PER_FILLING / filling_time(plant, volume) - 1.0e-9))
+    # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
+    stiffness = 1.0 if plan.thermal is None else plan.device.gas.heat_capacity_ratio
+    return max(1, math.ceil(step * STEPS_PER_FILLING * stiffness / filling_time(plant, volume) - 1.0e-9))
 
 
 def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
@@ -149,10 +163,12 @@ def vented(plant: PlantParameters, angle: float, angular_velocity: float) -> Pla
     """State at an angle [rad] with both chambers at the atmosphere."""
     volumes = chamber_volumes(plant, angle)
     mass_1, mass_2 = (chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes)
-    return PlantState(angle, angular_velocity, mass_1, mass_2, 0.0, 0.0, 0.0)
-
-
-def full_lines(plant: PlantParameters, lines: SupplyLines) -> LineState:
-    """Both lines at the pressures that their regulators are set to, and nothing let through yet."""
-    mass_1 = chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product)
-    return LineState(mass_1, chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product), 0.0)
+    return PlantState(
+        angle=angle,
+        angular_velocity=angular_velocity,
+        mass_1=mass_1,
+        mass_2=mass_2,
+        supplied_mass=0.0,
+        vented_mass=0.0,
+        leaked_mass=0.0,
+    )

@@ -1,6 +1,7 @@
 """The recording of a walk: the engine's rows as channels with units."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -9,8 +10,8 @@ from ppafo.engine.run import Run
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix
 from ppafo.model.plant import chamber_pressures
-from ppafo.model.regulator import LineState, line_pressures
 from ppafo.signals import Channel, Recording
+from ppafo.simulation.simulate import gas_channels
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.posture import ankle_path
 
@@ -26,10 +27,10 @@ def recorded(configuration: Configuration, run: Run, time: Floats, record: Mappi
     """The recording of a walk from its rows (samples,) by path, at these times [s]."""
     assert run.walk is not None, "a walk has a leg"
     angle, rate = record["state.angle"], record["state.angular_velocity"]
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])  # type: ignore[arg-type]
+    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])
     external = record["walk.external_torque"]
     path = ankle_path(configuration.gait, run.walk.timing, configuration.wearer)
-    channels = {
+    channels: dict[str, tuple[Any, str]] = {
         "angle": (angle, "rad"),
         "angular_velocity": (rate, "rad/s"),
         "shank_angle": (record["walk.now.shank"], "rad"),
@@ -48,11 +49,7 @@ def recorded(configuration: Configuration, run: Run, time: Floats, record: Mappi
         "supplied_mass": (record["state.supplied_mass"], "kg"),
         "vented_mass": (record["state.vented_mass"], "kg"),
     }
-    if run.lines is not None:
-        gas = LineState(*(record[f"line_state.{name}"] for name in LineState._fields))  # type: ignore[arg-type]
-        line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, gas)
-        channels |= {"line_pressure_1": (line_1, "Pa"), "line_pressure_2": (line_2, "Pa")}
-        channels["regulated_mass"] = (gas.regulated_mass, "kg")
+    channels |= gas_channels(configuration.device.gas, run, record)
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
         channels["safe_state"] = (record[SAFE_ROW], "-")

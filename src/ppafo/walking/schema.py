@@ -5,11 +5,21 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS, walking_controllers
 from ppafo.documents.models import NAME, one_of, optional, published_schema, table
+from ppafo.simulation import supply_line
 from ppafo.simulation.declaration import SAMPLING
-from ppafo.simulation.schema import device_fields, kind_field, number_type, quantity_fields, titled
-from ppafo.walking import declaration, supply_line
+from ppafo.simulation.schema import (
+    device_fields,
+    gas_model_table,
+    kind_field,
+    number_type,
+    quantity_fields,
+    supply_line_table,
+    titled,
+)
+from ppafo.walking import declaration
 from ppafo.walking.wearer import WEARER
 
 
@@ -18,10 +28,10 @@ def _controller() -> Any:
     return one_of(
         [
             table(
-                f"{titled(kind.name)}Walking",
-                kind_field(kind.name, kind.summary) | sampling | quantity_fields(kind.quantities),
+                f"{titled(name)}Walking",
+                kind_field(name, kind.summary) | sampling | quantity_fields(kind.quantities),
             )
-            for kind in WALKING_CONTROLLERS.values()
+            for name, kind in walking_controllers().items()
         ]
     )
 
@@ -37,17 +47,13 @@ def _fault(sensor: str) -> Any:
     )
 
 
-def _lines() -> Any:
-    fields = {
-        line: optional(table(f"{titled(line)}Line", quantity_fields(supply_line.line_quantities(line))), f"{line} line")
-        for line in supply_line.LINES
-    }
-    return table("SupplyLine", fields)
-
-
-@functools.cache
 def walk_file() -> type[BaseModel]:
-    """Return the model of a walk file."""
+    """Return the model of a walk file, for the controllers that are loaded."""
+    return _walk_file(tuple(walking_controllers().items()))
+
+
+@functools.lru_cache(maxsize=4)
+def _walk_file(_kinds: Any) -> type[BaseModel]:
     seed = Annotated[int, Field(ge=0, le=declaration.LARGEST_SEED)]
     sensors = quantity_fields(declaration.WALK_SENSORS)
     sensors |= {item.name: optional(number_type(item), item.summary) for item in declaration.BANDWIDTHS}
@@ -63,7 +69,10 @@ def walk_file() -> type[BaseModel]:
         "wearer": optional(table("Wearer", quantity_fields(WEARER)), "who walks; the paper's subject unless given"),
         "sensors": optional(table("WalkSensors", sensors), "what the controller sees; ideal unless given"),
         "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
-        supply_line.SECTION: optional(_lines(), "regulators and lines of the gas; constant pressures unless given"),
+        "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
+        supply_line.SECTION: optional(
+            supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
+        ),
         "run": optional(table("WalkRun", quantity_fields((declaration.STEP,))), "how it is computed"),
         "assumed": (dict[str, str], Field(default_factory=dict, description="values that no source gives, and why")),
     }
@@ -72,4 +81,6 @@ def walk_file() -> type[BaseModel]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a walk file."""
+    WALKING_CONTROLLERS.load_all()
+    CONTROLLERS.load_all()
     return published_schema(walk_file(), "ppafo walk")

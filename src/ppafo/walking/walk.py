@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, LaneBlock, load_program
-from ppafo.engine.run import NEVER_FAILED, batch_of
+from ppafo.engine.program import LaneResult
+from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, batch_of
 from ppafo.errors import ScenarioError
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
@@ -66,7 +67,7 @@ class WalkResult:
 
     def plot(self) -> "Figure":
         """Return a figure of the mean stride with the healthy gait beside it; ``.savefig(...)`` writes it."""
-        from ppafo.reporting.walk_figure import walk_figure
+        from ppafo.walking.figures.mean_stride import walk_figure
 
         return walk_figure({self.configuration.name: self})
 
@@ -95,7 +96,8 @@ def walk(
     outcome = _stepped(batch_of(run), run.step, progress)
     rows = state_row_numbers(run)
     record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
-    status = _status(float(outcome.states[rows["result.failure_time"], 0]), outcome.states)
+    failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
+    status = _status(failed, bool(too_many_parts), outcome.states)
     time = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     if status.time is not None:
         kept = time < status.time
@@ -144,6 +146,7 @@ def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
         step=configuration.step,
         record_interval=next(interval for longest, interval in RECORD_INTERVALS if seconds <= longest),
         supply_lines=configuration.supply_lines,
+        thermal=configuration.thermal,
     )
 
 
@@ -161,8 +164,8 @@ def _gathered(
     return WalkResult(configuration, recording, strides, averages, metrics, status, starts)
 
 
-def _status(failed: float, states: Floats) -> Status:
+def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
     if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
         return Status("completed", None, "completed")
     time = failed if failed < NEVER_FAILED else 0.0
-    return Status("diverged", time, f"diverged at t = {time:.6g} s; {REMEDY}")
+    return Status("diverged", time, f"diverged at t = {time:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}")

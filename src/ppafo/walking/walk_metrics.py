@@ -11,6 +11,7 @@ from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.followed_gait import gait_timing
+from ppafo.walking.posture import ankle_path
 from ppafo.walking.strides import PER_STRIDE, PHASES, SETTLING, Curves
 
 
@@ -93,3 +94,10 @@ def healthy_positive_work(configuration: Configuration) -> float:
     angle = gait.ankle_angle.sampled(phases)
     power = np.maximum(moment * np.gradient(angle, phases), 0.0)
     return float(np.trapezoid(power, phases))
+
+
+def healthy_toe_height(configuration: Configuration) -> Floats:
+    """Toes of the healthy gait over the ground [m] at ``PHASES``."""
+    gait = configuration.gait
+    path = ankle_path(gait, gait_timing(gait), configuration.wearer)
+    return path.toe_height(PHASES % 1.0, gait.shank_angle.sampled(PHASES), gait.ankle_angle.sampled(PHASES))

@@ -84,7 +84,7 @@ def _state_rows(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits) ->
     """The start at a heel strike with the wearer's own angles and vented chambers."""
     now = _gait_at_heel_strike(run, segments, gaits)
     plant = run.plant
-    volumes = chamber_volumes(plant, now["ankle"])  # type: ignore[arg-type]
+    volumes = chamber_volumes(plant, now["ankle"])
     masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
     foot = now["shank"] - now["ankle"] + 0.5 * np.pi
     return {f"walk.now.{name}": values for name, values in now.items()} | {

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.studies.uncertainty import outcomes
+from ppafo.studies import outcomes
 
 STUDY = "torque-task-uncertainty"
 SHORT = ["--set", "run.duration=0.3 s"]
@@ -36,7 +36,7 @@ def commands(tuning: Path) -> dict[str, list[str]]:
         "compare": ["compare", "--study", STUDY, "--baseline", "solenoid", "--draws", "64", *SHORT],
         "montecarlo": [
             *("montecarlo", STUDY, "--metric", "rms_error", "--configuration", "proportional"),
-            *("--width", "20 %", "--first", "64", "--most", "512", *SHORT),
+            *("--width", "20 %", "--first", "64", "--maximum", "512", *SHORT),
         ],
         "sensitivity": [
             *("sensitivity", STUDY, "--method", "morris", "--samples", "8", "--metric", "gas_supplied"),
@@ -93,7 +93,7 @@ def test_the_lines_of_a_tuning_can_be_pasted(tuning: Path, tmp_path: Path, capsy
     pasted = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("ppafo simulate"))
     assert main([*shlex.split(pasted)[1:], "--json", "--out", str(tmp_path / "run")]) == 0
     result = json.loads(capsys.readouterr().out)
-    stored = json.loads((tmp_path / "out" / "tuning.json").read_text())
+    stored = json.loads((tmp_path / "out" / "tune.json").read_text())
     assert result["metrics"]["rms_error"]["value"] == pytest.approx(stored["after"]["values"]["rms_error"], rel=1e-9)
 
 
@@ -120,8 +120,8 @@ effort = { starts = 1, generations = 1, candidates_per_gain = 4 }
 
 def test_an_interval_that_stays_too_wide_is_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["montecarlo", STUDY, "--metric", "rms_error", "--configuration", "proportional", *SHORT]
-    assert main([*words, "--width", "0.001 %", "--first", "32", "--most", "64"]) == 1
-    assert "not narrow enough after all 64 draws that were allowed" in capsys.readouterr().out
+    assert main([*words, "--width", "0.001 %", "--first", "32", "--maximum", "64"]) == 1
+    assert "the target width was not reached with the maximum of 64 draws" in capsys.readouterr().out
 
 
 def test_tunings_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -148,7 +148,7 @@ def test_an_interruption_leaves_nothing(
         (["compare"], "nothing to compare"),
         (["compare", "torque-task-solenoid", "torque-task-proportionel"], "did you mean 'torque-task-proportional'"),
         (["compare", "--study", STUDY, "--draws", "many"], "--draws many: must be a whole number"),
-        (["compare", "--study", STUDY, "--threads", "0"], "--threads 0: must be 1 or more"),
+        (["compare", "--study", STUDY, "--threads", "0"], "--threads 0: must be a whole number, 1 or more"),
         (["compare", "--study", STUDY, "--task", "slow"], "--task slow: is not of the form NAME:PATH=VALUE"),
         (["compare", "--study", STUDY, "--confidence", "200%"], "--confidence 200%: must be a number from 0 to 1"),
         (["compare", "--study", STUDY, "--task", "slow:reference.ramp=2 s"], "reference.ramp"),

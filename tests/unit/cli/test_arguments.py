@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.cli.whole_numbers import whole_number
 
 FULL = Path("/dev/full")
 
@@ -25,7 +26,7 @@ FULL = Path("/dev/full")
         (["sets", "-j"], "there is no option '-j'"),
         (
             ["simulate", "step-response", "--set"],
-            "argument --set: expected one argument; 'ppafo simulate --help' shows",
+            "--set: expected one argument; 'ppafo simulate --help' shows",
         ),
         (["audit"], "the following arguments are required: SET; 'ppafo audit --help' shows"),
         (["sets", "show"], "the following arguments are required: SET; 'ppafo sets show --help' shows"),
@@ -112,3 +113,41 @@ def test_terminal_that_cannot_show_a_character_gets_its_escape() -> None:
         [sys.executable, "-c", code], env={**os.environ, "PYTHONIOENCODING": "ascii"}, capture_output=True, check=True
     )
     assert done.stdout == b"5 \\xb0 \\udcff\n"
+
+
+MANY = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["compare", "step-response", "--draws", MANY],
+        ["unreported", "--seed", MANY],
+        ["sweep", "pressure-and-area", "--threads", MANY],
+        ["sweep", "pressure-and-area", "--threads", "1__0x"],
+        ["design", "torque-task", "--seed", MANY],
+        ["walk", "--set", f"sensors.seed={MANY}"],
+        ["simulate", "step-response", "--set", f"{'a' * 100_000}=1"],
+    ],
+    ids=lambda words: " ".join(words)[:40],
+)
+def test_number_or_key_without_end_is_one_line_that_can_be_read(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert len(told) < 1100
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_count_may_have_its_digits_in_groups_but_not_as_python_refuses_them(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert (
+        whole_number("1__000", "--runs") == whole_number("1_000", "--runs") == whole_number("1,000", "--runs") == 1000
+    )
+    assert main(["sweep", "pressure-and-area", "--runs", "1__0"]) == 2
+    assert main(["sweep", "pressure-and-area", "--threads", "0"]) == 2
+    assert "--threads 0: must be a whole number, 1 or more" in capsys.readouterr().err

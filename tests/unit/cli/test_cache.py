@@ -42,17 +42,17 @@ def test_warming_compiles_every_scenario_of_the_package(
     from ppafo.simulation.loading import list_scenarios
 
     asked: list[str] = []
-    monkeypatch.setattr(simulate, "compile_model", asked.append)
+    monkeypatch.setattr(simulate, "compile_models", asked.extend)
     assert main(["cache", "--warm"]) == 0
     assert asked == list(list_scenarios())
     assert "programs: 0" in capsys.readouterr().out
 
 
 def test_model_that_was_compiled_for_later_is_the_one_that_a_run_uses(fresh_cache: Path) -> None:
-    from ppafo.engine.lanes import load_program
+    from ppafo.engine.lanes import loaded
 
-    load_program.cache_clear()
-    simulate.compile_model("torque-task-proportional")
-    asked = load_program.cache_info().misses
+    loaded.cache_clear()
+    simulate.compile_models(["torque-task-proportional"])
+    asked = loaded.cache_info().misses
     simulate.simulate("torque-task-proportional", ["run.duration=10 ms"])
-    assert load_program.cache_info().misses == asked == 1
+    assert loaded.cache_info().misses == asked == 1

@@ -65,9 +65,10 @@ def test_a_design_is_printed_and_written_with_its_doubts(folder: Path, capsys: p
     out = folder / "out"
     assert main(["design", str(folder / "design.toml"), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert "* suggested: it has the smallest sum of error, gas and mass" in printed
+    assert "suggested: it has the smallest sum of error, gas and mass" in printed
+    assert printed.count("\n*  enfield-ls-v05s ") == 1
     assert "enfield-ls-v05s  mass (assumed)" in printed
-    names = ["design.json", "front.csv", "front.png", "front.svg", "ppafo.json", "report.html"]
+    names = ["design.json", "design.txt", "front.csv", "front.png", "front.svg", "ppafo.json", "report.html"]
     assert sorted(path.name for path in out.iterdir()) == names
     document = json.loads((out / "design.json").read_text())
     assert 0 <= document["suggested"] < len(document["front"])
@@ -76,7 +77,7 @@ def test_a_design_is_printed_and_written_with_its_doubts(folder: Path, capsys: p
     assert lines[0] == "valve,actuator,error [N m],gas [kg],mass [kg],supply.pressure [Pa_a]"
     assert len(lines) == 1 + len(document["front"])
     report = (out / "report.html").read_text()
-    assert "Look up before buying" in report
+    assert "Check before buying" in report
     assert "mass 300\N{NO-BREAK SPACE}g is assumed" in report
     assert "<script" not in report
 
@@ -94,13 +95,17 @@ def test_a_sizing_is_printed_and_written(folder: Path, capsys: pytest.CaptureFix
     assert main(["size", str(folder / "sizing.toml"), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "(typed, not measured)" in printed
-    assert "* suggested: enfield-ls-v05s at " in printed
-    names = ["ppafo.json", "report.html", "sizing.json", "sizing.png", "sizing.svg", "suggested.csv"]
+    assert "\n*  enfield-ls-v05s " in printed
+    assert "suggested: enfield-ls-v05s at " in printed
+    names = ["ppafo.json", "report.html", "size.json", "size.png", "size.svg", "size.txt", "suggested.csv"]
     assert sorted(path.name for path in out.iterdir()) == names
-    document = json.loads((out / "sizing.json").read_text())
+    document = json.loads((out / "size.json").read_text())
     assert document["suggested"] == "enfield-ls-v05s"
     assert document["valves"][0]["bottle"] == "pipeline-jacpac-9oz"
     assert (out / "suggested.csv").read_text().startswith("# simulated")
+    report = (out / "report.html").read_text()
+    assert "mass 300\N{NO-BREAK SPACE}g is assumed" in report
+    assert "Enfield Technologies LS-V05s" in report
 
 
 def test_a_sizing_without_a_suggestion_ends_with_1_and_says_why(
@@ -119,7 +124,7 @@ def test_an_interrupted_study_writes_nothing_and_ends_with_130(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    module = "ppafo.studies.design.evaluation" if command == "design" else "ppafo.studies.sizing.trials"
+    module = "ppafo.questions.design.evaluation" if command == "design" else "ppafo.questions.size.search"
     monkeypatch.setattr(f"{module}.run_ensemble", interrupted)
     file = folder / ("design.toml" if command == "design" else "sizing.toml")
     assert main([command, str(file), "--out", str(folder / "out")]) == 130
@@ -132,7 +137,12 @@ def test_an_interrupted_study_writes_nothing_and_ends_with_130(
     [
         (["design"], "no design was given: name one (torque-task) or give a .toml file"),
         (["design", "torque-tusk"], "there is no design 'torque-tusk', did you mean 'torque-task'?"),
-        (["design", "torque-task", "--seed", "-1"], "--seed -1: must be a whole number from 0"),
+        (["design", "torque-task", "--seed", "-1"], "--seed -1: must be a whole number, 0 or more"),
+        (
+            ["design", "torque-task", "--seed", "4294967296"],
+            "seed = 4294967296: must be a whole number from 0 to 429496",
+        ),
+        (["size", "push-off", "--threads", "0"], "--threads 0: must be a whole number, 1 or more"),
         (["size"], "no sizing was given: name one (push-off)"),
         (["size", "pushoff"], "there is no sizing 'pushoff', did you mean 'push-off'?"),
         (["parts", "enfield"], "there is no part 'enfield'"),

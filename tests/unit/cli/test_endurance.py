@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.reporting.endurance_report import FILES
+from ppafo.questions.endurance.file import list_bottles
 from ppafo.signals import Channel, Recording
 from ppafo.storage.comma_separated import read_csv, write_csv
-from ppafo.studies.endurance import list_bottles
 
 QUICK = ["endurance", "--gas-per-step", "1 g", "--step-time", "1.1 s"]
 
@@ -33,12 +32,12 @@ def test_text_says_run_time_steps_and_why_it_ended(capsys: pytest.CaptureFixture
     assert main(QUICK) == 0
     text = capsys.readouterr().out
     assert "run time" in text
-    assert "too cold: its pressure does not hold the supply pressure" in text
+    assert "too cold: its pressure is too low to maintain the supply pressure" in text
 
 
 def test_a_long_run_time_is_in_whole_minutes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["endurance", "--gas-per-step", "0.001 g", "--step-time", "1.1 s"]) == 0
-    assert "run time               1440 min of walking" in capsys.readouterr().out
+    assert "run time                           1440 min of walking" in capsys.readouterr().out
 
 
 def test_json_is_in_si_and_says_simulated(capsys: pytest.CaptureFixture[str]) -> None:
@@ -65,15 +64,22 @@ def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pyte
     out = tmp_path / "out"
     assert main([*QUICK, "--out", str(out)]) == 0
     assert main([*QUICK, "--reuse", "reservoir_volume=50 cm^3", "--out", str(out)]) == 0
-    assert {path.name for path in out.iterdir()} == set(FILES)
+    figures = {"endurance.png", "endurance.svg"}
+    assert {path.name for path in out.iterdir()} == figures | {
+        "bottle.csv",
+        "endurance.json",
+        "endurance.txt",
+        "ppafo.json",
+        "report.html",
+    }
     course = read_csv(out / "bottle.csv")
     assert course.kind == "simulated"
     assert course["bottle_mass"][0] == pytest.approx(0.255)
-    report = (out / "endurance.md").read_text(encoding="utf-8")
+    report = (out / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert "without reuse" in report
-    assert "| `reservoir_volume` | 50 cm^3 |" in report
-    assert "| `fill_pressure` | 64.7 psi absolute |" in report
-    assert "`bottle.room_heat_transfer` | 0.5 W/K | assumed" in report
+    assert "<td>reservoir_volume</td><td>50 cm³</td><td>given</td>" in report
+    assert "<td>fill_pressure</td><td>50 psig</td>" in report
+    assert "<td><code>bottle.room_heat_transfer</code></td><td>0.5 W/K</td><td>assumed</td>" in report
     assert (out / "endurance.png").stat().st_size > 10_000
 
 
@@ -93,7 +99,7 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path: Path, capsys: pytest.
         ([], "give either a recording or --gas-per-step"),
         (["--gas-per-step", "0.3"], "--gas-per-step 0.3: a number without a unit does not fit"),
         (["--gas-per-step", "0.3 g", "--step-time", "1 m"], "--step-time 1 m"),
-        (["--gas-per-step", "0.3 g", "--peak-flow", "0.1 g/s"], "at least the mean one"),
+        (["--gas-per-step", "0.3 g", "--peak-flow", "0.1 g/s"], "at least the mean flow"),
         (["--gas-per-step", "0.3 g", "--bottle", "paper-co2"], "did you mean 'paper-co2-9oz'"),
         (["--gas-per-step", "0.3 g", "--set", "room.temprature=0 degC"], "did you mean 'room.temperature'"),
         (["--gas-per-step", "0.3 g", "--rest", "-1 min"], "rest must be at least 0 s"),

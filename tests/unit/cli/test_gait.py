@@ -38,8 +38,16 @@ def test_an_imported_gait_is_written_whole_and_can_be_used_by_its_file(
     words = ["gait", "import", str(walk), "--body-mass", "62 kg", "--name", "mine", "--out", str(out), "--json"]
     assert main(words) == 0
     document = json.loads(capsys.readouterr().out)
-    assert {path.name for path in out.iterdir()} == {"mine.toml", "gait.json", "gait.png", "gait.svg", "ppafo.json"}
-    assert json.loads((out / "gait.json").read_text()) == document
+    assert {path.name for path in out.iterdir()} == {
+        "mine.toml",
+        "gait.json",
+        "gait.png",
+        "gait.svg",
+        "gait.txt",
+        "ppafo.json",
+        "report.html",
+    }
+    assert {**json.loads((out / "gait.json").read_text()), "folder": str(out)} == document
     assert document["origin"] == "synthetic"
     assert len(document["imported"]["strides"]) == document["strides"] == 3
     gait = load_gait(out / "mine.toml")

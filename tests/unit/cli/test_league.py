@@ -1,18 +1,19 @@
 """``ppafo league``, from words to files."""
 
 import json
-from functools import partial
 from pathlib import Path
 
 import pytest
 
-from ppafo.cli import league
 from ppafo.cli.main import build_parser, main
-from ppafo.reporting.league_files import NAMES
+from ppafo.questions.league.draws import SEED
+from ppafo.questions.league.entrants import ENTRANTS, WALKING_ENTRANTS
+from ppafo.questions.league.solve import DRAWS
+from ppafo.questions.league.walking import bound, contest
+from ppafo.questions.league.walking.task import CONFIGURATION
 from ppafo.storage.owned_folder import MARK
-from ppafo.studies.league import DRAWS, ENTRANTS, TASK, walking
-from ppafo.studies.league.walking.task import CONFIGURATION, MINUTES
 
+NAMES = ("league.txt", "league.json", "league.png", "league.svg", "report.html")
 SHORT = ["--set", "run.duration=0.4 s", "--set", "reference.ramp_time=0.2 s", "--set", "reference.level=2 N m"]
 
 
@@ -52,22 +53,22 @@ def test_a_league_without_draws_shows_dashes(capsys: pytest.CaptureFixture[str])
 
 def test_a_number_of_draws_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["league", "--draws", "-5"]) == 2
-    assert "draws = -5" in capsys.readouterr().err
+    assert "--draws -5: must be a whole number" in capsys.readouterr().err
 
 
 def test_the_defaults_of_the_command_are_those_of_the_study() -> None:
     parsed = build_parser("league").parse_args(["league"])
-    assert (parsed.scenario or league._TASK, parsed.draws) == (TASK, DRAWS)
+    assert (parsed.scenario, parsed.draws, parsed.seed) == (None, DRAWS, SEED)
     walks = build_parser("league").parse_args(["league", "--walk"])
-    assert (walks.walk, walks.minutes or league._MINUTES) == (CONFIGURATION, str(MINUTES))
+    assert (walks.walk, walks.minutes) == (CONFIGURATION, None)
 
 
 def test_a_walking_league_is_printed_and_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    two = [entrant for entrant in walking.WALKING_ENTRANTS if entrant.name in ("event_proportional", "off")]
-    monkeypatch.setattr(walking, "walking_league", partial(walking.walking_league, entrants=two))
-    monkeypatch.setattr(walking.bound, "find_spec", lambda _: None)
+    two = tuple(entrant for entrant in WALKING_ENTRANTS if entrant.name in ("event_proportional", "off"))
+    monkeypatch.setattr(contest, "WALKING_ENTRANTS", two)
+    monkeypatch.setattr(bound, "find_spec", lambda _: None)
     out = tmp_path / "out"
     assert main(["league", "--walk", "--minutes", "6 s", "--draws", "2", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
@@ -82,12 +83,12 @@ def test_a_walking_league_is_printed_and_written(
     ("words", "said"),
     [
         (["torque-task-proportional", "--walk"], "give a scenario or --walk, not both"),
-        (["--minutes", "0.2"], "--minutes belongs to a leg that walks"),
-        (["--gait", "falisse2019-subject1"], "--gait belongs to a leg that walks"),
+        (["--minutes", "0.2"], "--minutes needs a walk: add --walk"),
+        (["--gait", "falisse2019-subject1"], "--gait needs a walk: add --walk"),
         (["--walk", "proportionl"], "did you mean 'proportional'"),
-        (["--walk", "--minutes", "5"], "a league walks 0.1 to 1 minutes"),
+        (["--walk", "--minutes", "5"], "a league can walk for 0.1 to 1 minutes"),
         (["--walk", "--minutes", "soon"], "a number of minutes"),
-        (["--walk", "--set", "controller.kind=off"], "brings its own"),
+        (["--walk", "--set", "controller.kind=off"], "has its own"),
     ],
 )
 def test_words_that_do_not_go_together_are_one_line(

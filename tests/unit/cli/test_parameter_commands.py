@@ -70,8 +70,7 @@ def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys
         (["sets"], "ppafo.parameters.load_parameter_set"),
         (["sets", "show", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
         (["schema", "scenario"], "ppafo.simulation.schema.json_schema"),
-        (["reproduce"], "ppafo.studies.reproduction.reproduce"),
-        (["bench"], "ppafo.studies.bench.measure_speed"),
+        (["reproduce"], "ppafo.questions.reproduce.solve.reproduce"),
         (["simulate", "step-response"], "ppafo.simulation.simulate.simulate"),
     ],
 )
@@ -93,9 +92,7 @@ def test_a_place_that_cannot_be_written_is_found_before_any_work(
     assert file.read_text() == "mine"
 
 
-@pytest.mark.parametrize(
-    ("command", "name"), [(["reproduce"], "report.html"), (["bench"], "bench.md"), (["simulate", "step-response"], "x")]
-)
+@pytest.mark.parametrize(("command", "name"), [(["reproduce"], "report.html"), (["simulate", "step-response"], "x")])
 def test_a_folder_in_the_place_of_a_file_is_found_before_any_work(
     command: list[str], name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -9,13 +9,18 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.signals import Channel, Recording
 from ppafo.simulation.result import Result, Status
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import compile_model, simulate
+from ppafo.simulation.simulate import compile_models, simulate
 from ppafo.storage import read_result
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.storage.owned_folder import check_owned_folder, marked_folder, write_marked_folder
 
 FILES = ["figure.png", "figure.svg", "recording.csv", "recording.nc", "run.json"]
 
@@ -142,6 +147,50 @@ def test_without_a_file_the_figures_in_the_folder_are_drawn_again(
     assert names(saved) == FILES
 
 
+def test_the_end_of_a_walk_is_drawn_and_the_folder_stays_that_of_the_walk(tmp_path: Path) -> None:
+    time = 0.1 * np.arange(101)
+    recording = Recording("left leg", time, {"angle": Channel(1.5 + 0.1 * np.sin(time), "rad")}, kind="simulated")
+    folder = tmp_path / "walk"
+    write_marked_folder(folder, {"recording.nc": netcdf_bytes(recording, None), "walk.json": b"{}"}, "walk")
+    assert main(["plot", str(folder)]) == 0
+    assert names(folder) == ["figure.png", "figure.svg", "ppafo.json", "recording.nc", "walk.json"]
+    check_owned_folder(folder, marked_folder("walk"))
+    assert main(["plot", str(folder)]) == 0
+    assert main(["plot", str(folder), "--out", str(tmp_path / "end.pdf")]) == 0
+    (tmp_path / "foreign").mkdir()
+    (folder / "recording.nc").rename(tmp_path / "foreign" / "recording.nc")
+    assert main(["plot", str(tmp_path / "foreign")]) == 2
+    assert names(tmp_path / "foreign") == ["recording.nc"]
+
+
+def test_recordings_of_the_rig_are_drawn_each_on_its_own(tmp_path: Path) -> None:
+    recording = Recording("bench", np.array([0.0, 1.0]), {"angle": Channel(np.array([1.0, 1.1]), "rad")}, "synthetic")
+    for name in ("free-decay", "step-response"):
+        (tmp_path / f"{name}.csv").write_bytes(marked_csv_bytes(recording))
+    (tmp_path / "rig.json").write_text('{"format": "ppafo rig", "recordings": {}}')
+    assert main(["plot", str(tmp_path)]) == 0
+    assert {"free-decay.png", "free-decay.svg", "step-response.png", "step-response.svg"} <= set(names(tmp_path))
+
+
+def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_marked_folder(tmp_path / "a", {"change.png": b"", "report.html": b"", "compare.txt": b""}, "compare")
+    write_marked_folder(tmp_path / "b", {"sets.txt": b"", "sets.json": b"{}"}, "sets")
+    before = names(tmp_path / "a")
+    assert main(["plot", str(tmp_path / "a")]) == 0
+    assert main(["plot", str(tmp_path / "b"), "--json"]) == 0
+    first, _, second = capsys.readouterr().out.partition("\n")
+    assert first.endswith(
+        f"result of 'ppafo compare' has its figures (change.png); open {tmp_path / 'a' / 'report.html'}"
+    )
+    assert json.loads(second)["open"] == str(tmp_path / "b" / "sets.txt")
+    assert main(["plot", str(tmp_path / "a"), "--out", str(tmp_path / "new.png")]) == 2
+    assert "nothing is drawn anew" in capsys.readouterr().err
+    assert names(tmp_path / "a") == before
+    assert names(tmp_path) == ["a", "b"]
+
+
 def test_a_damaged_result_is_one_line_and_exit_code_2(
     saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -188,7 +237,7 @@ sys.exit(main(["simulate", "step-response", "--out", sys.argv[1]]))
 
 @pytest.mark.skipif(os.name == "nt", reason="signals work differently there")
 def test_an_interrupt_while_writing_ends_with_130_and_leaves_nothing(tmp_path: Path) -> None:
-    compile_model("step-response")
+    compile_models(["step-response"])
     command = [sys.executable, "-c", HELD_UP, str(tmp_path / "step")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.questions.walk import solve
 from ppafo.storage import read_csv, read_netcdf
 from ppafo.walking import loading
 
@@ -17,13 +18,14 @@ SHORT = ["--minutes", "0.1"]
 FILES = [
     "gait-phases.png",
     "gait-phases.svg",
-    "legs.gif",
+    "legs-moving.gif",
     "legs.png",
     "legs.svg",
     "mean-stride-off.csv",
     "mean-stride.csv",
     "mean-stride.png",
     "mean-stride.svg",
+    "ppafo.json",
     "recording-off.nc",
     "recording.csv",
     "recording.nc",
@@ -31,6 +33,7 @@ FILES = [
     "strides-off.csv",
     "strides.csv",
     "walk.json",
+    "walk.txt",
 ]
 
 
@@ -61,8 +64,8 @@ def test_a_walk_prints_its_table_and_where_the_files_are(tmp_path: Path, capsys:
 def test_a_walk_writes_its_folder_whole(walked: Path) -> None:
     assert names(walked) == FILES
     assert names(walked.parent) == ["solenoid"]
+    assert json.loads((walked / "ppafo.json").read_text())["files"] == [name for name in FILES if name != "ppafo.json"]
     document = json.loads((walked / "walk.json").read_text())
-    assert document["files"] == FILES
     assert document["status"]["kind"] == document["status_off"]["kind"] == "completed"
     assert document["configuration"]["controller"] == "event_on_off"
     assert document["metrics"]["gas"]["unit"] == "kg"
@@ -88,14 +91,14 @@ def test_the_report_holds_figures_and_numbers(walked: Path) -> None:
     page = (walked / "report.html").read_text()
     assert page.count("data:image/svg+xml;base64,") == 3
     assert "Gas per stride (g)" in page
-    assert "legs.gif" in page
+    assert "data:image/gif;base64," in page
     assert "<script" not in page
 
 
 def test_the_animation_is_small_and_moves(walked: Path) -> None:
     from PIL import Image
 
-    content = (walked / "legs.gif").read_bytes()
+    content = (walked / "legs-moving.gif").read_bytes()
     assert len(content) < 3_000_000
     with Image.open(io.BytesIO(content)) as picture:
         assert picture.n_frames >= 30  # type: ignore[attr-defined]
@@ -110,7 +113,7 @@ def test_an_earlier_walk_is_replaced_and_other_folders_are_not(
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("kept")
     assert main(["walk", *SHORT, "--out", str(tmp_path / "mine")]) == 2
-    assert "is not empty and not a ppafo walk (it has no walk.json)" in capsys.readouterr().err
+    assert "is not empty and not a result of 'ppafo walk' (it has no ppafo.json)" in capsys.readouterr().err
     assert names(tmp_path / "mine") == ["notes.txt"]
     copy = tmp_path / "copy"
     copy.mkdir()
@@ -150,9 +153,9 @@ MISTAKES = {
     "--minutes soon": "--minutes 'soon': a number of minutes, or a time such as '90 s'",
     "--set controller.unload_threshold=80N": "must be below controller.load_threshold, which is 60 N",
     "--set controller.swing_angel=90deg": "did you mean 'controller.swing_angle'?",
-    "--wearers many": "--wearers 'many' is not a whole number",
-    "--wearers 0": "0 wearers cannot walk; choose 1 to 1000000",
-    "--wearers 3 --seed x": "--seed 'x' is not a whole number",
+    "--wearers many": "--wearers many: must be a whole number",
+    "--wearers 0": "--wearers 0: must be a whole number, 1 or more",
+    "--wearers 3 --seed x": "--seed x: must be a whole number",
     "--wearer 3 --configs x": "there is no option '--configs'",
 }
 
@@ -199,7 +202,7 @@ def bursting(monkeypatch: pytest.MonkeyPatch) -> None:
         supply = replace(configuration.device.supply, pressure=1.0e18)
         return replace(configuration, device=replace(configuration.device, supply=supply))
 
-    monkeypatch.setattr(loading, "load_walk", changed)
+    monkeypatch.setattr(solve, "load_walk", changed)
 
 
 @pytest.mark.usefixtures("bursting")
@@ -207,19 +210,20 @@ def test_a_walk_that_diverges_is_a_status_and_exit_code_1(tmp_path: Path, capsys
     assert main(["walk", *SHORT, "--out", str(tmp_path / "walk")]) == 1
     captured = capsys.readouterr()
     assert captured.out.startswith("solenoid: diverged")
-    assert captured.err.startswith("ppafo: solenoid: diverged at t = ")
-    assert "try a smaller run.step" in captured.err
+    assert "\nsolenoid: diverged at t = " in captured.out
+    assert "try a smaller run.step" in captured.out
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())
     assert document["status"]["kind"] == "diverged"
     assert "diverged at t" in (tmp_path / "walk" / "report.html").read_text()
-    assert "legs.gif" not in names(tmp_path / "walk")
+    assert "legs-moving.gif" not in names(tmp_path / "walk")
 
 
 @pytest.mark.usefixtures("bursting")
 def test_wearers_that_diverge_are_told_with_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["walk", *SHORT, "--wearers", "4", "--out", str(tmp_path / "walk")]) == 1
-    assert "4 of 4 wearers diverged and are left out" in capsys.readouterr().err
-    assert names(tmp_path / "walk") == ["wearers.csv", "wearers.json"]
+    assert "4 of 4 wearers diverged and are left out" in capsys.readouterr().out
+    written = ["ppafo.json", "report.html", "wearers.csv", "wearers.json", "wearers.txt"]
+    assert names(tmp_path / "walk") == written
 
 
 def test_many_wearers_are_written_with_quantiles_and_histograms(
@@ -229,7 +233,8 @@ def test_many_wearers_are_written_with_quantiles_and_histograms(
     assert main(["walk", *SHORT, "--wearers", "50", "--seed", "4", "--out", str(folder)]) == 0
     printed = capsys.readouterr().out
     assert printed.startswith("solenoid: 50 wearers, 0.1 min each\n")
-    assert names(folder) == ["wearers.csv", "wearers.json", "wearers.png", "wearers.svg"]
+    written = [f"wearers.{ending}" for ending in ("csv", "json", "png", "svg", "txt")]
+    assert names(folder) == ["ppafo.json", "report.html", *written]
     document = json.loads((folder / "wearers.json").read_text())
     quantiles = document["outcomes"]["gas"]["quantiles"]
     rows = (folder / "wearers.csv").read_text().splitlines()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.control.profiles.tabulated import KIND, KNOTS, NEVER, Tabulated, bounds, used_knots, value
+from ppafo.engine.rows import rebuilt
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
@@ -17,7 +18,7 @@ def table(times: tuple[float, ...] = TIMES, values: tuple[float, ...] = VALUES, 
     settings = {item.name: item.default or 0.0 for item in KIND.quantities} | {"period": PERIOD, "level": level}
     settings |= {f"time_{number:02d}": time for number, time in enumerate(times, 1) if number > 1}
     settings |= {f"value_{number:02d}": value for number, value in enumerate(values, 1)}
-    return Tabulated(**settings)
+    return rebuilt(Tabulated, settings.values())
 
 
 def test_the_value_lies_on_straight_lines_between_the_knots_and_repeats() -> None:
@@ -42,8 +43,10 @@ def test_all_knots_may_be_used() -> None:
 
 
 def test_knots_that_never_come_count_neither_in_the_value_nor_in_the_bounds() -> None:
-    profile = table()._replace(value_20=99.0)
-    assert profile.time_20 == NEVER
+    whole = table()
+    assert whole.knots[18].time == NEVER
+    knots = (*whole.knots[:18], whole.knots[18]._replace(value=99.0), *whole.knots[19:])
+    profile = whole._replace(knots=knots)
     assert bounds(profile) == (-3.0, 6.0)
     assert max(value(profile, 0.01 * step)[0] for step in range(300)) <= 6.0
 

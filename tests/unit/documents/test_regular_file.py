@@ -1,6 +1,7 @@
 """Only regular files are read, and typed ones only up to a size."""
 
 import os
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -70,3 +71,13 @@ def test_a_link_to_a_file_is_read_and_recordings_may_be_long(tmp_path: Path) -> 
     (tmp_path / "file").write_bytes(b"x" * (MOST_BYTES_TYPED + 1))
     (tmp_path / "link").symlink_to(tmp_path / "file")
     assert len(read_regular_file(tmp_path / "link")) == MOST_BYTES_TYPED + 1
+
+
+def test_room_is_taken_for_what_is_there_and_not_for_the_most_that_may_be(tmp_path: Path) -> None:
+    (tmp_path / "small").write_bytes(b"x" * 1000)
+    tracemalloc.start()
+    content = read_regular_file(tmp_path / "small", 2_000_000_000)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert content == b"x" * 1000
+    assert most < 10_000_000

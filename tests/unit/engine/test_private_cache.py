@@ -1,5 +1,6 @@
 """The cache of compiled models runs nothing of others, and whatever is wrong with it, a model is compiled and runs."""
 
+import json
 import os
 import pickle
 import subprocess
@@ -207,3 +208,32 @@ def test_clearing_leaves_what_is_not_a_program(compiled: Path) -> None:
     (compiled.parent / "ppafo_results").rmdir()
     clear(compiled.parent)
     assert not compiled.parent.exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can make files of another user")
+def test_program_that_another_user_left_in_the_folder_is_not_run(compiled: Path, tmp_path: Path) -> None:
+    (index,) = compiled.rglob("*.nbi")
+    index.write_bytes(pickle.dumps(Trap(tmp_path / "sprung")))
+    sums = compiled / "checksums.json"
+    sums.write_text(json.dumps(cache._checksums(compiled)))
+    for place in (compiled, *compiled.rglob("*")):
+        os.chown(place, 65534, 65534)
+    assert loaded() == 42.0
+    assert not (tmp_path / "sprung").exists()
+    assert compiled.stat().st_uid == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no permission bits here")
+def test_program_into_which_others_can_write_is_compiled_anew(compiled: Path) -> None:
+    compiled.chmod(0o777)
+    assert loaded() == 42.0
+    assert compiled.stat().st_mode & 0o022 == 0
+
+
+def test_entry_that_is_a_link_to_itself_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    for folder in (loop, loop / "in"):
+        monkeypatch.setenv(cache.CACHE_VARIABLE, str(folder))
+        assert refusal(cache_folder()) != ""
+        assert loaded() == 42.0

@@ -19,9 +19,10 @@ from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slo
 from ppafo.model.regulator import LineState, SupplyLines, line_pressures
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
+from ppafo.simulation.plan import filled_lines
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking import load_walk
-from ppafo.walking.planning import full_lines, plan_walk, vented
+from ppafo.walking.planning import plan_walk, vented
 from ppafo.walking.walk import plan_of
 
 ANGLE = 1.7
@@ -41,6 +42,13 @@ class Filled(NamedTuple):
 
     state: PlantState
     lines: LineState
+
+
+def full_lines(plant: PlantParameters, lines: SupplyLines) -> LineState:
+    """Both lines as a run begins with them."""
+    given = filled_lines(plant, lines)
+    assert given is not None
+    return given.initial
 
 
 def open_ports(plant: PlantParameters) -> tuple[SinglePort, SinglePort]:

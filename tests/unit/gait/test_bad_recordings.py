@@ -58,17 +58,18 @@ def held(names: tuple[str, ...], start: int, samples: int) -> Change:
 CASES: dict[str, tuple[Change, str]] = {
     "degrees called radians": (
         changed(SHANK, np.degrees),
-        "shank_angle moves over 4.15e+03 deg in a stride, plausible is 25 to 120 deg; the numbers look like degrees",
+        "shank_angle covers a range of 4.15e+03 deg in a stride, plausible is 25 to 120 deg; the numbers "
+        "look like degrees",
     ),
     "radians called degrees": (
         changed(ANKLE, lambda x: x, "ankle_angle [deg]"),
-        "ankle_angle moves over 0.572 deg in a stride, plausible is 5 to 80 deg; the numbers look like radians",
+        "ankle_angle covers a range of 0.572 deg in a stride, plausible is 5 to 80 deg; the numbers look like radians",
     ),
     "shank counted the other way": (changed(SHANK, np.negative), "shank_angle grows while the foot stands"),
     "shank from the horizontal": (changed(SHANK, lambda x: x + 1.57), "shank_angle is 106 deg at heel strike and"),
     "ankle counted the other way": (
         changed(ANKLE, lambda x: np.pi - x),
-        "its sign is reversed; turn it around in the file, or change ankle_angle.positive in a gait",
+        "its sign is reversed; correct it in the file, or change ankle_angle.positive in a gait",
     ),
     "ankle with zero as neutral": (
         changed(ANKLE, lambda x: x - np.pi / 2.0),
@@ -90,13 +91,13 @@ CASES: dict[str, tuple[Change, str]] = {
         "vertical_force reaches 619 body weights, plausible is 0.5 to 2.5; is the body mass",
     ),
     "force of both feet": (changed(FORCE, lambda x: x + 0.5), "no heel strikes were found"),
-    "force downwards": (changed(FORCE, np.negative), "downwards: its sign is reversed; turn it around in the file"),
+    "force downwards": (changed(FORCE, np.negative), "downwards: its sign is reversed; correct it in the file"),
     "knee counted backwards": (changed(FORWARD, np.negative), "knee_forward is -10.1 m/s^2 about toe-off and 7.69"),
     "knee counted down": (
         changed(UP, np.negative),
-        "turn it around in the file, or change the sign of knee.up in a gait map",
+        "correct it in the file, or change the sign of knee.up in a gait map",
     ),
-    "knee with gravity": (changed(UP, lambda x: x + 9.81), "an accelerometer shows gravity too: take it away"),
+    "knee with gravity": (changed(UP, lambda x: x + 9.81), "an accelerometer measures gravity too: subtract it"),
     "knee in millimetres": (
         scaled((FORWARD, UP), 1000.0),
         "knee_forward and knee_up are 1000 times too large: while the foot is flat",
@@ -111,7 +112,7 @@ CASES: dict[str, tuple[Change, str]] = {
     "knee times g": (scaled((FORWARD, UP), 9.80665), "divide both by 9.80665 in the file"),
     "knee in centimetres": (
         scaled((FORWARD, UP), 100.0),
-        "knee_forward moves over 2.02e+03 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; is the unit right",
+        "knee_forward covers a range of 2.02e+03 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; is the unit right",
     ),
     "knee exchanged": (
         exchanged,
@@ -124,7 +125,7 @@ CASES: dict[str, tuple[Change, str]] = {
     "knee in g": (
         scaled((FORWARD, UP), 1.0 / 9.80665),
         "knee_forward and knee_up are in units of g: while the foot is flat the knee turns about the resting ankle, "
-        "which they miss by 79 %, and by 42 % with that mended; multiply both by 9.80665 in the file",
+        "which they miss by 79 %, and by 42 % with that corrected; multiply both by 9.80665 in the file",
     ),
     "knee in g with gravity": (
         lambda columns: {**columns, FORWARD: columns[FORWARD] / 9.80665, UP: columns[UP] / 9.80665 + 1.0},
@@ -194,7 +195,7 @@ def test_the_remedy_changes_the_gait_map_only_where_one_was_given(
     columns_map = package_map("right").model_copy(update={"centre_of_pressure": None})
     with pytest.raises(DataError, match=f"change (the sign of )?{re.escape(key)} in the gait map"):
         import_gait([path], ImportSettings(62.0, columns=columns_map))
-    with pytest.raises(DataError, match=f"turn it around in the file, or change .*{re.escape(key)} in a gait map"):
+    with pytest.raises(DataError, match=f"correct it in the file, or change .*{re.escape(key)} in a gait map"):
         import_gait([path], ImportSettings(62.0))
 
 
@@ -202,7 +203,7 @@ def test_a_reversed_shank_without_a_force_is_named_as_what_it_is(
     csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
     reversed_shank = changed(SHANK, np.negative)({name: x for name, x in columns.items() if name != FORCE})
-    with pytest.raises(DataError, match=r"comes from shank_angle: where its sign is reversed, turn it") as refused:
+    with pytest.raises(DataError, match=r"comes from shank_angle: where its sign is reversed, correct it") as refused:
         import_gait([csv_of(reversed_shank)], ImportSettings(62.0))
     assert "force" not in str(refused.value)
 
@@ -233,7 +234,7 @@ def test_noise_is_remarked_before_it_is_refused(csv_of: Callable[..., Path], col
     found = import_gait([path], ImportSettings(62.0))
     (remark,) = found.remarks
     assert remark.startswith("shank_angle differs between strides by 1")
-    assert "that is noise, or no steady walk; smooth the recording (--low-pass '6 Hz')" in remark
+    assert "that is noise, or the walk is not steady; smooth the recording (--low-pass '6 Hz')" in remark
     assert import_gait([path], ImportSettings(62.0, low_pass=6.0)).remarks == ()
 
 
@@ -294,7 +295,7 @@ def test_a_moment_file_without_a_whole_stride_is_named(opensim_files: dict[str, 
 def test_angles_without_a_unit_ask_for_it(opensim_files: dict[str, Path]) -> None:
     path = opensim_files["ik"]
     path.write_text(path.read_text().replace("Angles are in degrees.", ""))
-    with pytest.raises(DataError, match=r"'pelvis_tilt': the file does not say its unit; give shank_angle.unit in a"):
+    with pytest.raises(DataError, match=r"'pelvis_tilt': the file does not state its unit; give shank_angle.unit in a"):
         import_gait(list(opensim_files.values()), ImportSettings(62.0))
 
 
@@ -309,7 +310,7 @@ def test_files_of_different_forms_need_a_map(
     opensim_files: dict[str, Path], csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:
     mixed = [csv_of(columns), opensim_files["grf"]]
-    with pytest.raises(DataError, match=r"of different forms \(csv, opensim\); name the columns of all of them in a"):
+    with pytest.raises(DataError, match=r"different formats \(csv, opensim\); name the columns of all of them in a"):
         import_gait(mixed, ImportSettings(62.0))
 
 
@@ -327,7 +328,7 @@ def test_a_column_that_the_users_map_names_must_be_there(
 
 
 def test_an_unknown_kind_of_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"walk.trc: is none of .mot, .sto, .csv, .c3d"):
+    with pytest.raises(DataError, match=r"walk.trc: is not a .mot, .sto, .csv or .c3d file"):
         import_gait([tmp_path / "walk.trc"], ImportSettings(62.0))
 
 
@@ -338,10 +339,10 @@ def test_an_unknown_kind_of_file_is_refused(tmp_path: Path) -> None:
         (ImportSettings(float("nan")), "a body mass of nan kg is not plausible"),
         (ImportSettings(62.0, walking_speed=50.0), "a walking speed of 50 m/s is not plausible"),
         (ImportSettings(62.0, stature=175.0), "a stature of 175 m is not plausible; give it in m, such as '1.75 m'"),
-        (ImportSettings(62.0, low_pass=0.1), "a low pass at 0.1 Hz takes the walking away"),
+        (ImportSettings(62.0, low_pass=0.1), "a low pass at 0.1 Hz removes the walking itself"),
         (ImportSettings(62.0, low_pass=500.0), "cannot be low-passed at 500 Hz: it has 200.3 samples a second"),
-        (ImportSettings(62.0, least_strides=0), "the least number of strides is 1, not 0"),
-        (ImportSettings(62.0, name="My gait"), "name 'My gait' must consist of small letters"),
+        (ImportSettings(62.0, least_strides=0), "the minimum number of strides must be 1 or more, not 0"),
+        (ImportSettings(62.0, name="My gait"), "name 'My gait' must consist of lower-case letters"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(

@@ -12,6 +12,7 @@ from ppafo.errors import DataError
 from ppafo.gait import Gait
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, ShankMap
+from ppafo.gait.recorded.table import read_table
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
@@ -139,3 +140,25 @@ def test_without_the_library_the_message_says_what_to_install(tmp_path: Path, mo
     monkeypatch.setitem(sys.modules, "ezc3d", None)
     with pytest.raises(DataError, match=r"C3D files need ezc3d; install it with 'pip install ppafo\[c3d\]'"):
         import_gait([tmp_path / "walk.c3d"], ImportSettings(62.0))
+
+
+@pytest.mark.parametrize(
+    ("place", "byte", "told"),
+    [
+        (b"DESCRIPTIONS\x07\x00\xff", 0x00, "is damaged: the library ezc3d crashes on it"),
+        (b"EZC3D\x03\x00", 0x80, "ezc3d cannot read it|requires far more memory"),
+    ],
+    ids=["no dimensions", "a description of negative length"],
+)
+def test_a_file_that_brings_the_library_down_is_refused_in_one_line(
+    written: Callable[..., Path], place: bytes, byte: int, told: str
+) -> None:
+    path = written()
+    content = bytearray(path.read_bytes())
+    content[content.index(place) + len(place)] = byte
+    path.write_bytes(content)
+    resource = pytest.importorskip("resource", reason="this system does not tell how much memory was taken")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(DataError, match=rf"walk\.c3d: ({told})"):
+        read_table(path)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000

@@ -107,7 +107,7 @@ IMPLAUSIBLE = {
     ),
     "zero of the ankle": (
         {"ankle_angle": lambda c: dataclasses.replace(c, mean=c.mean - math.pi / 2)},
-        "write its mean so that it is 90 deg when the foot is square to the shank",
+        "write its mean so that it is 90 deg when the foot is perpendicular to the shank",
     ),
     "moment": ({"ankle_moment": negative}, "its sign is reversed; write mean, cosine and sine with the other sign"),
     "unit of the shank": ({"shank_angle": lambda c: c.scaled(math.radians(1.0))}, "the numbers look like radians"),
@@ -130,11 +130,11 @@ IMPLAUSIBLE = {
     ),
     "knee with gravity": (
         {"knee_up": lambda c: dataclasses.replace(c, mean=9.81)},
-        "knee_up is 9.81 m/s^2 on average, and a stride that repeats has 0",
+        "knee_up is 9.81 m/s^2 on average, and a periodic stride has 0",
     ),
     "knee in another unit": (
         {"knee_forward": lambda c: c.scaled(100.0)},
-        "knee_forward moves over 2.02e+03 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; is the unit right",
+        "knee_forward covers a range of 2.02e+03 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; is the unit right",
     ),
 }
 
@@ -159,7 +159,7 @@ def test_a_gait_file_with_its_knee_exchanged_is_refused(normative: Gait) -> None
 
 def test_a_gait_file_needs_no_knee_but_not_half_of_one(normative: Gait) -> None:
     half = dataclasses.replace(normative, knee_up=None)
-    with pytest.raises(DataError, match=r"half.toml: knee_forward is there without knee_up; give both, or none"):
+    with pytest.raises(DataError, match=r"half.toml: knee_forward is given without knee_up; give both, or neither"):
         parse_gait(gait_toml(half).encode(), "half.toml")
     without = dataclasses.replace(normative, knee_forward=None, knee_up=None)
     again = parse_gait(gait_toml(without).encode(), "without.toml")

@@ -148,7 +148,7 @@ def test_a_hip_that_does_not_move_is_refused(opensim_files: dict[str, Path]) -> 
     labels, *lines = rows.splitlines()
     fixed = ["\t".join([*line.split("\t")[:5], "0.0", "0.9"]) for line in lines]
     path.write_text(head + "time\t" + "\n".join([labels, *fixed]) + "\n")
-    with pytest.raises(DataError, match=r"the hip does not move \(pelvis_tx is constant\).*leave the stature out"):
+    with pytest.raises(DataError, match=r"the hip does not move \(pelvis_tx is constant\).*omit the stature"):
         import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=1.7))
 
 
@@ -161,7 +161,11 @@ def test_a_knee_that_is_carried_backwards_is_refused(
     forward, up = knee_way(walk.time)
     rest = {name: values for name, values in columns.items() if not name.startswith("knee_")}
     path = csv_of(rest | {"knee_forward [m]": forward - 2.6 * walk.time, "knee_up [m]": up})
-    with pytest.raises(DataError, match=r"goes back by 1.3 m/s: knee.forward counts against the walk; turn it around"):
+    with pytest.raises(
+        DataError,
+        match=r"goes back by 1.3 m/s: knee.forward points against the direction "
+        "of walking; correct it in the file",
+    ):
         import_gait([path], ImportSettings(62.0))
 
 
@@ -228,10 +232,10 @@ def test_the_low_pass_takes_noise_away_and_leaves_the_curve(
 
 
 def test_the_low_pass_is_at_its_half_power_where_it_says() -> None:
-    from ppafo.gait.recorded.signal import Signal, low_passed
+    from ppafo.gait.recorded.signal import Signal, low_pass
 
     time = np.arange(0.0, 20.0, 0.005)
-    passed = low_passed(Signal("sine", time, np.sin(2.0 * np.pi * 6.0 * time)), 6.0)
+    passed = low_pass(Signal("sine", time, np.sin(2.0 * np.pi * 6.0 * time)), 6.0)
     assert np.max(passed.values[1000:3000]) == pytest.approx(2.0**-0.5, rel=0.01)
 
 

@@ -2,10 +2,16 @@
 
 import numpy as np
 
-from ppafo.identification.bench.decay_motion import angle_of_decay
-from ppafo.identification.bench.gas_flow import GasAt, orifice_shape
-from ppafo.identification.bench.leak_laws import LAMINAR, LINEAR, Chambers, difference_in_time
-from ppafo.identification.bench.leak_opening import Opening
+from ppafo.identification.bench.decay import angle_of_decay
+from ppafo.identification.bench.flow_laws import (
+    LAMINAR,
+    LINEAR,
+    Chambers,
+    GasAt,
+    Opening,
+    difference_in_time,
+    orifice_shape,
+)
 from ppafo.identification.bench.valve_map import area_of_command
 from ppafo.identification.source import Source
 from ppafo.signals import Channel, Recording

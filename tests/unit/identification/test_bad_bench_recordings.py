@@ -23,11 +23,11 @@ from ppafo.signals import Recording
 
 VOLUME = 60e-6
 NEEDED = {
-    "static_torque": ("torque", "pressure_difference", "direction"),
-    "free_decay": ("angle",),
-    "open_valve_flow": ("upstream_pressure", "downstream_pressure", "mass_flow"),
-    "valve_map": ("command", "mass_flow", "upstream_pressure", "downstream_pressure"),
-    "vane_leak": ("pressure_1", "pressure_2"),
+    "static-torque": ("torque", "pressure_difference", "direction"),
+    "free-decay": ("angle",),
+    "open-valve-flow": ("upstream_pressure", "downstream_pressure", "mass_flow"),
+    "valve-map": ("command", "mass_flow", "upstream_pressure", "downstream_pressure"),
+    "vane-leak": ("pressure_1", "pressure_2"),
 }
 Solve = Callable[[Source], BenchResult]
 
@@ -39,11 +39,11 @@ def bench(planted: ModuleType) -> dict[str, tuple[Source, Solve]]:
     leak = planted.leak("orifice", planted.orifice_rate(3.39e-8, VOLUME))
     leak_settings = VaneLeakSettings(co2, VOLUME, VOLUME / 1.3, 0.113)
     return {
-        "static_torque": (planted.static(), lambda source: static_torque((source,))),
-        "free_decay": (planted.decay(), lambda source: free_decay((source,))),
-        "open_valve_flow": (planted.flow(), lambda source: open_valve_flow((source,), OpenValveFlowSettings(co2))),
-        "valve_map": (planted.sweep(), lambda source: valve_map((source,), ValveMapSettings(co2))),
-        "vane_leak": (leak, lambda source: vane_leak((source,), leak_settings)),
+        "static-torque": (planted.static(), lambda source: static_torque((source,))),
+        "free-decay": (planted.decay(), lambda source: free_decay((source,))),
+        "open-valve-flow": (planted.flow(), lambda source: open_valve_flow((source,), OpenValveFlowSettings(co2))),
+        "valve-map": (planted.sweep(), lambda source: valve_map((source,), ValveMapSettings(co2))),
+        "vane-leak": (leak, lambda source: vane_leak((source,), leak_settings)),
     }
 
 
@@ -83,14 +83,14 @@ def test_a_recording_that_is_too_short_is_refused(bench: dict[str, tuple[Source,
 @pytest.mark.parametrize(
     ("kind", "channel", "words"),
     [
-        ("static_torque", "torque", "'torque' is"),
-        ("static_torque", "pressure_difference", "'pressure_difference' is"),
-        ("static_torque", "direction", "falling branch is missing"),
-        ("free_decay", "angle", "'angle' is"),
-        ("open_valve_flow", "mass_flow", "'mass_flow' stays at"),
-        ("valve_map", "command", "'command' is"),
-        ("valve_map", "mass_flow", "'mass_flow' is"),
-        ("vane_leak", "pressure_1", "'pressure_1' is"),
+        ("static-torque", "torque", "'torque' is"),
+        ("static-torque", "pressure_difference", "'pressure_difference' is"),
+        ("static-torque", "direction", "falling branch is missing"),
+        ("free-decay", "angle", "'angle' is"),
+        ("open-valve-flow", "mass_flow", "'mass_flow' stays at"),
+        ("valve-map", "command", "'command' is"),
+        ("valve-map", "mass_flow", "'mass_flow' is"),
+        ("vane-leak", "pressure_1", "'pressure_1' is"),
     ],
 )
 def test_a_constant_channel_is_refused(
@@ -105,11 +105,11 @@ def test_a_constant_channel_is_refused(
 @pytest.mark.parametrize(
     ("kind", "channel", "share"),
     [
-        ("static_torque", "torque", 0.8),
-        ("static_torque", "pressure_difference", 0.5),
-        ("free_decay", "angle", 0.6),
-        ("open_valve_flow", "mass_flow", 0.7),
-        ("vane_leak", "pressure_1", 0.9),
+        ("static-torque", "torque", 0.8),
+        ("static-torque", "pressure_difference", 0.5),
+        ("free-decay", "angle", 0.6),
+        ("open-valve-flow", "mass_flow", 0.7),
+        ("vane-leak", "pressure_1", 0.9),
     ],
 )
 def test_a_saturated_sensor_is_refused_with_its_sample(
@@ -124,7 +124,7 @@ def test_a_saturated_sensor_is_refused_with_its_sample(
     assert "saturated" in text
 
 
-@pytest.mark.parametrize("kind", ["free_decay", "vane_leak"])
+@pytest.mark.parametrize("kind", ["free-decay", "vane-leak"])
 def test_a_gap_in_a_decay_is_refused_with_its_sample(bench: dict[str, tuple[Source, Solve]], kind: str) -> None:
     source, solve = bench[kind]
     time = source.recording.time.copy()
@@ -133,7 +133,7 @@ def test_a_gap_in_a_decay_is_refused_with_its_sample(bench: dict[str, tuple[Sour
     assert "(sample 400)" in refusal(solve, retimed(source, time))
 
 
-@pytest.mark.parametrize("kind", ["static_torque", "open_valve_flow", "valve_map"])
+@pytest.mark.parametrize("kind", ["static-torque", "open-valve-flow", "valve-map"])
 def test_a_pause_between_steady_readings_is_told(bench: dict[str, tuple[Source, Solve]], kind: str) -> None:
     source, solve = bench[kind]
     time = source.recording.time.copy()
@@ -146,7 +146,7 @@ def test_a_pause_between_steady_readings_is_told(bench: dict[str, tuple[Source, 
 def test_a_saturated_flow_meter_is_flagged_and_a_valve_that_is_open_is_not(
     bench: dict[str, tuple[Source, Solve]],
 ) -> None:
-    source, solve = bench["valve_map"]
+    source, solve = bench["valve-map"]
     flow = source.recording["mass_flow"]
     clipped = solve(changed(source, "mass_flow", np.minimum(flow, 0.6 * flow.max())))
     meter = next(check for check in clipped.failed if check.name == "flow meter")
@@ -156,7 +156,7 @@ def test_a_saturated_flow_meter_is_flagged_and_a_valve_that_is_open_is_not(
 
 
 def test_noise_alone_is_no_decay(bench: dict[str, tuple[Source, Solve]]) -> None:
-    source, solve = bench["free_decay"]
+    source, solve = bench["free-decay"]
     noise = np.random.default_rng(3).normal(0.0, 2e-3, len(source.recording))
     assert "nothing moves" in refusal(solve, changed(source, "angle", noise))
 
@@ -164,7 +164,7 @@ def test_noise_alone_is_no_decay(bench: dict[str, tuple[Source, Solve]]) -> None
 def test_a_vane_that_runs_into_a_stop_is_not_taken_for_one_that_comes_to_rest(
     bench: dict[str, tuple[Source, Solve]], planted: ModuleType
 ) -> None:
-    _, solve = bench["free_decay"]
+    _, solve = bench["free-decay"]
     smooth = planted.decay(noise=0.0)
     angle = smooth.recording["angle"]
     stopped = changed(smooth, "angle", np.minimum(angle, angle.min() + 0.7 * np.ptp(angle)))
@@ -174,7 +174,7 @@ def test_a_vane_that_runs_into_a_stop_is_not_taken_for_one_that_comes_to_rest(
 
 
 def test_steps_of_a_coarse_converter_are_no_saturation(bench: dict[str, tuple[Source, Solve]]) -> None:
-    source, solve = bench["vane_leak"]
+    source, solve = bench["vane-leak"]
     coarse = changed(source, "pressure_1", np.round(source.recording["pressure_1"], -4))
     assert solve(coarse).estimates
 

@@ -21,7 +21,7 @@ def test_half_widths_follow_from_the_interval() -> None:
 
 
 def test_an_identified_value_outside_its_interval_is_refused() -> None:
-    with pytest.raises(IdentificationError, match="lies inside its interval"):
+    with pytest.raises(IdentificationError, match="must lie inside its interval"):
         estimate(4.0, 1.0, 3.0)
 
 

@@ -7,22 +7,22 @@ from types import ModuleType
 
 import pytest
 
+from ppafo.answers.text import text_of
+from ppafo.answers.writing import files_of
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
-from ppafo.identification.identify import Identification, identify
 from ppafo.identification.problem import json_schema, parse_problem
 from ppafo.parameters.loading import load_device, load_parameter_set, parse_parameter_set
 from ppafo.parameters.writing import parameter_set_toml
-from ppafo.reporting.identification_files import identification_files
-from ppafo.reporting.identification_table import identification_table
+from ppafo.questions.identify.solve import Identification, identify
 from ppafo.storage import write_csv
 
 HEAD = 'schema_version = 1\nname = "twin"\ndevice.set = "ppafo2011"\n'
-STATIC = '[[procedure]]\nkind = "static_torque"\nrecordings = ["static.csv"]\n'
-DECAY = '[[procedure]]\nkind = "free_decay"\nrecordings = ["decay.csv"]\n'
-FLOW = '[[procedure]]\nkind = "open_valve_flow"\nrecordings = ["flow.csv"]\n'
-MAP = '[[procedure]]\nkind = "valve_map"\nrecordings = ["sweep.csv"]\n'
-LEAK = '[[procedure]]\nkind = "vane_leak"\nrecordings = ["leak.csv"]\nvolume_1 = "60 cm^3"\nvolume_2 = "46.15 cm^3"\n'
+STATIC = '[[procedure]]\nkind = "static-torque"\nrecordings = ["static.csv"]\n'
+DECAY = '[[procedure]]\nkind = "free-decay"\nrecordings = ["decay.csv"]\n'
+FLOW = '[[procedure]]\nkind = "open-valve-flow"\nrecordings = ["flow.csv"]\n'
+MAP = '[[procedure]]\nkind = "valve-map"\nrecordings = ["sweep.csv"]\n'
+LEAK = '[[procedure]]\nkind = "vane-leak"\nrecordings = ["leak.csv"]\nvolume_1 = "60 cm^3"\nvolume_2 = "46.15 cm^3"\n'
 MAPPED = "[columns.rig]\n"
 ALL = LEAK + MAP + FLOW + DECAY + STATIC
 
@@ -55,7 +55,7 @@ def solved(bench: Path) -> Solve:
 
 def test_procedures_run_in_the_recommended_order_whatever_the_order_of_the_file(solved: Solve) -> None:
     names = [result.procedure for result in solved(ALL).results]
-    assert names == ["static_torque", "free_decay", "open_valve_flow", "valve_map", "vane_leak"]
+    assert names == ["static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"]
 
 
 def test_every_planted_value_gets_into_the_new_set_with_interval_and_origin(solved: Solve, planted: ModuleType) -> None:
@@ -99,7 +99,7 @@ def test_a_value_that_is_not_identified_is_written_as_fitted_and_not_counted(
     entry = outcome.new_set.parameter_set.numbers["friction.static_torque"]
     assert entry.origin == "fitted"
     assert entry.note.startswith("holds for this model only, at 327.5 kPa")
-    table = identification_table(outcome)
+    table = text_of(outcome.answer()).splitlines()
     assert "1 value identified: actuator.torque_constant; fitted only" in " ".join(table)
 
 
@@ -129,14 +129,14 @@ def test_what_cannot_be_had_is_said_before_anything_is_fitted(solved: Solve, ben
     said: list[str] = []
     path = bench / "problem.toml"
     path.write_text(f'{HEAD}{LEAK.partition("volume_1")[0]}{DECAY}inertia = "unknown"\n')
-    outcome = identify(path, said.append)
+    outcome = identify(path, lambda progress: said.append(progress.activity))
     missing = {item.name for one in outcome.beforehand for item in one.prospects if not item.can_be_had}
     assert missing == {"absolute values", "area of the leak", "plateau or leak"}
     assert len(said) == 3
-    lines = identification_table(outcome)
-    assert lines[0] == "before free_decay, from the recordings alone:"
-    assert lines.index("before vane_leak, from the recordings alone:") < next(
-        n for n, line in enumerate(lines) if line.startswith("free_decay (synthetic)")
+    lines = text_of(outcome.answer()).splitlines()
+    assert lines[0] == "before free-decay, from the recordings alone:"
+    assert lines.index("before vane-leak, from the recordings alone:") < next(
+        n for n, line in enumerate(lines) if line.startswith("free-decay (synthetic)")
     )
 
 
@@ -164,30 +164,30 @@ def test_friction_that_contradicts_itself_is_told_and_fails(solved: Solve) -> No
 
 
 def test_figures_and_files_are_there_for_each_procedure_and_figure_3_for_both(solved: Solve) -> None:
-    files = identification_files(solved(STATIC + DECAY))
-    names = {"twin.toml", "estimates.json", "identify.txt"}
-    names |= {f"{name}.{kind}" for name in ("static_torque", "free_decay", "figure-3") for kind in ("png", "svg")}
+    files = files_of(solved(STATIC + DECAY).answer())
+    names = {"twin.toml", "identify.json", "identify.txt", "report.html"}
+    names |= {f"{name}.{kind}" for name in ("static-torque", "free-decay", "figure-3") for kind in ("png", "svg")}
     assert set(files) == names
     assert files["figure-3.png"].startswith(b"\x89PNG")
-    assert json.loads(files["estimates.json"])["procedures"][0]["recordings_are"] == "synthetic"
-    assert "figure-3.png" not in identification_files(solved(STATIC))
+    assert json.loads(files["identify.json"])["procedures"][0]["recordings_are"] == "synthetic"
+    assert "figure-3.png" not in files_of(solved(STATIC).answer())
 
 
 def test_the_published_schema_knows_every_procedure() -> None:
     text = json.dumps(json_schema())
-    assert all(name in text for name in ("static_torque", "free_decay", "open_valve_flow", "valve_map", "vane_leak"))
+    assert all(name in text for name in ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"))
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "procedure"),
-        (STATIC.replace("static_torque", "static_torqe"), "did you mean 'static_torque'"),
+        (STATIC.replace("static-torque", "static_torqe"), "did you mean 'static-torque'"),
         (f"{STATIC}colums = 'rig'\n", "did you mean 'columns'"),
         (f"{STATIC}columns = 'rig'\n", "procedure 1: there is no column map 'rig'; there are none"),
         (STATIC.replace("static.csv", "nowhere.csv"), "nowhere.csv"),
-        (STATIC.replace("static.csv", "decay.csv"), "decay.csv: static_torque needs a channel 'torque [N m]'"),
-        (f'{DECAY}start = "2 m"\n', "procedure 1, free_decay: start = '2 m': unit 'm' does not fit"),
+        (STATIC.replace("static.csv", "decay.csv"), "decay.csv: static-torque needs a channel 'torque [N m]'"),
+        (f'{DECAY}start = "2 m"\n', "procedure 1, free-decay: start = '2 m': unit 'm' does not fit"),
         (f'{DECAY}inertia = "0 kg m^2"\n', "must be above zero"),
         (f'{FLOW}valve = "proportionl"\n', "did you mean 'proportional'"),
         (f'{FLOW}temperature = "17 K"\n', "temperature = '17 K' must be from 150 to 600 K"),
@@ -264,7 +264,7 @@ def test_every_procedure_takes_a_calibration(solved: Solve, text: str) -> None:
 
 
 def test_a_decay_of_a_leak_takes_no_calibration(solved: Solve) -> None:
-    with pytest.raises(PpafoError, match="a decay has no use for it"):
+    with pytest.raises(PpafoError, match="it does not apply to a decay"):
         solved(f"{LEAK}calibration = 0.05\n")
 
 
@@ -287,3 +287,15 @@ def test_a_measured_gas_temperature_takes_the_place_of_the_set_s(solved: Solve) 
     plain, cool = (solved(f"{FLOW}{more}").results[0][path] for more in ("", 'temperature = "16.85 degC"\n'))
     assert cool.value / plain.value == pytest.approx((290.0 / 298.0) ** 0.5, rel=1e-6)
     assert "Gas at 290 K" in cool.explanation
+
+
+def test_a_file_that_spells_its_procedures_with_underscores_is_the_same_problem() -> None:
+    head = 'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n'
+    written = f"{head}{STATIC}{DECAY}{FLOW}{MAP}{LEAK}"
+    kinds = ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak")
+    former = written
+    for kind in kinds:
+        former = former.replace(f'"{kind}"', f'"{kind.replace("-", "_")}"')
+    problem = parse_problem(former.encode(), "bench.toml")
+    assert problem == parse_problem(written.encode(), "bench.toml")
+    assert tuple(item.kind for item in problem.procedure) == kinds

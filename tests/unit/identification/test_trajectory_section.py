@@ -3,21 +3,23 @@
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 
+from ppafo.answers.text import text_of
+from ppafo.answers.writing import files_of
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
-from ppafo.identification.identify import Identification, identify
 from ppafo.identification.problem import json_schema
+from ppafo.identification.source import Use, common_use
 from ppafo.parameters.device import Orifice
 from ppafo.parameters.loading import load_device, parse_parameter_set
 from ppafo.parameters.writing import parameter_set_toml
-from ppafo.reporting.identification_files import identification_document, identification_files
-from ppafo.reporting.identification_table import identification_table
+from ppafo.questions.identify.solve import Identification, identify
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
@@ -52,8 +54,8 @@ label = "slow"
 scenario = "step-response"
 overrides = ["controller.command=0.2"]
 """
-STATIC = '[[procedure]]\nkind = "static_torque"\nrecordings = ["static.csv"]\n'
-DECAY = '[[procedure]]\nkind = "free_decay"\nrecordings = ["decay.csv"]\ninertia = "10 g m^2"\n'
+STATIC = '[[procedure]]\nkind = "static-torque"\nrecordings = ["static.csv"]\n'
+DECAY = '[[procedure]]\nkind = "free-decay"\nrecordings = ["decay.csv"]\ninertia = "10 g m^2"\n'
 FIT = f"[trajectory]\n{PARAMETERS}{STEP}"
 
 Solve = Callable[[str], Identification]
@@ -140,7 +142,7 @@ def test_the_new_set_says_where_its_values_come_from_and_reads_back(both: Identi
 
 
 def test_the_document_has_all_that_the_fit_says(both: Identification) -> None:
-    document = json.loads(json.dumps(identification_document(both)))["trajectory"]
+    document = json.loads(json.dumps(both.to_dict()))["trajectory"]
     assert document["recordings_are"] == "synthetic"
     assert [item["inputs"] for item in document["recordings"]] == [[], ["command", "supply_pressure"]]
     assert np.array(document["covariance"]).shape == np.array(document["correlation"]).shape == (5, 5)
@@ -155,14 +157,14 @@ def test_the_document_has_all_that_the_fit_says(both: Identification) -> None:
 
 def test_every_recording_has_a_figure_and_correlations_and_profiles_have_one(both: Identification) -> None:
     names = {"fit-step", "fit-replayed", "correlation", "profiles"}
-    files = identification_files(both)
+    files = files_of(both.answer())
     pictures = {f"trajectory-{name}.{kind}" for name in names for kind in ("png", "svg")}
-    assert set(files) == pictures | {"fitted.toml", "estimates.json", "identify.txt", "posterior.nc"}
+    assert set(files) == pictures | {"fitted.toml", "identify.json", "identify.txt", "report.html", "posterior.nc"}
     assert files["trajectory-profiles.png"].startswith(b"\x89PNG")
 
 
 def test_the_table_shows_units_of_the_set_checks_profiles_and_the_next_experiment(both: Identification) -> None:
-    text = "\n".join(identification_table(both))
+    text = text_of(both.answer())
     assert "trajectory (synthetic): 5 numbers fitted to 2 recordings" in text
     assert "holds: what is left" in text
     assert "profile: foot_plate.inertia: 9.9" in text
@@ -271,7 +273,7 @@ def test_the_published_schema_has_the_section() -> None:
         (FIT.replace("2 g m^2", "2 g m"), "parameter 'foot_plate.inertia': low = '2 g m': unit 'g m' does not fit"),
         (FIT.replace("2 g m^2", "70 g m^2"), "problem.toml: trajectory: foot_plate.inertia: start 0.0084 must lie"),
         (f"{FIT}columns = 'rig'\n", "experiment 'step': there is no column map 'rig'; there are none"),
-        (f"{FIT}inputs = ['comand']\n", "experiment 'step': 'comand' is no measured input, did you mean 'command'"),
+        (f"{FIT}inputs = ['comand']\n", "experiment 'step': 'comand' is not a measured input, did you mean 'command'"),
         (f"{FIT}inputs = ['external_torque']\n", "has no channel 'external_torque' to follow"),
         (f"{FIT}channels = ['torque']\n", "channel 'torque' cannot be fitted"),
         (f"{FIT}noise = {{ angel = '1 deg' }}\n", "noise of 'angel', did you mean 'angle'"),
@@ -376,7 +378,7 @@ def test_a_held_vane_is_fitted_in_its_pressures(solve: Solve, laboratory: Path) 
         (f"{TANK}held = '75 deg'\n", "held and volume: with a fixed volume there is no vane"),
         (TANK.replace("60 cm^3", "0 cm^3"), "volume = '0 cm^3' must be above zero"),
         (TANK.replace("60 cm^3", "60 psi"), "volume"),
-        (f"{TANK}inputs = ['command', 'angle']\n", "the vane is held or absent, and inputs has 'angle'"),
+        (f"{TANK}inputs = ['command', 'angle']\n", "the vane is held or absent, but inputs has 'angle'"),
         (f"{TANK}scenario = 'step-response'\n", "volume and a scenario"),
         (f"{STEP}inputs = ['angel']\n", "did you mean 'angle'"),
     ],
@@ -387,11 +389,27 @@ def test_a_contradiction_about_the_vane_is_told(solve: Solve, laboratory: Path, 
         solve(f"{ONE_NUMBER}{text}")
 
 
-def test_a_bench_prior_from_a_recording_that_is_fitted_too_is_refused(solve: Solve) -> None:
-    prior = '[trajectory]\nparameters = [{ path = "friction.viscous_damping", prior = "bench" }]\n'
-    text = STEP.replace("step.csv", "decay.csv") + "channels = ['angle']\n"
-    with pytest.raises(PpafoError, match=r"prior = 'bench' comes from decay\.csv sha256:.*it would count twice"):
-        solve(f"{DECAY}{prior}{text}")
+@pytest.mark.parametrize("prior", ['prior = "bench"', 'start = "25 g m^2/s"'])
+@pytest.mark.parametrize("name", ["decay.csv", "copied.csv"])
+def test_a_recording_of_a_bench_procedure_that_is_fitted_too_is_refused(
+    solve: Solve, laboratory: Path, prior: str, name: str
+) -> None:
+    text = f'[trajectory]\nparameters = [{{ path = "friction.viscous_damping", {prior} }}]\n'
+    text += STEP.replace("step.csv", name) + "channels = ['angle']\n"
+    if name == "copied.csv":
+        # Another file, with the same numbers: a comment changes its hash and not theirs.
+        (laboratory / name).write_text(f"# a copy\n{(laboratory / 'decay.csv').read_text()}")
+    told = rf"free-decay \(decay\.csv sha256:.*'step' \({name} sha256:.*are the same recording.*would count twice"
+    with pytest.raises(PpafoError, match=told):
+        solve(f"{DECAY}{text}")
+
+
+def test_other_times_of_a_recording_of_a_bench_procedure_may_be_fitted() -> None:
+    recording = Recording("decay", np.arange(10.0), {"angle": Channel(np.arange(10.0), "rad")})
+    bench = Use("procedure", "decay.csv", recording, frozenset(), -np.inf, 4.0)
+    fitted = Use("experiment", "copy.csv", recording, frozenset({"angle"}), 4.0, 9.0)
+    assert common_use([bench], [fitted]) == ""
+    assert "would count twice" in common_use([bench], [replace(fitted, first=3.0)])
 
 
 def test_a_recording_in_two_experiments_is_refused(solve: Solve) -> None:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from ppafo.metrics.catalog import METRICS, evaluate
+from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import Readings
 from ppafo.metrics.switching import UNDECIDED, Swing, count_of, reversals, swung
 from ppafo.signals import Channel, Recording
@@ -22,6 +23,7 @@ INTERVAL = 0.01
 
 def samples_of(recording: Recording) -> list[Sample]:
     names = ("angle", "angular_velocity", "pressure_1", "pressure_2", "torque", "command", "reference")
+    names += ("temperature_1", "temperature_2")
     columns = zip(*(recording[name].tolist() for name in names), strict=True)
     return [Sample(float(number), *values) for number, values in enumerate(columns)]
 
@@ -47,13 +49,13 @@ def read(recording: Recording) -> dict[str, float]:
     course = Course(float(reference[-1]), largest, SAME_LEVEL * largest, 0.0)
     meters = {meter.name: metered(meter, samples, course) for kind in METRICS.values() for meter in kind.meters}
     ended = next(iter(meters.values()))[1]
-    masses = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2")
+    totals = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2", *ENERGIES)
     readings = Readings(
         meters={name: columns_of(state) for name, (state, _) in meters.items()},
         course=columns_of(ended),
         interval=np.array([INTERVAL]),
         samples=len(samples),
-        gains={name: recording[name][-1:] - recording[name][:1] for name in masses},
+        gains={name: recording[name][-1:] - recording[name][:1] for name in totals},
         traces={"angle": recording["angle"][:, None]},
     )
     with np.errstate(all="ignore"):
@@ -75,6 +77,9 @@ def recorded(torque: Floats, reference: Floats, command: Floats, angle: Floats) 
         "leaked_mass": (1e-5 * time, "kg"),
         "mass_1": (2e-5 + 4e-5 * time, "kg"),
         "mass_2": (3e-5 + 2e-5 * time, "kg"),
+        "temperature_1": (293.0 - torque, "K"),
+        "temperature_2": (293.0 + 2.0 * torque, "K"),
+        **{name: (number * time, "J") for number, name in enumerate(ENERGIES, 1)},
     }
     return Recording("metered", time, {name: Channel(channel, unit) for name, (channel, unit) in values.items()})
 

@@ -95,6 +95,19 @@ def test_the_largest_pressure_is_looked_for_in_both_chambers() -> None:
     assert value("largest_pressure", pressure_1=1e5 + TIME, pressure_2=4e5 - TIME) == 4e5
 
 
+def test_the_lowest_temperature_is_looked_for_in_both_chambers_and_needs_an_energy_balance() -> None:
+    assert value("lowest_temperature", temperature_1=290.0 + TIME, temperature_2=293.0 - 2.0 * TIME) == 287.0
+    assert value("lowest_temperature", temperature_1=290.0 + TIME, temperature_2=293.0 - 0.5 * TIME) == 290.0
+    assert "lowest_temperature" not in evaluate(recording(pressure_1=TIME, pressure_2=TIME))
+
+
+def test_the_final_error_is_that_of_the_last_sample_without_its_sign() -> None:
+    error = np.where(TIME < 2.9, 5.0, 0.25)
+    assert value("final_error", reference=RAMP, torque=RAMP - error) == 0.25
+    assert value("final_error", reference=RAMP, torque=RAMP + error) == 0.25
+    assert "final_error" not in evaluate(recording(torque=RAMP))
+
+
 def test_work_is_torque_over_angle_and_is_positive_where_the_actuator_drives() -> None:
     angle = 0.2 + 0.5 * TIME
     assert value("mechanical_work", angle=angle, torque=np.full(3001, 4.0)) == pytest.approx(6.0)

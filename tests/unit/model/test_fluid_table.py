@@ -15,8 +15,8 @@ from ppafo.model.fluid_table import (
     liquid_density,
     liquid_energy,
 )
-from ppafo.studies.endurance import tabulation
-from ppafo.studies.endurance.fluids import list_fluids, load_fluid
+from ppafo.questions.endurance.fluids import list_fluids, load_fluid
+from scripts import fluid_tables
 
 FLUIDS = list_fluids()
 CO2 = load_fluid("CO2").table
@@ -100,7 +100,7 @@ def test_saturated_co2_is_that_of_coolprop(properties: Any) -> None:
 
 @pytest.mark.parametrize("name", FLUIDS)
 def test_gas_is_that_of_coolprop(name: str, properties: Any) -> None:
-    table, coolprop_name = load_fluid(name).table, tabulation.PLANS[name].coolprop_name
+    table, coolprop_name = load_fluid(name).table, fluid_tables.PLANS[name].coolprop_name
     for at, share in zip(
         draws(table.temperatures[0], min(table.temperatures[-1], 303.0)), draws(0.0, 1.0), strict=True
     ):
@@ -112,17 +112,17 @@ def test_gas_is_that_of_coolprop(name: str, properties: Any) -> None:
 
 @pytest.mark.parametrize("name", FLUIDS)
 def test_the_tables_are_what_the_script_makes(name: str, properties: Any) -> None:
-    content = json.loads((resources.files("ppafo.studies.endurance") / "fluid_tables" / f"{name}.json").read_text())
-    plan = tabulation.PLANS[name]
+    content = json.loads((resources.files("ppafo.questions.endurance") / "fluid_tables" / f"{name}.json").read_text())
+    plan = fluid_tables.PLANS[name]
     assert content["temperatures"] == pytest.approx(plan.temperatures, rel=1e-7)
     for index in (0, len(plan.temperatures) // 2, len(plan.temperatures) - 1):
-        for column, value in tabulation.row_at(plan, plan.temperatures[index]).items():
+        for column, value in fluid_tables.row_at(plan, plan.temperatures[index]).items():
             assert content[column][index] == pytest.approx(value, rel=1e-6), column
 
 
 def test_the_script_writes_files_that_are_read_back(tmp_path: Any, properties: Any, monkeypatch: Any) -> None:
-    monkeypatch.setattr(tabulation, "PLANS", {"N2": tabulation.Plan("Nitrogen", (250.0, 300.0), 3, 400.0)})
-    tabulation.main(tmp_path)
+    monkeypatch.setattr(fluid_tables, "PLANS", {"N2": fluid_tables.Plan("Nitrogen", (250.0, 300.0), 3, 400.0)})
+    fluid_tables.main(tmp_path)
     content = json.loads((tmp_path / "N2.json").read_text())
     assert content["temperatures"] == [250.0, 300.0]
     assert len(content["factors"]) == 2

@@ -94,7 +94,7 @@ def test_a_value_in_the_place_of_a_table_names_the_keys_of_the_table() -> None:
 
 
 def test_a_name_of_another_form_says_which_form() -> None:
-    assert "name = 'My Bench' must consist of small letters" in problem_of(changed('"bench"', '"My Bench"'))
+    assert "name = 'My Bench' must consist of lower-case letters" in problem_of(changed('"bench"', '"My Bench"'))
 
 
 def test_a_mistake_inside_a_list_is_found_by_its_number() -> None:

@@ -68,7 +68,7 @@ def test_a_recording_does_not_follow_the_arrays_it_was_made_of() -> None:
 
 @pytest.mark.parametrize("times", [[0.0, 1.0, 1.0], [0.0, 2.0, 1.0]])
 def test_time_that_does_not_grow_is_refused(times: list[float]) -> None:
-    with pytest.raises(DataError, match=r"bench: time must grow from sample to sample, .* \(sample 3\)"):
+    with pytest.raises(DataError, match=r"bench: time must increase from sample to sample, .* \(sample 3\)"):
         Recording("bench", np.array(times), {})
 
 

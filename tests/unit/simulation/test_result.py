@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.metrics import Metric
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.document import plain, result_document, scenario_document
+from ppafo.simulation.document import plain, scenario_document
 from ppafo.simulation.result import Result, Status
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage import read_result
@@ -41,7 +41,7 @@ def test_a_stored_result_is_shown_without_its_numbers(result: Result, tmp_path: 
 
 
 def test_the_document_holds_every_number_of_the_device_in_si(result: Result) -> None:
-    device = result_document(result)["scenario"]["device"]
+    device = result.to_dict()["scenario"]["device"]
     scenario = result.scenario
     assert device["actuator"]["torque_constant"] == scenario.device.actuator.torque_constant
     assert device["supply"]["pressure"] == scenario.device.supply.pressure
@@ -49,7 +49,7 @@ def test_the_document_holds_every_number_of_the_device_in_si(result: Result) -> 
 
 
 def test_the_document_holds_assumptions_seed_versions_and_engine(result: Result) -> None:
-    document = result_document(result)
+    document = result.to_dict()
     assert document["seed"] == result.scenario.sensors.seed
     assert document["versions"] == {"ppafo": "0"}
     assert document["engine"] == {"step": 1e-3, "steps": 100}
@@ -57,7 +57,7 @@ def test_the_document_holds_assumptions_seed_versions_and_engine(result: Result)
 
 
 def test_a_number_that_json_does_not_know_becomes_null(result: Result) -> None:
-    document = json.loads(json.dumps(result_document(result), allow_nan=False))
+    document = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert document["metrics"]["broken"]["value"] is None
     assert document["metrics"]["angle_range"] == {"value": 0.1, "unit": "rad", "summary": "range"}
 

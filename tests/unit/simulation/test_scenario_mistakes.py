@@ -153,7 +153,7 @@ def test_what_is_missing_is_named(line: str, missing: str) -> None:
         ("seed = 1", "seed = 1.5", "sensors.seed = 1.5"),
         ("seed = 1", "seed = -1", "sensors.seed = -1"),
         ("schema_version = 1", "schema_version = 2", "schema_version = 2 is not allowed; allowed: 1"),
-        ('"task"', '"My Task"', "name = 'My Task' must consist of small letters, digits, '-' and '_'"),
+        ('"task"', '"My Task"', "name = 'My Task' must consist of lower-case letters, digits, '-' and '_'"),
         ('[sensors]\ndelay = "0 s"\nseed = 1', "", ""),
         ("[sensors]", "[[sensors]]", "must be a table"),
     ],

@@ -7,17 +7,24 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from ppafo.engine import lane_step
+from ppafo.engine.lanes import written
 from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement
+from ppafo.simulation.ensemble import _result as ensemble_result
+from ppafo.simulation.ensemble.running import Outcome, Request
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import LedMotion, ProfileChoice, Scenario
-from ppafo.simulation.simulate import simulate, simulate_many
+from ppafo.simulation.simulate import REMEDY, simulate, simulate_many
+from ppafo.walking.walk import _status as walk_status
 
 CHANNELS = {
     "angle",
@@ -235,3 +242,32 @@ def test_interrupt_is_seen_in_the_middle_of_a_long_run() -> None:
         running.wait(timeout=30)
         assert time.monotonic() - start < 5.0
         assert running.returncode != 0
+
+
+def test_a_step_that_is_not_done_in_the_most_parts_ends_the_run_with_time_and_remedy(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A coil that switches inside a step, after 10.3 ms, cuts it in two; here one part is the most."""
+    monkeypatch.setattr(lane_step, "MOST_PARTS", 1)
+    written.cache_clear()
+    try:
+        result = simulate("torque-task-solenoid", ["run.duration=0.1 s", "valve.opening_delay=10.3 ms"])
+    finally:
+        written.cache_clear()
+    assert result.status.kind == "diverged"
+    assert result.status.time == pytest.approx(0.0103, rel=1e-9)
+    assert result.status.message.startswith("diverged at t = 0.0103 s")
+    assert result.status.message.endswith(TOO_MANY_PARTS)
+    assert result.recording.time[-1] == pytest.approx(0.01)
+    assert all(np.isfinite(result.recording[name]).all() for name in result.recording.names)
+
+
+def test_runs_of_an_ensemble_and_walks_with_too_many_parts_say_so_too() -> None:
+    states = np.zeros((3, 1))
+    assert walk_status(1.5, True, states).message.endswith(f"t = 1.5 s; {TOO_MANY_PARTS}")
+    assert "parts" not in walk_status(1.5, False, states).message
+    outcome = Outcome(2, Request({}, (), 1.0, np.empty(0)))
+    outcome.failure_time[:] = 1.5
+    outcome.too_many_parts[1] = True
+    told = ensemble_result(SimpleNamespace(reasons={}), outcome).reasons  # type: ignore[arg-type]
+    assert told == {0: f"diverged at t = 1.5 s; {REMEDY}", 1: f"diverged at t = 1.5 s; {TOO_MANY_PARTS}"}

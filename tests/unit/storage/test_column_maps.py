@@ -164,7 +164,7 @@ def test_the_only_map_of_a_file_needs_no_name_and_a_problem_file_will_do(tmp_pat
     [
         ("", None, "is empty; 'ppafo schema columns' prints what belongs in it"),
         ("a = 1\n", None, "columns"),
-        (MAPS + MAPS.replace("logger", "scope"), None, "has several column maps; say which one"),
+        (MAPS + MAPS.replace("logger", "scope"), None, "has several column maps; name one as"),
         (MAPS, "loger", "no column map 'loger', did you mean 'logger'"),
         (MAPS.replace("column = 2", "colum = 2"), None, "did you mean 'column'"),
         ("columns = 3\n", None, "columns"),

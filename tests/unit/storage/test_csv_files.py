@@ -1,5 +1,6 @@
 """Recordings as CSV."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,7 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("\n\n", "has no header"),
         ("# only a remark\n", "has no header"),
         ("time [s],angle [rad]\n", "has a header but no samples"),
-        (b"\x89HDF\r\n\x1a\n\x00\xff\xfe", r"not a text file in UTF-8 \(byte 0\)"),
+        (b"\x89HDF\r\n\x1a\n\xff\xfe", r"not a text file in UTF-8 \(byte 0\)"),
         (b"time [s]\x00\n0\n", "not a text file"),
         ("time [s],angle [rad]\n0,1\n1,2", "cut off"),
         ("time [s],angle [rad]\n0,1\n1\n", "line 3 has 1 values for 2 columns"),
@@ -84,11 +85,11 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
         ("time [s],angle [rad]\n0,1\n1,1_000\n", r"line 3, column 'angle \[rad\]': '1_000' is not a number"),
         ("time [s],angle [rad]\n0,1\n0,2\n", "line 3, column 'time': the clock stands still"),
         ("# a\ntime [s],angle [rad]\n1,1\n0,2\n", "line 4, column 'time': the clock goes backwards"),
-        ("time [s],angle [rad]\n0,1\n0,2\n", "time must grow"),
-        ("time,angle\n0,1\n", "name columns as 'name \\[unit\\]', parted by commas; 'time' is none"),
+        ("time [s],angle [rad]\n0,1\n0,2\n", "time must increase"),
+        ("time,angle\n0,1\n", "name columns as 'name \\[unit\\]', separated by commas; 'time' is not one"),
         ("\ntime [s]\n0\n", "the header must come first, line 1 is empty"),
         ("time [s],angle [rad]\n0,1\n\n1,2\n", "line 3 has 0 values for 2 columns"),
-        ("time [s];angle [rad]\n0;1\n", "parted by commas"),
+        ("time [s];angle [rad]\n0;1\n", "separated by commas"),
         ("angle [rad],time [s]\n0,1\n", "the first column must be 'time \\[s\\]', it is 'angle'"),
         ("time [s],angle [rad],angle [deg]\n0,1,1\n", "two columns 'angle'"),
         ("time [s],angle [m]\n0,1\n", "column 'angle \\[m\\]': unit 'm' does not fit: an angle is needed"),
@@ -125,3 +126,14 @@ def test_an_earlier_file_stays_where_writing_fails(tmp_path: Path, monkeypatch: 
         write_csv(path, recording().with_channel("torque", np.zeros(3), "N m"))
     assert read_csv(path) == recording()
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_table_with_very_many_columns_or_blank_lines_is_refused_at_once(tmp_path: Path) -> None:
+    names = ",".join(f"c{index} [m]" for index in range(30_000))
+    start = time.process_time()
+    with pytest.raises(DataError, match="two columns 'c29999'"):
+        read_csv(written(tmp_path, f"time [s],{names},c29999 [m]\n0\n"))
+    assert time.process_time() - start < 3.0
+    with pytest.raises(DataError, match="line 3 has 0 values for 2 columns"):
+        read_csv(written(tmp_path, "time [s],angle [rad]\n0,1\n\n\n1,1\n"))
+    assert len(read_csv(written(tmp_path, "time [s],angle [rad]\n0,1\n1,1\n\n\n"))) == 2

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.storage import read_netcdf, read_recording, recordings
+from ppafo.storage import read_netcdf, read_recording, trial_reading
 
 SECRET = np.arange(3.0)
 
@@ -57,7 +57,7 @@ def test_numbers_of_another_file_are_refused(tmp_path: Path, make: Callable[[h5p
         make(file, secret(tmp_path))
         if make in (external_storage, virtual_data_set):
             file["angle"].attrs["units"] = "rad"
-    with pytest.raises(DataError, match=r"bench\.nc: .*a recording holds its numbers itself"):
+    with pytest.raises(DataError, match=r"bench\.nc: .*a recording must contain its numbers itself"):
         read_netcdf(tmp_path / "bench.nc")
 
 
@@ -111,14 +111,14 @@ def shuffled_after_gzip(file: h5py.File) -> None:
 
 
 HOSTILE = {
-    promised: "asks for 808 MB of memory",
+    promised: "requires 808 MB of memory",
     fill_value: "the file does not hold them",
     some_chunks_missing: "the file does not hold all of them",
-    huge_chunk: "asks for 400 MB of memory",
-    many_names: "asks for 80 MB of memory",
-    gzip_within_gzip: "packed in a way that is not read",
-    shuffled_after_gzip: "packed in a way that is not read",
-    chunk_that_grows: "'time' unpacks to more than it says",
+    huge_chunk: "requires 400 MB of memory",
+    many_names: "requires 80 MB of memory",
+    gzip_within_gzip: "compressed in a way that is not supported",
+    shuffled_after_gzip: "compressed in a way that is not supported",
+    chunk_that_grows: "'time' expands to more than it states",
 }
 
 
@@ -175,8 +175,8 @@ def test_file_of_texts_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("code", "message"),
     [
-        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "the HDF5 library crashes on it"),
-        ("import time; time.sleep(60)", "the HDF5 library comes to no end with it"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "the library h5py crashes on it"),
+        ("import time; time.sleep(60)", "the library h5py does not finish reading it"),
     ],
 )
 def test_library_that_crashes_or_hangs_on_a_file_takes_nobody_with_it(
@@ -186,8 +186,8 @@ def test_library_that_crashes_or_hangs_on_a_file_takes_nobody_with_it(
         file["time"] = np.arange(3.0)
         file["time"].attrs["units"] = "s"
     assert len(read_recording(tmp_path / "bench.nc")) == 3
-    monkeypatch.setattr(recordings, "_READING", code)
-    monkeypatch.setattr(recordings, "_MOST_SECONDS", 1.5)
+    monkeypatch.setattr(trial_reading, "_TRIAL", code)
+    monkeypatch.setattr(trial_reading, "_MOST_SECONDS", 1.5)
     with pytest.raises(DataError, match=rf"bench\.nc: is damaged: {message}"):
         read_recording(tmp_path / "bench.nc")
 

@@ -1,18 +1,31 @@
 """Folders that a command makes whole: one policy for results and reproductions."""
 
+import errno
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.reporting.reproduction_files import CLAIMS, FILES, check_reproduction_folder, write_reproduction
+from ppafo.storage import files
+from ppafo.storage.owned_folder import MARK, check_owned_folder, marked_folder, write_marked_folder
 
-WHOLE = {name: name.encode() for name in FILES} | {CLAIMS: b'{"claims": []}'}
+CLAIMS = "claims.json"
+WHOLE = {"report.html": b"report", "step-response.csv": b"rows", CLAIMS: b'{"claims": []}'}
+
+
+def check_reproduction_folder(folder: Path) -> None:
+    check_owned_folder(folder, marked_folder("reproduce"))
+
+
+def write_reproduction(folder: Path, contents: dict[str, bytes]) -> None:
+    write_marked_folder(folder, contents, "reproduce")
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {entry.name: entry.read_bytes() if entry.is_file() else b"" for entry in folder.iterdir()}
+    entries = [entry for entry in folder.iterdir() if entry.name != MARK]
+    return {entry.name: entry.read_bytes() if entry.is_file() else b"" for entry in entries}
 
 
 @pytest.mark.parametrize("there", [True, False], ids=["an empty folder", "no folder"])
@@ -33,14 +46,39 @@ def test_an_earlier_reproduction_is_replaced_whole(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
+@pytest.mark.parametrize(
+    ("command", "left"),
+    [
+        ("reproduce", {CLAIMS: b'{"claims": [1]}', "report.html": b"", "figure-7-step-response.png": b""}),
+        ("endurance", {"endurance.json": b'{"format": "ppafo endurance"}', "bottle.csv": b""}),
+        ("walk", {"walk.json": b'{"format": "ppafo walk", "files": ["walk.json", "legs.gif"]}', "legs.gif": b""}),
+        ("walk", {"wearers.json": b'{"format": "ppafo wearers", "files": ["wearers.csv"]}', "wearers.csv": b""}),
+    ],
+)
+def test_a_result_of_version_0_1_is_replaced_but_not_with_files_of_others(
+    command: str, left: dict[str, bytes], tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    for name, content in left.items():
+        (out / name).write_bytes(content)
+    check_owned_folder(out, marked_folder(command))
+    (out / "notes.txt").write_text("mine")
+    with pytest.raises(DataError, match=r"holds files that are not of its .* \(notes\.txt\)"):
+        check_owned_folder(out, marked_folder(command))
+    (out / "notes.txt").unlink()
+    write_marked_folder(out, WHOLE, command)
+    assert contents(out) == WHOLE
+
+
 def something_else(folder: Path) -> str:
     (folder / "thesis.txt").write_text("years of work")
-    return rf"is not empty and not a ppafo reproduction \(it has no {CLAIMS}\); choose another folder"
+    return rf"is not empty and not a result of 'ppafo reproduce' \(it has no {MARK}\); choose another folder"
 
 
 def claims_of_somebody_else(folder: Path) -> str:
     (folder / CLAIMS).write_text('["mine"]')
-    return r"claims\.json: is not of a ppafo reproduction"
+    return r"is not empty and not a result of 'ppafo reproduce'"
 
 
 def claims_that_are_no_json(folder: Path) -> str:
@@ -51,14 +89,14 @@ def claims_that_are_no_json(folder: Path) -> str:
 def a_reproduction_and_notes(folder: Path) -> str:
     write_reproduction(folder, WHOLE)
     (folder / "notes.txt").write_text("mine")
-    return r"holds files that are not of its ppafo reproduction \(notes\.txt\)"
+    return r"holds files that are not of its result of 'ppafo reproduce' \(notes\.txt\)"
 
 
 def a_reproduction_with_a_folder_in_it(folder: Path) -> str:
     write_reproduction(folder, WHOLE)
     (folder / "report.html").unlink()
     (folder / "report.html").mkdir()
-    return r"holds files that are not of its ppafo reproduction \(report\.html\)"
+    return r"holds files that are not of its result of 'ppafo reproduce' \(report\.html\)"
 
 
 FILLS = (
@@ -101,4 +139,50 @@ def test_a_failure_while_writing_leaves_the_earlier_reproduction(
     with pytest.raises(DataError, match="out: cannot be written: no space left on device"):
         write_reproduction(tmp_path / "out", {CLAIMS: b'{"claims": [1]}', "report.html": b"new"})
     assert contents(tmp_path / "out") == WHOLE
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+
+
+def test_folder_below_a_link_to_itself_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    with pytest.raises(DataError, match="cannot be written"):
+        check_reproduction_folder(tmp_path / "loop" / "out")
+
+
+@pytest.mark.parametrize("there", [WHOLE, {}], ids=["an earlier result", "an empty folder"])
+def test_folder_that_cannot_be_renamed_is_refused_before_anything_runs(
+    there: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    for name, content in there.items():
+        (out / name).write_bytes(content)
+    rename = Path.rename
+
+    def busy(self: Path, target: Path) -> Path:
+        if self == out:
+            raise OSError(errno.EBUSY, "Device or resource busy")
+        return rename(self, target)
+
+    check_reproduction_folder(out)
+    monkeypatch.setattr(Path, "rename", busy)
+    with pytest.raises(DataError, match=r"cannot be replaced \(device or resource busy\); choose a new folder in it"):
+        check_reproduction_folder(out)
+    assert contents(out) == there
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux lets two folders change places in one step")
+def test_earlier_result_and_new_one_change_places_in_one_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_reproduction(tmp_path / "out", WHOLE)
+    if not files._exchange(tmp_path / "out", tmp_path / "out"):
+        pytest.skip("not on this file system")
+
+    def never(self: Path, target: Path) -> Path:
+        raise AssertionError(f"{self} is renamed to {target}: a kill now would leave no result in its place")
+
+    monkeypatch.setattr(files, "_try_renaming", print)
+    monkeypatch.setattr(Path, "rename", never)
+    again = {CLAIMS: b'{"claims": [1]}', "report.html": b"new"}
+    write_reproduction(tmp_path / "out", again)
+    assert contents(tmp_path / "out") == again
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]

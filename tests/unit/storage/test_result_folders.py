@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
-from ppafo.storage import check_result_folder, read_recording, read_result, write_result
+from ppafo.storage import check_result_folder, files, read_recording, read_result, write_result
 
 DOCUMENT = {"status": {"kind": "completed"}, "scenario": {"name": "task"}}
 
@@ -174,11 +174,12 @@ def test_an_interrupt_leaves_no_folder_and_nothing_beside_it(
     assert names(tmp_path) == []
 
 
-@pytest.mark.parametrize(("method", "call"), [("write_bytes", 2), ("rename", 1), ("rename", 2)])
+@pytest.mark.parametrize(("method", "call"), [("write_bytes", 2), ("rename", 1), ("rename", 2), ("rename", 3)])
 def test_an_interrupt_leaves_an_earlier_result_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str, call: int
 ) -> None:
     folder = write_result(tmp_path / "task", recording(1.0), DOCUMENT, {})
+    monkeypatch.setattr(files, "_exchange", print)
     interrupt_at(monkeypatch, method, call)
     with pytest.raises(KeyboardInterrupt):
         write_result(folder, recording(2.0), DOCUMENT, {})
@@ -205,7 +206,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path, monkeypatch:
         ("[" * 100_000, "is not JSON"),
         ("[]", "is not of a ppafo result"),
         ('{"format": "ppafo result", "schema_version": 99}', "has schema_version 99, this version of ppafo reads 1"),
-        ('{"format": "ppafo result", "schema_version": 1}', "does not say what its recording and its files are"),
+        ('{"format": "ppafo result", "schema_version": 1}', "does not state what its recording and its files are"),
     ],
 )
 def test_an_unusable_document_is_one_line_that_names_it(tmp_path: Path, content: str, message: str) -> None:

@@ -8,8 +8,8 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
-from ppafo.validation.measured import checked
-from ppafo.validation.validate import ReplaySettings, compare_recording
+from ppafo.validation.agreement import ReplaySettings, compare_recording
+from ppafo.validation.measured import check_recording
 
 
 @pytest.fixture(scope="session")
@@ -24,6 +24,6 @@ def agree() -> Callable[..., object]:
     """Compares a recording with a device, with any settings of the replay."""
 
     def compare(recording: Recording, device: Device, **settings: object) -> object:
-        return compare_recording(checked(recording, device, "r.csv"), device, ReplaySettings(**settings))
+        return compare_recording(check_recording(recording, device, "r.csv"), device, ReplaySettings(**settings))
 
     return compare

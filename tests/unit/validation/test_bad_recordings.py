@@ -1,5 +1,6 @@
 """What cannot carry a comparison is refused in one line, or remarked on; never a silent wrong number."""
 
+import argparse
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,12 @@ import pytest
 from ppafo.errors import DataError, PpafoError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
+from ppafo.questions.question import quantity
+from ppafo.questions.validate.solve import validate
 from ppafo.signals import Channel, Recording
 from ppafo.validation import parse_thresholds
-from ppafo.validation.alignment import parse_limit
-from ppafo.validation.measured import checked, read_measured
-from ppafo.validation.start import parse_initial
-from ppafo.validation.validate import check_motion, validate
+from ppafo.validation.measured import check_recording, read_measured
+from ppafo.validation.replay import parse_initial
 
 Step = tuple[Device, Recording]
 HEADER = "time [s],command [-],angle [deg],pressure_1 [psi_g],pressure_2 [psi_g]"
@@ -24,7 +25,7 @@ ROWS = [f"{0.001 * n:.3f},1,{20 + n},{min(n, 50)},{50 - min(n, 50)}" for n in ra
 
 def refused(recording: Recording, device: Device) -> str:
     with pytest.raises(DataError) as caught:
-        checked(recording, device, "bench.csv")
+        check_recording(recording, device, "bench.csv")
     text = str(caught.value)
     assert text.startswith("bench.csv: ")
     assert "\n" not in text
@@ -107,7 +108,7 @@ def test_gauge_pressures_count_from_the_atmosphere_of_the_set(tmp_path: Path) ->
 def test_an_unknown_channel_that_is_like_none_is_left_out_and_said(step: Step) -> None:
     device, recording = step
     extra = recording.with_channel("room_temperature", np.full(len(recording), 295.0), "K")
-    assert any("'room_temperature'" in remark for remark in checked(extra, device, "bench.csv").remarks)
+    assert any("'room_temperature'" in remark for remark in check_recording(extra, device, "bench.csv").remarks)
 
 
 def test_a_recorded_supply_below_its_chambers_is_refused(step: Step) -> None:
@@ -124,10 +125,10 @@ def test_a_misspelt_input_is_not_passed_over(step: Step) -> None:
 
 def test_a_clipped_sensor_is_remarked_on_and_a_vane_at_its_stop_is_not(step: Step) -> None:
     device, recording = step
-    assert not any("limit" in remark for remark in checked(recording, device, "bench.csv").remarks)
+    assert not any("limit" in remark for remark in check_recording(recording, device, "bench.csv").remarks)
     noise = 2e3 * np.random.default_rng(2).standard_normal(len(recording))
     clipped = np.minimum(recording["pressure_1"] + noise, 4.0e5)
-    remarks = checked(recording.with_channel("pressure_1", clipped, "Pa"), device, "bench.csv").remarks
+    remarks = check_recording(recording.with_channel("pressure_1", clipped, "Pa"), device, "bench.csv").remarks
     assert any("'pressure_1' stays at exactly its largest value" in remark for remark in remarks)
 
 
@@ -143,10 +144,10 @@ def test_an_angle_far_beyond_the_stops_is_refused_and_noise_at_a_stop_is_not(
             agree(recording.with_channel("angle", recording["angle"] - np.radians(40.0), "rad"), device, motion=motion)
 
 
-def test_a_led_vane_needs_its_angle(step: Step, agree: Callable[..., Any]) -> None:
+def test_a_prescribed_vane_needs_its_angle(step: Step, agree: Callable[..., Any]) -> None:
     device, recording = step
     blind = renamed(recording, "angle", "knee_flexion")
-    with pytest.raises(DataError, match=r"no channel 'angle' to lead the vane along"):
+    with pytest.raises(DataError, match=r"no channel 'angle' to prescribe"):
         agree(blind, device, motion="measured")
 
 
@@ -159,7 +160,7 @@ def test_a_led_vane_needs_its_angle(step: Step, agree: Callable[..., Any]) -> No
         ("pressure_1=3 psi", "does not say which pressure"),
         ("angle", "does not start with a number"),
         ("3 deg", "a plain number without a unit"),
-        ("0.1", "a share of the full range in %"),
+        ("0.1", "a percentage of the full range"),
         ("angle=-5%", "must be above 0"),
         ("angle=0%", "must be above 0"),
         ("", "does not start with a number"),
@@ -186,13 +187,20 @@ def test_a_bad_initial_value_is_refused(text: str) -> None:
 
 
 def test_other_settings_are_checked() -> None:
-    assert parse_limit("5 ms") == 0.005
+    read = quantity("s")
+    assert read("5 ms") == 0.005
     assert parse_initial(["pressure_1=0 psi_g"], 9e4) == {"pressure_1": 9e4}
-    for text in ("-1 ms", "2 s", "5", "5 V"):
+    for text in ("-1 ms", "2 s"):
         with pytest.raises(DataError, match="longest delay"):
-            parse_limit(text)
+            validate("ppafo2011", ["r.csv"], longest_delay=read(text))
+    for text in ("5", "5 V"):
+        with pytest.raises(argparse.ArgumentTypeError, match=text):
+            read(text)
     with pytest.raises(DataError, match="did you mean 'measured'"):
-        check_motion("mesured")
+        validate("ppafo2011", ["r.csv"], motion="mesured")
+    for volume in (0.0, float("nan")):
+        with pytest.raises(DataError, match="volume"):
+            validate("ppafo2011", ["r.csv"], volume=volume)
     with pytest.raises(DataError, match="no recording was given"):
         validate("ppafo2011", [])
 

@@ -20,7 +20,21 @@ from ppafo.walking.planning import WalkPlan, plan_walk
 from ppafo.walking.wearer import paper_subject
 
 NO_FAULT = Fault(1.0e9, 0.0, 0.0)
-IDEAL = GaitSensors(200.0, *(0.0,) * 7, *(NO_FAULT,) * 5)
+IDEAL = GaitSensors(
+    follow_rate=200.0,
+    force_noise=0.0,
+    force_quantum=0.0,
+    lost_share=0.0,
+    angle_memory=0.0,
+    pressure_memory=0.0,
+    angle_lost_share=0.0,
+    pressure_lost_share=0.0,
+    heel_fault=NO_FAULT,
+    toe_fault=NO_FAULT,
+    angle_fault=NO_FAULT,
+    pressure_1_fault=NO_FAULT,
+    pressure_2_fault=NO_FAULT,
+)
 QUIET = SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0)
 
 

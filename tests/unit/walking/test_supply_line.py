@@ -8,9 +8,9 @@ import pytest
 
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.regulator import SupplyLines
+from ppafo.simulation.supply_line import entries
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.comparison import switched_off
-from ppafo.walking.supply_line import entries
 
 REGULATED = ("solenoid-regulators", "proportional-regulators")
 

@@ -1,14 +1,12 @@
 """Proportional control with damping injection, and a learnt feed-forward command as a table over the task."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 
 KNOTS = 31
-FIRST_KNOT = 4
-"""Place of the first knot among the parameters."""
 
 
 class DampedProportionalParameters(NamedTuple):
@@ -18,37 +16,7 @@ class DampedProportionalParameters(NamedTuple):
     damping: float
     damping_filter: float
     knot_spacing: float
-    knot_0: float
-    knot_1: float
-    knot_2: float
-    knot_3: float
-    knot_4: float
-    knot_5: float
-    knot_6: float
-    knot_7: float
-    knot_8: float
-    knot_9: float
-    knot_10: float
-    knot_11: float
-    knot_12: float
-    knot_13: float
-    knot_14: float
-    knot_15: float
-    knot_16: float
-    knot_17: float
-    knot_18: float
-    knot_19: float
-    knot_20: float
-    knot_21: float
-    knot_22: float
-    knot_23: float
-    knot_24: float
-    knot_25: float
-    knot_26: float
-    knot_27: float
-    knot_28: float
-    knot_29: float
-    knot_30: float
+    knots: Annotated[tuple[float, ...], KNOTS]
 
 
 class DampedGains(NamedTuple):
@@ -79,8 +47,8 @@ def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> 
     position = min(elapsed / parameters.knot_spacing, KNOTS - 1.0)
     before = min(int(position), KNOTS - 2)
     share = position - before
-    first = parameters[FIRST_KNOT + before]
-    return first + share * (parameters[FIRST_KNOT + before + 1] - first)
+    first = parameters.knots[before]
+    return first + share * (parameters.knots[before + 1] - first)
 
 
 def damped_command(

@@ -44,6 +44,16 @@ def update(
     return opening_for_rate(rates, wanted), FeedbackLinearisationState(reference, measurement.angle, velocity, 1.0)
 
 
+def restart(state: FeedbackLinearisationState, wanted: float, goes_on: float) -> FeedbackLinearisationState:
+    """The state; where another task begins (``goes_on`` 0, else 1), the torque wanted [N m] has no rate yet."""
+    return FeedbackLinearisationState(
+        reference=state.reference if goes_on > 0.5 else wanted,
+        angle=state.angle,
+        angular_velocity=state.angular_velocity,
+        started=state.started,
+    )
+
+
 KIND = ControllerKind(
     name="feedback_linearisation",
     summary="Chamber dynamics inverted at the measured pressures and angle: the torque error decays at a chosen rate.",
@@ -56,4 +66,5 @@ KIND = ControllerKind(
     parameters=FeedbackLinearisationParameters,
     initial=FeedbackLinearisationState(0.0, 0.0, 0.0, 0.0),
     update=update,
+    restart=restart,
 )

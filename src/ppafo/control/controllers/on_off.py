@@ -33,4 +33,5 @@ KIND = ControllerKind(
     parameters=OnOffParameters,
     initial=OnOffState(),
     update=update,
+    only_switches=True,
 )

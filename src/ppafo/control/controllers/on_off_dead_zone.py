@@ -41,6 +41,11 @@ def update(
     return direction * parameters.opening, OnOffDeadZoneState(direction)
 
 
+def restart(state: OnOffDeadZoneState, wanted: float, goes_on: float) -> OnOffDeadZoneState:
+    """The state, forgotten (``goes_on`` 0, else 1) where another task begins."""
+    return OnOffDeadZoneState(direction=state.direction * goes_on)
+
+
 KIND = ControllerKind(
     name="on_off_dead_zone",
     summary="On/off with a dead zone and hysteresis: the valve opens for a large error and closes for a small one.",
@@ -53,4 +58,6 @@ KIND = ControllerKind(
     parameters=OnOffDeadZoneParameters,
     initial=OnOffDeadZoneState(0.0),
     update=update,
+    restart=restart,
+    only_switches=True,
 )

@@ -46,6 +46,16 @@ def update(
     return pid_command(parameters, state, reference - measurement.torque, 0.0, period)
 
 
+def restart(state: PidState, wanted: float, goes_on: float) -> PidState:
+    """The state, forgotten (``goes_on`` 0, else 1) where another task begins."""
+    return PidState(
+        integral=state.integral * goes_on,
+        error=state.error,
+        slope=state.slope * goes_on,
+        started=state.started * goes_on,
+    )
+
+
 KIND = ControllerKind(
     name="pid",
     summary="Proportional, integral and derivative action on the torque error.",
@@ -62,4 +72,5 @@ KIND = ControllerKind(
     parameters=PidParameters,
     initial=PidState(0.0, 0.0, 0.0, 0.0),
     update=update,
+    restart=restart,
 )

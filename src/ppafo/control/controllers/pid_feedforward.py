@@ -9,6 +9,7 @@ from ppafo.control.chamber_model import (
     opening_for_rate,
     torque_rates,
 )
+from ppafo.control.controllers import pid
 from ppafo.control.controllers.pid import PidParameters, PidState, pid_command
 from ppafo.control.kind import ControllerKind
 from ppafo.model.declaration import Quantity
@@ -58,6 +59,12 @@ def update(
     return command, PidFeedforwardState(feedback, reference)
 
 
+def restart(state: PidFeedforwardState, wanted: float, goes_on: float) -> PidFeedforwardState:
+    """The state, forgotten (``goes_on`` 0, else 1) where another task begins; the reference then has no rate."""
+    feedback = pid.restart(state.feedback, wanted, goes_on)
+    return PidFeedforwardState(feedback=feedback, reference=state.reference)
+
+
 KIND = ControllerKind(
     name="pid_feedforward",
     summary="PID on the torque error, with the opening that a valve model asks for along the reference.",
@@ -74,4 +81,5 @@ KIND = ControllerKind(
     parameters=PidFeedforwardParameters,
     initial=PidFeedforwardState(PidState(0.0, 0.0, 0.0, 0.0), 0.0),
     update=update,
+    restart=restart,
 )

@@ -40,6 +40,11 @@ def update(
     return parameters.reaching_command * share, SlidingModeState(integral if is_inside else state.integral)
 
 
+def restart(state: SlidingModeState, wanted: float, goes_on: float) -> SlidingModeState:
+    """The state, forgotten (``goes_on`` 0, else 1) where another task begins."""
+    return SlidingModeState(integral=state.integral * goes_on)
+
+
 KIND = ControllerKind(
     name="sliding_mode",
     summary="Sliding mode on the torque error and its integral, with a boundary layer.",
@@ -52,4 +57,5 @@ KIND = ControllerKind(
     parameters=SlidingModeParameters,
     initial=SlidingModeState(0.0),
     update=update,
+    restart=restart,
 )

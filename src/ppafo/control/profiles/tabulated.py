@@ -1,6 +1,6 @@
 """A table of up to 32 knots, joined by straight lines and repeated: any recorded course in time."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ProfileKind
 from ppafo.model.declaration import Quantity
@@ -11,8 +11,15 @@ NEVER = 1.0e6
 """Time [s] of a knot that is not used."""
 
 
+class Knot(NamedTuple):
+    """Time [s] and value of a knot after the first one."""
+
+    time: float
+    value: float
+
+
 class Tabulated(NamedTuple):
-    """Level that is added to all values, length of a repetition [s], and the knots: times [s] and values.
+    """Level that is added to all values, length of a repetition [s], value of the first knot, and the other knots.
 
     A knot at or after the end of a repetition is not used; from the last one a line leads to the first.
     """
@@ -20,68 +27,7 @@ class Tabulated(NamedTuple):
     level: float
     period: float
     value_01: float
-    time_02: float
-    value_02: float
-    time_03: float
-    value_03: float
-    time_04: float
-    value_04: float
-    time_05: float
-    value_05: float
-    time_06: float
-    value_06: float
-    time_07: float
-    value_07: float
-    time_08: float
-    value_08: float
-    time_09: float
-    value_09: float
-    time_10: float
-    value_10: float
-    time_11: float
-    value_11: float
-    time_12: float
-    value_12: float
-    time_13: float
-    value_13: float
-    time_14: float
-    value_14: float
-    time_15: float
-    value_15: float
-    time_16: float
-    value_16: float
-    time_17: float
-    value_17: float
-    time_18: float
-    value_18: float
-    time_19: float
-    value_19: float
-    time_20: float
-    value_20: float
-    time_21: float
-    value_21: float
-    time_22: float
-    value_22: float
-    time_23: float
-    value_23: float
-    time_24: float
-    value_24: float
-    time_25: float
-    value_25: float
-    time_26: float
-    value_26: float
-    time_27: float
-    value_27: float
-    time_28: float
-    value_28: float
-    time_29: float
-    value_29: float
-    time_30: float
-    value_30: float
-    time_31: float
-    value_31: float
-    time_32: float
-    value_32: float
+    knots: Annotated[tuple[Knot, ...], KNOTS - 1]
 
 
 class Segment(NamedTuple):
@@ -106,37 +52,9 @@ def advanced(segment: Segment, place: float, time: float, value: float) -> Segme
 
 def segment_at(profile: Tabulated, place: float) -> Segment:
     """The segment in which a place [s] of a repetition lies; its end is later than the place."""
-    segment = Segment(0.0, profile.value_01, profile.time_02, profile.value_02)
-    segment = advanced(segment, place, profile.time_03, profile.value_03)
-    segment = advanced(segment, place, profile.time_04, profile.value_04)
-    segment = advanced(segment, place, profile.time_05, profile.value_05)
-    segment = advanced(segment, place, profile.time_06, profile.value_06)
-    segment = advanced(segment, place, profile.time_07, profile.value_07)
-    segment = advanced(segment, place, profile.time_08, profile.value_08)
-    segment = advanced(segment, place, profile.time_09, profile.value_09)
-    segment = advanced(segment, place, profile.time_10, profile.value_10)
-    segment = advanced(segment, place, profile.time_11, profile.value_11)
-    segment = advanced(segment, place, profile.time_12, profile.value_12)
-    segment = advanced(segment, place, profile.time_13, profile.value_13)
-    segment = advanced(segment, place, profile.time_14, profile.value_14)
-    segment = advanced(segment, place, profile.time_15, profile.value_15)
-    segment = advanced(segment, place, profile.time_16, profile.value_16)
-    segment = advanced(segment, place, profile.time_17, profile.value_17)
-    segment = advanced(segment, place, profile.time_18, profile.value_18)
-    segment = advanced(segment, place, profile.time_19, profile.value_19)
-    segment = advanced(segment, place, profile.time_20, profile.value_20)
-    segment = advanced(segment, place, profile.time_21, profile.value_21)
-    segment = advanced(segment, place, profile.time_22, profile.value_22)
-    segment = advanced(segment, place, profile.time_23, profile.value_23)
-    segment = advanced(segment, place, profile.time_24, profile.value_24)
-    segment = advanced(segment, place, profile.time_25, profile.value_25)
-    segment = advanced(segment, place, profile.time_26, profile.value_26)
-    segment = advanced(segment, place, profile.time_27, profile.value_27)
-    segment = advanced(segment, place, profile.time_28, profile.value_28)
-    segment = advanced(segment, place, profile.time_29, profile.value_29)
-    segment = advanced(segment, place, profile.time_30, profile.value_30)
-    segment = advanced(segment, place, profile.time_31, profile.value_31)
-    segment = advanced(segment, place, profile.time_32, profile.value_32)
+    segment = Segment(0.0, profile.value_01, profile.knots[0].time, profile.knots[0].value)
+    for knot in profile.knots[1:]:
+        segment = advanced(segment, place, knot.time, knot.value)
     segment = advanced(segment, place, profile.period, profile.value_01)
     is_last = segment.end >= profile.period
     return Segment(
@@ -157,7 +75,7 @@ def value(profile: Tabulated, time: float) -> tuple[float, float, float]:
 
 def used_knots(profile: Tabulated) -> list[tuple[float, float]]:
     """Times [s] and values, without the level, of the knots that are used."""
-    knots = [(0.0, profile.value_01), *zip(profile[3::2], profile[4::2], strict=True)]
+    knots = [(0.0, profile.value_01), *((knot.time, knot.value) for knot in profile.knots)]
     return [knot for knot in knots if knot[0] < profile.period]
 
 
@@ -180,7 +98,8 @@ KIND = ProfileKind(
     quantities=(
         Quantity("level", "", "level that is added to all values", 0.0),
         Quantity("period", "s", "length of a repetition", None, 1.0e-6, 1.0e6),
-        *(_quantity(name) for name in Tabulated._fields[2:]),
+        _quantity("value_01"),
+        *(_quantity(f"{name}_{number:02}") for number in range(2, KNOTS + 1) for name in ("time", "value")),
     ),
     parameters=Tabulated,
     value=value,

@@ -71,7 +71,7 @@ TUNED = {
     "damping": 0.0046,
     "damping_filter": 0.001,
 }
-"""SI units; found with ``python -m ppafo.studies.league.walking_tuning event_damped_learning``."""
+"""SI units; found with ``python scripts/walking_gains.py event_damped_learning``."""
 
 KIND = ControllerKind(
     name="event_damped_learning",

@@ -73,4 +73,5 @@ KIND = ControllerKind(
     parameters=EventOnOffParameters,
     initial=EventOnOffState(phases.START, safety.START, 0.0),
     update=update,
+    only_switches=True,
 )

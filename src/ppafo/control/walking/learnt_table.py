@@ -10,7 +10,7 @@ the stride passes over them, so no stride has to be kept; they are written out o
 straight line of arithmetic for all wearers at once.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.walking.torque_profile import TorqueProfile
 
@@ -28,25 +28,10 @@ class LearningRules(NamedTuple):
 class LearntTable(NamedTuple):
     """Learnt commands [-] at knots that lie evenly from the beginning to the end of the torque profile."""
 
-    knot_0: float
-    knot_1: float
-    knot_2: float
-    knot_3: float
-    knot_4: float
-    knot_5: float
-    knot_6: float
-    knot_7: float
-    knot_8: float
-    knot_9: float
-    knot_10: float
-    knot_11: float
-    knot_12: float
-    knot_13: float
-    knot_14: float
-    knot_15: float
+    knots: Annotated[tuple[float, ...], KNOTS]
 
 
-EMPTY = LearntTable(*(0.0,) * KNOTS)
+EMPTY = LearntTable(knots=(0.0,) * KNOTS)
 
 
 def near(place: float, knot: float) -> float:
@@ -57,22 +42,22 @@ def near(place: float, knot: float) -> float:
 def learnt(table: LearntTable, place: float) -> float:
     """Command [-] at a place counted in knots: straight between knots, 0 outside of the table."""
     return (
-        table.knot_0 * near(place, 0.0)
-        + table.knot_1 * near(place, 1.0)
-        + table.knot_2 * near(place, 2.0)
-        + table.knot_3 * near(place, 3.0)
-        + table.knot_4 * near(place, 4.0)
-        + table.knot_5 * near(place, 5.0)
-        + table.knot_6 * near(place, 6.0)
-        + table.knot_7 * near(place, 7.0)
-        + table.knot_8 * near(place, 8.0)
-        + table.knot_9 * near(place, 9.0)
-        + table.knot_10 * near(place, 10.0)
-        + table.knot_11 * near(place, 11.0)
-        + table.knot_12 * near(place, 12.0)
-        + table.knot_13 * near(place, 13.0)
-        + table.knot_14 * near(place, 14.0)
-        + table.knot_15 * near(place, 15.0)
+        table.knots[0] * near(place, 0.0)
+        + table.knots[1] * near(place, 1.0)
+        + table.knots[2] * near(place, 2.0)
+        + table.knots[3] * near(place, 3.0)
+        + table.knots[4] * near(place, 4.0)
+        + table.knots[5] * near(place, 5.0)
+        + table.knots[6] * near(place, 6.0)
+        + table.knots[7] * near(place, 7.0)
+        + table.knots[8] * near(place, 8.0)
+        + table.knots[9] * near(place, 9.0)
+        + table.knots[10] * near(place, 10.0)
+        + table.knots[11] * near(place, 11.0)
+        + table.knots[12] * near(place, 12.0)
+        + table.knots[13] * near(place, 13.0)
+        + table.knots[14] * near(place, 14.0)
+        + table.knots[15] * near(place, 15.0)
     )
 
 
@@ -108,20 +93,22 @@ def taught(
 def moved_table(table: LearntTable, place: float, weight: float, step: float, forgetting: float) -> LearntTable:
     """The table with the two knots at a place moved in part: each by its share of the sample's ``weight``."""
     return LearntTable(
-        moved(table.knot_0, near(place, 0.0) * weight, step, forgetting),
-        moved(table.knot_1, near(place, 1.0) * weight, step, forgetting),
-        moved(table.knot_2, near(place, 2.0) * weight, step, forgetting),
-        moved(table.knot_3, near(place, 3.0) * weight, step, forgetting),
-        moved(table.knot_4, near(place, 4.0) * weight, step, forgetting),
-        moved(table.knot_5, near(place, 5.0) * weight, step, forgetting),
-        moved(table.knot_6, near(place, 6.0) * weight, step, forgetting),
-        moved(table.knot_7, near(place, 7.0) * weight, step, forgetting),
-        moved(table.knot_8, near(place, 8.0) * weight, step, forgetting),
-        moved(table.knot_9, near(place, 9.0) * weight, step, forgetting),
-        moved(table.knot_10, near(place, 10.0) * weight, step, forgetting),
-        moved(table.knot_11, near(place, 11.0) * weight, step, forgetting),
-        moved(table.knot_12, near(place, 12.0) * weight, step, forgetting),
-        moved(table.knot_13, near(place, 13.0) * weight, step, forgetting),
-        moved(table.knot_14, near(place, 14.0) * weight, step, forgetting),
-        moved(table.knot_15, near(place, 15.0) * weight, step, forgetting),
+        knots=(
+            moved(table.knots[0], near(place, 0.0) * weight, step, forgetting),
+            moved(table.knots[1], near(place, 1.0) * weight, step, forgetting),
+            moved(table.knots[2], near(place, 2.0) * weight, step, forgetting),
+            moved(table.knots[3], near(place, 3.0) * weight, step, forgetting),
+            moved(table.knots[4], near(place, 4.0) * weight, step, forgetting),
+            moved(table.knots[5], near(place, 5.0) * weight, step, forgetting),
+            moved(table.knots[6], near(place, 6.0) * weight, step, forgetting),
+            moved(table.knots[7], near(place, 7.0) * weight, step, forgetting),
+            moved(table.knots[8], near(place, 8.0) * weight, step, forgetting),
+            moved(table.knots[9], near(place, 9.0) * weight, step, forgetting),
+            moved(table.knots[10], near(place, 10.0) * weight, step, forgetting),
+            moved(table.knots[11], near(place, 11.0) * weight, step, forgetting),
+            moved(table.knots[12], near(place, 12.0) * weight, step, forgetting),
+            moved(table.knots[13], near(place, 13.0) * weight, step, forgetting),
+            moved(table.knots[14], near(place, 14.0) * weight, step, forgetting),
+            moved(table.knots[15], near(place, 15.0) * weight, step, forgetting),
+        )
     )

@@ -30,4 +30,5 @@ KIND = ControllerKind(
     parameters=OffParameters,
     initial=OffState(),
     update=update,
+    only_switches=True,
 )

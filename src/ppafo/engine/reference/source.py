@@ -29,7 +29,7 @@ from collections import namedtuple
 
 from numba import float64, njit, types, void
 '''
-INLINE = '@njit(error_model="numpy")'
+INLINE = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 SIGNATURE = 'void(float64, types.Array(float64, 1, "C", readonly=True), float64[::1], float64[::1], float64, float64)'
 COMPILED = f'@njit({SIGNATURE}, cache=True, error_model="numpy")'
 

@@ -1,22 +1,36 @@
-"""One step of both chambers with the lines that feed them: the gas scheme with supply pressures that change.
+"""One step of both chambers with the lines that feed them: both gas schemes with supply pressures that change.
 
 The stages are those of ``pneumatics``, which keep their second order with any matrix: this one says that a line loses
 what its chamber gains, so that a chamber that has come to the pressure of a small line asks for no small step. The
-lines follow after each stage, with what the valves took from each of them.
+lines follow after each stage, with what the valves took from each of them. Gas in a line has the reference temperature,
+with an energy balance of the chambers too: what a warm chamber pushes back gives its heat to the line's walls.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ppafo.engine.scheme.pneumatics import (
+    ALLOWED_OF_PRESSURE,
     SHORTEST,
     GasChange,
     Linearisation,
     MovingGas,
     begin_moving_stage,
     linearise,
+    pressure_that_matters,
 )
-from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
+from ppafo.engine.scheme.thermal_flows import ThermalFlows, carried
+from ppafo.engine.scheme.thermal_gas import ThermalGas, begin_thermal_stage, thermal_pressures
+from ppafo.model.plant import (
+    PlantParameters,
+    PlantState,
+    ThermalParameters,
+    ThermalState,
+    chamber_pressures,
+    chamber_volumes,
+)
+from ppafo.model.ports import PortFlowSlopes
 from ppafo.model.regulator import LineState, LineStep, SupplyLines, line_pressures, step_lines
 
 
@@ -33,28 +47,28 @@ def fed_plant(plant: PlantParameters, lines: SupplyLines, state: LineState) -> P
     """The plant with the pressures of its lines in place of those that the regulators are set to."""
     pressure_1, pressure_2 = line_pressures(lines, plant.gas_product, state)
     return PlantParameters(
-        plant.gas_product,
-        plant.torque_constant,
-        plant.volume_per_angle,
-        plant.angle_min,
-        plant.angle_max,
-        plant.dead_volume_1,
-        plant.dead_volume_2,
-        plant.restitution,
-        plant.static_torque,
-        plant.dynamic_torque,
-        plant.viscous_damping,
-        plant.inertia,
-        plant.gravity_torque,
-        plant.external_torque,
-        pressure_1,
-        pressure_2,
-        plant.atmospheric_pressure,
-        plant.valve_conductance,
-        plant.leak_conductance,
-        plant.valve_curve,
-        plant.leak_curve,
-        plant.relieving,
+        gas_product=plant.gas_product,
+        torque_constant=plant.torque_constant,
+        volume_per_angle=plant.volume_per_angle,
+        angle_min=plant.angle_min,
+        angle_max=plant.angle_max,
+        dead_volume_1=plant.dead_volume_1,
+        dead_volume_2=plant.dead_volume_2,
+        restitution=plant.restitution,
+        static_torque=plant.static_torque,
+        dynamic_torque=plant.dynamic_torque,
+        viscous_damping=plant.viscous_damping,
+        inertia=plant.inertia,
+        gravity_torque=plant.gravity_torque,
+        external_torque=plant.external_torque,
+        supply_pressure=pressure_1,
+        dorsiflexion_pressure=pressure_2,
+        atmospheric_pressure=plant.atmospheric_pressure,
+        valve_conductance=plant.valve_conductance,
+        leak_conductance=plant.leak_conductance,
+        valve_curve=plant.valve_curve,
+        leak_curve=plant.leak_curve,
+        relieving=plant.relieving,
     )
 
 
@@ -127,6 +141,114 @@ def end_lines(
         plant.gas_product,
         line_state,
         change.supplied - taken_2,
+        taken_2,
+        begun.lines.inlet_rise,
+        step,
+    ).after
+
+
+def line_error(plant: PlantParameters, lines: SupplyLines, first: LineState, after: LineState) -> float:
+    """Estimated error of both line pressures at the end of a step over what is allowed [-], as ``gas_error``.
+
+    ``first`` are the lines after the first stage, which is of first order; half of what the second stage moved them by.
+    """
+    first_1, first_2 = line_pressures(lines, plant.gas_product, first)
+    after_1, after_2 = line_pressures(lines, plant.gas_product, after)
+    return (0.5 / ALLOWED_OF_PRESSURE) * max(
+        abs(after_1 - first_1) / pressure_that_matters(plant, after_1),
+        abs(after_2 - first_2) / pressure_that_matters(plant, after_2),
+    )
+
+
+class FedThermalGas(NamedTuple):
+    """First stage with an energy balance; beside the chambers as in ``FedGas``."""
+
+    chambers: ThermalGas
+    taken_2: float
+    drift_2: float
+    lines: LineStep
+
+
+def with_line(flow: PortFlowSlopes, share: float) -> PortFlowSlopes:
+    """The flow of a port whose line loses what its chamber gains; ``share`` as in ``with_lines``."""
+    more = flow.source_slope * share
+    return PortFlowSlopes(
+        total=flow.total,
+        total_slope=flow.total_slope + more,
+        from_source=flow.from_source,
+        source_slope=flow.source_slope + more,
+    )
+
+
+def mass_from_source(thermal: ThermalParameters, flow: float, state: PlantState, masses: ThermalState) -> float:
+    """True mass flow [kg/s] out of line 2 from the flow at the reference temperature, below 0 for warm gas back in."""
+    return flow * carried(thermal, flow, 1.0, math.sqrt(state.mass_2 / masses.mass_2)).mass
+
+
+def begin_fed_thermal_gas(
+    plant: PlantParameters,
+    thermal: ThermalParameters,
+    lines: SupplyLines,
+    line_state: LineState,
+    state: PlantState,
+    masses: ThermalState,
+    next_angle: float,
+    port_1: Any,
+    port_2: Any,
+    step: float,
+    port_flow_slopes: Callable[..., Any],
+) -> FedThermalGas:
+    """First stage of one step [s] as ``begin_fed_gas``, of gas with an energy balance."""
+    at_begin = thermal_pressures(plant, state, next_angle, step)
+    share_1, share_2 = at_begin.volume_1 / lines.volume_1, at_begin.volume_2 / lines.volume_2
+    # What comes from a line brings more energy than mass, by the ratio of heat capacities.
+    per_line = 1.0 / thermal.heat_capacity_ratio
+    in_1 = with_line(port_flow_slopes(at_begin.pressure_1, port_1, plant.valve_curve), per_line * share_1)
+    in_2 = with_line(port_flow_slopes(at_begin.pressure_2, port_2, plant.valve_curve), per_line * share_2)
+    chambers = begin_thermal_stage(plant, thermal, state, masses, at_begin, in_1, in_2, step)
+    first, by_2 = chambers.first, chambers.matrix.slopes.supplied_by_2
+    drift_2 = by_2 * state.mass_2 * chambers.growth / at_begin.volume_2
+    taken_2 = mass_from_source(thermal, in_2.from_source, state, masses) + drift_2 + by_2 * first.content_2
+    stepped = step_lines(
+        lines,
+        plant.supply_pressure,
+        plant.dorsiflexion_pressure,
+        plant.gas_product,
+        line_state,
+        step * (first.supplied - taken_2),
+        step * taken_2,
+        0.0,
+        step,
+    )
+    return FedThermalGas(chambers, taken_2, drift_2, stepped)
+
+
+def end_thermal_lines(
+    plant: PlantParameters,
+    thermal: ThermalParameters,
+    lines: SupplyLines,
+    line_state: LineState,
+    begun: FedThermalGas,
+    second: ThermalFlows,
+    port_2: Any,
+    step: float,
+    port_flow: Callable[..., Any],
+) -> LineState:
+    """Both lines at the end of the step [s], from the second stage of the chambers [kg/s]."""
+    gas = begun.chambers
+    pressure_2 = gas.end.mass_2 * plant.gas_product / gas.volume_2
+    flow_2 = port_flow(pressure_2, port_2, plant.valve_curve).from_source
+    from_2 = mass_from_source(thermal, flow_2, gas.end, gas.end_masses)
+    second_2 = from_2 - 2.0 * begun.taken_2 - begun.drift_2 + gas.matrix.slopes.supplied_by_2 * second.content_2
+    taken_2 = step * (1.5 * begun.taken_2 + 0.5 * second_2)
+    supplied = step * (1.5 * gas.first.supplied + 0.5 * second.supplied)
+    return step_lines(
+        lines,
+        plant.supply_pressure,
+        plant.dorsiflexion_pressure,
+        plant.gas_product,
+        line_state,
+        supplied - taken_2,
         taken_2,
         begun.lines.inlet_rise,
         step,

@@ -47,6 +47,23 @@ class ThermalMatrix(NamedTuple):
     cooling_2: float
 
 
+class ThermalBegin(NamedTuple):
+    """Both chambers at the begin of a step: volumes then and at its end [m^3], rate at which chamber 1 grows [m^3/s].
+
+    Then pressures [Pa], absolute, over contents [kg], and the pressures.
+    """
+
+    volume_1: float
+    volume_2: float
+    next_1: float
+    next_2: float
+    growth: float
+    per_content_1: float
+    per_content_2: float
+    pressure_1: float
+    pressure_2: float
+
+
 class ThermalGas(NamedTuple):
     """First stage of a step: its matrix, the stage, the changes in time, the gas and volumes it leads to.
 
@@ -122,16 +139,46 @@ def begin_thermal_gas(
     port_flow_slopes: Callable[..., Any],
 ) -> ThermalGas:
     """First stage of one step [s] in which the volumes run linearly to those of ``next_angle`` [rad]."""
+    at_begin = thermal_pressures(plant, state, next_angle, step)
+    in_1 = port_flow_slopes(at_begin.pressure_1, port_1, plant.valve_curve)
+    in_2 = port_flow_slopes(at_begin.pressure_2, port_2, plant.valve_curve)
+    return begin_thermal_stage(plant, thermal, state, masses, at_begin, in_1, in_2, step)
+
+
+def thermal_pressures(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
+    """Both chambers at the begin of a step [s] whose volumes run to those of ``next_angle`` [rad]. Equation (3)."""
     volume_1, volume_2 = chamber_volumes(plant, state.angle)
     next_1, next_2 = chamber_volumes(plant, next_angle)
     growth = (next_1 - volume_1) / max(step, SHORTEST)
     per_content_1 = plant.gas_product / volume_1
     per_content_2 = plant.gas_product / volume_2
-    pressure_1 = state.mass_1 * per_content_1
-    pressure_2 = state.mass_2 * per_content_2
-    in_1 = port_flow_slopes(pressure_1, port_1, plant.valve_curve)
-    in_2 = port_flow_slopes(pressure_2, port_2, plant.valve_curve)
-    leak = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
+    return ThermalBegin(
+        volume_1=volume_1,
+        volume_2=volume_2,
+        next_1=next_1,
+        next_2=next_2,
+        growth=growth,
+        per_content_1=per_content_1,
+        per_content_2=per_content_2,
+        pressure_1=state.mass_1 * per_content_1,
+        pressure_2=state.mass_2 * per_content_2,
+    )
+
+
+def begin_thermal_stage(
+    plant: PlantParameters,
+    thermal: ThermalParameters,
+    state: PlantState,
+    masses: ThermalState,
+    at_begin: ThermalBegin,
+    in_1: Any,
+    in_2: Any,
+    step: float,
+) -> ThermalGas:
+    """First stage of one step [s] with moving volumes, from the flows through both ports and their slopes."""
+    volume_1, volume_2, growth = at_begin.volume_1, at_begin.volume_2, at_begin.growth
+    per_content_1, per_content_2 = at_begin.per_content_1, at_begin.per_content_2
+    leak = orifice_flow_slopes(at_begin.pressure_1, at_begin.pressure_2, plant.leak_conductance, plant.leak_curve)
     flow_1 = PortFlow(in_1.total, in_1.from_source)
     flow_2 = PortFlow(in_2.total, in_2.from_source)
     flows = thermal_flows(thermal, state, masses, volume_1, volume_2, growth, flow_1, flow_2, leak[0])
@@ -145,7 +192,7 @@ def begin_thermal_gas(
     first = solve_thermal_stage(matrix, combined(flows, 1.0, drift, 1.0))
     change = combined(first, step, first, 0.0)
     end, end_masses = with_thermal_gas(state, masses, change)
-    return ThermalGas(matrix, first, drift, end, end_masses, next_1, next_2, growth)
+    return ThermalGas(matrix, first, drift, end, end_masses, at_begin.next_1, at_begin.next_2, growth)
 
 
 def second_thermal_stage(

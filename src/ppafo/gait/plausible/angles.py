@@ -22,12 +22,12 @@ def check_shank(walk: Checked) -> None:
     low, high = SHANK_RANGE
     if not low <= travel <= high:
         raise DataError(
-            f"{place} moves over {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
+            f"{place} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
             f"{_unit_hint(travel, low, high)}"
         )
     if float(np.mean(phi[MIDSTANCE][:5])) < float(np.mean(phi[MIDSTANCE][-5:])):
         raise DataError(
-            f"{place} grows while the foot stands: the shank would fall back over it; "
+            f"{place} grows while the foot stands: the shank would rotate backwards over it; "
             f"{walk.other_sign('shank_angle.positive')}{_other_foot(walk)}"
         )
     if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
@@ -46,7 +46,7 @@ def check_ankle(walk: Checked) -> None:
     low, high = ANKLE_RANGE
     if not low <= travel <= high:
         raise DataError(
-            f"{place} moves over {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
+            f"{place} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
             f"{_unit_hint(travel, low, high)}"
         )
     stand, lean = theta[MIDSTANCE], phi[MIDSTANCE]
@@ -66,9 +66,11 @@ def check_ankle(walk: Checked) -> None:
 
 
 _NEUTRAL: dict[Given, str] = {
-    "map": "give ankle_angle.neutral in the gait map: what the file shows when the foot is square to the shank",
-    "columns": "write it as 90 deg when the foot is square to the shank, or give a gait map with ankle_angle.neutral",
-    "gait_file": "write its mean so that it is 90 deg when the foot is square to the shank",
+    "map": "give ankle_angle.neutral in the gait map: the reading of the file when the foot is "
+    "perpendicular to the shank",
+    "columns": "write it as 90 deg when the foot is perpendicular to the shank, or give a gait map with "
+    "ankle_angle.neutral",
+    "gait_file": "write its mean so that it is 90 deg when the foot is perpendicular to the shank",
 }
 
 

@@ -29,6 +29,6 @@ def other_sign(given: Given, key: str, turned: str = "the other sign") -> str:
     """Return how to turn a curve around: by its key in a gait map, or in the file."""
     return {
         "map": f"change {key} in the gait map",
-        "columns": f"turn it around in the file, or change {key} in a gait map",
+        "columns": f"correct it in the file, or change {key} in a gait map",
         "gait_file": f"write mean, cosine and sine with {turned}",
     }[given]

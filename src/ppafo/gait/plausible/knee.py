@@ -19,7 +19,7 @@ def check_knee(walk: Checked) -> None:
     there = [name for name in KNEE if name in walk.curves]
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
-        raise DataError(f"{walk.file[there[0]]}: {there[0]} is there without {missing}; give both, or none")
+        raise DataError(f"{walk.file[there[0]]}: {there[0]} is given without {missing}; give both, or neither")
     check_turning(walk)
     for name in there:
         _check_size(name, walk)
@@ -31,12 +31,12 @@ def _check_size(name: str, walk: Checked) -> None:
     travel, mean, (low, high) = float(np.ptp(values)), float(np.mean(values[:-1])), KNEE_TRAVEL
     if abs(mean) > KNEE_MEAN:
         raise DataError(
-            f"{place} is {mean:.3g} m/s^2 on average, and a stride that repeats has 0 (within {KNEE_MEAN:g} is let "
-            "pass); an accelerometer shows gravity too: take it away"
+            f"{place} is {mean:.3g} m/s^2 on average, and a periodic stride has 0 (up to {KNEE_MEAN:g} is accepted); "
+            "an accelerometer measures gravity too: subtract it"
         )
     if not low <= travel <= high:
         raise DataError(
-            f"{place} moves over {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
+            f"{place} covers a range of {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
             "is the unit right (m/s^2, or m for a position)?"
         )
 

@@ -39,7 +39,7 @@ _G = STANDARD_GRAVITY
 
 
 def _too_small(factor: float, words: str) -> tuple[_Mistake, ...]:
-    """Return numbers that are too small by a factor; knee_up alone is too small over the flat foot to be told."""
+    """Return numbers that are too small by a factor; knee_up alone is too small over the flat foot to be recognised."""
     return (
         _Mistake(f"are {words}", f"multiply both by {factor:g}", (factor, 0.0), (0.0, factor)),
         _Mistake(f"differ, knee_forward is {words}", f"multiply it by {factor:g}", (factor, 0.0), (0.0, 1.0)),
@@ -60,7 +60,7 @@ _MISTAKES = (
     _Mistake("are exchanged", "exchange them", (0.0, 1.0), (1.0, 0.0)),
     _Mistake(
         "are exchanged, and knee_up has the other sign",
-        "exchange them and turn knee_up around",
+        "exchange them and reverse knee_up",
         (0.0, -1.0),
         (1.0, 0.0),
     ),
@@ -70,7 +70,7 @@ _MISTAKES = (
     *_too_large(1000.0),
     _Mistake("are exchanged and in units of g", f"exchange them and multiply both by {_G:g}", (0.0, _G), (_G, 0.0)),
 )
-"""The first that fits is named. A sign alone is told by the swing."""
+"""The first that fits is named. A sign alone is recognised in the swing."""
 
 _WHERE: dict[Given, str] = {
     "map": "in the gait map or the file",
@@ -94,7 +94,7 @@ def check_turning(walk: Checked) -> None:
             raise DataError(
                 f"{walk.file['knee_forward']}: knee_forward and knee_up {mistake.words}: while the foot is flat the "
                 f"knee turns about the resting ankle, which they miss by {100.0 * missed:.0f} %, and by "
-                f"{100.0 * left:.0f} % with that mended; {mistake.remedy} {_WHERE[walk.given]}"
+                f"{100.0 * left:.0f} % with that corrected; {mistake.remedy} {_WHERE[walk.given]}"
             )
 
 

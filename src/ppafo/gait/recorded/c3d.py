@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
-from ppafo.gait.recorded.table import C3D, MotionTable
+from ppafo.errors import DataError, first_twice, one_line
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
+from ppafo.storage.trial_reading import check_can_be_read
 
 _AXES = "xyz"
 _MARK = b"\x50"
@@ -18,13 +18,15 @@ _UNITS = {"Nmm/kg": "N mm/kg", "Nmm": "N mm", "Nm": "N m", "Nm/kg": "N m/kg", ""
 _GROUPS = (("ANGLES", "ANGLE_UNITS"), ("MOMENTS", "MOMENT_UNITS"), ("FORCES", "FORCE_UNITS"))
 
 
-def read_c3d(path: str | Path) -> MotionTable:
-    """Return points as columns ``LABEL.x``, ``.y``, ``.z`` and analog channels by label, at the rate of the points.
+def read_c3d(path: str | Path) -> tuple[Floats, dict[str, Floats], dict[str, str]]:
+    """Return time [s], columns and their units: points as ``LABEL.x``, ``.y``, ``.z``, analog channels by label.
 
     Analog channels are faster; the samples at the times of the points are taken. A gap in a point is NaN here, and
     refused by whoever uses the column.
     """
-    content = _opened(path)
+    _check_is_c3d(path)
+    check_can_be_read(Path(path), __name__, "open_c3d", "ezc3d")
+    content = open_c3d(path)
     parameters: Any = content["parameters"]
     rate = _rate(parameters, path)
     points: Floats = content["data"]["points"]
@@ -43,17 +45,23 @@ def read_c3d(path: str | Path) -> MotionTable:
         stated = _texts(parameters["ANALOG"], "UNITS")
         for number, label in enumerate(names):
             columns[label] = analogs[number, ::step][:frames]
-            units[label] = _spelled(stated[number]) if number < len(stated) else ""
-    return MotionTable(str(path), C3D, np.arange(frames) / rate, columns, units)
+            units[label] = _unit_name(stated[number]) if number < len(stated) else ""
+    return np.arange(frames) / rate, columns, units
 
 
-def _opened(path: str | Path) -> Any:
+def _check_is_c3d(path: str | Path) -> None:
     try:
-        import ezc3d
+        import ezc3d  # noqa: F401  # its absence is reported before the file is looked at
     except ImportError as error:
         raise DataError(f"{path}: C3D files need ezc3d; install it with 'pip install ppafo[c3d]'") from error
     if read_bytes(path)[1:2] != _MARK:
         raise DataError(f"{path}: is not a C3D file")
+
+
+def open_c3d(path: str | Path) -> Any:
+    """Return what ezc3d makes of a file; a damaged one can bring down the process."""
+    import ezc3d
+
     try:
         return ezc3d.c3d(str(path))
     except (OSError, RuntimeError, ValueError, IndexError, KeyError) as error:
@@ -63,7 +71,7 @@ def _opened(path: str | Path) -> Any:
 def _rate(parameters: Any, path: str | Path) -> float:
     values = np.atleast_1d(parameters["POINT"]["RATE"]["value"])
     rate = float(values[0]) if values.size else 0.0
-    if not rate > 0.0:
+    if not 0.0 < rate < np.inf:
         raise DataError(f"{path}: POINT:RATE is {rate:g}; points need a rate above 0 Hz")
     return rate
 
@@ -71,7 +79,7 @@ def _rate(parameters: Any, path: str | Path) -> float:
 def _labels(group: Any, count: int, path: str | Path) -> list[str]:
     """Return the labels, without the subject's name before a colon."""
     labels = [label.rpartition(":")[2].strip() for label in _texts(group, "LABELS")][:count]
-    twice = next((label for label in labels if labels.count(label) > 1), None)
+    twice = first_twice(labels)
     if twice is not None or len(labels) != count:
         what = f"two of {twice!r}" if twice is not None else f"{len(labels)} labels for {count} columns"
         raise DataError(f"{path}: there are {what}; every point and channel needs a label of its own")
@@ -80,15 +88,15 @@ def _labels(group: Any, count: int, path: str | Path) -> list[str]:
 
 def _units(group: Any, labels: Iterable[str]) -> dict[str, str]:
     """Return the unit of every point's coordinates: those of model outputs stand in groups of their own."""
-    usual = _spelled(next(iter(_texts(group, "UNITS")), ""))
+    usual = _unit_name(next(iter(_texts(group, "UNITS")), ""))
     units = {label: usual for label in labels}
     for names, unit in _GROUPS:
-        stated = _spelled(next(iter(_texts(group, unit)), ""))
+        stated = _unit_name(next(iter(_texts(group, unit)), ""))
         units.update({label.rpartition(":")[2].strip(): stated for label in _texts(group, names)})
     return {f"{label}.{axis}": unit for label, unit in units.items() for axis in _AXES}
 
 
-def _spelled(unit: str) -> str:
+def _unit_name(unit: str) -> str:
     return _UNITS.get(unit.strip(), unit.strip())
 
 

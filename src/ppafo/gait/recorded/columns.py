@@ -37,7 +37,7 @@ class Found:
         values = self.table.columns[name]
         check_finite(values, place, self.table.time)
         if not unit:
-            raise DataError(f"{place}: the file does not say its unit; give {self.unit_key} in a gait map")
+            raise DataError(f"{place}: the file does not state its unit; give {self.unit_key} in a gait map")
         given = "" if unit == "-" else unit
         problem = ""
         for si_unit in si_units:
@@ -70,7 +70,7 @@ def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable
         raise DataError(f"{curve}: both {files} have the column {bare[0]!r}; give one of them, or name another column")
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
-        return Found(f"{curve}.unit", holders[0], _detected_knee(holders[0], tuple(zip(signs, bare, strict=True))))
+        return Found(f"{curve}.unit", holders[0], _detect_knee(holders[0], tuple(zip(signs, bare, strict=True))))
     if optional and not any(name in table.columns for name in bare for table in tables):
         return None
     known = [name for table in tables for name in table.columns]
@@ -85,7 +85,7 @@ def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable
     )
 
 
-def _detected_knee(table: MotionTable, terms: tuple[tuple[float, str], ...]) -> tuple[tuple[float, str], ...]:
+def _detect_knee(table: MotionTable, terms: tuple[tuple[float, str], ...]) -> tuple[tuple[float, str], ...]:
     """Return the terms with the knee taken away where its flexion counts above 0, as in the newer OpenSim models."""
     if table.form != OPENSIM:
         return terms

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.recorded.signal import Signal, low_passed
+from ppafo.gait.recorded.signal import Signal, low_pass
 from ppafo.signals.recording import Floats
 
 LOADED, UNLOADED = 0.05, 0.03
@@ -113,7 +113,7 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
     Heel strike is where the forward swing of the shank ends, its largest angle. Toe-off is where it leans back
     fastest before the swing, after Aminian et al. 2002, J Biomech 35:689, who find both in a gyroscope on the shank.
     """
-    smooth = low_passed(shank, _SMOOTH)
+    smooth = low_pass(shank, _SMOOTH)
     peaks = _heel_strikes(smooth)
     rate = np.gradient(smooth.values, smooth.time)
     return [
@@ -140,6 +140,6 @@ def _toe_off(shank: Signal, rate: Floats, first: int, last: int) -> int:
     if lowest - middle < 2 or shank.values[lowest] > _DEEPEST:
         raise DataError(
             f"{shank.file}: the shank does not lean back before the swing after {shank.time[first]:g} s, so there is "
-            "no toe-off to be found in it; give a vertical force, or mend the sign of the shank angle"
+            "no toe-off to be found in it; give a vertical force, or correct the sign of the shank angle"
         )
     return middle + int(np.argmin(rate[middle:lowest]))

@@ -21,7 +21,7 @@ _COARSE = 0.002
 """Share of the range; a sensor with coarser steps keeps a value where its curve turns round."""
 
 
-def check_held(
+def check_constant(
     walk: Mapping[str, Signal], tables: Sequence[MotionTable], strides: Sequence[Stride], left_out: Sequence[Stride]
 ) -> None:
     """Refuse a column that keeps one value for longer than 0.1 s within the strides; in swing a load may.
@@ -34,7 +34,7 @@ def check_held(
         table = by_file[signal.file]
         spans = [_span(name, item) for item in (strides if name in _LOADS else [*strides, *left_out])]
         for column in signal.columns:
-            found = held_stretch(table.time, table.columns[column], spans)
+            found = constant_stretch(table.time, table.columns[column], spans)
             if found is not None:
                 raise DataError(
                     f"{table.file}: column {column!r} of {name} keeps one value from {found[0]:.4g} to "
@@ -43,7 +43,7 @@ def check_held(
                 )
 
 
-def held_stretch(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+def constant_stretch(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
     """Return start and end [s] of the first stretch with one value that covers more than 0.1 s of the spans."""
     moves = np.flatnonzero(np.diff(values) != 0.0)
     if moves.size == 0:

@@ -13,13 +13,13 @@ from ppafo.gait.plausible.checked import Checked, Given
 from ppafo.gait.plausible.loads import check_force_scale, force_remarks
 from ppafo.gait.plausible.stride import check_plausible
 from ppafo.gait.recorded.events import Stride, strides_from_force, strides_from_shank
-from ppafo.gait.recorded.held import check_held
+from ppafo.gait.recorded.held import check_constant
 from ppafo.gait.recorded.knee import check_way, knee_remarks
 from ppafo.gait.recorded.mapping import CONVENTIONS, GaitMap, Side
 from ppafo.gait.recorded.noise import check_scatter, scatter_remarks
 from ppafo.gait.recorded.settings import ImportSettings, check_settings
-from ppafo.gait.recorded.signal import Signal, low_passed
-from ppafo.gait.recorded.strides import CurveStatistics, covered, mean_curve, without_outliers
+from ppafo.gait.recorded.signal import Signal, low_pass
+from ppafo.gait.recorded.strides import CurveStatistics, mean_curve, strides_within, without_outliers
 from ppafo.gait.recorded.table import CSV, MotionTable, read_table
 from ppafo.gait.recorded.walk import Person, recorded_walk
 
@@ -60,11 +60,11 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     walk = recorded_walk(tables, columns, person, is_default=settings.columns is None)
     events = "vertical_force" if "vertical_force" in walk else "shank_angle"
     found = _strides(walk, events, given)
-    smooth = walk if settings.low_pass is None else {n: low_passed(s, settings.low_pass) for n, s in walk.items()}
-    usable = [item for item in found if all(covered(walk[name], [item]) for name in REQUIRED)]
+    smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
+    usable = [item for item in found if all(strides_within(walk[name], [item]) for name in REQUIRED)]
     strides, left_out = without_outliers(usable, LARGEST_STRIDE_CHANGE)
     _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events)}, settings.least_strides)
-    check_held(walk, tables, strides, left_out)
+    check_constant(walk, tables, strides, left_out)
     curves = {name: mean_curve(name, signal, strides) for name, signal in smooth.items()}
     share, time = _mean([item.stance_share for item in strides]), _mean([item.time for item in strides])
     means = {name: item.mean for name, item in curves.items()}
@@ -85,7 +85,7 @@ def _convention(tables: Sequence[MotionTable], side: Side) -> GaitMap:
     forms = sorted({table.form for table in tables})
     if len(forms) > 1:
         raise DataError(
-            f"the files are of different forms ({', '.join(forms)}); name the columns of all of them in a gait map"
+            f"the files have different formats ({', '.join(forms)}); name the columns of all of them in a gait map"
         )
     if forms[0] == CSV and side != "right":
         raise DataError("a CSV file without a gait map has the columns of one foot; --side left has no meaning there")
@@ -110,7 +110,7 @@ def _check_enough(strides: list[Stride], found: list[Stride], walk: Mapping[str,
     )
     raise DataError(
         f"{walk['shank_angle'].file}: has {count} within angles and events ({events}; {spans}), {least} are needed; "
-        "give a longer recording, or ask for fewer with --least-strides"
+        "give a longer recording, or accept fewer with --least-strides"
     )
 
 

@@ -69,7 +69,9 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
     if mapped.thigh is not None and mapped.thigh_length is None:
         remarks.append(f"thigh of {_thigh_length(mapped, stature):.3f} m: {THIGH_SHARE:g} of the stature (Winter 2009)")
     if walk["knee_forward"].is_position:
-        remarks.append(f"acceleration of the knee from a series of {HARMONICS['knee_forward']} harmonics of its way")
+        remarks.append(
+            f"acceleration of the knee from a series of {HARMONICS['knee_forward']} harmonics of its position"
+        )
     return remarks
 
 
@@ -81,7 +83,8 @@ def check_way(walk: Mapping[str, Signal], given: Given) -> None:
     speed = float((knee.values[-1] - knee.values[0]) / (knee.time[-1] - knee.time[0]))
     if speed < -_FASTEST_BACK:
         raise DataError(
-            f"{knee.file}: the knee goes back by {-speed:.2g} m/s: knee.forward counts against the walk; "
+            f"{knee.file}: the knee goes back by {-speed:.2g} m/s: knee.forward points against the "
+            "direction of walking; "
             f"{other_sign(given, 'the sign of knee.forward')}"
         )
 
@@ -105,8 +108,9 @@ def _check_hip_moves(mapped: KneeMap, file: str, forward: Floats, up: Floats) ->
     for values, terms in ((forward, mapped.forward), (up, mapped.up)):
         if np.ptp(values) == 0.0:
             raise DataError(
-                f"{file}: the hip does not move ({', '.join(terms)} is constant), and without its way there is none of "
-                "the knee; leave the stature out, or knee of the gait map"
+                f"{file}: the hip does not move ({', '.join(terms)} is constant), and without its motion "
+                "that of the knee "
+                "is unknown; omit the stature, or knee in the gait map"
             )
 
 

@@ -19,9 +19,9 @@ _FILE = TomlKind("gait map", "gait-map", resources.files("ppafo.gait.recorded"),
 _STRICT = ConfigDict(strict=True, extra="forbid", frozen=True)
 _Text = Annotated[str, Field(min_length=1)]
 _Terms = Annotated[
-    tuple[_Text, ...], Field(strict=False, min_length=1, description="columns to add up; '-' before one takes it away")
+    tuple[_Text, ...], Field(strict=False, min_length=1, description="columns to add; '-' before one subtracts it")
 ]
-_Unit = Annotated[_Text | None, Field(description="unit of the columns, where the file does not say it")]
+_Unit = Annotated[_Text | None, Field(description="unit of the columns, where the file does not state it")]
 _Flexion = Literal["plantarflexion", "dorsiflexion"]
 
 
@@ -32,7 +32,7 @@ class ShankMap(BaseModel):
 
     terms: _Terms | None = None
     unit: _Unit = None
-    positive: Annotated[Literal["ankle_in_front", "ankle_behind"], Field(description="which lean counts above 0")] = (
+    positive: Annotated[Literal["ankle_in_front", "ankle_behind"], Field(description="which lean is positive")] = (
         "ankle_in_front"
     )
     knee: Annotated[_Text | None, Field(description="marker at the knee, instead of terms")] = None
@@ -54,8 +54,10 @@ class AngleMap(BaseModel):
 
     terms: _Terms
     unit: _Unit = None
-    positive: Annotated[_Flexion, Field(description="which motion counts above 0")]
-    neutral: Annotated[_Text, Field(description="what the file shows when the foot is square to the shank")] = "0 deg"
+    positive: Annotated[_Flexion, Field(description="which motion is positive")]
+    neutral: Annotated[
+        _Text, Field(description="the reading of the file when the foot is perpendicular to the shank")
+    ] = "0 deg"
 
 
 class MomentMap(BaseModel):
@@ -65,7 +67,7 @@ class MomentMap(BaseModel):
 
     terms: _Terms
     unit: _Unit = None
-    positive: Annotated[_Flexion, Field(description="which internal moment counts above 0")]
+    positive: Annotated[_Flexion, Field(description="which internal moment is positive")]
 
 
 class ForceMap(BaseModel):
@@ -75,7 +77,7 @@ class ForceMap(BaseModel):
 
     terms: _Terms
     unit: _Unit = None
-    positive: Annotated[Literal["up", "down"], Field(description="which force counts above 0")] = "up"
+    positive: Annotated[Literal["up", "down"], Field(description="which force is positive")] = "up"
 
 
 class PressureMap(BaseModel):
@@ -85,7 +87,7 @@ class PressureMap(BaseModel):
 
     terms: _Terms
     unit: _Unit = None
-    positive: Annotated[Literal["forward", "backward"], Field(description="which way counts above 0")] = "forward"
+    positive: Annotated[Literal["forward", "backward"], Field(description="which direction is positive")] = "forward"
 
 
 class KneeMap(BaseModel):
@@ -100,9 +102,9 @@ class KneeMap(BaseModel):
         _Terms | None,
         Field(description="lean of the thigh, above 0 with the knee in front; forward and up then are of the hip"),
     ] = None
-    thigh_unit: Annotated[_Text | None, Field(description="unit of the lean, where the file does not say it")] = None
+    thigh_unit: Annotated[_Text | None, Field(description="unit of the lean, where the file does not state it")] = None
     thigh_length: Annotated[
-        _Text | None, Field(description="hip to knee, such as '0.40 m'; without it a share of the stature")
+        _Text | None, Field(description="hip to knee, such as '0.40 m'; default: a fraction of the stature")
     ] = None
 
     @model_validator(mode="after")

@@ -35,21 +35,21 @@ def check_scatter(
     for item in _scatters(curves, errors):
         if item.spread > REFUSED_SPREAD or item.misfit > REFUSED_MISFIT:
             raise DataError(
-                f"{walk[item.name].file}: {_said(item)}; at most {100.0 * REFUSED_SPREAD:.0f} % and "
-                f"{100.0 * REFUSED_MISFIT:.0f} % are let pass; {_REMEDY}"
+                f"{walk[item.name].file}: {_statement(item)}; at most {100.0 * REFUSED_SPREAD:.0f} % and "
+                f"{100.0 * REFUSED_MISFIT:.0f} % are accepted; {_REMEDY}"
             )
 
 
 def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> list[str]:
     """Return a line on each curve that scatters more than a steady walk does."""
     return [
-        f"{_said(item)}: that is noise, or no steady walk; {_REMEDY}"
+        f"{_statement(item)}: that is noise, or the walk is not steady; {_REMEDY}"
         for item in _scatters(curves, errors)
         if item.spread > REMARKED_SPREAD or item.misfit > REMARKED_MISFIT
     ]
 
 
-def _said(item: _Scatter) -> str:
+def _statement(item: _Scatter) -> str:
     return (
         f"{item.name} differs between strides by {100.0 * item.spread:.0f} % of its range and its series misses "
         f"{100.0 * item.misfit:.1f} % (standard deviation, root mean square)"

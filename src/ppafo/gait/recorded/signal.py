@@ -33,7 +33,7 @@ class Signal:
         return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
 
 
-def low_passed(signal: Signal, cut_off: float) -> Signal:
+def low_pass(signal: Signal, cut_off: float) -> Signal:
     """Return the signal through a Butterworth filter passed forwards and backwards, -3 dB at ``cut_off`` [Hz]."""
     from scipy.signal import butter, sosfiltfilt
 

@@ -41,7 +41,7 @@ def phases() -> Floats:
     return np.linspace(0.0, 1.0, SAMPLES)
 
 
-def covered(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
+def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
     """Return the strides that lie within a signal, to half a sample."""
     slack = 0.5 / signal.rate
     return [item for item in strides if item.start >= signal.time[0] - slack and item.end <= signal.time[-1] + slack]
@@ -64,7 +64,7 @@ def _over_strides(curves: Floats, strides: Sequence[Stride]) -> CurveStatistics:
 
 def mean_curve(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
     """Return the curves of the strides that a signal covers; at least one has to be."""
-    inside = covered(signal, strides)
+    inside = strides_within(signal, strides)
     if not inside:
         raise DataError(
             f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no whole "
@@ -73,17 +73,17 @@ def mean_curve(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveSta
         )
     result = statistics(signal, inside)
     if signal.is_position:
-        return _differentiated(result, HARMONICS[name])
-    return _bridged(result) if name == "centre_of_pressure" else result
+        return _accelerations(result, HARMONICS[name])
+    return _bridge_swing(result) if name == "centre_of_pressure" else result
 
 
-def _differentiated(result: CurveStatistics, harmonics: int) -> CurveStatistics:
+def _accelerations(result: CurveStatistics, harmonics: int) -> CurveStatistics:
     """Return the accelerations [m/s^2] of positions [m], each stride with its own time."""
     pairs = zip(result.curves, result.strides, strict=True)
     return _over_strides(np.array([acceleration_of(way, harmonics, item.time) for way, item in pairs]), result.strides)
 
 
-def _bridged(result: CurveStatistics) -> CurveStatistics:
+def _bridge_swing(result: CurveStatistics) -> CurveStatistics:
     """Return a centre of pressure with a straight line over swing, where it has no meaning."""
     percent = phases()
     share = float(np.mean([item.stance_share for item in result.strides]))

@@ -39,9 +39,9 @@ def read_table(path: str | Path) -> MotionTable:
     elif suffix == ".c3d":
         from ppafo.gait.recorded.c3d import read_c3d
 
-        table = read_c3d(path)
+        table = MotionTable(str(path), C3D, *read_c3d(path))
     else:
-        raise DataError(f"{path}: is none of .mot, .sto, .csv, .c3d")
+        raise DataError(f"{path}: is not a .mot, .sto, .csv or .c3d file")
     _check_gaps(table)
     return table
 

@@ -7,7 +7,7 @@ from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_torque
 from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
 from ppafo.identification.bench.vane_leak import vane_leak
-from ppafo.identification.check import Check
+from ppafo.identification.estimate import Check
 
 __all__ = [
     "BenchResult",

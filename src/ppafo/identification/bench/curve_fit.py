@@ -1,4 +1,14 @@
-"""Curves fitted to samples, with intervals that allow for residuals that follow each other and a law that misses."""
+"""Curves fitted to samples, with intervals that allow for residuals that follow each other and a law that misses.
+
+Readings side by side are put into blocks. Were the law right, the means of blocks of m readings would scatter by
+1/sqrt(m) of what single readings do; a misfit that lasts over many readings makes them scatter more. The test is that
+of lack of fit (between over within blocks, F distributed; Draper and Smith, Applied Regression Analysis, ch. 2). Where
+it fails, the variance is that between blocks, with as many degrees of freedom as there are blocks less parameters:
+the Birge ratio (Birge, Phys. Rev. 40, 1932) of the block means, and batch means for readings that follow each other.
+
+What a law absorbs of its own misfit no residual shows. So the fit is repeated without each block in turn: a law that
+misses gives other values on other parts of a recording (jackknife over blocks; Kuensch, Ann. Statist. 17, 1989).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -7,12 +17,122 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.identification.bench.lack_of_fit import LackOfFit, jackknifed, lack_of_fit
-from ppafo.identification.bench.regression import quantile
 from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
+
+Indices = NDArray[np.intp]
+
+_FEWEST_BLOCKS = 8
+_MOST_BLOCKS = 64
+"""More would find what follows from sample to sample, for which there is an interval of its own."""
+
+_FEWEST_IN_A_BLOCK = 2
+_DRAWS = 4000
+
+
+CHANCE = 0.01
+"""How often a law that is right may be reported to miss the readings by more than they scatter [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LackOfFit:
+    """Mean square of the block means times their size, its degrees of freedom, and the blocks (indices of samples).
+
+    Without blocks the law misses by no more than the scatter, and the mean square is that of the residuals.
+    """
+
+    mean_square: float
+    freedom: int
+    blocks: tuple[Indices, ...]
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether the law misses by more than the scatter."""
+        return bool(self.blocks)
+
+    def deviation(self, confidence: float) -> float:
+        """Return half the width of an interval for a reading's mean error, in the unit of the residuals."""
+        return quantile(confidence, self.freedom) * float(np.sqrt(self.mean_square))
+
+
+def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Sequence[Floats] = ()) -> LackOfFit:
+    """Return the lack of fit that widens intervals most, over numbers of blocks, in the order of samples and others.
+
+    ``along`` are variables over which a misfit may run besides, such as a pressure. Readings that have some are steady
+    ones, whose noise may differ from place to place; in a course of time a misfit may fill one block alone.
+    """
+    freedom = max(1, residuals.size - parameters)
+    widest = LackOfFit(float(residuals @ residuals) / freedom, freedom, ())
+    orders = [np.arange(residuals.size), *(np.argsort(values, kind="stable") for values in along)]
+    counts = _block_counts(residuals.size, parameters)
+    chance = CHANCE / max(1, len(counts) * len(orders))
+    for order in orders:
+        for count in counts:
+            found = _misfit_between(residuals, tuple(np.array_split(order, count)), parameters, chance)
+            if found is None or (
+                along and not _exceeds_uneven_noise([residuals[block] for block in found.blocks], chance)
+            ):
+                continue
+            if found.deviation(confidence) > widest.deviation(confidence):
+                widest = found
+    return widest
+
+
+def quantile(confidence: float, freedom: int) -> float:
+    """Return the two-sided quantile of Student's distribution."""
+    from scipy.stats import t
+
+    return float(t.ppf(0.5 + confidence / 2.0, freedom))
+
+
+def exceeds_chance(between: float, within: float, freedom: int, inner_freedom: int, chance: float) -> bool:
+    """Return whether a mean square between groups is larger than that within them, but for a chance [-]; F test."""
+    from scipy.stats import f
+
+    return between > within and (within <= 0.0 or bool(f.sf(between / within, freedom, inner_freedom) <= chance))
+
+
+def jackknife(values_without: Sequence[Floats], confidence: float) -> Floats:
+    """Return half widths from the values that were fitted without each block in turn."""
+    stacked = np.array(values_without)
+    count = stacked.shape[0]
+    variance = (count - 1) / count * ((stacked - stacked.mean(axis=0)) ** 2).sum(axis=0)
+    return np.asarray(quantile(confidence, count - 1) * np.sqrt(variance))
+
+
+def _block_counts(size: int, parameters: int) -> list[int]:
+    """Return the numbers of blocks to try: from few to as many as leave two readings in each, and a limit."""
+    counts: list[int] = []
+    count = max(_FEWEST_BLOCKS, 2 * parameters)
+    while count * _FEWEST_IN_A_BLOCK <= size and (not counts or count <= _MOST_BLOCKS):
+        counts.append(count)
+        count *= 2
+    return counts
+
+
+def _misfit_between(residuals: Floats, blocks: tuple[Indices, ...], parameters: int, chance: float) -> LackOfFit | None:
+    """Return the lack of fit between blocks where it is larger than chance allows, else None."""
+    freedom, inner = len(blocks) - parameters, residuals.size - len(blocks)
+    parts = [residuals[block] for block in blocks]
+    between = sum(float(part.sum()) ** 2 / part.size for part in parts) / freedom
+    within = sum(float(((part - part.mean()) ** 2).sum()) for part in parts) / inner
+    is_missing = exceeds_chance(between, within, freedom, inner, chance)
+    return LackOfFit(between, freedom, blocks) if is_missing else None
+
+
+def _exceeds_uneven_noise(parts: list[Floats], chance: float) -> bool:
+    """Return whether the blocks' means scatter more than noise does that is larger in some blocks than in others.
+
+    The F test takes one variance for all. Here each block has its own: were all errors independent, the sum of the
+    squared means times their size would be one of squared normal numbers, weighted by the blocks' mean squares.
+    """
+    weights = np.array([float(part @ part) / part.size for part in parts])
+    seen = sum(float(part.sum()) ** 2 / part.size for part in parts)
+    draws = np.random.default_rng(1).standard_normal((_DRAWS, weights.size))
+    return bool(np.mean(draws**2 @ weights >= seen) <= chance)
+
 
 CLEARLY_WORSE = 10.0
 """Difference in Akaike's criterion from which one law is refused in favour of another."""
@@ -33,7 +153,6 @@ class CurveFit:
     correlation: Floats
     residuals: Floats
     effective: float
-    at_bound: tuple[bool, ...]
     widened: Floats
     spread: Floats
 
@@ -44,14 +163,14 @@ class CurveFit:
 
 
 @dataclass(frozen=True, slots=True)
-class _Bounded:
+class _BoundedProblem:
     """What is fitted: residuals over values, and the bounds of the values."""
 
     residuals_of: Callable[[Floats], Floats]
     lower: Floats
     upper: Floats
 
-    def solved(self, start: Floats, kept: "NDArray[np.bool_] | slice" = slice(None)) -> "OptimizeResult":
+    def solve(self, start: Floats, kept: "NDArray[np.bool_] | slice" = slice(None)) -> "OptimizeResult":
         """Return the least squares over the samples that are kept."""
         from scipy.optimize import least_squares
 
@@ -83,38 +202,37 @@ def fit_curve(
     """
     fit = solve_curve(residuals_of, start, lower, upper, confidence)
     missing = lack_of_fit(fit.residuals, start.size, confidence, along)
-    return _widened(fit, _Bounded(residuals_of, lower, upper), missing, confidence) if missing.is_seen else fit
+    return _widen(fit, _BoundedProblem(residuals_of, lower, upper), missing, confidence) if missing.is_seen else fit
 
 
 def solve_curve(
     residuals_of: Callable[[Floats], Floats], start: Floats, lower: Floats, upper: Floats, confidence: float
 ) -> CurveFit:
     """Return the bounded least-squares fit with the first of these intervals; enough to compare laws with."""
-    found = _Bounded(residuals_of, lower, upper).solved(start)
+    found = _BoundedProblem(residuals_of, lower, upper).solve(start)
     residuals, inverse = np.asarray(found.fun), _inverse(np.asarray(found.jac))
     spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = inverse / np.outer(spread, spread)
     return CurveFit(
         values=np.asarray(found.x),
-        half_widths=_following(residuals, spread.size, confidence) * spread,
+        half_widths=_half_width_per_unit(residuals, spread.size, confidence) * spread,
         correlation=correlation,
         residuals=residuals,
         effective=effective_samples(residuals),
-        at_bound=tuple(bool(flag) for flag in found.active_mask != 0),
         widened=np.ones(spread.size),
         spread=spread,
     )
 
 
-def _following(residuals: Floats, parameters: int, confidence: float) -> float:
+def _half_width_per_unit(residuals: Floats, parameters: int, confidence: float) -> float:
     """Return the half width per unit of the design for samples that each resemble the one before."""
     freedom = max(1.0, effective_samples(residuals) - parameters)
     variance = np.mean(residuals**2) * residuals.size / freedom
     return float(quantile(confidence, max(1, int(freedom))) * np.sqrt(variance))
 
 
-def _widened(fit: CurveFit, problem: _Bounded, missing: LackOfFit, confidence: float) -> CurveFit:
+def _widen(fit: CurveFit, problem: _BoundedProblem, missing: LackOfFit, confidence: float) -> CurveFit:
     """Return the fit with the intervals that hold where the law misses the samples."""
     spread = fit.spread
     freedom = max(1, fit.residuals.size - spread.size)
@@ -123,8 +241,8 @@ def _widened(fit: CurveFit, problem: _Bounded, missing: LackOfFit, confidence: f
     for block in missing.blocks:
         kept = np.ones(fit.residuals.size, dtype=np.bool_)
         kept[block] = False
-        without.append(np.asarray(problem.solved(fit.values, kept).x))
-    candidates = (fit.half_widths, missing.deviation(confidence) * spread, jackknifed(without, confidence))
+        without.append(np.asarray(problem.solve(fit.values, kept).x))
+    candidates = (fit.half_widths, missing.deviation(confidence) * spread, jackknife(without, confidence))
     half_widths = np.max(np.stack(candidates), axis=0)
     widened = half_widths / np.where(independent > 0.0, independent, half_widths)
     return replace(fit, half_widths=half_widths, widened=widened)

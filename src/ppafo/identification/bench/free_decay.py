@@ -10,25 +10,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
-from ppafo.identification.bench.decay_motion import angle_of_decay, stop_time, velocity_of_decay
-from ppafo.identification.bench.decay_samples import (
+from ppafo.identification.bench.curve_fit import CurveFit, fit_curve, quantile
+from ppafo.identification.bench.decay import (
     ANGLE,
-    FEWEST_SAMPLES,
     FEWEST_SMOOTHED,
+    MINIMUM_SAMPLES,
     PROCEDURE,
     Decay,
+    angle_of_decay,
     decay_of,
     noise_of,
     smoothed_rates,
     smoothing_width,
+    stop_time,
+    velocity_of_decay,
 )
-from ppafo.identification.bench.evidence import Evidence, Number
 from ppafo.identification.bench.inputs import check_sources, kind_of
-from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, counted
-from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate
+from ppafo.identification.bench.result import (
+    BenchResult,
+    Evidence,
+    Number,
+    Panel,
+    Series,
+    count_of,
+    prospect_of,
+)
+from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats
 
@@ -57,25 +64,72 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
 
     The angular velocity is fitted with the angle where a recording has it, each weighted by its noise.
     Several recordings are several impulses to the same device: the ratios are common, each has its own start.
+    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     chosen = settings or FreeDecaySettings()
-    check_sources(sources, PROCEDURE, (ANGLE,), FEWEST_SAMPLES)
+    check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
     decays = tuple(decay_of(source, chosen.start, chosen.end) for source in sources)
     fit = _fit(decays, chosen.confidence)
     estimates = _estimates(Evidence(traces(sources), chosen.confidence, chosen.calibration), fit, chosen)
-    checks = (_residual_check(decays, fit), _separated(fit))
+    checks = (_residual_check(decays, fit), _separation_check(fit))
     text, panels = _summary(decays, fit, chosen), _panels(decays, fit)
-    return BenchResult(PROCEDURE, text, estimates, checks, panels, kind_of(sources), (_stopped(decays, fit),))
+    return BenchResult(PROCEDURE, text, estimates, checks, panels, kind_of(sources), (_rest_remark(decays, fit),))
 
 
-def _modelled(decay: Decay, own: Floats, rates: Floats) -> Floats:
+def decay_prospects(sources: tuple[Source, ...], settings: FreeDecaySettings) -> tuple[Prospect, ...]:
+    """Return how well damping and Coulomb friction can be had, and whether as more than ratios to the inertia."""
+    check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
+    decays = [decay_of(source, settings.start, settings.end) for source in sources]
+    information = np.zeros((2, 2))
+    rate, deceleration = _rough_rates(decays[0])
+    for decay in decays:
+        speed = float(np.abs(smoothed_rates(decay.time, decay.angle)[0][:5]).max())
+        information += _information(decay, speed, rate, deceleration)
+    covariance = np.linalg.pinv(information)
+    half = quantile(settings.confidence, sum(decay.time.size for decay in decays)) * np.sqrt(np.diag(covariance))
+    likeness = float(covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1]))
+    where = f"{decays[0].time[-1]:.3g} s of decay; errors of both are correlated by {likeness:+.2f}"
+    known = settings.inertia is not None
+    text = f"with an inertia of {settings.inertia:.4g} kg m^2" if known else "no inertia is known: only ratios to it"
+    return (
+        prospect_of("damping", half[0], rate, where),
+        prospect_of("dynamic friction", half[1], deceleration, where),
+        Prospect("absolute values", known, text),
+    )
+
+
+def _rough_rates(decay: Decay) -> tuple[float, float]:
+    """Return damping rate [1/s] and deceleration [rad/s^2] from the slope of acceleration over velocity."""
+    velocity, acceleration = smoothed_rates(decay.time, decay.sign * decay.angle)
+    moving = velocity > 0.1 * velocity.max()
+    slope, level = np.polyfit(velocity[moving], acceleration[moving], 1)
+    longest = 1.0 / float(decay.time[-1])
+    return max(-float(slope), 0.1 * longest), max(-float(level), 0.01 * longest * float(velocity.max()))
+
+
+def _information(decay: Decay, speed: float, rate: float, deceleration: float) -> Floats:
+    """Return the information of one decay on rate and deceleration, with start angle and speed unknown."""
+    values = np.array([rate, deceleration, speed, 0.0])
+    steps = np.array([1e-4 * rate, 1e-4 * deceleration, 1e-4 * speed, 1.0])
+
+    def course(at: Floats) -> Floats:
+        return angle_of_decay(decay.time, at[3], at[2], at[0], at[1])
+
+    columns = [(course(values + step) - course(values - step)) / (2.0 * step.sum()) for step in np.diag(steps)]
+    jacobian = np.stack(columns, axis=1) / noise_of(decay.angle)
+    own, common = jacobian[:, 2:], jacobian[:, :2]
+    kept = common - own @ np.linalg.lstsq(own, common, rcond=None)[0]
+    return np.asarray(kept.T @ kept)
+
+
+def _model_angle(decay: Decay, own: Floats, rates: Floats) -> Floats:
     swept = angle_of_decay(decay.time, 0.0, max(float(own[1]), 0.0), float(rates[0]), float(rates[1]))
     return np.asarray(own[0] + decay.sign * swept)
 
 
 def _misses(decay: Decay, own: Floats, rates: Floats) -> Floats:
     """Return measured less modelled [rad]: of the angle, and of the velocity where it was measured, weighted."""
-    of_angle = decay.angle - _modelled(decay, own, rates)
+    of_angle = decay.angle - _model_angle(decay, own, rates)
     if decay.velocity is None:
         return np.asarray(of_angle)
     speed = velocity_of_decay(decay.time, max(float(own[1]), 0.0), float(rates[0]), float(rates[1]))
@@ -123,8 +177,8 @@ def _estimates(evidence: Evidence, fit: CurveFit, settings: FreeDecaySettings) -
 
 
 def _ratios(fit: CurveFit, evidence: Evidence) -> tuple[Number, Number]:
-    trade = f"errors of damping and Coulomb friction go together with {fit.correlation[0, 1]:+.2f}"
-    gain = f"; {evidence.calibration_told}" if evidence.calibration else ""
+    trade = f"errors of damping and Coulomb friction are correlated by {fit.correlation[0, 1]:+.2f}"
+    gain = f"; {evidence.calibration_text}" if evidence.calibration else ""
     friction = math.hypot(float(fit.half_widths[1]), evidence.calibration * float(fit.values[1]))
     return (
         Number(
@@ -163,26 +217,26 @@ def _residual_check(decays: tuple[Decay, ...], fit: CurveFit) -> Check:
     swept = max(float(np.ptp(decay.angle)) for decay in decays)
     noise = max(noise_of(decay.angle) for decay in decays)
     misses = [
-        decay.angle - _modelled(decay, fit.values[2 + 2 * number : 4 + 2 * number], fit.values[:2])
+        decay.angle - _model_angle(decay, fit.values[2 + 2 * number : 4 + 2 * number], fit.values[:2])
         for number, decay in enumerate(decays)
     ]
     missed = float(np.sqrt(np.mean(np.concatenate(misses) ** 2)))
     share = missed / swept
     holds = missed <= 3.0 * noise or share <= _GOOD_SHARE
-    text = f"the fitted decay misses the angle by {math.degrees(missed):.3g} deg rms, {share:.2%} of what was swept"
+    text = f"the fitted decay misses the angle by {math.degrees(missed):.3g} deg rms, {share:.2%} of the swept range"
     return Check("residuals", holds, text if holds else f"{text}: another torque acts, such as gravity or an end stop")
 
 
-def _separated(fit: CurveFit) -> Check:
+def _separation_check(fit: CurveFit) -> Check:
     likeness = float(fit.correlation[0, 1])
     holds = abs(likeness) < 0.995
     word = "can" if holds else "cannot"
     return Check(
-        "two frictions", holds, f"damping and Coulomb friction {word} be told apart (correlation {likeness:+.3f})"
+        "two frictions", holds, f"damping and Coulomb friction {word} be distinguished (correlation {likeness:+.3f})"
     )
 
 
-def _stopped(decays: tuple[Decay, ...], fit: CurveFit) -> str:
+def _rest_remark(decays: tuple[Decay, ...], fit: CurveFit) -> str:
     """Say whether the vane came to rest within the recording, where Coulomb friction shows best."""
     count = sum(
         stop_time(float(fit.values[3 + 2 * number]), *map(float, fit.values[:2])) <= decay.time[-1]
@@ -192,9 +246,9 @@ def _stopped(decays: tuple[Decay, ...], fit: CurveFit) -> str:
 
 
 def _summary(decays: tuple[Decay, ...], fit: CurveFit, settings: FreeDecaySettings) -> str:
-    known = "" if settings.inertia is not None else "; the inertia is not known, so only ratios over it follow"
+    known = "" if settings.inertia is not None else "; the inertia is not known, so only ratios to it follow"
     both = any(decay.velocity is not None for decay in decays)
-    what = f"{counted(len(decays), 'decay')}{' of angle and angular velocity' if both else ''}"
+    what = f"{count_of(len(decays), 'decay')}{' of angle and angular velocity' if both else ''}"
     return f"{what}; beta/I = {fit.values[0]:.4g} 1/s, T_c/I = {fit.values[1]:.4g} rad/s^2{known}"
 
 
@@ -204,7 +258,7 @@ def _panels(decays: tuple[Decay, ...], fit: CurveFit) -> tuple[Panel, ...]:
     for number, decay in enumerate(decays):
         own = fit.values[2 + 2 * number : 4 + 2 * number]
         named = number == 0
-        modelled = _modelled(decay, own, fit.values[:2])
+        modelled = _model_angle(decay, own, fit.values[:2])
         angles += [Series("measured" if named else "", decay.time, decay.angle, "measured")]
         angles += [Series("fitted" if named else "", decay.time, modelled, "law")]
         velocity, acceleration = smoothed_rates(decay.time, decay.sign * decay.angle)

@@ -5,11 +5,14 @@ from collections.abc import Iterable
 import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
+from ppafo.identification.estimate import Prospect
 from ppafo.identification.source import Source
 from ppafo.signals import CHANNELS, Recording, RecordingKind
-from ppafo.signals.faults import longest_gap, plateaus
+from ppafo.signals.faults import is_at_limit, longest_gap, plateaus
 from ppafo.signals.recording import Floats
 
+_NO_SENSORS = ("command", "direction", "repetition")
+_COARSE = 0.02
 _SHARE_THAT_IS_CLIPPED = 0.05
 _FEWEST_CLIPPED = 4
 _SHARE_THAT_MOVES = 0.02
@@ -59,15 +62,28 @@ def check_not_clipped(
         )
 
 
-def check_absolute(source: Source, procedure: str, name: str) -> None:
-    """Refuse a pressure that is zero or less: it was recorded as gauge."""
-    values = source.recording[name]
-    low = int(np.argmin(values))
-    if values[low] <= 0.0:
+def check_absolute(source: Source, procedure: str, names: Iterable[str]) -> None:
+    """Refuse pressures that are zero or less: they were recorded as gauge."""
+    for name in names:
+        values = source.recording[name]
+        low = int(np.argmin(values))
+        if values[low] <= 0.0:
+            raise IdentificationError(
+                f"{source.name}: {procedure}: '{name}' is {values[low]:g} Pa at sample {low + 1}, which is not an "
+                f"absolute pressure: use psi_g, bar_g or kPa_g for gauge"
+            )
+
+
+def check_no_gap(source: Source, procedure: str, part: Recording) -> int:
+    """Return how many samples of a recording lie before a part of it; refuse a part with a gap."""
+    skipped = int(np.searchsorted(source.recording.time, part.time[0]))
+    gap = longest_gap(part.time)
+    if gap is not None:
         raise IdentificationError(
-            f"{source.name}: {procedure}: '{name}' is {values[low]:g} Pa at sample {low + 1}, which is not absolute: "
-            f"say psi_g, bar_g, kPa_g for gauge"
+            f"{source.name}: {procedure}: there is a gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s "
+            f"(sample {skipped + gap.index + 1}); give start or end to exclude it"
         )
+    return skipped
 
 
 def pauses(sources: tuple[Source, ...]) -> tuple[str, ...]:
@@ -78,7 +94,7 @@ def pauses(sources: tuple[Source, ...]) -> tuple[str, ...]:
     listed = [
         f"{source.name} has no reading for {gap.duration:.4g} s after sample {gap.index + 1}" for source, gap in found
     ]
-    return (f"pauses: {'; '.join(listed)}; steady readings lose nothing by it",)
+    return (f"pauses: {'; '.join(listed)}; steady readings are not affected",)
 
 
 def window(recording: Recording, start: float | None, end: float | None) -> Recording:
@@ -96,7 +112,45 @@ def kind_of(sources: tuple[Source, ...]) -> RecordingKind:
     return next(kind for kind in _KINDS if kind in kinds)
 
 
-def pooled(sources: tuple[Source, ...], name: str) -> Floats:
+def data_prospects(sources: tuple[Source, ...]) -> tuple[Prospect, ...]:
+    """Return what the sensors did not show: values beyond a limit, and what is finer than a converter's steps."""
+    found = [
+        prospect
+        for source in sources
+        for name in source.recording.names
+        if name not in _NO_SENSORS
+        for prospect in _of_sensor(source, name)
+    ]
+    if found:
+        return tuple(found)
+    count = sum(len(source.recording) for source in sources)
+    pauses = [gap.duration for source in sources if (gap := longest_gap(source.recording.time)) is not None]
+    pause = f"the longest pause is {max(pauses):.3g} s" if pauses else "no pause"
+    return (Prospect("all samples", True, f"{count}; no sensor at its limit, no coarse converter, {pause}"),)
+
+
+def _of_sensor(source: Source, name: str) -> list[Prospect]:
+    values, found = source.recording[name], []
+    for item in plateaus(values):
+        if is_at_limit(values, item):
+            text = f"{source.name}: it stays there for {item.count} samples, from sample {item.first + 1}: a limit"
+            found.append(Prospect(f"'{name}' beyond {item.value:.6g}", False, text))
+    step = _coarseness(values)
+    if step > _COARSE and not found:
+        text = f"{source.name}: its values are {step:.0%} of their range apart, a coarse converter"
+        found.append(Prospect(f"'{name}' at a finer resolution", False, text))
+    return found
+
+
+def _coarseness(values: Floats) -> float:
+    """Return the usual distance of neighbouring values over their range, where many samples share few values."""
+    different = np.unique(values)
+    if different.size < 2 or different.size > values.size / 10:
+        return 0.0
+    return float(np.median(np.diff(different)) / (different[-1] - different[0]))
+
+
+def pool(sources: tuple[Source, ...], name: str) -> Floats:
     """Return a channel of all recordings, one after the other."""
     return np.concatenate([source.recording[name] for source in sources])
 
@@ -109,7 +163,7 @@ def _check_sizes(source: Source, procedure: str) -> None:
         if abs(values[worst]) > _LARGEST_NUMBER:
             raise IdentificationError(
                 f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}, more than any "
-                f"sensor shows: the line is damaged"
+                f"sensor measures: the line is damaged"
             )
 
 

@@ -7,13 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.identification.bench.curve_fit import CLEARLY_WORSE, CurveFit, fit_curve
-from ppafo.identification.bench.evidence import Evidence, Number
-from ppafo.identification.bench.leak_laws import Chambers, Law, decay_times, difference_in_time
-from ppafo.identification.bench.leak_opening import Opening
-from ppafo.identification.bench.regression import CHANCE, exceeds_chance
-from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.bench.curve_fit import CHANCE, CLEARLY_WORSE, CurveFit, exceeds_chance, fit_curve
+from ppafo.identification.bench.flow_laws import Chambers, Law, Opening, decay_times, difference_in_time
+from ppafo.identification.bench.result import Evidence, Number
+from ppafo.identification.estimate import Check, Estimate, Verdict
 from ppafo.signals.recording import Floats
 
 EDGE = 20
@@ -91,7 +88,7 @@ def fit_law(
     ones = np.ones(1 + len(decays))
     fit = solve(lambda values: _misfits(decays, curves(values)) / scale, ones, 1e-3 * ones, 1e3 * ones, confidence)
     wide = float(fit.half_widths[0]) * rate
-    return _fitted(
+    return _law_of_fit(
         law.name, law.formula, law.rate_unit, float(fit.values[0]) * rate, wide, fit, scale, count, curves(fit.values)
     )
 
@@ -123,7 +120,7 @@ def fit_relaxation(decays: tuple[Decay, ...], count: float, confidence: float) -
         (start + drop * float(fit.values[place]), drop * float(fit.half_widths[place]))
         for place, start, drop in zip(range(2, fit.values.size, 2), starts, drops, strict=True)
     )
-    fitted = _fitted(RELAXATION, formula, "1/s", rate, wide, fit, scale, count, curves(fit.values))
+    fitted = _law_of_fit(RELAXATION, formula, "1/s", rate, wide, fit, scale, count, curves(fit.values))
     return replace(fitted, plateaus=plateaus)
 
 
@@ -131,7 +128,7 @@ def _misfits(decays: tuple[Decay, ...], curves: list[Floats]) -> Floats:
     return np.concatenate([decay.difference - curve for decay, curve in zip(decays, curves, strict=True)])
 
 
-def _fitted(
+def _law_of_fit(
     name: str,
     formula: str,
     unit: str,
@@ -156,7 +153,7 @@ def best_law(fitted: list[FittedLaw]) -> FittedLaw:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """Whether an area may be told, and why."""
+    """Whether an area may be reported, and why."""
 
     verdict: Verdict
     reason: str
@@ -170,12 +167,12 @@ class Judgement:
 def judge(fitted: list[FittedLaw], best: FittedLaw, noise: float, span: float, unit: str) -> Judgement:
     """Return whether the orifice law, the first, describes the data: it must come close to what a smooth curve reaches.
 
-    Where it is clearly the best law and misses by less than a hundredth of ``span``, the value is told as a weak one.
+    Where it is clearly the best law and misses by less than a hundredth of ``span``, the value is reported as weak.
     """
     orifice = fitted[0]
     rivals = [item.name for item in fitted[1:] if item.criterion - orifice.criterion < CLEARLY_WORSE]
     behind = orifice.criterion - best.criterion
-    times = f"{orifice.rms / noise:.2f} times as far ({DESCRIBES:g} is good)"
+    times = f"{orifice.rms / noise:.2f} times as much ({DESCRIBES:g} is good)"
     misses = f"the orifice law misses the data by {orifice.rms:.3g} {unit} rms, "
     misses += f"a smooth curve by {noise:.3g} {unit}: {times}"
     is_close = orifice.rms <= DESCRIBES * noise and behind <= CLEARLY_WORSE
@@ -184,17 +181,17 @@ def judge(fitted: list[FittedLaw], best: FittedLaw, noise: float, span: float, u
     if not is_close and not rivals and orifice.rms <= _CLOSE * span:
         return Judgement(
             "weak",
-            f"{misses}; it is by far the best law, but something else takes part, such as the gas's temperature; "
-            f"the interval covers what of that shows in the residuals",
+            f"{misses}; it is by far the best law, but something else contributes, such as the gas temperature; the "
+            f"interval covers what of that appears in the residuals",
         )
     if not is_close:
         compared = f"{misses}, and {decides}" if behind > CLEARLY_WORSE else misses
-        return Judgement("law does not describe the data", f"{compared}; an area would be a pretence")
+        return Judgement("law does not describe the data", f"{compared}; an area would be meaningless")
     if rivals:
         return Judgement(
             "weak",
-            f"{misses}; but {' and '.join(rivals)} fit as well: over so small a range of pressure the laws cannot be "
-            f"told apart, and the value holds at these pressures only",
+            f"{misses}; but {' and '.join(rivals)} fit as well: the laws cannot be distinguished over so small a range "
+            f"of pressure, and the value holds at these pressures only",
         )
     return Judgement("identified", misses)
 
@@ -209,7 +206,8 @@ def law_checks(fitted: list[FittedLaw], best: FittedLaw, judged: Judgement, unit
         for item in fitted
         if item is not best and item.name != RELAXATION and item.criterion - best.criterion < CLEARLY_WORSE
     ]
-    found = f"{best.name} is clearly the best" if not rivals else f"{best.name} and {' and '.join(rivals)} fit alike"
+    alike = f"{best.name} and {' and '.join(rivals)} fit equally well"
+    found = alike if rivals else f"{best.name} is clearly the best"
     ranking = sorted(fitted, key=lambda item: item.criterion)
     listed = ", ".join(
         f"{item.name} {item.rms:.3g} {unit} ({item.criterion - best.criterion:+.3g})" for item in ranking
@@ -241,10 +239,8 @@ def leak_or_relaxation(
     name, (plateau, _) = "leak or relaxation", relaxation.plateaus[0]
     if len(decays) == 1:
         rate = relaxation.rate / (1.0 + decays[0].chambers.volume_ratio)
-        text = (
-            f"cannot be said: a linear leak of {rate:.3g} 1/s and sensors whose difference is off by {plateau:.4g} Pa "
-        )
-        return Check(name, False, f"{text}give the same curve; a decay from another pressure tells them apart"), None
+        text = f"undecided: a linear leak of {rate:.3g} 1/s and a sensor offset of {plateau:.4g} Pa in the difference "
+        return Check(name, False, f"{text}give the same curve; a decay from another pressure distinguishes them"), None
     offset = _shared_plateau(decays, confidence, lambda shared, _top: shared)
     share = _shared_plateau(decays, confidence, lambda shared, top: shared * top)
     freedom = max(1, int(count) - 1 - 2 * len(decays))
@@ -257,16 +253,14 @@ def leak_or_relaxation(
 
     is_offset, is_share = explains(offset), explains(share)
     if is_offset and is_share:
-        text = "cannot be said: a linear leak with sensors that are off, and a relaxation, explain these decays alike"
-        return Check(name, False, f"{text}; they begin at pressures too near each other"), None
+        text = "undecided: a linear leak with a sensor offset and a relaxation explain these decays equally well"
+        return Check(name, False, f"{text}; they begin at pressures too close to each other"), None
     if not is_offset:
-        return Check(name, True, "a relaxation: no zero of the sensors, the same in all decays, explains them"), None
+        return Check(name, True, "a relaxation: no sensor offset common to all decays explains them"), None
     units = np.array([1.0 / longest, scale])
     (rate, zero), wide = (offset.values[:2] * units).tolist(), (offset.half_widths[:2] * units).tolist()
     found = OffsetLeak((rate, wide[0]), (zero, wide[1]))
-    return Check(
-        name, True, f"a linear leak: sensors that are off by {found.offset[0]:.4g} Pa explain all decays"
-    ), found
+    return Check(name, True, f"a linear leak: a sensor offset of {found.offset[0]:.4g} Pa explains all decays"), found
 
 
 def _scales(decays: tuple[Decay, ...]) -> tuple[float, float]:
@@ -299,7 +293,7 @@ def _shared_plateau(
 
 
 def condition_of(best: FittedLaw, which: Check) -> str:
-    """Return where the rate of the best law holds: only if that law does, where the laws cannot be told apart."""
+    """Return where the rate of the best law holds: only if that law does, where the laws cannot be distinguished."""
     return "" if which.holds else f"if the leak is {best.name}"
 
 
@@ -311,10 +305,10 @@ def opening_estimates(
         nothing = math.nan
         missing = Number(opening.path, opening.unit, nothing, nothing, judged.sentence)
         return (evidence.estimate(missing, nothing, judged.verdict),)
-    return tuple(weakened(evidence.calibrated(number), judged) for number in numbers)
+    return tuple(weaken(evidence.with_calibration(number), judged) for number in numbers)
 
 
-def weakened(estimate: Estimate, judged: Judgement) -> Estimate:
+def weaken(estimate: Estimate, judged: Judgement) -> Estimate:
     """Return the estimate, called weak where its law is."""
     is_too_sure = estimate.verdict in ("identified", "holds for this model only") and judged.verdict == "weak"
     return replace(estimate, verdict="weak") if is_too_sure else estimate

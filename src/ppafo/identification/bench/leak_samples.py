@@ -7,19 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.gas_flow import GasAt
-from ppafo.identification.bench.inputs import check_absolute, check_moves, check_sources, window
+from ppafo.identification.bench.flow_laws import Chambers, GasAt, Opening
+from ppafo.identification.bench.inputs import check_absolute, check_moves, check_no_gap, check_sources, window
 from ppafo.identification.bench.leak_fits import EDGE, Decay
-from ppafo.identification.bench.leak_laws import Chambers
-from ppafo.identification.bench.leak_opening import Opening
 from ppafo.identification.source import Source
 from ppafo.signals import Recording
-from ppafo.signals.faults import longest_gap, plateaus, stands_out
+from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 
-PROCEDURE = "vane_leak"
+PROCEDURE = "vane-leak"
 CHANNELS = ("pressure_1", "pressure_2")
-FEWEST_SAMPLES = 20
+MINIMUM_SAMPLES = 20
 STANDS_STILL = 0.02
 """Change of a pressure over that of the other, up to which a chamber counts as a room."""
 
@@ -50,14 +48,16 @@ class VaneLeakSettings:
         return Opening(self.gas, self.discharge_coefficient, self.critical_ratio)
 
 
-def falling(sources: tuple[Source, ...], settings: VaneLeakSettings) -> tuple[tuple[Decay, ...], tuple[float, ...]]:
+def falling_decays(
+    sources: tuple[Source, ...], settings: VaneLeakSettings
+) -> tuple[tuple[Decay, ...], tuple[float, ...]]:
     """Return the decays in which a leak shows, none where the chambers are tight, with the noise [Pa] of each."""
-    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
     shown = [item for item in (closed_chambers(source, settings) for source in sources) if item.falls]
     return tuple(decay_in(item, settings) for item in shown), tuple(item.noise for item in shown)
 
 
-class Closed(NamedTuple):
+class ClosedChambers(NamedTuple):
     """Two closed chambers: time [s], pressures [Pa] of the fuller and the other, which is the fuller, noise [Pa]."""
 
     time: Floats
@@ -82,13 +82,12 @@ class Closed(NamedTuple):
         return self.drop > 3.0 * self.noise / math.sqrt(EDGE)
 
 
-def closed_chambers(source: Source, settings: VaneLeakSettings) -> Closed:
+def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChambers:
     """Return the chambers of a recording between its start and equal pressures."""
     check_moves(source, PROCEDURE, "pressure_1")
     part = window(source.recording, settings.start, settings.end)
     _check_samples(source, part)
-    for name in CHANNELS:
-        check_absolute(source, PROCEDURE, name)
+    check_absolute(source, PROCEDURE, CHANNELS)
     pair = part["pressure_1"], part["pressure_2"]
     fuller = 1 if np.mean((pair[0] - pair[1])[:EDGE]) > 0.0 else 2
     first, second = pair if fuller == 1 else pair[::-1]
@@ -96,16 +95,16 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> Closed:
     start = float(np.mean(difference[:EDGE]))
     low = np.flatnonzero(difference < _NEARLY_EQUAL * start)
     last = int(low[0]) if low.size else difference.size
-    if last < FEWEST_SAMPLES:
+    if last < MINIMUM_SAMPLES:
         raise IdentificationError(
             f"{source.name}: {PROCEDURE}: only {last} samples lie between start and equal pressures, "
-            f"{FEWEST_SAMPLES} are needed; record faster, or give start"
+            f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
         )
     noise = float(np.std(np.diff(difference[:last]))) / np.sqrt(2.0)
-    return Closed(part.time[:last] - part.time[0], first[:last], second[:last], fuller, noise)
+    return ClosedChambers(part.time[:last] - part.time[0], first[:last], second[:last], fuller, noise)
 
 
-def decay_in(closed: Closed, settings: VaneLeakSettings) -> Decay:
+def decay_in(closed: ClosedChambers, settings: VaneLeakSettings) -> Decay:
     """Return the decay of the pressure difference."""
     difference = closed.difference
     ratio = _volume_ratio(closed, settings)
@@ -117,24 +116,18 @@ def decay_in(closed: Closed, settings: VaneLeakSettings) -> Decay:
 
 def _check_samples(source: Source, part: Recording) -> None:
     """Refuse a gap, and a sensor that was at its limit when the decay began."""
-    skipped = int(np.searchsorted(source.recording.time, part.time[0]))
-    gap = longest_gap(part.time)
-    if gap is not None:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: there is a gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s "
-            f"(sample {skipped + gap.index + 1}); give start or end, so that it lies outside"
-        )
+    skipped = check_no_gap(source, PROCEDURE, part)
     for name in CHANNELS:
         for plateau in plateaus(part[name]):
             if plateau.first < EDGE and stands_out(part[name], plateau):
                 raise IdentificationError(
                     f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {plateau.value:g} Pa for "
-                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and moves only then: the "
-                    f"sensor is saturated, or the chamber was not closed yet; give start"
+                    f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and changes only then: the "
+                    f"sensor is saturated, or the chamber was not yet closed; give start"
                 )
 
 
-def _volume_ratio(closed: Closed, settings: VaneLeakSettings) -> float:
+def _volume_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
     """Return the volume of the emptying chamber over that of the other, 0 where the other is a room."""
     change = float(np.mean(closed.first[:EDGE]) - np.mean(closed.first[-EDGE:]))
     rise = float(np.mean(closed.second[-EDGE:]) - np.mean(closed.second[:EDGE]))
@@ -143,7 +136,7 @@ def _volume_ratio(closed: Closed, settings: VaneLeakSettings) -> float:
     return given_ratio(closed, settings) or max(rise / change, 0.0)
 
 
-def given_ratio(closed: Closed, settings: VaneLeakSettings) -> float:
+def given_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
     """Return the volume of the fuller chamber over that of the other; 0 where one of them is not known."""
     if settings.volume_1 is None or settings.volume_2 is None:
         return 0.0

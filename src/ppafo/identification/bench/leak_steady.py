@@ -6,7 +6,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
-from ppafo.identification.bench.evidence import Evidence, Number
+from ppafo.identification.bench.flow_laws import LAMINAR, LINEAR, Law, Opening
 from ppafo.identification.bench.inputs import (
     check_absolute,
     check_moves,
@@ -14,7 +14,7 @@ from ppafo.identification.bench.inputs import (
     check_sources,
     kind_of,
     pauses,
-    pooled,
+    pool,
 )
 from ppafo.identification.bench.leak_fits import (
     FittedLaw,
@@ -24,23 +24,20 @@ from ppafo.identification.bench.leak_fits import (
     judge,
     law_checks,
     opening_estimates,
-    weakened,
+    weaken,
 )
-from ppafo.identification.bench.leak_laws import LAMINAR, LINEAR, Law
-from ppafo.identification.bench.leak_opening import Opening
-from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats
 
-PROCEDURE = "vane_leak"
+PROCEDURE = "vane-leak"
 CHANNELS = ("pressure_1", "pressure_2", "mass_flow")
-FEWEST_SAMPLES = 8
+MINIMUM_SAMPLES = 8
 _DEGREE = 3
 _UNITS = {"orifice": "kg/(s Pa)", "laminar": "kg/(s Pa^2)", "linear": "kg/(s Pa)"}
 _SPREAD_FOR_A_ZERO = 0.3
-"""Range of the law's course over its largest value, from which the zero of the meter can be told from the leak."""
+"""Range of the law's course over its largest value, from which the zero of the meter can be separated from the leak."""
 
 
 class _Readings(NamedTuple):
@@ -81,17 +78,16 @@ def steady_leak(
 
 
 def _readings(sources: tuple[Source, ...]) -> _Readings:
-    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
     for source in sources:
         check_moves(source, PROCEDURE, "mass_flow")
         check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])
-    readings = _Readings(*(pooled(sources, name) for name in CHANNELS))
+    readings = _Readings(*(pool(sources, name) for name in CHANNELS))
     for source in sources:
-        for name in CHANNELS[:2]:
-            check_absolute(source, PROCEDURE, name)
+        check_absolute(source, PROCEDURE, CHANNELS[:2])
     if float(readings.difference @ readings.flow) <= 0.0:
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; turn its sign round"
+            f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; reverse its sign"
         )
     return readings
 
@@ -103,14 +99,14 @@ def _noise(readings: _Readings) -> float:
     return float(np.sqrt(np.mean((readings.flow - curve) ** 2) * count / (count - _DEGREE)))
 
 
-class _Fitted(NamedTuple):
-    """A law fitted to steady readings, and the zero of the flow meter, None where it cannot be told apart."""
+class _SteadyFit(NamedTuple):
+    """A law fitted to steady readings, and the zero of the flow meter, None where it cannot be separated."""
 
     law: FittedLaw
     zero: Number | None
 
 
-def _fit(law: Law, readings: _Readings, confidence: float) -> _Fitted:
+def _fit(law: Law, readings: _Readings, confidence: float) -> _SteadyFit:
     """Fit the law's coefficient and, where the pressures differ enough to tell them apart, the meter's zero."""
     shape, flow = law.shape(readings.first, readings.second), readings.flow
     guess, scale = float(shape @ flow / (shape @ shape)), float(np.abs(flow).max())
@@ -129,28 +125,28 @@ def _fit(law: Law, readings: _Readings, confidence: float) -> _Fitted:
     value, half = float(fit.values[0]) * guess, float(fit.half_widths[0]) * guess
     curve = flow - fit.residuals * scale
     unit, widened = _UNITS[law.name], float(fit.widened[0])
-    return _Fitted(FittedLaw(law.name, law.formula, value, half, unit, rms, criterion, (curve,), widened), zero)
+    return _SteadyFit(FittedLaw(law.name, law.formula, value, half, unit, rms, criterion, (curve,), widened), zero)
 
 
 def _zero(fit: CurveFit, scale: float) -> Number:
     value, half = float(fit.values[1]) * scale, float(fit.half_widths[1]) * scale
-    text = "What the flow meter shows without flow, from the law's course over pressure."
+    text = "Reading of the flow meter without flow, from the shape of the law over pressure."
     return Number("vane_leak.flow_zero", "kg/s", value, half, text, scale=scale, widened=float(fit.widened[1]))
 
 
 def _estimates(
-    evidence: Evidence, opening: Opening, fitted: list[_Fitted], best: FittedLaw, judged: Judgement, where: str
+    evidence: Evidence, opening: Opening, fitted: list[_SteadyFit], best: FittedLaw, judged: Judgement, where: str
 ) -> tuple[Estimate, ...]:
     orifice, zero = fitted[0]
-    text = f"In steady flow. {opening.gas.temperature_told}; {evidence.calibration_told}. {judged.sentence}"
+    text = f"In steady flow. {opening.gas.temperature_text}; {evidence.calibration_text}. {judged.sentence}"
     numbers = opening.numbers(orifice.rate, orifice.half_width, text, orifice.widened)
     listed = list(opening_estimates(evidence, opening, numbers, judged))
-    listed += [] if zero is None else [evidence.plain(zero)]
+    listed += [] if zero is None else [evidence.without_calibration(zero)]
     if best is not orifice:
         text = f"Coefficient of the law that fits best: {best.formula}."
         path = f"vane_leak.{best.name}_coefficient"
         number = Number(path, best.rate_unit, best.rate, best.half_width, text, None, 0.0, best.widened, where)
-        listed.append(weakened(evidence.calibrated(number), judged))
+        listed.append(weaken(evidence.with_calibration(number), judged))
     return tuple(listed)
 
 
@@ -165,5 +161,5 @@ def _panels(difference: Floats, flow: Floats, orifice: FittedLaw, best: FittedLa
     axis = ("Pressure difference", "Pa_d")
     return (
         Panel("Steady leak", *axis, "Flow", "kg/s", tuple(shown)),
-        Panel("Residuals", *axis, "Measured less fitted", "kg/s", tuple(rest)),
+        Panel("Residuals", *axis, "Measured minus fitted", "kg/s", tuple(rest)),
     )

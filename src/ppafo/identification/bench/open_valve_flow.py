@@ -8,8 +8,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CLEARLY_WORSE, CurveFit, fit_curve
-from ppafo.identification.bench.evidence import Evidence, Number
-from ppafo.identification.bench.gas_flow import GasAt, iso6358_shape, orifice_shape
+from ppafo.identification.bench.flow_laws import GasAt, iso6358_shape, orifice_shape
 from ppafo.identification.bench.inputs import (
     check_absolute,
     check_moves,
@@ -17,19 +16,17 @@ from ppafo.identification.bench.inputs import (
     check_sources,
     kind_of,
     pauses,
-    pooled,
+    pool,
 )
-from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate
+from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series
+from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.signals.recording import Floats
 
-PROCEDURE = "open_valve_flow"
+PROCEDURE = "open-valve-flow"
 CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
-FEWEST_SAMPLES = 5
+MINIMUM_SAMPLES = 5
 _FULLY_OPEN = 0.99
 _LARGEST_CRITICAL_RATIO = 0.95
 _SPREAD_OF_RATIOS = 0.15
@@ -75,8 +72,11 @@ class OpenReadings:
 
 
 def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings) -> BenchResult:
-    """Return Cd A [m^2] and Cd [-], and C [m^3/(s Pa)] and b [-] where the pressure ratios span enough; (6), (7)."""
-    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
+    """Return Cd A [m^2] and Cd [-], and C [m^3/(s Pa)] and b [-] where the pressure ratios span enough; (6), (7).
+
+    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
+    """
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
     for source in sources:
         _check_source(source, settings.gas)
     points = open_readings(sources)
@@ -90,7 +90,7 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
     evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow(settings.calibration))
     estimates = _estimates(evidence, settings, orifice, sonic)
     checks = _checks(settings, orifice, sonic)
-    one_ratio = "one pressure ratio, or choked flow alone: the orifice law and C with b cannot be told apart"
+    one_ratio = "one pressure ratio, or choked flow alone: the orifice law and C with b cannot be distinguished"
     remarks = (*(() if sonic is not None else (one_ratio,)), *pauses(sources))
     text = f"{points.flow.size} readings, pressure ratios {points.ratio.min():.3g} to {points.ratio.max():.3g}; "
     text += f"Cd A = {orifice.values[0] * 1e6:.4g} mm^2"
@@ -99,10 +99,26 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
     return BenchResult(PROCEDURE, text, estimates, checks, panels, kind_of(sources), remarks)
 
 
+def flow_prospects(sources: tuple[Source, ...], settings: OpenValveFlowSettings) -> tuple[Prospect, ...]:
+    """Return whether Cd A, Cd, and C with b can be had from the pressure ratios that were recorded."""
+    check_sources(sources, PROCEDURE, CHANNELS, 1)
+    readings = open_readings(sources)
+    ratio = readings.ratio
+    spread = f"{ratio.size} readings with the valve open, pressure ratios {ratio.min():.3g} to {ratio.max():.3g}"
+    has_area = bool(settings.area)
+    area = "over the area of the set" if has_area else "the set has no area of the valve: only the product Cd A"
+    both = spans_enough(readings, settings.gas)
+    needed = spread if both else f"{spread}: choked and subsonic flow are needed"
+    return (
+        Prospect("effective area", True, spread),
+        Prospect("discharge coefficient", has_area, area),
+        Prospect("C and b of ISO 6358", both, needed),
+    )
+
+
 def _check_source(source: Source, gas: GasAt) -> None:
     """Refuse pressures that are not absolute, and a flow that stays where these would have it change."""
-    for name in CHANNELS[:2]:
-        check_absolute(source, PROCEDURE, name)
+    check_absolute(source, PROCEDURE, CHANNELS[:2])
     upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
     driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
     check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
@@ -110,11 +126,11 @@ def _check_source(source: Source, gas: GasAt) -> None:
 
 def open_readings(sources: tuple[Source, ...]) -> OpenReadings:
     """Return the readings with the valve fully open; exchanged pressures and a valve that never was are refused."""
-    upstream, downstream, flow = (pooled(sources, name) for name in CHANNELS)
+    upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
     is_open = np.concatenate([_is_open(source) for source in sources])
-    if is_open.sum() < FEWEST_SAMPLES:
+    if is_open.sum() < MINIMUM_SAMPLES:
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE} needs {FEWEST_SAMPLES} readings with the valve fully open, "
+            f"{sources[0].name}: {PROCEDURE} needs {MINIMUM_SAMPLES} readings with the valve fully open, "
             f"command 1 or -1; there are {int(is_open.sum())}"
         )
     points = OpenReadings(upstream[is_open], downstream[is_open], np.abs(flow[is_open]))
@@ -122,7 +138,7 @@ def open_readings(sources: tuple[Source, ...]) -> OpenReadings:
     if wrong.size > points.flow.size // 10:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: downstream_pressure is at or above upstream_pressure in {wrong.size} of "
-            f"{points.flow.size} readings; are the two columns exchanged?"
+            f"{points.flow.size} readings; are the two columns swapped?"
         )
     if points.flow.max() <= 0.0:
         check_moves(sources[0], PROCEDURE, "mass_flow")
@@ -188,7 +204,7 @@ def _sonic_fit(points: OpenReadings, settings: OpenValveFlowSettings) -> CurveFi
 def _estimates(
     evidence: Evidence, settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None
 ) -> tuple[Estimate, ...]:
-    given = f"{settings.gas.temperature_told}; {evidence.calibration_told}"
+    given = f"{settings.gas.temperature_text}; {evidence.calibration_text}"
     product = Number(
         "open_valve_flow.effective_area",
         "m^2",
@@ -198,12 +214,12 @@ def _estimates(
         lowest=0.0,
         widened=orifice.widened[0],
     )
-    told = [evidence.calibrated(number) for number in (*_coefficient(product, settings, given), product)]
+    told = [evidence.with_calibration(number) for number in (*_coefficient(product, settings, given), product)]
     return (*told, *_sonic_estimates(evidence, settings, sonic, given))
 
 
 def _coefficient(product: Number, settings: OpenValveFlowSettings, given: str) -> list[Number]:
-    """Return Cd where the set has an area and the orifice law is asked for."""
+    """Return Cd where the set has an area and the orifice law is requested."""
     if settings.law != "orifice" or not settings.area:
         return []
     text = f"Cd A over the set's area of {settings.area * 1e6:.4g} mm^2, taken as exact. {given}."
@@ -218,8 +234,8 @@ def _sonic_estimates(
     """Return C and b; a gain that both pressures share leaves b, their ratio, as it is."""
     if sonic is None:
         return ()
-    section = settings.path if settings.law == "iso6358" else PROCEDURE
-    trade = f"Errors of C and b go together with {sonic.correlation[0, 1]:+.2f}"
+    section = settings.path if settings.law == "iso6358" else "open_valve_flow"
+    trade = f"Errors of C and b are correlated by {sonic.correlation[0, 1]:+.2f}"
     forms = (
         ("sonic_conductance", "m^3/(s Pa)", f"C of ISO 6358. {trade}. {given}."),
         ("critical_ratio", "", f"b of ISO 6358. {trade}."),
@@ -229,11 +245,11 @@ def _sonic_estimates(
         Number(f"{section}.{name}", unit, value, half, text, lowest=0.0, widened=widened)
         for (name, unit, text), value, half, widened in fitted
     )
-    return evidence.calibrated(conductance), evidence.plain(ratio)
+    return evidence.with_calibration(conductance), evidence.without_calibration(ratio)
 
 
 def _checks(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None) -> tuple[Check, ...]:
-    reported = sonic if settings.law == "iso6358" and sonic is not None else orifice
+    reported = _law_to_report(settings, orifice, sonic)
     noise = "of the largest flow"
     listed = [
         Check("residuals", reported.rms <= _GOOD_SHARE, f"the law misses the flow by {reported.rms:.2%} {noise} (rms)")
@@ -246,8 +262,12 @@ def _checks(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit 
     return tuple(listed)
 
 
+def _law_to_report(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None) -> CurveFit:
+    return sonic if settings.law == "iso6358" and sonic is not None else orifice
+
+
 def _which_law(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit) -> Check:
-    """Ask whether the readings clearly prefer the law that was not asked for (Akaike's criterion)."""
+    """Return whether the readings clearly prefer the law that was not requested (Akaike's criterion)."""
     count = min(orifice.effective, sonic.effective)
     gain = count * math.log(max(orifice.rms, 1e-15) / max(sonic.rms, 1e-15)) * 2.0 - 2.0
     better = (
@@ -273,25 +293,11 @@ def _panels(
     if sonic is not None:
         curve = sonic.values[0] * gas.flow_per_sonic_conductance * iso6358_shape(ones, ratios, float(sonic.values[1]))
         shown.append(Series("ISO 6358", ratios, curve, "law" if settings.law == "iso6358" else "other law"))
-    modelled = points.flow - orifice.residuals * float(points.flow.max())
-    if settings.law == "iso6358" and sonic is not None:
-        modelled = points.flow - sonic.residuals * float(points.flow.max())
+    modelled = points.flow - _law_to_report(settings, orifice, sonic).residuals * float(points.flow.max())
     ends = np.array([0.0, float(points.flow.max())])
+    compared = (Series("", points.flow, modelled, "measured"), Series("", ends, ends, "law"))
+    ratio_axis = ("Downstream over upstream pressure", "-")
     return (
-        Panel(
-            "Open-valve flow",
-            "Downstream over upstream pressure",
-            "-",
-            "Flow over upstream pressure",
-            "kg/(s Pa)",
-            tuple(shown),
-        ),
-        Panel(
-            "Fitted against measured",
-            "Measured flow",
-            "kg/s",
-            "Fitted flow",
-            "kg/s",
-            (Series("", points.flow, modelled, "measured"), Series("", ends, ends, "law")),
-        ),
+        Panel("Open-valve flow", *ratio_axis, "Flow over upstream pressure", "kg/(s Pa)", tuple(shown)),
+        Panel("Fitted against measured", "Measured flow", "kg/s", "Fitted flow", "kg/s", compared),
     )

@@ -1,12 +1,38 @@
-"""What a bench procedure returns: estimates, checks of the residuals, and what to draw."""
+"""What a bench procedure returns: estimates with verdicts, checks of the residuals, and what to draw, in SI units."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
-from ppafo.identification.bench.picture import Panel
-from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import WORTH_TELLING, Check, Estimate, Prospect, Verdict
 from ppafo.signals import RecordingKind
+from ppafo.signals.recording import Floats
+
+Role = Literal["rising", "falling", "measured", "second", "law", "other law"]
+"""How a series looks: crosses, circles, dots in one or another colour, a line, a thin line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Points or a line: values along both axes in the units of the panel; an empty name stays out of the legend."""
+
+    name: str
+    x: Floats
+    y: Floats
+    role: Role
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One panel: what its axes are, their SI units, and what is drawn."""
+
+    title: str
+    x_name: str
+    x_unit: str
+    y_name: str
+    y_unit: str
+    series: tuple[Series, ...]
+
 
 IDENTIFIED_WITHIN = 0.25
 """Half width over value up to which a value is called identified."""
@@ -57,6 +83,98 @@ def verdict_of(value: float, low: float, high: float, scale: float | None = None
     return "holds for this model only" if is_capped else "identified"
 
 
-def counted(number: int, noun: str) -> str:
+def count_of(number: int, noun: str) -> str:
     """Return a number with its noun, ``1 decay`` or ``3 decays``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+_ANY = -math.inf
+_NOTHING = 1.0e-9
+_CAPPED: Verdict = "holds for this model only"
+_MISSED = "The law misses the readings by more than they scatter: another law of the same device has another value."
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A fitted number: where it belongs, its SI unit, half the width of its interval, its explanation.
+
+    ``scale`` stands in for the size of a value that may be zero; ``lowest`` is where its interval ends at the latest;
+    ``widened`` is how much wider than the scatter's the interval is, because the law misses the readings. ``condition``
+    says where the value holds, if the device has another one elsewhere.
+    """
+
+    path: str
+    unit: str
+    value: float
+    half_width: float
+    explanation: str
+    scale: float | None = None
+    lowest: float = _ANY
+    widened: float = 1.0
+    condition: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Recordings, confidence of the intervals, and the relative uncertainty of the sensors' gain, same confidence [-].
+
+    A gain that is wrong shows in no residual: it can only be stated.
+    """
+
+    recordings: tuple[str, ...]
+    confidence: float = 0.95
+    calibration: float = 0.0
+
+    def with_calibration(self, number: Number) -> Estimate:
+        """Return the estimate of a number to which a wrong gain would pass on, with the calibration in its interval."""
+        return self.estimate(number, math.hypot(number.half_width, self.calibration * number.value))
+
+    def without_calibration(self, number: Number) -> Estimate:
+        """Return the estimate of a number that no gain touches, such as a time constant."""
+        return self.estimate(number, number.half_width)
+
+    def at_or_above_zero(self, number: Number) -> Estimate:
+        """Return the estimate of a number that the fit could not bring below zero, and whether it stopped there."""
+        bounded = replace(number, lowest=0.0)
+        if number.value > _NOTHING * (number.value + number.half_width):
+            return self.without_calibration(bounded)
+        text = f"The fit would put it below zero, so it is held at zero. {number.explanation}"
+        return self.estimate(replace(bounded, explanation=text), number.half_width, "at its bound")
+
+    def estimate(self, number: Number, half_width: float, verdict: Verdict | None = None) -> Estimate:
+        """Return the estimate of a number with an interval of a half width of its own, in its unit."""
+        value, half = float(number.value), float(half_width)
+        low, high = value - half, value + half
+        is_missed = float(number.widened) >= WORTH_TELLING
+        told = verdict or verdict_of(value, low, high, number.scale, is_missed or bool(number.condition))
+        missed = f" {_MISSED}" if is_missed and told == _CAPPED else ""
+        return Estimate(
+            path=number.path,
+            value=value,
+            unit=number.unit,
+            low=max(number.lowest, low),
+            high=high,
+            verdict=told,
+            explanation=f"{number.explanation}{missed}",
+            recordings=self.recordings,
+            confidence=self.confidence,
+            widened=float(number.widened),
+            condition=number.condition,
+        )
+
+    @property
+    def calibration_text(self) -> str:
+        """The statement about the calibration, as the end of a sentence."""
+        if self.calibration:
+            return f"the interval includes {self.calibration:.2%} for the calibration of the sensors"
+        return "the interval does not include the calibration of the sensors"
+
+
+def prospect_of(name: str, half_width: float, size: float, where: str) -> Prospect:
+    """Return whether a number can be had, from half the width that scatter and design alone would give it.
+
+    Slow disturbances and a law that misses widen an interval later; nothing makes it narrower.
+    """
+    share = float(half_width) / abs(size) if size else math.inf
+    width = f"{share:.2g} times its size" if share >= 0.1 else f"{share:.2%}"
+    return Prospect(name, share < WEAK_WITHIN, f"expected within {width} at best; {where}")

@@ -13,14 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.evidence import Evidence, Number
+from ppafo.identification.bench.curve_fit import CHANCE, quantile
 from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pauses
-from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.regression import CHANCE, Regression, labels_of, regress
-from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.bench.static_readings import PROCEDURE, Readings, readings_of
-from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate
+from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series, prospect_of
+from ppafo.identification.bench.static_readings import PROCEDURE, Readings, Regression, labels_of, readings_of, regress
+from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats
 
@@ -45,6 +42,7 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
 
     Readings whose direction is 0 belong to no branch and are left out. So is a flat start of the rising branch, where a
     scale that only pulls shows nothing until friction is overcome.
+    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     chosen = settings or StaticTorqueSettings()
     check_sources(sources, PROCEDURE, CHANNELS, 1)
@@ -64,8 +62,8 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     evidence = Evidence(traces(sources), chosen.confidence, chosen.calibration)
     estimates = _estimates(evidence, readings, fit, growing if grows else None, growing)
     if grows:
-        estimates = (*estimates, evidence.calibrated(_at_no_pressure(readings, chosen.confidence)))
-    straight = _straight(readings, grows, chosen.confidence)
+        estimates = (*estimates, evidence.with_calibration(_at_no_pressure(readings, chosen.confidence)))
+    straight = _straight_check(readings, grows, chosen.confidence)
     return BenchResult(
         PROCEDURE,
         _summary(readings, fit, grows),
@@ -75,6 +73,54 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         kind_of(sources),
         pauses(sources),
     )
+
+
+def static_prospects(sources: tuple[Source, ...], settings: StaticTorqueSettings) -> tuple[Prospect, ...]:
+    """Return how well torque constant, static friction and its growth can be had; intervals from scatter and design."""
+    check_sources(sources, PROCEDURE, CHANNELS, 1)
+    readings = readings_of(sources)
+    design = np.stack(
+        [
+            readings.pressure,
+            np.ones_like(readings.pressure),
+            -readings.branch,
+            -readings.branch * (readings.pressure - readings.middle),
+        ],
+        axis=1,
+    )
+    scale = np.sqrt((design**2).mean(axis=0))
+    noise, means = _cells(readings)
+    factor = quantile(settings.confidence, max(1, readings.pressure.size - 4)) * noise
+    inverse = np.linalg.pinv((design / scale).T @ (design / scale))
+    half = factor * np.sqrt(np.diag(inverse)) / scale
+    span = float(np.ptp(readings.pressure))
+    slope = float(np.polyfit(readings.pressure, readings.torque, 1)[0])
+    levels = int(readings.levels.max()) + 1
+    where = f"{levels} pressures over {span / 1e3:.3g} kPa"
+    return (
+        prospect_of("torque constant", half[0], slope, where),
+        prospect_of("static friction", half[2], means, f"both branches at {where}"),
+        Prospect(
+            "growth of the friction",
+            bool(levels > 2 and half[3] * span < abs(means)),
+            f"{half[3] * span:.2g} N m from the lowest to the highest pressure would show",
+        ),
+    )
+
+
+def _cells(readings: Readings) -> tuple[float, float]:
+    """Return the scatter within pressures and branches [N m], about lines of their own, and half their distance."""
+    cells = labels_of([readings.levels, (readings.branch > 0).astype(np.int64)])
+    left, count = 0.0, 0
+    for cell in range(int(cells.max()) + 1):
+        x, y = readings.pressure[cells == cell], readings.torque[cells == cell]
+        if y.size > 2 and np.ptp(x) > 0.0:
+            y = y - np.polyval(np.polyfit(x - x.mean(), y, 1), x - x.mean())
+        left, count = left + float(((y - y.mean()) ** 2).sum()), count + y.size - 1
+    rising = readings.branch > 0
+    line = np.polyfit(readings.pressure, readings.torque, 1)
+    rest = readings.torque - np.polyval(line, readings.pressure)
+    return float(np.sqrt(left / max(count, 1))), 0.5 * float(np.mean(rest[~rising]) - np.mean(rest[rising]))
 
 
 def _fit(
@@ -99,12 +145,12 @@ def _check_order(sources: tuple[Source, ...], fit: Regression) -> None:
     names = ", ".join(source.name for source in sources)
     if fit.coefficients[_SLOPE] <= 0.0:
         raise IdentificationError(
-            f"{names}: {PROCEDURE}: the torque falls with the pressure difference; turn the sign of one channel round"
+            f"{names}: {PROCEDURE}: the torque falls with the pressure difference; reverse the sign of one channel"
         )
     if fit.coefficients[_FRICTION] < -fit.half_widths[_FRICTION]:
         raise IdentificationError(
             f"{names}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
-            f"turn the sign of channel 'direction' round"
+            f"reverse the sign of channel 'direction'"
         )
 
 
@@ -133,13 +179,13 @@ def _estimates(
             widened=growing.widened[_GROWTH],
         ),
     )
-    return tuple(evidence.calibrated(number) for number in numbers)
+    return tuple(evidence.with_calibration(number) for number in numbers)
 
 
 def _torque_constant(evidence: Evidence, fit: Regression) -> Number:
     source = {"independent readings": "the scatter of the readings"}.get(fit.widest, f"the {fit.widest}")
     text = f"Common slope of both branches; residuals scatter by {fit.scatter:.3g} N m; "
-    text += f"the interval comes from {source}; {evidence.calibration_told}."
+    text += f"the interval comes from {source}; {evidence.calibration_text}."
     value, half = fit.coefficients[_SLOPE], fit.half_widths[_SLOPE]
     return Number("actuator.torque_constant", "m^3", value, half, text, widened=fit.widened[_SLOPE])
 
@@ -154,7 +200,9 @@ def _static_torque(readings: Readings, fit: Regression, seen: Regression | None)
         condition = f"at {readings.middle / 1e3:.4g} kPa"
         grown = f"it grows by {growth:.3g} m^3 with the pressure difference (per Pa), from {at_rest:.3g} N m at none, "
         grown += "and a model with one friction torque is right at that pressure only"
-    text = f"Half the distance of the branches at the mean pressure difference of {readings.middle:.4g} Pa; {grown}."
+    text = (
+        f"Half the distance between the branches at the mean pressure difference of {readings.middle:.4g} Pa; {grown}."
+    )
     value, half = fit.coefficients[_FRICTION], fit.half_widths[_FRICTION]
     widened = fit.widened[_FRICTION]
     return Number("friction.static_torque", "N m", value, half, text, widened=widened, condition=condition)
@@ -164,12 +212,12 @@ def _at_no_pressure(readings: Readings, confidence: float) -> Number:
     """Return the friction that is left without a pressure difference, where it grows along a straight line."""
     fit = _fit(readings, True, confidence, at=0.0)
     lowest = float(readings.pressure.min())
-    text = f"Static friction without a pressure difference, on a line through readings from {lowest:.4g} Pa on."
+    text = f"Static friction without a pressure difference, on a line through readings from {lowest:.4g} Pa upwards."
     value, half, widened = fit.coefficients[_FRICTION], fit.half_widths[_FRICTION], fit.widened[_FRICTION]
     return Number("static_torque.friction_at_no_pressure", "N m", value, half, text, widened=widened)
 
 
-def _straight(readings: Readings, grows: bool, confidence: float) -> Check:
+def _straight_check(readings: Readings, grows: bool, confidence: float) -> Check:
     """Ask whether a square of the pressure would explain more, and how much torque it would move."""
     centred = readings.pressure - readings.middle
     square = centred**2 - np.mean(centred**2)
@@ -179,7 +227,9 @@ def _straight(readings: Readings, grows: bool, confidence: float) -> Check:
     holds = bool(not bent.differs_from_zero(bent.coefficients.size - 1) or share < _SAG_THAT_HARMS_NOBODY)
     word = "straight" if holds else "bent"
     return Check(
-        "straight line", holds, f"the branches are {word}: a square term would move {share:.1%} of the torque range"
+        "straight line",
+        holds,
+        f"the branches are {word}: a quadratic term would change the torque by {share:.1%} of its range",
     )
 
 
@@ -231,5 +281,5 @@ def _panels(readings: Readings, fit: Regression) -> tuple[Panel, ...]:
     axis = ("Pressure difference", "Pa_d")
     return (
         Panel("Static torque", *axis, "Torque", "N m", (*main, line)),
-        Panel("Residuals", *axis, "Measured less fitted", "N m", (*rest, zero)),
+        Panel("Residuals", *axis, "Measured minus fitted", "N m", (*rest, zero)),
     )

@@ -15,21 +15,20 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
-from ppafo.identification.bench.evidence import Evidence, Number
-from ppafo.identification.bench.gas_flow import GasAt, orifice_shape
+from ppafo.identification.bench.flow_laws import GasAt, orifice_shape
 from ppafo.identification.bench.inputs import check_absolute, check_moves, check_sources, kind_of, pauses
-from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.check import Check
-from ppafo.identification.estimate import Estimate
+from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series
+from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.signals.faults import FEWEST_AT_LIMIT, plateaus, scatters
 from ppafo.signals.recording import Floats
 
-PROCEDURE = "valve_map"
+_FEWEST_SMALL = 5
+
+PROCEDURE = "valve-map"
 CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
-FEWEST_SAMPLES = 12
-_LEAST_RANGE = 0.5
+MINIMUM_SAMPLES = 12
+_MINIMUM_RANGE = 0.5
 _SEEN_BEYOND = 0.02
 _SMALL_COMMAND = 0.2
 _GOOD_SHARE = 0.05
@@ -58,7 +57,7 @@ class _Map(NamedTuple):
         return bool((self.branch > 0).any() and (self.branch < 0).any())
 
 
-class _Fitted(NamedTuple):
+class _MapFit(NamedTuple):
     """The fitted map, and the area [m^2] in whose multiples gain and full area were fitted."""
 
     fit: CurveFit
@@ -76,15 +75,18 @@ class _Fitted(NamedTuple):
 
 
 def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchResult:
-    """Return dead band [-], gain [m^2], full area Cd A [m^2], saturation and hysteresis [-] from command and flow."""
-    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
-    measured = _measured(sources, settings.gas)
+    """Return dead band [-], gain [m^2], full area Cd A [m^2], saturation and hysteresis [-] from command and flow.
+
+    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
+    """
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    measured = _read_map(sources, settings.gas)
     fitted = _fit(measured, settings.confidence)
     fit, scale = fitted
     evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow(settings.calibration))
     estimates = _estimates(evidence, measured, fitted, settings.path)
     checks = (*_checks(measured, fit), _meter_check(sources))
-    remarks = (*_one_way(measured), *pauses(sources))
+    remarks = (*_one_way_remark(measured), *pauses(sources))
     values = fit.values
     text = (
         f"{measured.command.size} readings; dead band {values[_DEAD_BAND]:.3g}, hysteresis {values[_HYSTERESIS]:.3g}, "
@@ -93,9 +95,23 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     return BenchResult(PROCEDURE, text, estimates, checks, _panels(measured, fit, scale), kind_of(sources), remarks)
 
 
+def map_prospects(sources: tuple[Source, ...], _settings: ValveMapSettings) -> tuple[Prospect, ...]:
+    """Return whether dead band, both directions and hysteresis can be had from the commands that were given."""
+    command = np.concatenate([source.recording["command"] for source in sources])
+    small = int((np.abs(command) < _SMALL_COMMAND).sum())
+    low, high = float(command.min()), float(command.max())
+    ways = is_two_way(sources)
+    both = low < -0.1 and high > 0.1
+    return (
+        Prospect("dead band", small >= _FEWEST_SMALL, f"{small} commands below {_SMALL_COMMAND:g}"),
+        Prospect("both directions", both, f"commands from {low:.3g} to {high:.3g}"),
+        Prospect("hysteresis", ways, "commands rise and fall" if ways else "the command goes one way only"),
+    )
+
+
 def is_two_way(sources: tuple[Source, ...]) -> bool:
     """Return whether commands both rise and fall."""
-    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
     branches = np.concatenate([_branch(source) for source in sources])
     return bool((branches > 0).any() and (branches < 0).any())
 
@@ -109,14 +125,13 @@ def area_of_command(
     return np.asarray(np.sign(shifted) * size)
 
 
-def _measured(sources: tuple[Source, ...], gas: GasAt) -> _Map:
+def _read_map(sources: tuple[Source, ...], gas: GasAt) -> _Map:
     commands, areas, branches = [], [], []
     for source in sources:
         recording = source.recording
         check_moves(source, PROCEDURE, "command")
         check_moves(source, PROCEDURE, "mass_flow")
-        for name in CHANNELS[2:]:
-            check_absolute(source, PROCEDURE, name)
+        check_absolute(source, PROCEDURE, CHANNELS[2:])
         command = recording["command"]
         wrong = np.flatnonzero(np.abs(command) > 1.0 + 1e-9)
         if wrong.size:
@@ -130,15 +145,15 @@ def _measured(sources: tuple[Source, ...], gas: GasAt) -> _Map:
         commands.append(command[usable])
         branches.append(_branch(source)[usable])
     measured = _Map(np.concatenate(commands), np.concatenate(areas), np.concatenate(branches))
-    if np.ptp(measured.command) < _LEAST_RANGE:
+    if np.ptp(measured.command) < _MINIMUM_RANGE:
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the command moves by {np.ptp(measured.command):.3g} only; "
-            f"{_LEAST_RANGE:g} or more is needed to see dead band and gain"
+            f"{sources[0].name}: {PROCEDURE}: the command covers a range of only {np.ptp(measured.command):.3g}; "
+            f"{_MINIMUM_RANGE:g} or more is needed to identify dead band and gain"
         )
     if float(measured.command @ measured.area) <= 0.0:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: flow into chamber 1 falls with the command; "
-            f"turn the sign of one of them round"
+            f"reverse the sign of one of them"
         )
     return measured
 
@@ -152,7 +167,7 @@ def _branch(source: Source) -> Floats:
     return signs[last]
 
 
-def _fit(measured: _Map, confidence: float) -> _Fitted:
+def _fit(measured: _Map, confidence: float) -> _MapFit:
     """Fit on areas over the largest one; values are dead band, gain, full area (both over the largest), hysteresis."""
     scale = float(np.abs(measured.area).max())
     widest = 0.5 if measured.is_two_way else 1e-9
@@ -164,23 +179,25 @@ def _fit(measured: _Map, confidence: float) -> _Fitted:
     lower[_GAIN], lower[_FULL] = 1e-3, 1e-2
     starts = [np.array([band, 1.0 / (1.0 - band), 0.95, 0.25 * widest]) for band in (0.02, 0.15, 0.35)]
     fits = [fit_curve(residuals, start, lower, upper, confidence, (measured.command,)) for start in starts]
-    return _Fitted(min(fits, key=lambda fit: fit.rms), scale)
+    return _MapFit(min(fits, key=lambda fit: fit.rms), scale)
 
 
-def _estimates(evidence: Evidence, measured: _Map, fitted: _Fitted, path: str) -> tuple[Estimate, ...]:
+def _estimates(evidence: Evidence, measured: _Map, fitted: _MapFit, path: str) -> tuple[Estimate, ...]:
     """Return what the map has; a wrong gain of the sensors passes on to areas, not to commands."""
-    band = fitted.number(_DEAD_BAND, f"{path}.dead_band", "Command below which nothing flows, both ways alike.")
+    band = fitted.number(
+        _DEAD_BAND, f"{path}.dead_band", "Command below which nothing flows, the same in both directions."
+    )
     gain = fitted.area(_GAIN, "valve_map.gain", "Effective area Cd A per command beyond the dead band.")
-    listed = [evidence.plain(replace(band, scale=_SMALL_COMMAND)), evidence.calibrated(gain)]
+    listed = [evidence.without_calibration(replace(band, scale=_SMALL_COMMAND)), evidence.with_calibration(gain)]
     saturation = _saturation(fitted.fit)
     if saturation.value < float(np.abs(measured.command).max()) - _SEEN_BEYOND:
         text = f"The valve is fully open from a command of {saturation.value:.3g} on; Cd A there."
-        listed.append(evidence.calibrated(fitted.area(_FULL, "valve_map.full_area", text)))
-        listed.append(evidence.plain(saturation))
+        listed.append(evidence.with_calibration(fitted.area(_FULL, "valve_map.full_area", text)))
+        listed.append(evidence.without_calibration(saturation))
     if measured.is_two_way:
         text = "Width between the curves for a rising and a falling command."
         width = fitted.number(_HYSTERESIS, "valve_map.hysteresis", text)
-        listed.append(evidence.plain(replace(width, scale=_SMALL_COMMAND)))
+        listed.append(evidence.without_calibration(replace(width, scale=_SMALL_COMMAND)))
     return tuple(listed)
 
 
@@ -204,7 +221,7 @@ def _checks(measured: _Map, fit: CurveFit) -> tuple[Check, ...]:
         "residuals", fit.rms <= _GOOD_SHARE, f"the map misses the opening by {fit.rms:.2%} of the full one (rms)"
     )
     listed = [fits]
-    if not _one_way(measured):
+    if not _one_way_remark(measured):
         sides = [float(np.mean(fit.residuals[sign * measured.command > 0.1])) * sign for sign in (1.0, -1.0)]
         apart = abs(sides[0] - sides[1])
         text = f"the two directions differ by {apart:.2%} of the full opening"
@@ -214,10 +231,10 @@ def _checks(measured: _Map, fit: CurveFit) -> tuple[Check, ...]:
     return (*listed, Check("hysteresis seen", measured.is_two_way, text))
 
 
-def _one_way(measured: _Map) -> tuple[str, ...]:
-    """Return a remark where the valve was opened one way only: nothing can be said of the other."""
+def _one_way_remark(measured: _Map) -> tuple[str, ...]:
+    """Return a remark where the valve was opened one way only: the other remains unknown."""
     both = bool((measured.command > 0.1).any() and (measured.command < -0.1).any())
-    return () if both else ("only one direction was recorded: whether the other is alike is unknown",)
+    return () if both else ("only one direction was recorded: whether the other behaves the same is unknown",)
 
 
 def _meter_check(sources: tuple[Source, ...]) -> Check:
@@ -254,7 +271,7 @@ def _panels(measured: _Map, fit: CurveFit, scale: float) -> tuple[Panel, ...]:
             "Residuals",
             "Command",
             "-",
-            "Measured less fitted",
+            "Measured minus fitted",
             "m^2",
             (Series("", measured.command, rest, "measured"),),
         ),

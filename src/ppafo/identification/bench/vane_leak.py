@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.curve_fit import effective_samples, fit_curve, solve_curve
-from ppafo.identification.bench.evidence import Evidence, Number
+from ppafo.identification.bench.curve_fit import CLEARLY_WORSE, effective_samples, fit_curve, solve_curve
+from ppafo.identification.bench.flow_laws import LAMINAR, LINEAR, decay_times
 from ppafo.identification.bench.inputs import check_sources, kind_of
 from ppafo.identification.bench.leak_fits import (
     Decay,
@@ -27,21 +27,29 @@ from ppafo.identification.bench.leak_fits import (
     opening_estimates,
     smooth_curve,
 )
-from ppafo.identification.bench.leak_laws import LAMINAR, LINEAR
 from ppafo.identification.bench.leak_samples import (
     CHANNELS,
-    FEWEST_SAMPLES,
+    MINIMUM_SAMPLES,
     PROCEDURE,
-    Closed,
+    ClosedChambers,
     VaneLeakSettings,
     closed_chambers,
     decay_in,
+    falling_decays,
     given_ratio,
 )
+from ppafo.identification.bench.leak_steady import CHANNELS as STEADY
 from ppafo.identification.bench.leak_steady import steady_leak
-from ppafo.identification.bench.picture import Panel, Series
-from ppafo.identification.bench.result import BenchResult, counted
-from ppafo.identification.check import Check
+from ppafo.identification.bench.result import (
+    IDENTIFIED_WITHIN,
+    BenchResult,
+    Evidence,
+    Number,
+    Panel,
+    Series,
+    count_of,
+)
+from ppafo.identification.estimate import Check, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats
 
@@ -52,22 +60,69 @@ def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchR
     """Return A_leak [m^2] where the orifice law (6), (7) describes the decay, else the law that does, and no area.
 
     Recordings with a ``mass_flow`` are steady: the flow that keeps up the pressure, at several pressures.
+    IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     if sources and all("mass_flow" in source.recording for source in sources):
         return steady_leak(sources, settings.opening, settings.confidence, settings.calibration)
     if settings.calibration:
         raise IdentificationError(
-            f"{PROCEDURE}: calibration = {settings.calibration:g}: a decay has no use for it, for a gain that both "
-            f"sensors share leaves its rate as it is; what counts is the volume. Leave it out"
+            f"{PROCEDURE}: calibration = {settings.calibration:g}: it does not apply to a decay, because a gain common "
+            f"to both sensors does not change its rate; what matters is the volume. Leave it out"
         )
-    check_sources(sources, PROCEDURE, CHANNELS, FEWEST_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
     closed = tuple(closed_chambers(source, settings) for source in sources)
     tight = [not item.falls for item in closed]
     if all(tight):
         return _tight_leak(sources, closed, settings)
     if any(tight):
-        raise IdentificationError(_none_shows(sources[tight.index(True)], closed[tight.index(True)]))
+        raise IdentificationError(_no_leak_text(sources[tight.index(True)], closed[tight.index(True)]))
     return _decaying_leak(sources, tuple(decay_in(item, settings) for item in closed), settings)
+
+
+def leak_prospects(sources: tuple[Source, ...], settings: VaneLeakSettings) -> tuple[Prospect, ...]:
+    """Return whether an area can be found, and whether the laws of a leak can be distinguished over these pressures."""
+    if all("mass_flow" in source.recording for source in sources):
+        check_sources(sources, PROCEDURE, STEADY, 1)
+        pressures = np.concatenate([source.recording["pressure_1"] for source in sources])
+        span = float(np.ptp(pressures) / pressures.max())
+        return (Prospect("law of the leak", span > IDENTIFIED_WITHIN, f"steady flow over {span:.0%} of the pressure"),)
+    decays, noise = falling_decays(sources, settings)
+    known = (settings.volume_1 if not decays or decays[0].emptying == 1 else settings.volume_2) is not None
+    volume = "the volume is known" if known else "the volume is not known: only its ratio to the volume"
+    listed = [Prospect("area of the leak", known, volume)]
+    if not decays:
+        return (
+            *listed,
+            Prospect("leak", False, "no pressure difference falls by more than the noise: an upper bound only"),
+        )
+    gain = min(_least_gain(decay, level, settings) for decay, level in zip(decays, noise, strict=True))
+    fell = max(1.0 - float(decay.difference[-1] / decay.difference[0]) for decay in decays)
+    text = f"the difference falls by {fell:.1%}; AIC between the laws is expected at {gain:.3g}, "
+    text += f"{CLEARLY_WORSE:g} is clear"
+    several = len(decays) > 1
+    more = "several decays" if several else "one decay: a sensor offset gives a linear leak the same curve"
+    return (
+        *listed,
+        Prospect("law of the leak", gain >= CLEARLY_WORSE, text),
+        Prospect("plateau or leak", several, more),
+    )
+
+
+def _least_gain(decay: Decay, noise: float, settings: VaneLeakSettings) -> float:
+    """Return the least AIC expected between the opening's law and others, with start and rate free."""
+    start, end = float(decay.difference[0]), float(np.mean(decay.difference[-20:]))
+    curves = []
+    for law in (settings.opening.law(), LAMINAR, LINEAR):
+        lasting, difference = decay_times(law, decay.chambers, start, 0.9 * end)
+        whole = float(np.interp(-end, -difference, lasting))
+        curves.append(np.interp(decay.time / decay.time[-1] * whole, lasting, difference))
+    free = np.stack([np.ones_like(decay.time), decay.time], axis=1)
+    gains = []
+    for other in curves[1:]:
+        apart = other - curves[0]
+        left = apart - free @ np.linalg.lstsq(free, apart, rcond=None)[0]
+        gains.append(left.size * float(np.log1p(np.mean(left**2) / max(noise, 1e-9) ** 2)))
+    return float(min(gains))
 
 
 def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], settings: VaneLeakSettings) -> BenchResult:
@@ -81,10 +136,12 @@ def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], setti
     best, orifice = best_law(fitted), fitted[0]
     drop = max(float(np.ptp(decay.difference)) for decay in decays)
     judged = judge(fitted, best, noise, drop, "Pa")
-    checks = [*law_checks(fitted, best, judged, "Pa"), *_kept(decays)]
-    # Only what is told needs the intervals of a law that may miss, which take long.
+    checks = [*law_checks(fitted, best, judged, "Pa"), *_kept_check(decays)]
+    # Only what is reported needs the intervals of a law that may miss, which take long.
     told_laws = {
-        law.name: fit_law(law, decays, count, settings.confidence) for law in laws if law.name in _told(best, judged)
+        law.name: fit_law(law, decays, count, settings.confidence)
+        for law in laws
+        if law.name in _reported_laws(best, judged)
     }
     orifice, best = told_laws.get(orifice.name, orifice), told_laws.get(best.name, best)
     evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow())
@@ -93,34 +150,36 @@ def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], setti
     if best is relaxation:
         told, leak = leak_or_relaxation(decays, relaxation, count, settings.confidence)
         checks.append(told)
-        estimates += [evidence.plain(number) for number in _course(relaxation, leak)]
+        estimates += [evidence.without_calibration(number) for number in _course(relaxation, leak)]
     elif best.name != orifice.name:
-        estimates.append(evidence.plain(replace(_rate(best), condition=condition_of(best, checks[1]))))
+        estimates.append(evidence.without_calibration(replace(_rate(best), condition=condition_of(best, checks[1]))))
     return BenchResult(
         PROCEDURE,
-        f"{counted(len(decays), 'decay')}; best law: {best.name} ({best.formula}); orifice: {judged.verdict}",
+        f"{count_of(len(decays), 'decay')}; best law: {best.name} ({best.formula}); orifice: {judged.verdict}",
         tuple(estimates),
         tuple(checks),
         _panels(decays, orifice, best),
         kind_of(sources),
-        () if _kept(decays) else ("chamber 2 stands still and counts as a room",),
+        () if _kept_check(decays) else ("the pressure in chamber 2 is constant, so it is treated as a room",),
     )
 
 
-def _told(best: FittedLaw, judged: Judgement) -> set[str]:
-    """Return the names of the laws whose rates are told: the best one, and the orifice's where it gives an area."""
+def _reported_laws(best: FittedLaw, judged: Judgement) -> set[str]:
+    """Return the names of the laws whose rates are reported: the best one, and the orifice's where it gives an area."""
     return {best.name, *(() if judged.verdict == "law does not describe the data" else ("orifice",))}
 
 
-def _none_shows(source: Source, closed: Closed) -> str:
+def _no_leak_text(source: Source, closed: ClosedChambers) -> str:
     return (
-        f"{source.name}: {PROCEDURE}: no leak shows: the pressure difference falls by {closed.drop:.3g} Pa with a "
-        f"noise of {closed.noise:.3g} Pa, while it falls in the other recordings; give it its own procedure, which "
-        f"tells how large a leak may be"
+        f"{source.name}: {PROCEDURE}: no leak is visible: the pressure difference falls by {closed.drop:.3g} Pa with a "
+        f"noise of {closed.noise:.3g} Pa, while it falls in the other recordings; give it a procedure of "
+        f"its own, which finds an upper bound of the leak"
     )
 
 
-def _tight_leak(sources: tuple[Source, ...], closed: tuple[Closed, ...], settings: VaneLeakSettings) -> BenchResult:
+def _tight_leak(
+    sources: tuple[Source, ...], closed: tuple[ClosedChambers, ...], settings: VaneLeakSettings
+) -> BenchResult:
     """Return how large a leak may be that does not show: as large as the fall that the samples allow."""
     longest = max(float(item.time[-1]) for item in closed)
     scale = max(float(np.mean(item.difference)) for item in closed)
@@ -142,7 +201,9 @@ def _tight_leak(sources: tuple[Source, ...], closed: tuple[Closed, ...], setting
     slope, half = float(fit.values[0]) / longest, float(fit.half_widths[0]) / longest
     rate = max(slope, 0.0)
     most = FittedLaw("orifice", "", rate, max(slope + half, 0.0) - rate, "1/s", fit.rms * scale, 0.0, (), 1.0)
-    text = f"No leak shows in {longest:.4g} s; with {settings.confidence:.0%} it is below the upper end."
+    text = (
+        f"No leak is visible in {longest:.4g} s; with {settings.confidence:.0%} confidence it is below the upper end."
+    )
     evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow())
     estimates = tuple(
         replace(evidence.estimate(number, number.half_width * (1.0 + evidence.calibration), "upper bound"), low=0.0)
@@ -151,7 +212,9 @@ def _tight_leak(sources: tuple[Source, ...], closed: tuple[Closed, ...], setting
     rises = slope + half < 0.0
     told = "the pressure difference rises" if rises else "the pressure difference does not rise either"
     check = Check("nothing flows in", not rises, f"{told}: {-slope * falls[0] * scale:+.3g} Pa/s at first sight")
-    summary = f"{counted(len(closed), 'recording')} of closed chambers; no leak shows, so there is an upper bound only"
+    summary = (
+        f"{count_of(len(closed), 'recording')} of closed chambers; no leak is visible, so there is only an upper bound"
+    )
     shown = tuple(Series("measured", item.time, item.difference, "measured") for item in closed[:1])
     panel = Panel("Closed chambers", "Time", "s", "Pressure difference", "Pa_d", shown)
     return BenchResult(PROCEDURE, summary, estimates, (check,), (panel,), kind_of(sources))
@@ -198,11 +261,11 @@ def _numbers(settings: VaneLeakSettings, emptying: set[int], orifice: FittedLaw,
         path = "vane_leak.area_over_volume"
         return [Number(path, "1/m", value, half, text, lowest=0.0, widened=orifice.widened)]
     conductance, half = (item * per_volume * volume for item in (orifice.rate, orifice.half_width))
-    text = f"From a volume of {volume * 1e6:.4g} cm^3, taken as exact. {gas.temperature_told}; {reason}"
+    text = f"From a volume of {volume * 1e6:.4g} cm^3, taken as exact. {gas.temperature_text}; {reason}"
     return settings.opening.numbers(conductance, half, text, orifice.widened)
 
 
-def _kept(decays: tuple[Decay, ...]) -> tuple[Check, ...]:
+def _kept_check(decays: tuple[Decay, ...]) -> tuple[Check, ...]:
     """Return whether what one chamber loses the other gains; nothing to ask where the other is a room."""
     if all(decay.chambers.volume_ratio == 0.0 for decay in decays):
         return ()
@@ -230,5 +293,5 @@ def _panels(decays: tuple[Decay, ...], orifice: FittedLaw, best: FittedLaw) -> t
             rest.append(Series(other.name if named else "", decay.time[thin], misses, "second"))
     return (
         Panel("Closed chambers", "Time", "s", "Pressure difference", "Pa_d", tuple(shown)),
-        Panel("Residuals", "Time", "s", "Measured less fitted", "Pa_d", tuple(rest)),
+        Panel("Residuals", "Time", "s", "Measured minus fitted", "Pa_d", tuple(rest)),
     )

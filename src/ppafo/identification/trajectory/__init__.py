@@ -1,14 +1,18 @@
-"""Trajectory fit: any numbers of a device from any recordings of its motion, with intervals and verdicts."""
+"""Trajectory fit: any numbers of a device from any recordings of its motion, with intervals and verdicts.
 
-from ppafo.identification.trajectory.channels import ChannelFit
+Rooms, each leaning on those before it: ``experiment`` and ``problem`` say what is asked, ``preparation`` and
+``residuals`` run it, ``information`` and ``search`` find the least misfit. ``whitening`` and ``sensor_noise`` are the
+noise of a sensor, with which ``weighing`` searches on; ``posterior`` draws both, ``misfit`` tests the model against
+itself, ``uncertainty`` gives intervals and verdicts. ``fitting`` does all of it and returns ``result``, ``follow_up``
+asks further. ``section``, ``document`` and ``outcome`` do so for a problem file.
+"""
+
 from ppafo.identification.trajectory.document import trajectory_from_dict
-from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
 from ppafo.identification.trajectory.experiment import Experiment
 from ppafo.identification.trajectory.fitting import fit
-from ppafo.identification.trajectory.problem import Search, TrajectoryProblem
-from ppafo.identification.trajectory.profiles import Profile, profile
-from ppafo.identification.trajectory.ranges import FreeParameter, Prior
-from ppafo.identification.trajectory.result import TrajectoryFit
+from ppafo.identification.trajectory.follow_up import Candidate, Expected, Profile, expected_information, profile
+from ppafo.identification.trajectory.problem import FreeParameter, Prior, Search, TrajectoryProblem
+from ppafo.identification.trajectory.result import ChannelFit, TrajectoryFit
 
 __all__ = [
     "Candidate",

@@ -1,35 +1,45 @@
 """From the section [trajectory] of a problem file to a problem: texts with units, scenarios and recordings by name."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from ppafo.documents.problems import first_problem
 from ppafo.errors import IdentificationError
-from ppafo.identification.source import Source
-from ppafo.identification.trajectory.expected import Candidate
-from ppafo.identification.trajectory.experiment import Experiment
-from ppafo.identification.trajectory.paths import TIME_OFFSET, declaration_of, full_path
-from ppafo.identification.trajectory.problem import Search, TrajectoryProblem
-from ppafo.identification.trajectory.ranges import FreeParameter, Prior
+from ppafo.identification.source import Source, common_use, source_of
+from ppafo.identification.trajectory.experiment import (
+    FITTED_CHANNELS,
+    INPUTS,
+    TIME_OFFSET,
+    Experiment,
+    declaration_of,
+    full_path,
+)
+from ppafo.identification.trajectory.follow_up import Candidate
+from ppafo.identification.trajectory.problem import FreeParameter, Prior, Search, TrajectoryProblem, use_of
 from ppafo.identification.trajectory.section import (
     CandidateSection,
     ExperimentSection,
     ParameterSection,
+    Setting,
     TrajectorySection,
+    noise_of_channels,
+    quantity_of,
 )
-from ppafo.identification.trajectory.setting import Setting, noise_of_channels, quantity_of
-from ppafo.identification.trajectory.verdicts import interval_factor
-from ppafo.identification.trajectory.without_scenario import compared_channels, experiment_without_scenario
+from ppafo.identification.trajectory.uncertainty import interval_factor
+from ppafo.parameters import apply_overrides, build_device
+from ppafo.parameters.device import Device
+from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.recorded.inputs import LONGEST_STEP
+from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, LONGEST_STEP, between_stops
+from ppafo.simulation.recorded.scenario import fixed_volume, held_at, recorded_scenario
+from ppafo.simulation.recorded.start import Start, samples_at_rest
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import read_csv
-from ppafo.storage.files import read_bytes
 
 _VALVE = "device.valve"
 _PRESSURES = ("pressure_1", "pressure_2")
@@ -40,22 +50,31 @@ SHORTEST_STEP = 1.0e-6
 def trajectory_from_dict(
     content: Mapping[str, Any], folder: Path | None = None, file: str = "trajectory"
 ) -> TrajectoryProblem:
-    """Return the problem in nested dictionaries laid out as the section of a file; paths in it begin in ``folder``."""
+    """Return the problem in nested dictionaries laid out as the section of a file; paths in it begin in ``folder``.
+
+    Texts have their units, the problem is in SI. IdentificationError or DataError, one line that names ``file``.
+    """
     try:
         section = TrajectorySection.model_validate(dict(content))
     except ValidationError as error:
         text = first_problem(error.errors(include_url=False), TrajectorySection)
         raise IdentificationError(f"{file}: {text}") from error
     home = folder or Path()
-    return trajectory_problem(section, Setting(lambda item: _read(home / item.recording), home, file))
+
+    def read(item: ExperimentSection) -> Source:
+        return source_of(home / item.recording, read_csv(home / item.recording))
+
+    return trajectory_problem(section, Setting(read, home, file))
 
 
 def trajectory_problem(section: TrajectorySection, setting: Setting) -> TrajectoryProblem:
     """Return the problem of a section."""
     experiments = tuple(_experiment(item, setting) for item in section.experiments)
     scenarios = {item.label: item.scenario for item in experiments}
-    sources = {item.label: item.source for item in experiments}
-    parameters = [_parameter(item, scenarios, sources, setting) for item in section.parameters]
+    twice = common_use(setting.used, map(use_of, experiments))
+    if twice:
+        raise IdentificationError(f"{setting.file}: {twice}; bench values are where the fit starts and what it holds")
+    parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
     nuisances = [one for item in section.experiments for one in _nuisances(item, setting)]
     search = Search(
         loss=section.loss,
@@ -69,11 +88,6 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
 def candidates_of(section: TrajectorySection, setting: Setting, noise: Mapping[str, float]) -> tuple[Candidate, ...]:
     """Return the experiments that could be done next; ``noise`` [rad], [Pa] by channel where none is given."""
     return tuple(_candidate(item, setting, noise) for item in section.candidates)
-
-
-def _read(path: Path) -> Source:
-    digest = hashlib.sha256(read_bytes(path)).hexdigest()
-    return Source(read_csv(path), f"{path.name} sha256:{digest}")
 
 
 def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
@@ -98,7 +112,7 @@ def _experiment_of(item: ExperimentSection, scenario: str, source: Source, setti
     for name in ("held", "volume"):
         if getattr(item, name) is not None:
             raise IdentificationError(
-                f"{said}: {name} and a scenario: the scenario says how the vane moves; leave one out"
+                f"{said}: {name} and a scenario: the scenario prescribes how the vane moves; omit one of them"
             )
     return Experiment(
         label=item.label,
@@ -143,9 +157,7 @@ def _time_offset(item: ExperimentSection, setting: Setting) -> FreeParameter:
     return FreeParameter(TIME_OFFSET, low=-longest, high=longest, recordings=(item.label,))
 
 
-def _parameter(
-    item: ParameterSection, scenarios: Mapping[str, Scenario], sources: Mapping[str, str], setting: Setting
-) -> FreeParameter:
+def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], setting: Setting) -> FreeParameter:
     scenario = next((scenarios[label] for label in item.recordings if label in scenarios), None)
     acting = scenario or next(iter(scenarios.values()))
     quantity = declaration_of(item.path, acting)
@@ -156,7 +168,7 @@ def _parameter(
         return None if text is None else quantity_of(said, text, quantity.unit, atmosphere)
 
     if item.prior == "bench":
-        prior: Prior | None = _bench_prior(item, full_path(item.path, acting), sources, setting)
+        prior: Prior | None = _bench_prior(item, full_path(item.path, acting), setting)
     else:
         mean = None if item.prior is None else number("prior.mean", item.prior.mean)
         prior = None if item.prior is None or mean is None else Prior(mean, abs(mean) * item.prior.relative)
@@ -171,8 +183,8 @@ def _parameter(
     )
 
 
-def _bench_prior(item: ParameterSection, path: str, sources: Mapping[str, str], setting: Setting) -> Prior:
-    """Return what a bench procedure of the same problem found, as a prior; not from a recording that is fitted too."""
+def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
+    """Return what a bench procedure of the same problem found, as a prior."""
     estimate = setting.bench.get(path)
     if estimate is None or not estimate.is_usable:
         have = ", ".join(path for path, one in setting.bench.items() if one.is_usable) or "none"
@@ -180,10 +192,83 @@ def _bench_prior(item: ParameterSection, path: str, sources: Mapping[str, str], 
             f"{setting.file}: parameter '{item.path}': prior = 'bench': no procedure of this problem identified it; "
             f"identified: {have}"
         )
-    for label, source in sources.items():
-        if source in estimate.recordings and (not item.recordings or label in item.recordings):
-            raise IdentificationError(
-                f"{setting.file}: parameter '{item.path}': prior = 'bench' comes from {source}, which experiment "
-                f"'{label}' fits too: it would count twice; leave the prior out"
-            )
     return Prior(estimate.value, estimate.half_width / interval_factor(estimate.confidence))
+
+
+def experiment_without_scenario(item: ExperimentSection, source: Source, setting: Setting) -> Experiment:
+    """Return the experiment of a recording on the device of the set; it begins at the first sample unless told."""
+    said = f"{setting.file}: experiment '{item.label}'"
+    if setting.parameter_set is None:
+        raise IdentificationError(f"{said}: needs a scenario, because no device was given")
+    if item.initial_state == "scenario":
+        raise IdentificationError(f"{said}: initial_state = 'scenario', but it has no scenario; omit it")
+    recording = source.recording
+    first = float(recording.time[0]) if item.start is None else quantity_of(f"{said}: start", item.start, "s")
+    used = recording.between(first, float(recording.time[-1]))
+    device = build_device(apply_overrides(setting.parameter_set, item.overrides, setting.valve), setting.valve)
+    device, fixed = _fixed(item, device, said)
+    inputs = _inputs(item, recording, said)
+    start = _start_of(used, device, fixed, said)
+    motion = held_at(start.angle) if fixed else None
+    scenario = recorded_scenario(recording, device, start, used.duration, said, motion)
+    noise, channels = noise_of_channels(item.noise, said), compared_channels(item)
+    return Experiment(item.label, scenario, recording, first, channels, noise, inputs, source=source.trace)
+
+
+def compared_channels(item: ExperimentSection) -> tuple[str, ...]:
+    """Return what an experiment is compared in: as given, else all that is neither held nor followed."""
+    if item.channels is not None:
+        return item.channels
+    if item.volume is not None:
+        return ("pressure_1",)
+    is_led = item.held is not None or ANGLE in (item.inputs or ())
+    return FITTED_CHANNELS[1:] if is_led else FITTED_CHANNELS
+
+
+def _fixed(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:
+    """Return the device and what of its state is known where the vane is held, or where there is none."""
+    if (item.held is not None or item.volume is not None) and ANGLE in (item.inputs or ()):
+        raise IdentificationError(f"{said}: the vane is held or absent, but inputs has '{ANGLE}': omit one of them")
+    if item.held is not None and item.volume is not None:
+        raise IdentificationError(f"{said}: held and volume: with a fixed volume there is no vane; omit one of them")
+    if item.held is not None:
+        return device, {ANGLE: quantity_of(f"{said}: held", item.held, "rad")}
+    if item.volume is None:
+        return device, {}
+    volume = quantity_of(f"{said}: volume", item.volume, "m^3")
+    if not volume > 0.0:
+        raise IdentificationError(f"{said}: volume = '{item.volume}' must be above zero")
+    known = {ANGLE: device.actuator.angle_min, "pressure_2": device.supply.atmospheric_pressure}
+    return fixed_volume(device, volume), known
+
+
+def _inputs(item: ExperimentSection, recording: Recording, said: str) -> tuple[str, ...]:
+    if COMMAND not in recording:
+        have = ", ".join(recording.names)
+        raise IdentificationError(
+            f"{said}: has no scenario, so its recording needs a channel '{COMMAND}'; it has {have}"
+        )
+    if item.inputs is None:
+        return tuple(name for name in INPUTS if name in recording)
+    if COMMAND not in item.inputs:
+        raise IdentificationError(f"{said}: has no scenario, so inputs must have '{COMMAND}'")
+    return item.inputs
+
+
+def _start_of(recording: Recording, device: Device, known: Mapping[str, float], said: str) -> Start:
+    """Return the mean of the samples at rest, at most 50 ms; the first one where the valve is open from the start."""
+    count = samples_at_rest(recording)
+
+    def mean(name: str) -> float:
+        if name in known:
+            return known[name]
+        if name not in recording:
+            raise IdentificationError(
+                f"{said}: there is no channel '{name}' to start from; give a scenario, which prescribes the "
+                "initial state"
+            )
+        return float(np.mean(recording[name][:count]))
+
+    angle, pressure_1, pressure_2 = (mean(name) for name in FITTED_CHANNELS)
+    rate = mean("angular_velocity") if "angular_velocity" in recording and ANGLE not in known else 0.0
+    return Start(float(between_stops(np.array([angle]), device, said)[0]), rate, pressure_1, pressure_2)

@@ -1,45 +1,74 @@
 """Fits any numbers of a device to any recordings and says of each how well they fix it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from ppafo.identification.trajectory.channels import (
+from ppafo.identification.trajectory.experiment import Experiment, broken_order, with_numbers
+from ppafo.identification.trajectory.information import correlation
+from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment, prepare, with_half_steps
+from ppafo.identification.trajectory.problem import Range, TrajectoryProblem, ranges_of, reach_of
+from ppafo.identification.trajectory.residuals import (
+    Residuals,
+    coordinate_bounds,
+    numbers_in,
+    prior_coordinates,
+    trajectories,
+)
+from ppafo.identification.trajectory.result import (
     ChannelFit,
+    TrajectoryFit,
     channel_fits,
+    noise_remark,
     predictions,
     reason_of_misfit,
-    taken_for_noise,
 )
-from ppafo.identification.trajectory.columns import numbers_in, trajectories
-from ppafo.identification.trajectory.experiment import Experiment
-from ppafo.identification.trajectory.information import correlation
-from ppafo.identification.trajectory.paths import broken_order, with_numbers
-from ppafo.identification.trajectory.preparation import Floats, Prepared, prepare
-from ppafo.identification.trajectory.problem import TrajectoryProblem, ranges_of
-from ppafo.identification.trajectory.ranges import Range, reach_of
-from ppafo.identification.trajectory.residuals import Residuals, coordinate_bounds, prior_coordinates
-from ppafo.identification.trajectory.result import TrajectoryFit
 from ppafo.identification.trajectory.search import Optimum, optimum
-from ppafo.identification.trajectory.step_error import step_remarks
-from ppafo.identification.trajectory.uncertainty import Uncertainty, uncertainty_of
-from ppafo.identification.trajectory.verdicts import Evidence, estimate_of
-from ppafo.identification.trajectory.weighing import weighed
+from ppafo.identification.trajectory.uncertainty import Evidence, Uncertainty, estimate_of, uncertainty_of
+from ppafo.identification.trajectory.weighing import weigh
 from ppafo.parameters.device import Device
+from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.channels import CHANNELS
 from ppafo.signals.recording import Channel, Recording, RecordingKind
 
+LARGE = 0.3
+"""RMS change over the noise, when steps are halved, from which the steps are reported as too long."""
 
-def fit(problem: TrajectoryProblem, tell: Callable[[str], None] = lambda _text: None) -> TrajectoryFit:
+
+def step_remarks(residuals: Residuals, point: Floats, signals: list[dict[str, Floats]]) -> tuple[str, ...]:
+    """Return a sentence for each experiment whose steps are too long; ``signals`` are its runs by channel."""
+    remarks = []
+    for prepared, coarse in zip(residuals.experiments, signals, strict=True):
+        finer = with_half_steps(prepared, numbers_in(prepared.label, residuals.ranges, point))
+        fine = trajectories([finer], residuals.ranges, point[None, :])[0]
+        moved = {
+            channel.name: float(np.sqrt(np.mean(np.square(fine[channel.name][:, 0] - coarse[channel.name]))))
+            / channel.noise
+            for channel in prepared.channels
+        }
+        worst = max(moved, key=lambda name: moved[name])
+        if moved[worst] > LARGE:
+            remarks.append(_remark(prepared, finer, worst, moved[worst]))
+    return tuple(remarks)
+
+
+def _remark(prepared: PreparedExperiment, finer: PreparedExperiment, channel: str, moved: float) -> str:
+    return (
+        f"{prepared.label}: steps of {1e3 * prepared.run.step:.3g} ms are too long for so little noise: half of that "
+        f"changes {channel} by {moved:.2g} times its noise; give step = '{1e3 * finer.run.step:.3g} ms' or less"
+    )
+
+
+def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> TrajectoryFit:
     """Return the numbers of a problem that explain its recordings best, each with interval and verdict.
 
-    Residuals are weighted with the noise of their channel. ``tell`` is called with what is being done.
-    IdentificationError where the problem cannot be run.
+    Estimates are in SI units; matrices (parameters, parameters) follow their order. Residuals are weighted with the
+    noise of their channel. ``report`` hears what is being done. IdentificationError where it cannot be run.
     """
-    found = optimum(residuals_of(problem), problem.search, tell)
-    tell("trajectory fit: noise of the sensors")
+    found = optimum(residuals_of(problem), problem.search, report)
+    report(Progress("trajectory fit: noise of the sensors"))
     given = [frozenset(item.noise) for item in problem.experiments]
-    whole = weighed(found, given)
+    whole = weigh(found, given)
     uncertainty = uncertainty_of(whole, problem.search, *coordinate_bounds(found.residuals.ranges))
     residuals = whole.optimum.residuals
     signals = [
@@ -54,7 +83,7 @@ def residuals_of(problem: TrajectoryProblem) -> Residuals:
     """Return the residuals of a problem."""
     ranges = ranges_of(problem)
     start = np.array([item.coordinate(item.start) for item in ranges])
-    return Residuals(tuple(_prepared(item, ranges, start) for item in problem.experiments), ranges)
+    return Residuals(tuple(_prepare(item, ranges, start) for item in problem.experiments), ranges)
 
 
 def noise_in(problem: TrajectoryProblem) -> dict[str, float]:
@@ -65,10 +94,9 @@ def noise_in(problem: TrajectoryProblem) -> dict[str, float]:
     return found
 
 
-def _prepared(experiment: Experiment, ranges: Sequence[Range], point: Floats) -> Prepared:
-    acting = [pair for pair in zip(ranges, point, strict=True) if pair[0].acts_in(experiment.label)]
-    numbers = {item.path: item.number(float(z)) for item, z in acting}
-    return prepare(experiment, numbers, reach_of([item for item, _ in acting]))
+def _prepare(experiment: Experiment, ranges: Sequence[Range], point: Floats) -> PreparedExperiment:
+    reach = reach_of([item for item in ranges if item.acts_in(experiment.label)])
+    return prepare(experiment, numbers_in(experiment.label, ranges, point), reach)
 
 
 def _result(
@@ -82,7 +110,7 @@ def _result(
     prepared, ranges, centre = found.residuals.experiments, found.residuals.ranges, uncertainty.centre
     evidence = _evidence(problem, found, uncertainty, channels)
     slopes = np.array([item.slope(float(z)) for item, z in zip(ranges, centre, strict=True)])
-    scenarios = tuple(with_numbers(item.scenario, numbers_in(item, ranges, centre)) for item in prepared)
+    scenarios = tuple(with_numbers(item.scenario, numbers_in(item.label, ranges, centre)) for item in prepared)
     return TrajectoryFit(
         problem=problem,
         estimates=tuple(estimate_of(evidence, index) for index in range(len(ranges))),
@@ -130,16 +158,16 @@ def _sources(problem: TrajectoryProblem, item: Range) -> tuple[str, ...]:
     return tuple(one.source or one.recording.label for one in acting)
 
 
-def _model(prepared: Prepared, values: dict[str, Floats]) -> Recording:
+def _model(prepared: PreparedExperiment, values: dict[str, Floats]) -> Recording:
     return _recording(f"model of {prepared.label}", prepared, values, "simulated")
 
 
-def _measurement(experiment: Experiment, prepared: Prepared) -> Recording:
+def _measurement(experiment: Experiment, prepared: PreparedExperiment) -> Recording:
     values = {channel.name: channel.values for channel in prepared.channels}
     return _recording(experiment.label, prepared, values, experiment.recording.kind)
 
 
-def _recording(label: str, prepared: Prepared, values: dict[str, Floats], kind: RecordingKind) -> Recording:
+def _recording(label: str, prepared: PreparedExperiment, values: dict[str, Floats], kind: RecordingKind) -> Recording:
     channels = {name: Channel(series, CHANNELS[name].unit) for name, series in values.items()}
     return Recording(label, prepared.time, channels, kind)
 
@@ -153,18 +181,20 @@ def _remarks(
     device: Device,
 ) -> tuple[str, ...]:
     stopped = (
-        f"the search stopped after {problem.search.most_evaluations} evaluations before it settled: start nearer, or "
-        f"allow more"
+        f"the search stopped after {problem.search.most_evaluations} evaluations before it converged: "
+        f"start closer to the solution, or allow more evaluations"
     )
     broken = broken_order(device)
-    misfit = f"the model does not explain the recordings: {evidence.misfit}; what it fixes holds for this model only"
+    misfit = (
+        f"the model does not explain the recordings: {evidence.misfit}; what it determines holds for this model only"
+    )
     return (
         *([] if found.has_converged else [stopped]),
-        *([misfit, *predictions(channels)] if evidence.misfit else _taken_for_noise(channels, uncertainty)),
+        *([misfit, *predictions(channels)] if evidence.misfit else _noise_remarks(channels, uncertainty)),
         *([broken] if broken else []),
     )
 
 
-def _taken_for_noise(channels: Sequence[ChannelFit], uncertainty: Uncertainty) -> list[str]:
+def _noise_remarks(channels: Sequence[ChannelFit], uncertainty: Uncertainty) -> list[str]:
     noises = {sensor.channel: sensor.in_words for sensor in uncertainty.sensors}
-    return [taken_for_noise(one, noises[one.channel]) for one in channels if not one.is_explained]
+    return [noise_remark(one, noises[one.channel]) for one in channels if not one.is_explained]

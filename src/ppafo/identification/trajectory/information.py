@@ -1,7 +1,10 @@
-"""What recordings say about coordinates: information matrix, covariance, how much residuals hang together.
+"""What recordings say about coordinates: information matrix, covariance, mixtures of normal distributions.
 
 All matrices are those of the coordinates of ``Range``: logarithms, or numbers over their size.
 """
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,8 +21,18 @@ STEP_IN_ERRORS = 1.0
 SMALLEST_SHARE = 1.0e-12
 """Eigenvalues of the scaled information below this share of the largest are noise of the differences."""
 
+FIXED = 1.0e-9
+"""Share below which an eigenvalue fixes nothing, so that a solution does not move along its direction."""
+
 LEAST = 1.0e-12
 """Information of a coordinate that changes nothing at all, so that its variance stays a number."""
+
+
+def principal_axes(information: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the scale of each coordinate, and eigenvalues (growing) and eigenvectors of the scaled information."""
+    scale = np.sqrt(np.maximum(np.diag(information), LEAST))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    return scale, values, vectors
 
 
 def loss_weights(residuals: Floats, loss: str) -> Floats:
@@ -61,8 +74,7 @@ def directions_for(information: Floats, is_fixed: Mask) -> Floats:
     directions = np.diag(np.where(is_fixed, SMALLEST_STEP, 0.0))
     free = np.flatnonzero(~is_fixed)
     part = information[np.ix_(free, free)]
-    scale = np.sqrt(np.maximum(np.diag(part), LEAST))
-    values, vectors = np.linalg.eigh(part / np.outer(scale, scale))
+    scale, values, vectors = principal_axes(part)
     errors = 1.0 / np.sqrt(np.maximum(values, SMALLEST_SHARE * values[-1])) if free.size else values
     found = STEP_IN_ERRORS * errors * vectors / scale[:, None]
     size = np.max(np.abs(found), axis=0, initial=0.0)
@@ -72,8 +84,7 @@ def directions_for(information: Floats, is_fixed: Mask) -> Floats:
 
 def covariance(information: Floats) -> Floats:
     """Return the inverse of an information matrix; a direction without information gets a huge variance, not none."""
-    scale = np.sqrt(np.maximum(np.diag(information), LEAST))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    scale, values, vectors = principal_axes(information)
     kept = np.maximum(values, SMALLEST_SHARE * values[-1])
     return np.asarray((vectors / kept) @ vectors.T / np.outer(scale, scale))
 
@@ -94,3 +105,68 @@ def autocorrelation(residuals: Floats) -> float:
     away = residuals - residuals.mean()
     size = float(np.sum(away * away))
     return float(np.sum(away[1:] * away[:-1]) / size) if size > 0.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Mixture:
+    """Normal distributions of coordinates, counted from a point: means (parts, coordinates), covariances, a draw each.
+
+    ``chain`` says to which chain of draws each part belongs.
+    """
+
+    means: Floats
+    covariances: Floats
+    draws: Floats
+    chain: "np.ndarray[tuple[int], np.dtype[np.intp]]"
+
+    @property
+    def mean(self) -> Floats:
+        """Mean of all coordinates."""
+        return np.asarray(self.means.mean(axis=0))
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of all coordinates."""
+        away = self.means - self.mean
+        return np.asarray(self.covariances.mean(axis=0) + away.T @ away / len(away))
+
+    def below(self, index: int, at: Floats) -> Floats:
+        """Return the probability that a coordinate lies below each of some places."""
+        from scipy.special import ndtr
+
+        spread = np.sqrt(self.covariances[:, index, index])
+        return np.asarray(ndtr((at[:, None] - self.means[:, index]) / spread).mean(axis=1))
+
+    def quantile(self, index: int, share: float, low: float = -math.inf, high: float = math.inf) -> float:
+        """Return the place below which a coordinate lies with a probability, given that it lies between two bounds."""
+        from scipy.optimize import brentq
+
+        first, last = self.below(index, np.array([low, high]))
+        wanted = first + share * (last - first)
+        error = 12.0 * math.sqrt(float(self.covariance[index, index]))
+        ends = max(low, float(self.mean[index]) - error), min(high, float(self.mean[index]) + error)
+        if not ends[0] < ends[1] or last - first < LEAST:
+            return float(np.clip(self.mean[index], low, high))
+
+        def away(place: float) -> float:
+            return float(self.below(index, np.array([place]))[0] - wanted)
+
+        if away(ends[0]) >= 0.0:
+            return ends[0]
+        return ends[1] if away(ends[1]) <= 0.0 else float(brentq(away, *ends, xtol=1.0e-6 * error))
+
+
+def inverse_with_root(precision: Floats) -> tuple[Floats, Floats]:
+    """Return the inverse of a precision and a root of it; a direction that nothing fixes gets a huge variance."""
+    scale, values, vectors = principal_axes(precision)
+    kept = np.maximum(values, SMALLEST_SHARE * values[-1])
+    root = vectors / np.sqrt(kept) / scale[:, None]
+    return root @ root.T, root
+
+
+def solution(precision: Floats, product: Floats) -> Floats:
+    """Return the solution of a linear system that does not move along directions that nothing fixes."""
+    scale, values, vectors = principal_axes(precision)
+    is_fixed = values > FIXED * values[-1]
+    shares = np.where(is_fixed, 1.0 / np.where(is_fixed, values, 1.0), 0.0)
+    return np.asarray((vectors * shares) @ (vectors.T @ (product / scale)) / scale)

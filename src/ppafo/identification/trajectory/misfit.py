@@ -1,4 +1,4 @@
-"""Does the model explain all recordings with one set of numbers? Fits of parts are held against the joint fit.
+"""Does the model explain all recordings with one set of numbers? Fits of parts are compared with the joint fit.
 
 The joint cost less the sum of the costs of separate fits is a quadratic form of what pulls each part away from the
 joint optimum. Where the model is right it is a sum of squares of normal numbers; where something is missing, parts
@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.identification.trajectory.mixture import inverted, solved
-from ppafo.identification.trajectory.posterior import LinearModel, NoiseDraw, drawn_posterior, whitened
-from ppafo.identification.trajectory.preparation import Floats, Prepared
+from ppafo.identification.trajectory.information import inverse_with_root, solution
+from ppafo.identification.trajectory.posterior import LinearModel, NoiseDraw, draw_posterior, whiten
+from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment
 from ppafo.identification.trajectory.sensor_noise import SensorNoise, sensor_noise
-from ppafo.identification.trajectory.weighing import Weighed
+from ppafo.identification.trajectory.weighing import WhitenedFit
 
 ALARM = 5.0e-4
 """Chance below which one of the comparisons is called a misfit.
@@ -63,12 +63,12 @@ class Misfit:
         if not self.comparisons:
             return "there is one part only, so the model could not be tested against itself"
         one = min(self.comparisons, key=lambda item: item.chance)
-        told = f"{one.parts} fitted apart lower the misfit by {one.saved:.3g} where {one.freedom:.3g} is expected"
+        told = f"{one.parts} fitted separately lower the misfit by {one.saved:.3g} where {one.freedom:.3g} is expected"
         chance = f"chance {one.chance:.2g}" if one.chance >= 1.0e-6 else "chance below 1e-6"
         return f"{told} ({chance}; most in {one.worst})" if self.is_found else f"{told} ({chance})"
 
 
-def misfit_of(found: Weighed, together: Sequence[NoiseDraw], seed: int) -> Misfit:
+def misfit_of(found: WhitenedFit, together: Sequence[NoiseDraw], seed: int) -> Misfit:
     """Return what fits of parts say against the joint fit, over draws of the noise.
 
     The noise is that of the finest parts, each fitted apart: what is left of the joint fit has the misfit in it, and
@@ -77,9 +77,9 @@ def misfit_of(found: Weighed, together: Sequence[NoiseDraw], seed: int) -> Misfi
     """
     model, kept = found.model, len(found.optimum.point)
     labels = _labels(found.optimum.residuals.experiments)
-    apart, noises = _apart(found, labels)
-    _, draws = drawn_posterior(apart, noises, kept, seed, chains=1, count=_DRAWS)
-    atoms = [_atoms(model, _joined(*pair), labels, kept) for pair in zip(draws, together, strict=False)]
+    apart, noises = _fit_apart(found, labels)
+    _, draws = draw_posterior(apart, noises, kept, seed, chains=1, count=_DRAWS)
+    atoms = [_atoms(model, _join_noise(*pair), labels, kept) for pair in zip(draws, together, strict=False)]
     halves = [f"{label} half" for label in ("first", "second")]
     kinds = {
         "experiments": [one for one, _, _ in labels],
@@ -92,10 +92,10 @@ def misfit_of(found: Weighed, together: Sequence[NoiseDraw], seed: int) -> Misfi
         keys = [name for name in names for _ in range(2)] if names is not halves else halves * len(labels)
         if len(set(keys)) > 1:
             comparisons.append(_comparison(parts, keys, atoms, model, kept))
-    return Misfit(tuple(comparisons), _alone(labels, atoms))
+    return Misfit(tuple(comparisons), _only_channels(labels, atoms))
 
 
-def _joined(apart: NoiseDraw, together: NoiseDraw) -> NoiseDraw:
+def _join_noise(apart: NoiseDraw, together: NoiseDraw) -> NoiseDraw:
     """Return the noise of sensors fitted apart, and that of the joint fit for those whose tails are heavy even then.
 
     A few samples at an impact that the model misses make tails look somewhat heavy, but no more.
@@ -108,12 +108,14 @@ def _joined(apart: NoiseDraw, together: NoiseDraw) -> NoiseDraw:
     )
 
 
-def _apart(found: Weighed, labels: Sequence[tuple[str, str, slice]]) -> tuple[LinearModel, tuple[SensorNoise, ...]]:
+def _fit_apart(
+    found: WhitenedFit, labels: Sequence[tuple[str, str, slice]]
+) -> tuple[LinearModel, tuple[SensorNoise, ...]]:
     """Return the linear model with columns of its own for each channel of each recording, and the noise it leaves."""
     model, kept = found.model, len(found.optimum.point)
     weights = [sensor.weights for sensor in found.sensors]
-    rows = whitened(model, found.noises, weights)[:, :kept]
-    _, root = inverted(rows.T @ rows + model.precision[:kept, :kept])
+    rows = whiten(model, found.noises, weights)[:, :kept]
+    _, root = inverse_with_root(rows.T @ rows + model.precision[:kept, :kept])
     blocks = []
     for _, _, place in labels:
         values, vectors = np.linalg.eigh(root.T @ (rows[place].T @ rows[place]) @ root)
@@ -124,7 +126,7 @@ def _apart(found: Weighed, labels: Sequence[tuple[str, str, slice]]) -> tuple[Li
     columns = np.hstack([*blocks, model.columns[:, kept:]])
     width = columns.shape[1] - 1
     apart = LinearModel(columns, model.sensors, np.zeros(width), np.zeros((width, width)))
-    whole = whitened(apart, found.noises, weights)
+    whole = whiten(apart, found.noises, weights)
     columns[:, -1] -= columns[:, :-1] @ np.linalg.lstsq(whole[:, :-1], whole[:, -1], rcond=None)[0]
     noises = [
         sensor_noise(apart.segments(apart.residuals, place), sensor.is_given)
@@ -141,7 +143,7 @@ class _Atoms:
     pull: Floats
 
 
-def _labels(experiments: Sequence[Prepared]) -> list[tuple[str, str, slice]]:
+def _labels(experiments: Sequence[PreparedExperiment]) -> list[tuple[str, str, slice]]:
     found, first = [], 0
     for prepared in experiments:
         for channel in prepared.channels:
@@ -151,9 +153,9 @@ def _labels(experiments: Sequence[Prepared]) -> list[tuple[str, str, slice]]:
 
 
 def _atoms(model: LinearModel, draw: NoiseDraw, labels: Sequence[tuple[str, str, slice]], kept: int) -> _Atoms:
-    rows = whitened(model, draw.noises, draw.weights)
+    rows = whiten(model, draw.noises, draw.weights)
     products = rows.T @ rows
-    mean = -solved(products[:-1, :-1] + model.precision, products[:-1, -1] + model.pull)
+    mean = -solution(products[:-1, :-1] + model.precision, products[:-1, -1] + model.pull)
     slopes, left = rows[:, :kept], rows[:, -1] + rows[:, :-1] @ mean
     if rows.shape[1] > kept + 1:
         basis = np.linalg.qr(rows[:, kept:-1])[0]
@@ -192,7 +194,7 @@ def _quadratic(information: Floats, pull: Floats, prior: Floats) -> tuple[Floats
     from scipy.stats import chi2
 
     joint = information.sum(axis=0) + prior
-    _, root = inverted(joint)
+    _, root = inverse_with_root(joint)
     count, width = pull.shape
     steps, known = [], []
     for own, along in zip(information, pull, strict=True):
@@ -222,7 +224,7 @@ def _quadratic(information: Floats, pull: Floats, prior: Floats) -> tuple[Floats
     return shares, mean, float(chi2.sf(shares.sum() / stretch, mean / stretch))
 
 
-def _alone(labels: Sequence[tuple[str, str, slice]], atoms: Sequence[_Atoms]) -> tuple[str, ...]:
+def _only_channels(labels: Sequence[tuple[str, str, slice]], atoms: Sequence[_Atoms]) -> tuple[str, ...]:
     """Return, for each coordinate, the channel of the recording that has nearly all that is known of it."""
     known = np.mean([np.einsum("aii->ai", one.information) for one in atoms], axis=0)
     pairs = known[0::2] + known[1::2]

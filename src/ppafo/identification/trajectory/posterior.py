@@ -11,7 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.identification.trajectory.mixture import FIXED, LEAST, SMALLEST_SHARE, Mixture, inverted, solved
+from ppafo.identification.trajectory.information import (
+    FIXED,
+    LEAST,
+    SMALLEST_SHARE,
+    Mixture,
+    inverse_with_root,
+    principal_axes,
+    solution,
+)
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.sensor_noise import (
     FREEDOMS,
@@ -20,7 +28,7 @@ from ppafo.identification.trajectory.sensor_noise import (
     drift_of,
     errors_of,
     longest_memory,
-    profiled,
+    profile_likelihood,
     regression_of,
     sample_weights,
     t_likelihood,
@@ -79,7 +87,7 @@ class NoiseDraw:
     mean: Floats
 
 
-def drawn_posterior(
+def draw_posterior(
     model: LinearModel,
     noises: Sequence[SensorNoise],
     kept: int,
@@ -95,13 +103,13 @@ def drawn_posterior(
         states = [_State.of(noise, model, sensor) for sensor, noise in enumerate(noises)]
         for turn in range(SETTLING + count):
             states = _with_memory(model, states, random)
-            mean, covariance, root = _given_noise(model, states)
+            mean, covariance, root = _distribution_given_noise(model, states)
             if turn >= SETTLING and turn % _SHOWN == 0:
                 noise, weights = tuple(one.noise for one in states), tuple(one.weights for one in states)
                 shown.append(NoiseDraw(noise, weights, mean))
             draw = mean + root @ random.standard_normal(len(mean))
             left = model.residuals + model.slopes @ draw
-            states = [_drawn(model, state, sensor, draw, left, random) for sensor, state in enumerate(states)]
+            states = [_draw_noise(model, state, sensor, draw, left, random) for sensor, state in enumerate(states)]
             if turn >= SETTLING:
                 means.append(mean[:kept])
                 covariances.append(covariance[:kept, :kept])
@@ -111,7 +119,7 @@ def drawn_posterior(
     return parts, tuple(shown)
 
 
-def whitened(model: LinearModel, noises: Sequence[SensorNoise], weights: Sequence[Sequence[Floats]]) -> Floats:
+def whiten(model: LinearModel, noises: Sequence[SensorNoise], weights: Sequence[Sequence[Floats]]) -> Floats:
     """Return the columns whitened by the noise of the sensors, of variance 1 each."""
     found = np.zeros_like(model.columns)
     for places, noise, parts in zip(model.sensors, noises, weights, strict=True):
@@ -187,7 +195,7 @@ def _products(model: LinearModel, noise: SensorNoise, weights: Sequence[Floats],
     return products, spread
 
 
-def _drawn(
+def _draw_noise(
     model: LinearModel, state: _State, sensor: int, draw: Floats, left: Floats, random: np.random.Generator
 ) -> _State:
     """Return the noise of a sensor drawn anew, given a draw of the columns and what is ``left``; its drift stays."""
@@ -217,12 +225,12 @@ def _with_level(state: _State, draw: Floats, count: int, random: np.random.Gener
     return replace(state, noise=noise, products=state.products / ratio**2)
 
 
-def _given_noise(model: LinearModel, states: Sequence[_State]) -> tuple[Floats, Floats, Floats]:
+def _distribution_given_noise(model: LinearModel, states: Sequence[_State]) -> tuple[Floats, Floats, Floats]:
     """Return mean, covariance and a root of it of the columns given the noise."""
     products = np.sum([state.products for state in states], axis=0)
     precision = products[:-1, :-1] + model.precision
-    covariance, root = inverted(precision)
-    return -solved(precision, products[:-1, -1] + model.pull), covariance, root
+    covariance, root = inverse_with_root(precision)
+    return -solution(precision, products[:-1, -1] + model.pull), covariance, root
 
 
 def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random.Generator) -> list[_State]:
@@ -257,8 +265,7 @@ def _without_columns(model: LinearModel, products: Floats) -> float:
     """Return the log likelihood of noise with all columns integrated out, but for a constant."""
     precision = products[:-1, :-1] + model.precision
     pull = products[:-1, -1] + model.pull
-    scale = np.sqrt(np.maximum(np.diag(precision), LEAST))
-    values, vectors = np.linalg.eigh(precision / np.outer(scale, scale))
+    scale, values, vectors = principal_axes(precision)
     kept = np.maximum(values, SMALLEST_SHARE * values[-1])
     along = vectors.T @ (pull / scale)
     size = float(np.sum(np.where(values > FIXED * values[-1], along * along / kept, 0.0)))
@@ -288,7 +295,7 @@ def _regression(
 ) -> AutoRegression:
     """Return coefficients drawn given all but the first samples, which then accept them or not."""
     mean, precision = regression_of(scaled, weights, shape.order)
-    found = from_coefficients(mean + inverted(precision)[1] @ random.standard_normal(shape.order))
+    found = from_coefficients(mean + inverse_with_root(precision)[1] @ random.standard_normal(shape.order))
     if found is None:
         return shape
     gain = sum(
@@ -309,7 +316,7 @@ def _proposal(numbers: Floats, is_zeroed: bool, scaled: Sequence[Floats], weight
 
     def at(first: float, second: float) -> float:
         moved = numbers + _STEP * np.array([first, second])
-        return profiled(drift_of(moved, is_zeroed), scaled, weights)[0]
+        return profile_likelihood(drift_of(moved, is_zeroed), scaled, weights)[0]
 
     middle = at(0.0, 0.0)
     cross = 0.25 * (at(1.0, 1.0) + at(-1.0, -1.0) - at(1.0, -1.0) - at(-1.0, 1.0))

@@ -1,6 +1,6 @@
 """Makes an experiment ready for fitting: its samples with their noise, and one clock for all columns.
 
-The step stays as it is while the search goes on. The parts in which the engine does it follow the numbers, though, and
+The step stays as it is during the search. The parts in which the engine does it follow the numbers, though, and
 any other choice of them moves a run a little. Runs of a fit are allowed so little error that differences hardly see it.
 """
 
@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from ppafo.engine.replay import StepInputs
 from ppafo.engine.run import Run
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.completion import scenario_of
-from ppafo.identification.trajectory.experiment import Experiment
-from ppafo.identification.trajectory.paths import with_numbers
+from ppafo.identification.trajectory.experiment import Experiment, scenario_of, with_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.inputs import ANGLE, RecordedInputs, led_along, step_inputs
 from ppafo.simulation.scenario import FreeMotion, Scenario
@@ -24,7 +22,7 @@ from ppafo.simulation.scenario import FreeMotion, Scenario
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-FEWEST_SAMPLES = 10
+MINIMUM_SAMPLES = 10
 FIT_TOLERANCE = 0.02
 """Error that a run of a fit is allowed over that of any other run; columns of differences keep to 1e-3 with it."""
 _FINER = 0.25
@@ -62,7 +60,7 @@ class Samples:
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
+class PreparedExperiment:
     """An experiment by its label, with its scenario completed and its samples placed in the record of a run.
 
     ``run`` has the step and the clock of all columns; a sample is ``share`` [-] of the way from record ``place`` to the
@@ -96,35 +94,36 @@ class Prepared:
         return self.run.step * self.run.record_every
 
 
-def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float = 0.0) -> Prepared:
+def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
     """Return the experiment made ready.
 
     ``numbers`` by path are the start values; ``reach`` [s] is the largest time offset that is tried.
+    IdentificationError for a recording with too few samples or a channel whose noise is unknown.
     """
     recording, said = experiment.recording, f"experiment '{experiment.label}'"
     inside = recording.time >= experiment.start - _FITS
     time = np.maximum(recording.time[inside] - experiment.start, 0.0)
-    if time.size < FEWEST_SAMPLES:
+    if time.size < MINIMUM_SAMPLES:
         raise IdentificationError(
             f"{said}: {recording.label} has {time.size} samples after {experiment.start:g} s, "
-            f"at least {FEWEST_SAMPLES} are needed"
+            f"at least {MINIMUM_SAMPLES} are needed"
         )
-    channels = tuple(_measured(experiment, name, inside) for name in experiment.channels)
+    channels = tuple(_measured_channel(experiment, name, inside) for name in experiment.channels)
     scenario = replace(scenario_of(experiment), duration=float(time[-1]) + reach)
     recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
-    return _planned(experiment.label, scenario, Samples(time, channels, reach), numbers, recorded)
+    return _plan(experiment.label, scenario, Samples(time, channels, reach), numbers, recorded)
 
 
-def prepared_times(label: str, scenario: Scenario, samples: Samples, numbers: Mapping[str, float]) -> Prepared:
+def prepare_times(label: str, scenario: Scenario, samples: Samples, numbers: Mapping[str, float]) -> PreparedExperiment:
     """Return samples of a scenario's run made ready, at ``numbers`` by path."""
-    return _planned(label, scenario, samples, numbers, None)
+    return _plan(label, scenario, samples, numbers, None)
 
 
-def halved(prepared: Prepared, numbers: Mapping[str, float]) -> Prepared:
+def with_half_steps(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> PreparedExperiment:
     """Return the experiment with steps half as long and a quarter of the allowed error."""
     scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
     run = plan_run(with_numbers(scenario, numbers))
-    return _placed(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
+    return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
 def noise_of(values: Floats) -> float:
@@ -132,7 +131,7 @@ def noise_of(values: Floats) -> float:
 
     What the signal itself does between four samples counts as noise where it is larger; a few jumps do not matter.
     """
-    if values.size < FEWEST_SAMPLES:
+    if values.size < MINIMUM_SAMPLES:
         return 0.0
     differences = np.abs(np.diff(values, n=3))
     most = _KEPT * _SPREAD_OF_MEDIAN * float(np.median(differences))
@@ -140,19 +139,21 @@ def noise_of(values: Floats) -> float:
     return float(np.sqrt(np.mean(inner * inner)) / _SHARE_OF_KEPT / _GAIN_OF_DIFFERENCES)
 
 
-def _planned(
+def _plan(
     label: str,
     scenario: Scenario,
     samples: Samples,
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None,
-) -> Prepared:
+) -> PreparedExperiment:
     run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
     nowhere = np.zeros(samples.time.size)
-    return _placed(Prepared(label, scenario, run, samples, nowhere.astype(np.intp), nowhere, recorded), run)
+    return _place_samples(
+        PreparedExperiment(label, scenario, run, samples, nowhere.astype(np.intp), nowhere, recorded), run
+    )
 
 
-def _placed(prepared: Prepared, run: Run) -> Prepared:
+def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
     """Return the samples placed in a record of a run that is no finer than they need."""
     samples, recorded = prepared.samples, prepared.recorded
     every = _steps_between_samples(samples, run.step)
@@ -189,7 +190,7 @@ def _read_interval(samples: Samples) -> float:
     return max(_READ_INTERVAL, float(samples.time[-1]) / _MOST_RECORDS)
 
 
-def _measured(experiment: Experiment, name: str, inside: NDArray[np.bool_]) -> Measured:
+def _measured_channel(experiment: Experiment, name: str, inside: NDArray[np.bool_]) -> Measured:
     values = experiment.recording[name][inside]
     noise = experiment.noise[name] if name in experiment.noise else noise_of(values)
     if not noise > 0.0:

@@ -1,6 +1,6 @@
 """The search for the optimum: several starts, each refined with scipy's bounded least squares."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +9,9 @@ from ppafo.engine.lane_rows import LANES
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.information import ROBUST_SCALE, directions_for, precision, standard_errors
 from ppafo.identification.trajectory.preparation import Floats
-from ppafo.identification.trajectory.problem import Search
-from ppafo.identification.trajectory.ranges import Range, is_nuisance
+from ppafo.identification.trajectory.problem import Range, Search, is_nuisance
 from ppafo.identification.trajectory.residuals import FIRST_STEP, Mask, Neighbourhood, Residuals, coordinate_bounds
+from ppafo.progress import Progress, Report, report_nothing
 
 DRAWS_PER_START = 8
 STAGES = 3
@@ -26,6 +26,8 @@ _SETTLED = 0.05
 """A further stage that moves no coordinate by more than this share of its standard error is the last."""
 _WIDEST_DRAW = 1.5
 _NOTABLE = 1.0e-3
+_EXPLAINED = 1.5**2
+"""Mean square of the residuals over their noise up to which they are no more than noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,24 +42,49 @@ class Optimum:
     has_converged: bool
 
 
-def optimum(residuals: Residuals, search: Search, tell: Callable[[str], None] = lambda _text: None) -> Optimum:
-    """Return the best optimum of all starts; ``tell`` is called with what is being done."""
+def optimum(residuals: Residuals, search: Search, report: Report = report_nothing) -> Optimum:
+    """Return the best optimum of all starts; ``report`` hears what is being done."""
     best: Optimum | None = None
-    nested = _nested(residuals, search, tell)
+    nested = _nested_descent(residuals, search, report)
     evaluations = 0 if nested is None else nested.evaluations
     starts = [*_starts(residuals, search), *([] if nested is None else [nested.point])]
     for number, start in enumerate(starts, start=1):
-        least = "" if best is None else f", least misfit so far {best.cost:.6g}"
-        tell(f"trajectory fit: start {number} of {len(starts)}{least}")
+        least = "" if best is None else f", lowest misfit so far {best.cost:.6g}"
+        report(Progress(f"trajectory fit: start {number} of {len(starts)}{least}"))
         found = _refine(residuals, start, search)
         evaluations += found.evaluations
         if best is None or found.cost < best.cost:
             best = found
     if best is None:
-        raise IdentificationError("the model diverges at every start; look at start values and bounds (ppafo audit)")
-    is_beaten = nested is not None and nested.cost < best.cost * (1.0 - _NOTABLE)
-    has_converged = best.has_converged and not is_beaten
+        raise IdentificationError("the model diverges at every start; check start values and bounds (ppafo audit)")
+    others = _without_one(residuals, best, search, report)
+    evaluations += sum(one.evaluations for one in others)
+    for one in others:
+        if _beats(one, best):
+            found = _refine(residuals, one.point, search)
+            evaluations += found.evaluations
+            best = found if found.cost < best.cost else best
+    fewer = others if nested is None else (nested, *others)
+    has_converged = best.has_converged and not any(_beats(one, best) for one in fewer)
     return Optimum(best.residuals, best.point, best.cost, evaluations, best.information, has_converged)
+
+
+def _beats(nested: "Descent", best: Optimum) -> bool:
+    return nested.cost < best.cost * (1.0 - _NOTABLE)
+
+
+def _without_one(residuals: Residuals, best: Optimum, search: Search, report: Report) -> tuple["Descent", ...]:
+    """Return where the search ends with one number at a time held at its start.
+
+    None where the residuals are no larger than the noise, for then no fit can be notably lower.
+    """
+    count = len(residuals.ranges)
+    if count < 2 or 2.0 * best.cost <= _EXPLAINED * residuals.channel_slices()[-1].stop:
+        return ()
+    report(Progress("trajectory fit: with one number at a time held at its start"))
+    start = np.array([item.coordinate(item.start) for item in residuals.ranges])
+    found = (_descend_holding(residuals, start, np.arange(count) == index, search) for index in range(count))
+    return tuple(one for one in found if one is not None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +108,7 @@ def descend(
     tried: dict[bytes, Neighbourhood] = {}
 
     def around(point: Floats) -> Neighbourhood:
-        """Run a point and its differences together: a Jacobian is asked for nearly wherever a residual was."""
+        """Run a point and its differences together: a Jacobian is requested nearly wherever a residual was."""
         key = point.tobytes()
         if key not in tried:
             tried.clear()
@@ -104,21 +131,27 @@ def descend(
     return Descent(done.x, float(done.cost), int(done.nfev), done.status > 0)
 
 
-def _nested(residuals: Residuals, search: Search, tell: Callable[[str], None]) -> Descent | None:
+def _nested_descent(residuals: Residuals, search: Search, report: Report) -> Descent | None:
     """Return where the search ends with all nuisances held at their start, as a start with them free.
 
     A fit with more numbers that ends above one with fewer has not found its least. None where no nuisance is fitted, or
     nothing else.
     """
-    is_held = [is_nuisance(item) for item in residuals.ranges]
-    if not any(is_held) or all(is_held):
+    is_held = np.array([is_nuisance(item) for item in residuals.ranges])
+    if not is_held.any() or is_held.all():
         return None
-    point = np.array([item.coordinate(item.start) for item in residuals.ranges])
-    fewer = residuals.holding({index: float(point[index]) for index in np.flatnonzero(is_held).tolist()})
-    free = ~np.array(is_held)
+    report(Progress("trajectory fit: with initial states and time offsets held"))
+    return _descend_holding(
+        residuals, np.array([item.coordinate(item.start) for item in residuals.ranges]), is_held, search
+    )
+
+
+def _descend_holding(residuals: Residuals, start: Floats, is_held: Mask, search: Search) -> Descent | None:
+    """Return where the search ends with some numbers held at the start; None where the model diverges there."""
+    point, free = start.copy(), ~is_held
+    fewer = residuals.hold({index: float(point[index]) for index in np.flatnonzero(is_held).tolist()})
     if not np.isfinite(fewer.of_data(point[None, free])).all():
         return None
-    tell("trajectory fit: with initial states and time offsets held")
     found = descend(fewer, point[free], np.diag(np.full(int(free.sum()), FIRST_STEP)), search, _TOLERANCES[0])
     point[free] = found.point
     return Descent(point, found.cost, found.evaluations, found.has_converged)
@@ -158,7 +191,7 @@ def _starts(residuals: Residuals, search: Search) -> Sequence[Floats]:
     first = np.array([item.coordinate(item.start) for item in residuals.ranges])
     if not np.isfinite(residuals.of_data(first[None, :])).all():
         if search.other_starts == 0:
-            raise IdentificationError("the model diverges at the start values; look at them (ppafo audit)")
+            raise IdentificationError("the model diverges at the start values; check them (ppafo audit)")
         return _best_draws(residuals, first, search)
     return [first, *_best_draws(residuals, first, search)]
 
@@ -166,7 +199,7 @@ def _starts(residuals: Residuals, search: Search) -> Sequence[Floats]:
 def _best_draws(residuals: Residuals, first: Floats, search: Search) -> list[Floats]:
     if search.other_starts == 0:
         return []
-    low, high = _near(residuals.ranges, first)
+    low, high = _box_of_draws(residuals.ranges, first)
     random = np.random.default_rng(search.seed)
     points = low + (high - low) * random.random((DRAWS_PER_START * search.other_starts, len(first)))
     # In blocks: the records of hundreds of runs at once would fill the memory.
@@ -176,7 +209,7 @@ def _best_draws(residuals: Residuals, first: Floats, search: Search) -> list[Flo
     return [points[index] for index in order[: search.other_starts]]
 
 
-def _near(ranges: Sequence[Range], first: Floats) -> tuple[Floats, Floats]:
+def _box_of_draws(ranges: Sequence[Range], first: Floats) -> tuple[Floats, Floats]:
     """Return the box of the draws: the bounds, on the log scale at most a factor of 4.5 from the start."""
     low, high = coordinate_bounds(ranges)
     return np.maximum(low, first - _WIDEST_DRAW), np.minimum(high, first + _WIDEST_DRAW)

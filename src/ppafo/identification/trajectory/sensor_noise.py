@@ -21,7 +21,7 @@ from ppafo.identification.trajectory.whitening import (
 )
 
 FREEDOMS = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0])
-"""Degrees of freedom of a t distribution that are tried; more cannot be told from a normal one."""
+"""Degrees of freedom of a t distribution that are tried; more cannot be distinguished from a normal one."""
 
 MOST_ORDER = 30
 _HEAVY_ORDERS = (0, 1, 2, 3, 5, 8, 12, 20)
@@ -111,13 +111,13 @@ def t_likelihood(errors: Floats, freedoms: Floats) -> Floats:
     return np.asarray(len(errors) * constant - (half + 0.5) * logs.sum(axis=0))
 
 
-def lagged(segment: Floats, order: int) -> Floats:
+def previous_samples(segment: Floats, order: int) -> Floats:
     """Return what a sample is predicted from, (samples after the first ``order``, order), the latest first."""
     windows = np.lib.stride_tricks.sliding_window_view(segment[:-1], order)
     return windows[:, ::-1]
 
 
-def profiled(shape: Shape, segments: Sequence[Floats], weights: Sequence[Floats]) -> tuple[float, float]:
+def profile_likelihood(shape: Shape, segments: Sequence[Floats], weights: Sequence[Floats]) -> tuple[float, float]:
     """Return the log likelihood at the best common level, and that level."""
     squares, logs, count = 0.0, 0.0, 0
     for one, weight in zip(segments, weights, strict=True):
@@ -168,7 +168,7 @@ def _autoregression(segments: list[Floats]) -> SensorNoise:
     reflections, left = reflections_of(segments, most)
     scores = [_criterion(-0.5 * count * math.log(left[order]), order + 1, count) for order in range(most + 1)]
     shape = from_reflections(reflections[: int(np.argmin(scores))])
-    likelihood, level = profiled(shape, segments, [np.ones(len(one)) for one in segments])
+    likelihood, level = profile_likelihood(shape, segments, [np.ones(len(one)) for one in segments])
     return _of(shape, level, len(segments), likelihood)
 
 
@@ -179,13 +179,15 @@ def _drift(segments: list[Floats], is_zeroed: bool) -> SensorNoise:
     ones, longest = [np.ones(len(one)) for one in segments], longest_memory(segments)
 
     def cost(numbers: Floats) -> float:
-        return -profiled(drift_of(_within(numbers, longest), is_zeroed), segments, ones)[0] + _outside(numbers, longest)
+        return -profile_likelihood(drift_of(_within(numbers, longest), is_zeroed), segments, ones)[0] + _outside(
+            numbers, longest
+        )
 
     grid = [np.array([ratio, memory]) for ratio in (-9.0, -6.0, -3.0, 0.0) for memory in (1.5, 3.5, 5.5)]
     start = min(grid, key=cost)
     found = minimize(cost, start, method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.02, "maxfev": 120})
     shape = drift_of(_within(found.x, longest), is_zeroed)
-    likelihood, level = profiled(shape, segments, ones)
+    likelihood, level = profile_likelihood(shape, segments, ones)
     return _of(shape, level, len(segments), likelihood)
 
 
@@ -246,7 +248,7 @@ def regression_of(segments: Sequence[Floats], weights: Sequence[Floats], order: 
     """Return the coefficients of an autoregression by weighted least squares, and their precision at level 1."""
     precision, product = np.zeros((order, order)), np.zeros(order)
     for one, weight in zip(segments, weights, strict=True):
-        before, after = lagged(one, order), weight[order:]
+        before, after = previous_samples(one, order), weight[order:]
         precision += before.T @ (after[:, None] * before)
         product += before.T @ (after * one[order:])
     precision += _LEAST * np.eye(order)

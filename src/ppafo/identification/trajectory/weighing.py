@@ -1,19 +1,94 @@
-"""The search goes on with the noise of each sensor: whitened residuals, new slopes, until nothing moves any more."""
+"""The search resumes with the noise of each sensor: whitened residuals, new slopes, until nothing moves any more.
+
+Hum, lines in the spectrum of a sensor such as those of the mains, is taken out.
+"""
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.identification.trajectory.hum import hum_columns, hum_of, without_hum
-from ppafo.identification.trajectory.information import directions_for
-from ppafo.identification.trajectory.mixture import inverted, solved
-from ppafo.identification.trajectory.posterior import LinearModel, whitened
-from ppafo.identification.trajectory.preparation import Floats, Prepared
+from ppafo.identification.trajectory.information import directions_for, inverse_with_root, solution
+from ppafo.identification.trajectory.posterior import LinearModel, whiten
+from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment
 from ppafo.identification.trajectory.residuals import Neighbourhood, coordinate_bounds, prior_coordinates
 from ppafo.identification.trajectory.search import Optimum, is_at_bound
-from ppafo.identification.trajectory.sensor_noise import SensorNoise, sample_weights, sensor_noise
+from ppafo.identification.trajectory.sensor_noise import SensorNoise, errors_of, sample_weights, sensor_noise
+from ppafo.identification.trajectory.whitening import from_reflections, reflections_of
+
+MOST_LINES = 3
+CHANCE = 1.0e-4
+"""Chance at which noise alone would be taken for hum, for each sensor."""
+
+_PADDED = 4
+_FEWEST_CYCLES = 5.0
+_CELLS = 12
+_FEWEST_SAMPLES = 64
+
+
+def hum_of(segments: Sequence[Floats]) -> tuple[float, ...]:
+    """Return the frequencies of hum in a sensor's recordings, in cycles per sample."""
+    found: list[float] = []
+    if min(len(one) for one in segments) < _FEWEST_SAMPLES:
+        return ()
+    for _ in range(MOST_LINES):
+        left = [without_hum(one, tuple(found)) for one in segments]
+        line = _strongest_line(left)
+        if line is None:
+            break
+        found.append(line)
+    return tuple(found)
+
+
+def hum_columns(count: int, frequencies: Sequence[float]) -> Floats:
+    """Return a cosine and a sine of each frequency at ``count`` samples, (samples, columns)."""
+    phases = 2.0 * math.pi * np.outer(np.arange(count), np.array(frequencies))
+    return np.hstack([np.cos(phases), np.sin(phases)])
+
+
+def without_hum(segment: Floats, frequencies: Sequence[float]) -> Floats:
+    """Return the samples less what sinusoids of these frequencies explain."""
+    if not frequencies:
+        return segment
+    columns = hum_columns(len(segment), frequencies)
+    return np.asarray(segment - columns @ np.linalg.lstsq(columns, segment, rcond=None)[0])
+
+
+def _strongest_line(segments: Sequence[Floats]) -> float | None:
+    """Return the line that stands highest above its neighbourhood, None where chance may have made it."""
+    from scipy.ndimage import median_filter
+    from scipy.stats import gamma
+
+    reflections, _ = reflections_of(list(segments), 1)
+    white = [errors_of(from_reflections(reflections), one)[1:] for one in segments]
+    shortest = min(len(one) for one in white)
+    size = _PADDED * max(len(one) for one in white)
+    power = np.zeros(size // 2 + 1)
+    for one in white:
+        power += np.square(np.abs(np.fft.rfft((one - one.mean()) * np.hanning(len(one)), size))) / len(one)
+    parts = float(len(white))
+    around = median_filter(power, size=2 * _CELLS * _PADDED + 1, mode="nearest")
+    height = power / np.maximum(around, 1.0e-300) * gamma.ppf(0.5, parts)
+    edge = math.ceil(_FEWEST_CYCLES * size / shortest)
+    height[:edge] = height[-edge:] = 0.0
+    best = int(np.argmax(height))
+    if gamma.sf(height[best], parts) * shortest > CHANCE:
+        return None
+    return _refine_frequency(white, best / size, 1.0 / size)
+
+
+def _refine_frequency(white: Sequence[Floats], frequency: float, reach: float) -> float:
+    """Return the frequency near one at which sinusoids explain most."""
+    from scipy.optimize import minimize_scalar
+
+    def left(place: float) -> float:
+        return sum(float(np.sum(np.square(without_hum(one, (place,))))) for one in white)
+
+    found = minimize_scalar(left, bounds=(frequency - reach, frequency + reach), method="bounded")
+    return float(found.x)
+
 
 MOST_ROUNDS = 8
 ESTIMATED_ROUNDS = 2
@@ -74,7 +149,7 @@ class Whitening:
 
 
 @dataclass(frozen=True, slots=True)
-class Weighed:
+class WhitenedFit:
     """Where the search with noise ended: whitened optimum, its linear model (hum in it), sensors, and rounds."""
 
     optimum: Optimum
@@ -88,7 +163,7 @@ class Weighed:
         return tuple(sensor.noise for sensor in self.sensors)
 
 
-def weighed(found: Optimum, given: Sequence[frozenset[str]]) -> Weighed:
+def weigh(found: Optimum, given: Sequence[frozenset[str]]) -> WhitenedFit:
     """Return the optimum that the noise of each sensor makes of one that was found with white noise.
 
     ``given`` has, for each experiment, the channels whose noise was given: it is not taken to be less.
@@ -98,15 +173,15 @@ def weighed(found: Optimum, given: Sequence[frozenset[str]]) -> Weighed:
     near = residuals.around(point, directions_for(found.information, fixed))
     sensors = _sensors(residuals.experiments, given)
     for number in range(1, MOST_ROUNDS + 1):
-        sensors = tuple(_heard(one, near.of_data, number <= ESTIMATED_ROUNDS) for one in sensors)
+        sensors = tuple(_estimate_noise(one, near.of_data, number <= ESTIMATED_ROUNDS) for one in sensors)
         model = _linear_model(near, sensors)
         step, information = _step(near, model, sensors)
-        errors = np.sqrt(np.diag(inverted(information)[0]))
+        errors = np.sqrt(np.diag(inverse_with_root(information)[0]))
         has_settled = bool(np.all(np.abs(step) <= SETTLED * errors))
         if has_settled or number == MOST_ROUNDS:
             break
         directions = directions_for(information, is_at_bound(near.point + step, residuals.ranges))
-        further = _damped(near, step, directions, Whitening(sensors))
+        further = _damp_step(near, step, directions, Whitening(sensors))
         if further is None:
             # Where the runs are rough no step lowers the cost any more: this is as near as one comes.
             has_settled = bool(np.all(np.abs(step) <= ROUGH * errors))
@@ -121,10 +196,10 @@ def weighed(found: Optimum, given: Sequence[frozenset[str]]) -> Weighed:
         information=information,
         has_converged=found.has_converged and has_settled,
     )
-    return Weighed(optimum, model, sensors, number)
+    return WhitenedFit(optimum, model, sensors, number)
 
 
-def _sensors(experiments: Sequence[Prepared], given: Sequence[frozenset[str]]) -> tuple[Sensor, ...]:
+def _sensors(experiments: Sequence[PreparedExperiment], given: Sequence[frozenset[str]]) -> tuple[Sensor, ...]:
     """Return the sensors: recordings of one channel, sampled alike, share one."""
     found: dict[tuple[str, int, bool], list[slice]] = {}
     intervals: dict[tuple[str, int, bool], float] = {}
@@ -146,7 +221,7 @@ def _sensors(experiments: Sequence[Prepared], given: Sequence[frozenset[str]]) -
     )
 
 
-def _heard(sensor: Sensor, residuals: Floats, is_estimated: bool) -> Sensor:
+def _estimate_noise(sensor: Sensor, residuals: Floats, is_estimated: bool) -> Sensor:
     """Return the sensor with its noise and hum estimated from residuals, or with its weights alone."""
     segments = [residuals[place] for place in sensor.places]
     hum = tuple(one / sensor.interval for one in hum_of(segments)) if is_estimated else sensor.hum
@@ -175,32 +250,32 @@ def _linear_model(near: Neighbourhood, sensors: Sequence[Sensor]) -> LinearModel
 def _step(near: Neighbourhood, model: LinearModel, sensors: Sequence[Sensor]) -> tuple[Floats, Floats]:
     """Return the step to the least of the whitened cost inside the bounds, and the information of the coordinates."""
     count = len(near.point)
-    rows = whitened(model, [one.noise for one in sensors], [one.weights for one in sensors])
+    rows = whiten(model, [one.noise for one in sensors], [one.weights for one in sensors])
     products = rows.T @ rows
     precision, pull = products[:-1, :-1] + model.precision, products[:-1, -1] + model.pull
-    step = -solved(precision, pull)[:count]
+    step = -solution(precision, pull)[:count]
     information = precision[:count, :count]
     if len(pull) > count:
         across = precision[:count, count:]
-        information = information - across @ inverted(precision[count:, count:])[0] @ across.T
-        pull = pull[:count] - across @ solved(precision[count:, count:], pull[count:])
+        information = information - across @ inverse_with_root(precision[count:, count:])[0] @ across.T
+        pull = pull[:count] - across @ solution(precision[count:, count:], pull[count:])
     low, high = coordinate_bounds(near.residuals.ranges)
     if np.all((near.point + step >= low) & (near.point + step <= high)):
         return step, information
-    return _inside(information, pull, low - near.point, high - near.point), information
+    return _step_inside_bounds(information, pull, low - near.point, high - near.point), information
 
 
-def _inside(information: Floats, pull: Floats, low: Floats, high: Floats) -> Floats:
+def _step_inside_bounds(information: Floats, pull: Floats, low: Floats, high: Floats) -> Floats:
     """Return the step to the least of a quadratic cost between bounds."""
     from scipy.optimize import lsq_linear
 
-    _, root = inverted(information)
+    _, root = inverse_with_root(information)
     upper = np.linalg.inv(root)
     found = lsq_linear(upper, -root.T @ pull, bounds=(np.minimum(low, 0.0), np.maximum(high, 0.0) + 1.0e-15))
     return np.asarray(found.x)
 
 
-def _damped(near: Neighbourhood, step: Floats, directions: Floats, whitening: Whitening) -> Neighbourhood | None:
+def _damp_step(near: Neighbourhood, step: Floats, directions: Floats, whitening: Whitening) -> Neighbourhood | None:
     """Return the neighbourhood after a step, halved until the cost does not rise; None where it always does."""
     low, high = coordinate_bounds(near.residuals.ranges)
     before = _cost(near, whitening)

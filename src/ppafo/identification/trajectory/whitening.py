@@ -38,7 +38,7 @@ class AutoRegression:
     def rows(self, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
         """Return whitened columns (samples, columns) and the logarithm of the spread of each sample."""
         roots = np.sqrt(weights)
-        whitened = _predicted(values, self.predictors, self.spreads) * roots[:, None]
+        whitened = _prediction_errors(values, self.predictors, self.spreads) * roots[:, None]
         stages = np.minimum(np.arange(len(values)), self.order)
         return whitened, np.log(self.spreads[stages]) - np.log(roots)
 
@@ -78,7 +78,7 @@ class Drift:
 
     def path(self, values: Floats, weights: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Return the drift, drawn given the samples, and its variance; normals of 0 give its mean."""
-        drawn: tuple[Floats, Floats] = _smoothed(values, 1.0 / weights, self.memory, self.ratio, self.first, normals)
+        drawn: tuple[Floats, Floats] = _smooth(values, 1.0 / weights, self.memory, self.ratio, self.first, normals)
         return drawn
 
     def heavy_likelihood(self, values: Floats, level: float, freedom: float) -> float:
@@ -124,7 +124,7 @@ def from_reflections(reflections: Floats) -> AutoRegression:
 
 def from_coefficients(coefficients: Floats) -> AutoRegression | None:
     """Return the autoregression with these coefficients; None where noise like that would grow without end."""
-    reflections: Floats = _stepped_down(np.array(coefficients))
+    reflections: Floats = _step_down(np.array(coefficients))
     return None if np.any(np.abs(reflections) >= 1.0) else from_reflections(reflections)
 
 
@@ -143,12 +143,12 @@ def reflections_of(segments: list[Floats], most: int) -> tuple[Floats, Floats]:
     return reflections, np.maximum(left, _LEAST)
 
 
-def _compiled(function: Any) -> Any:
+def _compile(function: Any) -> Any:
     return njit(cache=True, error_model="numpy")(function)
 
 
-@_compiled
-def _predicted(values: Any, predictors: Any, spreads: Any) -> Any:
+@_compile
+def _prediction_errors(values: Any, predictors: Any, spreads: Any) -> Any:
     count, width = values.shape
     order = len(spreads) - 1
     out = np.empty((count, width))
@@ -165,8 +165,8 @@ def _predicted(values: Any, predictors: Any, spreads: Any) -> Any:
     return out
 
 
-@_compiled
-def _stepped_down(coefficients: Any) -> Any:
+@_compile
+def _step_down(coefficients: Any) -> Any:
     order = len(coefficients)
     found = np.zeros(order)
     for stage in range(order - 1, -1, -1):
@@ -182,7 +182,7 @@ def _stepped_down(coefficients: Any) -> Any:
     return found
 
 
-@_compiled
+@_compile
 def _gains(variances: Any, memory: float, change: float, first: float) -> Any:
     count = len(variances)
     gains, spreads = np.empty(count), np.empty(count)
@@ -195,7 +195,7 @@ def _gains(variances: Any, memory: float, change: float, first: float) -> Any:
     return gains, spreads
 
 
-@_compiled
+@_compile
 def _innovations(values: Any, gains: Any, spreads: Any, memory: float) -> Any:
     count, width = values.shape
     out, expected = np.empty((count, width)), np.zeros(width)
@@ -207,8 +207,8 @@ def _innovations(values: Any, gains: Any, spreads: Any, memory: float) -> Any:
     return out
 
 
-@_compiled
-def _smoothed(values: Any, variances: Any, memory: float, change: float, first: float, normals: Any) -> Any:
+@_compile
+def _smooth(values: Any, variances: Any, memory: float, change: float, first: float, normals: Any) -> Any:
     count = len(values)
     mean, left = np.empty(count), np.empty(count)
     expected, unknown = 0.0, first
@@ -230,7 +230,7 @@ def _smoothed(values: Any, variances: Any, memory: float, change: float, first: 
     return path, spread
 
 
-@_compiled
+@_compile
 def _mixture_likelihood(values: Any, memory: float, change: float, first: float, shares: Any, nodes: Any) -> float:
     expected, unknown, total = 0.0, first, 0.0
     for sample in range(len(values)):

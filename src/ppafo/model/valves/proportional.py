@@ -17,14 +17,12 @@ from ppafo.model.ports import (
     single_port_flow,
     single_port_flow_slopes,
 )
+from ppafo.model.turns import DOUBLINGS, SMALLEST_SHARE, TERMS
 from ppafo.model.valves.kind import ValveKind, ValveModel
 
 NO_SLEW_LIMIT = 1.0e12
 SAME_INSTANT = 1.0e-11
 TINY = 1.0e-300
-DOUBLINGS = 12
-SMALLEST_STEP = 0.5**DOUBLINGS
-TERMS = 9
 ARRIVAL = 30.0
 """Time over the slower time constant of a spool after which it has arrived to rounding."""
 
@@ -206,7 +204,7 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
     slower = max(1.0 / damping_ratio, 2.0 * damping_ratio)
     share = min(1.0, ARRIVAL * slower / max(angular * step, TINY))
     moving = share * step
-    small = angular * moving * SMALLEST_STEP
+    small = angular * moving * SMALLEST_SHARE
     trace, determinant = -2.0 * damping_ratio * small, small * small
     # A^n = p + q A, term by term: the next is A times this one.
     p, q, exp_p, exp_q, mean_p, mean_q = 1.0, 0.0, 1.0, 0.0, 1.0, 0.0
@@ -224,7 +222,7 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
         squared = exp_q * exp_q
         exp_p, exp_q = exp_p * exp_p - determinant * squared, 2.0 * exp_p * exp_q + trace * squared
     # A is small times ((0, 1), (-1, -2 d)) for x and x'/w.
-    per_rate = moving * SMALLEST_STEP
+    per_rate = moving * SMALLEST_SHARE
     faster = angular * small
     return SpoolStep(
         exp_p,

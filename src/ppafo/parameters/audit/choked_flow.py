@@ -43,10 +43,11 @@ def _constant(evidence: Evidence, path: str, expected: float) -> Iterator[Findin
         id=path.rpartition(".")[2].replace("_", "-"),
         severity="note" if holds else "error",
         title=f"{quantity.summary} {'follows' if holds else 'does not follow'} from the gas data",
-        values=evidence.named(path, *GAS_PATHS),
+        values=evidence.values_of(path, *GAS_PATHS),
         sides=(Side("printed", printed, quantity.unit), Side("from the gas data", expected, quantity.unit)),
         paragraph=(
-            f"Printed is {evidence.written(path, printed)}; the gas data give {expected:.5g} {quantity.unit}".rstrip()
+            f"Printed is {evidence.in_set_unit(path, printed)}; the gas data give {expected:.5g} "
+            f"{quantity.unit}".rstrip()
             + f". The two {verdict}.{remedy}"
         ),
     )
@@ -61,7 +62,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
     if formula is None or (exponent is not None and math.isclose(exponent, right, rel_tol=1e-9)):
         return
     correct = choked_flow_constant(k, gas.specific_gas_constant, gas.temperature)
-    values = evidence.named(_EXPONENT, _C1, *GAS_PATHS)
+    values = evidence.values_of(_EXPONENT, _C1, *GAS_PATHS)
     title = "the printed exponent inside C1 is not the one of choked flow"
     if exponent is None:
         text = f"The formula '{formula}' cannot be read as arithmetic in k; the right exponent is (k + 1)/(k - 1)."

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from ppafo.errors import UnitError
 from ppafo.parameters.audit.evidence import Evidence
 from ppafo.parameters.audit.finding import Finding, Side
-from ppafo.parameters.parameter_set import entry_in_si, shown
+from ppafo.parameters.parameter_set import entry_in_si, number_text
 from ppafo.units import to_si
 
 _NEEDS_PLAIN = "a plain number"
@@ -13,7 +13,7 @@ _NEEDS_PLAIN = "a plain number"
 
 def check(evidence: Evidence) -> Iterator[Finding]:
     """Yield one finding for values of a foreign dimension, and one for each whose unit is that of its inverse."""
-    refused = dict(_refused(evidence))
+    refused = dict(_refusals(evidence))
     inverted = [path for path in refused if _fits_inverse(evidence, path)]
     for path in inverted:
         yield _upside_down(evidence, path)
@@ -22,7 +22,7 @@ def check(evidence: Evidence) -> Iterator[Finding]:
         yield _foreign(evidence, foreign)
 
 
-def _refused(evidence: Evidence) -> Iterator[tuple[str, str]]:
+def _refusals(evidence: Evidence) -> Iterator[tuple[str, str]]:
     for path, entry in evidence.parameter_set.numbers.items():
         try:
             entry_in_si(entry, evidence.declared[path], evidence.atmosphere())
@@ -51,10 +51,11 @@ def _upside_down(evidence: Evidence, path: str) -> Finding:
         id=f"{name}-upside-down",
         severity="error",
         title=f"{path} is upside down: its unit belongs to the inverse",
-        values=evidence.named(path),
+        values=evidence.values_of(path),
         sides=(Side("as printed", value, inverse_unit), Side("taken literally", 1.0 / value, quantity.unit)),
         paragraph=(
-            f"{path} = {shown(entry)} is meant as: {quantity.summary}. That has the unit {quantity.unit}; the printed "
+            f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit "
+            f"{quantity.unit}; the printed "
             f"unit {entry.unit} is the one of its inverse. Reconciled by turning the ratio over and keeping the "
             f"number: taken literally it would be {1.0 / value:.3g} {quantity.unit}."
         ),
@@ -67,11 +68,11 @@ def _foreign(evidence: Evidence, paths: list[str]) -> Finding:
         id="dimensions",
         severity="error",
         title="values whose unit does not fit their equation",
-        values=evidence.named(*paths),
+        values=evidence.values_of(*paths),
         sides=tuple(Side(path, evidence.number(path) or 0.0, "as given, base units") for path in paths),
         paragraph=(
             f"{described}. Reconciled by giving the same number in the unit that is needed, if only the unit was "
-            f"misprinted; the other checks go on with the number as it stands."
+            f"misprinted; the other checks use the number as it stands."
         ),
     )
 
@@ -79,4 +80,4 @@ def _foreign(evidence: Evidence, paths: list[str]) -> Finding:
 def _mismatch(evidence: Evidence, path: str) -> str:
     needed = evidence.declared[path].unit or _NEEDS_PLAIN
     entry = evidence.parameter_set.numbers[path]
-    return f"{path} = {shown(entry)}, where {needed} is needed ({evidence.declared[path].summary})"
+    return f"{path} = {number_text(entry)}, where {needed} is needed ({evidence.declared[path].summary})"

@@ -76,7 +76,7 @@ class Evidence:
         relative = min(printed_half_width(entry) / abs(entry.value), 0.99)
         return Interval(abs(value) * (1.0 - relative), abs(value) * (1.0 + relative))
 
-    def written(self, path: str, value: float) -> str:
+    def in_set_unit(self, path: str, value: float) -> str:
         """Return an SI value in the unit in which the set gives the quantity at a path, for example ``84 g m^2``."""
         entry, quantity = self.parameter_set.numbers.get(path), self.declared[path]
         for unit in alternatives(quantity) if entry is not None else ():
@@ -89,7 +89,7 @@ class Evidence:
             return f"{converted:.4g} {entry.unit if entry else ''}".rstrip()
         return f"{value:.4g} {quantity.unit.removesuffix('_a')}".rstrip()
 
-    def named(self, *paths: str) -> tuple[NamedValue, ...]:
+    def values_of(self, *paths: str) -> tuple[NamedValue, ...]:
         """Return the values at those paths that the set has, as they were given."""
         numbers, texts = self.parameter_set.numbers, self.parameter_set.texts
         found = [NamedValue(p, numbers[p].value, numbers[p].unit, numbers[p].origin) for p in paths if p in numbers]

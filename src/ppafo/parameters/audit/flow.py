@@ -63,13 +63,13 @@ def _flow(evidence: Evidence, name: str) -> _ValveFlow | None:
 def _contradiction(evidence: Evidence, flow: _ValveFlow) -> Finding:
     area_path, _, flow_path, pressure_path = _paths(flow.name)
     needed = flow.measured / flow.per_area
-    printed = evidence.written(flow_path, flow.measured)
-    pressure = evidence.written(pressure_path, evidence.number(pressure_path) or 0.0)
+    printed = evidence.in_set_unit(flow_path, flow.measured)
+    pressure = evidence.in_set_unit(pressure_path, evidence.number(pressure_path) or 0.0)
     return Finding(
         id=f"flow-of-{flow.name}",
         severity="error",
         title=f"the printed flow of valve '{flow.name}' does not follow from Cd A",
-        values=evidence.named(*_paths(flow.name)),
+        values=evidence.values_of(*_paths(flow.name)),
         sides=(
             Side("printed flow", flow.measured, "kg/s"),
             Side("Cd A C1 P", flow.predicted, "kg/s"),
@@ -77,12 +77,12 @@ def _contradiction(evidence: Evidence, flow: _ValveFlow) -> Finding:
         ),
         paragraph=(
             f"Fully open at {pressure} the valve '{flow.name}' passes "
-            f"{evidence.written(flow_path, flow.predicted)} by Cd A = {flow.coefficient:.4g} x "
-            f"{evidence.written(area_path, flow.area)}, printed is {printed}: a factor "
+            f"{evidence.in_set_unit(flow_path, flow.predicted)} by Cd A = {flow.coefficient:.4g} x "
+            f"{evidence.in_set_unit(area_path, flow.area)}, printed is {printed}: a factor "
             f"{flow.predicted / flow.measured:.3g}. Reconciled by Cd A = {1e6 * needed:.4g} mm^2, that is "
             f"Cd = {needed / flow.area:.3g} with the printed area, or "
-            f"{evidence.written(area_path, needed / flow.coefficient)} with the printed Cd; or by "
-            f"{evidence.written(flow_path, flow.predicted)} as the flow."
+            f"{evidence.in_set_unit(area_path, needed / flow.coefficient)} with the printed Cd; or by "
+            f"{evidence.in_set_unit(flow_path, flow.predicted)} as the flow."
         ),
     )
 
@@ -99,7 +99,7 @@ def _shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> Iterator
             id=f"one-coefficient-{first.name}-{other.name}",
             severity="error",
             title=f"one Cd cannot give the printed flows of '{first.name}' and '{other.name}'",
-            values=evidence.named(*_paths(first.name)[:3], *_paths(other.name)[:3]),
+            values=evidence.values_of(*_paths(first.name)[:3], *_paths(other.name)[:3]),
             sides=(Side("ratio of the areas", areas, ""), Side("ratio of the printed flows", measured, "")),
             paragraph=(
                 f"With one discharge coefficient {first.coefficient:.4g} flow goes as area: '{first.name}' must pass "

@@ -30,7 +30,7 @@ def _unknown(evidence: Evidence, name: str) -> Finding:
         id="gas-species",
         severity="error",
         title=f"no data for the gas '{name}'",
-        values=evidence.named("gas.species"),
+        values=evidence.values_of("gas.species"),
         sides=(),
         paragraph=f"The gas '{name}' is not one of {', '.join(SPECIES)}; name one of these.",
     )
@@ -42,10 +42,10 @@ def _differs(evidence: Evidence, path: str, value: float, expected: float, sourc
         id=path.replace(".", "-").replace("_", "-"),
         severity="error",
         title=f"{path} is not that of the named gas",
-        values=evidence.named("gas.species", path),
+        values=evidence.values_of("gas.species", path),
         sides=(Side("in the set", value, unit), Side("of the gas", expected, unit)),
         paragraph=(
-            f"{path} is {evidence.written(path, value)}, but {evidence.text('gas.species')} has "
-            f"{evidence.written(path, expected)} ({source}). Reconciled by that value or by naming the gas in use."
+            f"{path} is {evidence.in_set_unit(path, value)}, but {evidence.text('gas.species')} has "
+            f"{evidence.in_set_unit(path, expected)} ({source}). Reconciled by that value or by naming the gas in use."
         ),
     )

@@ -32,11 +32,12 @@ def check(evidence: Evidence) -> Iterator[Finding]:
         id="ideal-gas",
         severity="warning" if abs(error) > _WORTH_A_WARNING else "note",
         title=f"the ideal gas law {counts} {gas.species} by {100.0 * abs(error):.2g} % at supply pressure",
-        values=evidence.named("gas.species", "gas.temperature", _SUPPLY),
+        values=evidence.values_of("gas.species", "gas.temperature", _SUPPLY),
         sides=(Side("real-gas factor, ideal", 1.0, ""), Side("real-gas factor, real", compressibility, "")),
         paragraph=(
             f"With the second virial coefficient {1e6 * virial:.3g} cm^3/mol the real-gas factor at "
-            f"{evidence.written(_SUPPLY, pressure)} is {compressibility:.4f}: the ideal gas law {counts} the mass in a "
+            f"{evidence.in_set_unit(_SUPPLY, pressure)} is {compressibility:.4f}: the ideal gas law "
+            f"{counts} the mass in a "
             f"full chamber by {100.0 * abs(error):.2g} %. Reconciled by a real-gas factor in equation (3), where gas "
             f"use matters to that precision."
         ),

@@ -57,22 +57,22 @@ def _product(evidence: Evidence, product: str, rate_path: str, name: str, rate: 
     inertia, printed = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
     expected, implied = inertia * rate, printed / rate
     unit = evidence.declared[product].unit
-    ratio = evidence.named(rate_path)[0]
+    ratio = evidence.values_of(rate_path)[0]
     return Finding(
         id=f"{name.replace(' ', '-')}-against-inertia",
         severity="error",
         title=f"{name} is not the product of inertia and the printed ratio",
-        values=evidence.named(product, _INERTIA, rate_path),
+        values=evidence.values_of(product, _INERTIA, rate_path),
         sides=(
             Side(f"printed {name}", printed, unit),
             Side("inertia times ratio", expected, unit),
             Side("inertia that would agree", implied, "kg m^2"),
         ),
         paragraph=(
-            f"Inertia {evidence.written(_INERTIA, inertia)} times {abs(float(ratio.value)):g} {ratio.unit} is "
-            f"{evidence.written(product, expected)}, printed is {evidence.written(product, printed)}: a factor "
-            f"{printed / expected:.3g}. Reconciled by an inertia of {evidence.written(_INERTIA, implied)}, or by "
-            f"{evidence.written(product, expected)} as the {name}."
+            f"Inertia {evidence.in_set_unit(_INERTIA, inertia)} times {abs(float(ratio.value)):g} {ratio.unit} is "
+            f"{evidence.in_set_unit(product, expected)}, printed is {evidence.in_set_unit(product, printed)}: a factor "
+            f"{printed / expected:.3g}. Reconciled by an inertia of {evidence.in_set_unit(_INERTIA, implied)}, or by "
+            f"{evidence.in_set_unit(product, expected)} as the {name}."
         ),
     )
 
@@ -85,9 +85,9 @@ def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, deca
     printed = evidence.number(_INERTIA) or 0.0
     shifted = [printed * 10.0**shift for shift in _SHIFTS if common.low <= printed * 10.0**shift <= common.high]
     best = shifted[0] if shifted else _middle(common)
-    written = evidence.written(_INERTIA, best)
+    written = evidence.in_set_unit(_INERTIA, best)
     slip = (
-        f" {written} is the printed {evidence.written(_INERTIA, printed)} with the decimal point moved: either the "
+        f" {written} is the printed {evidence.in_set_unit(_INERTIA, printed)} with the decimal point moved: either the "
         f"inertia or both products carry the slip, and only a weighing can tell which."
         if shifted
         else ""
@@ -96,7 +96,7 @@ def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, deca
         id="one-inertia-for-both",
         severity="note",
         title=f"damping and dynamic friction both agree with an inertia of {written}",
-        values=evidence.named(_INERTIA, _DAMPING, _FRICTION, decay_path, _DECELERATION),
+        values=evidence.values_of(_INERTIA, _DAMPING, _FRICTION, decay_path, _DECELERATION),
         sides=(
             Side("printed inertia", printed, "kg m^2"),
             Side("reconciling inertia", best, "kg m^2"),
@@ -105,6 +105,6 @@ def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, deca
         ),
         paragraph=(
             f"Within the printed digits both products hold for any inertia from "
-            f"{evidence.written(_INERTIA, common.low)} to {evidence.written(_INERTIA, common.high)}.{slip}"
+            f"{evidence.in_set_unit(_INERTIA, common.low)} to {evidence.in_set_unit(_INERTIA, common.high)}.{slip}"
         ),
     )

@@ -30,10 +30,10 @@ def _two_forms(evidence: Evidence, section: str, names: tuple[str, ...]) -> Find
         id=f"forms-of-{section.rpartition('.')[2]}",
         severity="error",
         title=f"{section} is given in two forms",
-        values=evidence.named(*(f"{section}.{name}" for name in names)),
+        values=evidence.values_of(*(f"{section}.{name}" for name in names)),
         sides=(),
         paragraph=(
-            f"{section} has {', '.join(names)}, which are two answers to one question, so no device can be built. "
+            f"{section} has {', '.join(names)}, which specify one orifice twice, so no device can be built. "
             "Reconciled by area and discharge_coefficient alone, or by sonic_conductance and critical_ratio alone."
         ),
     )
@@ -60,11 +60,12 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]
         id=f"open-flow-of-{name}",
         severity="note",
         title=f"valve '{name}' passes {_GRAMS * flow:#.3g} g/s of {gas.species}",
-        values=evidence.named(*(f"{section}.{item.name}" for item in form), _SUPPLY),
+        values=evidence.values_of(*(f"{section}.{item.name}" for item in form), _SUPPLY),
         sides=(Side("flow from supply to atmosphere", flow, "kg/s"), Side("conductance", conductance, "kg/(s Pa)")),
         paragraph=(
-            f"Fully open from {evidence.written(_SUPPLY, supply)} to the atmosphere it passes {_GRAMS * flow:#.3g} g/s "
-            f"{origin}. Hold this against the data sheet."
+            f"Fully open from {evidence.in_set_unit(_SUPPLY, supply)} to the atmosphere it passes "
+            f"{_GRAMS * flow:#.3g} g/s "
+            f"{origin}. Compare this with the data sheet."
         ),
     )
 

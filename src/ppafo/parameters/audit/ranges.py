@@ -6,7 +6,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.audit.evidence import Evidence
 from ppafo.parameters.audit.finding import Finding, Side
 from ppafo.parameters.declaration import is_within
-from ppafo.parameters.parameter_set import number_in_si, shown
+from ppafo.parameters.parameter_set import number_in_si, number_text
 
 
 def check(evidence: Evidence) -> Iterator[Finding]:
@@ -19,10 +19,10 @@ def check(evidence: Evidence) -> Iterator[Finding]:
             id=f"range-of-{path.replace('.', '-').replace('_', '-')}",
             severity="error",
             title=f"{path} is out of range",
-            values=evidence.named(path),
+            values=evidence.values_of(path),
             sides=(Side("in the set", value, quantity.unit), *_limits(quantity)),
             paragraph=(
-                f"{path} = {shown(entry)}: {quantity.summary} must lie between {quantity.minimum:g} and "
+                f"{path} = {number_text(entry)}: {quantity.summary} must lie between {quantity.minimum:g} and "
                 f"{quantity.maximum:g} {quantity.unit}".rstrip()
                 + ". Reconciled by a value in that range."
             ),

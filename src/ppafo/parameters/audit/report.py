@@ -21,13 +21,13 @@ def audit(parameter_set: ParameterSet) -> list[Finding]:
     evidence = Evidence(parameter_set, parameter_set.declared())
     found = [finding for check in CHECKS.values() for finding in check(evidence)]
     changed = overridden_paths(parameter_set)
-    judged = [_judged(finding, parameter_set, changed) for finding in found]
+    judged = [_judge(finding, parameter_set, changed) for finding in found]
     if not changed:
         judged += _idle_reasons(parameter_set, {finding.id for finding in found})
     return sorted(judged, key=lambda finding: _ORDER[finding.severity])
 
 
-def _judged(finding: Finding, parameter_set: ParameterSet, changed: frozenset[str]) -> Finding:
+def _judge(finding: Finding, parameter_set: ParameterSet, changed: frozenset[str]) -> Finding:
     """Apply the set's reason, which speaks of the set's own values and not of overrides."""
     reason = parameter_set.accepted.get(finding.id, "")
     if not reason or any(value.path in changed for value in finding.values):
@@ -42,8 +42,8 @@ def _idle_reasons(parameter_set: ParameterSet, found: set[str]) -> Iterator[Find
             yield Finding(
                 id="idle-acceptance",
                 severity="warning",
-                title=f"the set accepts '{identifier}', which is not found",
+                title=f"the set accepts '{identifier}', which does not exist",
                 values=(),
                 sides=(),
-                paragraph=f"Nothing called '{identifier}' was found. Take the entry out of the set; it says: {reason}",
+                paragraph=f"There is no finding '{identifier}'. Remove the entry from the set; its reason is: {reason}",
             )

@@ -36,15 +36,15 @@ def _valve(evidence: Evidence, name: str) -> Iterator[Finding]:
         id=f"flow-of-{name}",
         severity="error",
         title=f"the printed flow of valve '{name}' does not follow from its sonic conductance",
-        values=evidence.named(*paths),
+        values=evidence.values_of(*paths),
         sides=(
             Side("printed flow", measured, "kg/s"),
             Side("flow of the sonic conductance", predicted, "kg/s"),
             Side("sonic conductance that gives the printed flow", needed, "m^3/(s Pa)"),
         ),
         paragraph=(
-            f"Fully open the valve '{name}' passes {evidence.written(flow, predicted)} by its sonic conductance, "
-            f"printed is {evidence.written(flow, measured)}: a factor {predicted / measured:.3g}. Reconciled by a "
-            f"sonic conductance of {evidence.written(size, needed)}, or by the other flow."
+            f"Fully open the valve '{name}' passes {evidence.in_set_unit(flow, predicted)} by its sonic conductance, "
+            f"printed is {evidence.in_set_unit(flow, measured)}: a factor {predicted / measured:.3g}. Reconciled by a "
+            f"sonic conductance of {evidence.in_set_unit(size, needed)}, or by the other flow."
         ),
     )

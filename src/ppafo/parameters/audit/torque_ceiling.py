@@ -21,13 +21,13 @@ def check(evidence: Evidence) -> Iterator[Finding]:
     ceilings = {path: constant * (value - evidence.atmosphere()) for path, value in supplies.items()}
     severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
     per_psi = constant * to_si(1.0, "psi", "Pa")
-    pressures = {path: evidence.written(path, value) for path, value in supplies.items()}
+    pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
     held = (f"{ceilings[path]:#.3g} N m at {pressures[path]} ({path})" for path in supplies)
     yield Finding(
         id="torque-ceiling",
         severity=severity,
         title=f"the supply holds at most {max(ceilings.values()):#.3g} N m",
-        values=evidence.named(_TORQUE_CONSTANT, *supplies, _DEMAND, _STATIC),
+        values=evidence.values_of(_TORQUE_CONSTANT, *supplies, _DEMAND, _STATIC),
         sides=tuple(Side(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()),
         paragraph=(
             f"The torque constant is {per_psi:#.3g} N m/psi. With one chamber at supply and the other at atmosphere "
@@ -44,7 +44,7 @@ def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Sever
     if demand is not None and demand > ceiling:
         needed = demand / constant / 1e3
         return "warning", (
-            f" The demanded {demand:.3g} N m lie above it, so that every valve and controller keeps an error of "
-            f"{demand - ceiling:.3g} N m; reconciled by {needed:.4g} kPa_g of supply, or by asking for less."
+            f" The requested {demand:.3g} N m lie above it, so that every valve and controller keeps an error of "
+            f"{demand - ceiling:.3g} N m; reconciled by {needed:.4g} kPa_g of supply, or by requesting less."
         )
     return "note", " A reference above that cannot be followed by any valve or controller."

@@ -22,7 +22,7 @@ def check(evidence: Evidence) -> Iterator[Finding]:
         id="virtual-work",
         severity="warning",
         title="torque constant and volume per angle differ, against virtual work",
-        values=evidence.named(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, *gas_paths),
+        values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, *gas_paths),
         sides=(
             Side("torque constant", torque_constant, "m^3"),
             Side("volume per angle", volume_per_angle, "m^3/rad"),
@@ -57,7 +57,8 @@ def _gas_use(
     )
     text = (
         f" Filling 1 cm^3 from atmosphere to supply takes {density:.3g} mg of gas, so the "
-        f"{evidence.written(path, used)} of one filling occupy {1e6 * needed:.3g} cm^3; over the whole range the vane "
+        f"{evidence.in_set_unit(path, used)} of one filling occupy {1e6 * needed:.3g} cm^3; over the whole "
+        "range the vane "
         f"sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the volume per "
         f"angle. The gas use favours the {nearer}."
     )

@@ -31,12 +31,12 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
     if smallest > 0.0:
         return
     empty = min(-travel - dead / slope, turn)
-    end = evidence.written(end_path, evidence.number(end_path) or 0.0)
+    end = evidence.in_set_unit(end_path, evidence.number(end_path) or 0.0)
     yield Finding(
         id=f"volume-{chamber}",
         severity="error",
         title=f"volume of chamber {chamber} is not positive over the range of angles",
-        values=evidence.named(_SLOPE, stop_path, dead_path, end_path),
+        values=evidence.values_of(_SLOPE, stop_path, dead_path, end_path),
         sides=(
             Side(f"V{chamber} at the end of the range", smallest, "m^3"),
             Side("dead volume that is needed at least", -slope * travel, "m^3"),

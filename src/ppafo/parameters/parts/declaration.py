@@ -6,7 +6,7 @@ from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 
 MASS = Quantity("mass", "kg", "mass of the part, of both valves for a pair", minimum=0.0, maximum=100.0)
 RATING = Quantity(
-    "largest_pressure", "Pa_a", "largest pressure that the part is made for", minimum=1.0e4, maximum=1.0e8
+    "largest_pressure", "Pa_a", "maximum pressure that the part is rated for", minimum=1.0e4, maximum=1.0e8
 )
 NOMINAL_FLOW = Quantity(
     "nominal_flow", "m^3/s", "flow of air at normal conditions from 6 bar to 5 bar gauge", minimum=0.0, maximum=1.0

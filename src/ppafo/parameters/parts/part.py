@@ -6,6 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters.declaration import ORIFICE
+
 Origin = Literal["published", "datasheet", "quoted", "measured", "derived", "assumed"]
 DOUBTFUL: tuple[Origin, ...] = ("quoted", "assumed")
 """Origins that a reader has to look at before buying: from memory of a document, or a guess."""
@@ -25,7 +28,9 @@ class Figure(BaseModel):
             "'measured', 'derived' from other figures, or 'assumed'"
         ),
     ]
-    source: Annotated[str, Field(min_length=1, description="where to look it up; for an assumed one, what it rests on")]
+    source: Annotated[
+        str, Field(min_length=1, description="where to look it up; for an assumed one, the basis of the assumption")
+    ]
     note: Annotated[str, Field(description="reason or remark; needed where it is derived or assumed")] = ""
 
 
@@ -62,3 +67,11 @@ class Part:
     def full_mass(self) -> float:
         """Mass [kg] of the part as it is carried: of a bottle, with its gas."""
         return self.values["mass"] if "mass" in self.values else self.values["empty_mass"] + self.values["content"]
+
+    @property
+    def model_numbers(self) -> dict[str, float]:
+        """Numbers of a valve by path, in SI; what its maker does not say is ideal, as the declarations have it."""
+        settings = {item.name: item.default for item in VALVES[self.kind].quantities if item.default is not None}
+        orifice = {item.name: self.values[item.name] for item in ORIFICE if item.name in self.values}
+        own = {name: self.values[name] for name in settings if name in self.values}
+        return {f"valve.{name}": number for name, number in (orifice | settings | own).items()}

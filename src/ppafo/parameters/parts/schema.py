@@ -17,8 +17,8 @@ _NAMES = Annotated[tuple[str, ...], Field(strict=False)]
 
 def _part(title: str, group: str, quantities: tuple[Quantity, ...], extra: dict[str, Any] | None = None) -> Any:
     fields: dict[str, Any] = {
-        "maker": (str, Field(min_length=1, description="who makes or sells it")),
-        "model": (str, Field(min_length=1, description="what the maker calls it")),
+        "maker": (str, Field(min_length=1, description="manufacturer or dealer")),
+        "model": (str, Field(min_length=1, description="designation given by the manufacturer")),
         "document": (str, Field("", description="data sheet, catalogue or paper; empty where none is known")),
         "note": (str, Field("", description="remark")),
         "unknown": (_NAMES, Field(default=(), description="figures that are not known")),

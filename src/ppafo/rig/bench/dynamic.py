@@ -106,8 +106,29 @@ def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState
     energy_1, energy_2, line_energy_1, line_energy_2 = (
         gas_energy(mass, warm, physics.heat_capacity) for mass in (mass_1, mass_2, line_1, line_2)
     )
-    gas = (mass_1, energy_1, mass_2, energy_2, line_1, line_energy_1, line_2, line_energy_2)
-    return RigState(angle, rate, *gas, *(0.0,) * 8, angle, *pressures)
+    return RigState(
+        angle=angle,
+        angular_velocity=rate,
+        mass_1=mass_1,
+        energy_1=energy_1,
+        mass_2=mass_2,
+        energy_2=energy_2,
+        line_mass_1=line_1,
+        line_energy_1=line_energy_1,
+        line_mass_2=line_2,
+        line_energy_2=line_energy_2,
+        supplied_mass=0.0,
+        vented_mass=0.0,
+        leaked_mass=0.0,
+        supply_drop_1=0.0,
+        supply_drop_2=0.0,
+        enthalpy_in=0.0,
+        work_done=0.0,
+        heat_in=0.0,
+        seen_angle=angle,
+        seen_pressure_1=pressures[0],
+        seen_pressure_2=pressures[1],
+    )
 
 
 def _outcome(name: str, scenario: Scenario, given: RigRun, names: tuple[str, ...]) -> Outcome:
@@ -127,7 +148,7 @@ def _outcome(name: str, scenario: Scenario, given: RigRun, names: tuple[str, ...
 
 
 def measured(scenario: Scenario, given: RigRun, solution: RigSolution) -> dict[str, Floats]:
-    """Return what the sensors show at every sample; the torque is worked out from the measured pressures."""
+    """Return what the sensors show at every sample; the torque is computed from the measured pressures."""
     seen = [seen_signals(given, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
     true = dict(zip(("angle", "pressure_1", "pressure_2"), np.array(seen).T, strict=True))
     for name, drop in _SUPPLIES.items():
@@ -147,7 +168,7 @@ def device_overrides(request: Request) -> tuple[str, ...]:
 
 
 def _of_package(name: str, request: Request) -> Scenario:
-    """Return a scenario of the package with the device that was asked for."""
+    """Return a scenario of the package with the requested device."""
     document = copy.deepcopy(dict(load_scenario(name).origin.content))
     document["device"] = {"overrides": document["device"].get("overrides", []), **_device_table(request)}
     return scenario_from_dict(document, request.overrides)

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lane_meters import TRACED
-from ppafo.engine.lanes import Floats
+from ppafo.engine.lanes import Floats, load_programs
+from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import MetricKind
@@ -56,6 +57,8 @@ def run_ensemble(
     out of range is REFUSED and the others go on. Memory grows with the number of runs: give chunks of some ten
     thousand.
 
+    Where a Python object controls ``base``, the runs are made one after the other: some 30 ms each.
+
     A pressure at the start that the scenario gives as a word follows the column of the pressure that it names. All
     other pressures of ``base`` are absolute, whatever ``supply.atmospheric_pressure`` is.
     """
@@ -67,8 +70,10 @@ def run_ensemble(
         raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
     checked = checked_columns(base, columns)
     plan = plan_ensemble(checked)
-    request = Request(metrics, tuple(dict.fromkeys(bands)), interval, _times(plan, interval if bands else 0.0))
+    times = _times(plan, interval if bands else 0.0)
+    request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.control.custom)
     outcome = Outcome(checked.runs, request)
+    load_programs(outcome.programs([batch for _, batch in plan.batches]))
     for members, batch in plan.batches:
         outcome.run(batch, members, threads)
     return _result(plan, outcome)
@@ -79,7 +84,8 @@ def _result(plan: EnsemblePlan, outcome: Outcome) -> EnsembleResult:
     status[list(plan.reasons)] = REFUSED
     reasons = dict(plan.reasons)
     for run in np.flatnonzero(status == DIVERGED).tolist():
-        reasons[run] = f"diverged at t = {outcome.failure_time[run]:.6g} s; {REMEDY}"
+        remedy = TOO_MANY_PARTS if outcome.too_many_parts[run] else REMEDY
+        reasons[run] = f"diverged at t = {outcome.failure_time[run]:.6g} s; {remedy}"
     times = outcome.request.times
     return EnsembleResult(
         status, outcome.failure_time, dict(sorted(reasons.items())), outcome.metrics, times, outcome.traces
@@ -105,6 +111,8 @@ def _check_channel(base: Scenario, name: str) -> None:
         raise ScenarioError(f"{base.name}: the channel '{name}' cannot be traced{_hint(name, TRACED)}")
     if name == REFERENCE and base.control.kind == OPEN_LOOP:
         raise ScenarioError(f"{base.name}: a constant command follows no reference, so there is none to trace")
+    if name.startswith("temperature_") and base.thermal is None:
+        raise ScenarioError(f"{base.name}: '{name}' needs gas with an energy balance ([gas_model] kind = \"thermal\")")
 
 
 def _hint(name: str, known: Mapping[str, object]) -> str:

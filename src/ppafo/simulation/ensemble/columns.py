@@ -48,8 +48,8 @@ class Columns:
 
 def checked_columns(base: Scenario, columns: Mapping[str, Any]) -> Columns:
     """Return the columns with the chosen valve as ``valve``; ScenarioError for what no single run is to blame for."""
-    if base.control.kind == PYTHON_CONTROLLER:
-        raise ScenarioError(f"{base.name}: a Python controller cannot run in an ensemble; use one of the catalogue")
+    if base.control.kind == PYTHON_CONTROLLER and base.control.custom is None:
+        raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
     declared = declared_numbers(base)
     values: dict[str, Floats] = {}
     for given, column in columns.items():
@@ -72,6 +72,11 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
         return
     if path in _TEXTS:
         raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; make an ensemble for each")
+    if base.control.kind == PYTHON_CONTROLLER and path.startswith("controller."):
+        raise ScenarioError(
+            f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
+            "a module with a KIND has them (docs/how-to/add-a-controller.md)"
+        )
     hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
     raise ScenarioError(f"{base.name}: there is no number '{given}' that could vary{hint}")
 

@@ -85,4 +85,20 @@ def _number(scenario: Scenario, path: str) -> Floats | float:
     return node  # type: ignore[no-any-return]
 
 
-RULES: tuple[Rule, ...] = (_inconsistent, _beyond_the_stops, _too_late)
+def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]:
+    """A second regulator that is set to more than the line has that feeds it."""
+    supply = scenario.device.supply
+    if scenario.supply_lines is None:
+        return ()
+
+    def line(run: int) -> str:
+        first, second = (
+            written(at(pressure, run), "Pa_a", at(supply.atmospheric_pressure, run))
+            for pressure in (supply.pressure, supply.dorsiflexion_pressure)
+        )
+        return f"supply.dorsiflexion_pressure = {second}: with [supply_line] at most supply.pressure, {first}"
+
+    return ((np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line),)
+
+
+RULES: tuple[Rule, ...] = (_inconsistent, _beyond_the_stops, _too_late, _second_regulator_above_the_first)

@@ -1,11 +1,12 @@
 """Runs the batches of an ensemble and reads their meters."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 
+from ppafo.control.kind import PythonController
 from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
 from ppafo.engine.metering import group_of, metered, meters_of
 from ppafo.engine.program import Program
@@ -13,6 +14,7 @@ from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics.metric import MetricKind, Readings
 from ppafo.model.thermal import energy_per_content
+from ppafo.simulation.sampled import run_in_turn
 
 GAINED = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2")
 """Channels whose gain follows from the first and the last state."""
@@ -22,12 +24,16 @@ _SAME = 1.0e-6
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is wanted of every run: metrics by name, channels to trace and the times at which to keep them [s]."""
+    """What is wanted of every run: metrics by name, channels to trace and the times at which to keep them [s].
+
+    ``custom`` is the Python object that controls every run, one after the other; None where the lanes do.
+    """
 
     metrics: Mapping[str, MetricKind]
     bands: tuple[str, ...]
     every: float
     times: Floats
+    custom: PythonController | None = None
 
 
 @final
@@ -38,8 +44,15 @@ class Outcome:
         self.request = request
         self.failure_time = np.full(runs, np.nan)
         self.is_completed = np.zeros(runs, dtype=bool)
+        self.too_many_parts = np.zeros(runs, dtype=bool)
         self.metrics = {name: np.full(runs, np.nan) for name in request.metrics}
         self.traces = {name: np.full((request.times.size, runs), np.nan) for name in request.bands}
+
+    def programs(self, batches: Iterable[Batch]) -> list[Program]:
+        """Return the programs that batches need, with their meters."""
+        first = {batch.program: batch for batch in batches}
+        alone = [Batch(item.program, item.clock, item.parameters[:, :1], item.states[:, :1]) for item in first.values()]
+        return [_asked(batch, self.request).batch.program for batch in alone] if len(alone) > 1 else []
 
     def run(self, plain: Batch, members: Members, threads: int | None) -> None:
         """Run a batch whose runs have these places in the ensemble."""
@@ -56,7 +69,10 @@ class Outcome:
                 trace = result.record[:: asked.band_stride, batch.program.traced.index(name)]
                 self.traces[name][: len(trace), members[runs]] = trace
 
-        run_blocks(batch, take, threads)
+        if self.request.custom is None:
+            run_blocks(batch, take, threads)
+        else:
+            run_in_turn(batch, self.request.custom, take)
         self._judge(asked, members, states, plain.states.shape[0])
         readings = asked.readings(states, slice(None), None)
         for name in asked.metrics:
@@ -65,7 +81,9 @@ class Outcome:
 
     def _judge(self, asked: "_Asked", members: Members, states: Floats, physical: int) -> None:
         """Which runs were completed, as in a single run: possible all the time, and finite at the end."""
-        failed = group_of("result", asked.batch.program.state_rows(), states).failure_time
+        result = group_of("result", asked.batch.program.state_rows(), states)
+        failed = result.failure_time
+        self.too_many_parts[members] = result.too_many_parts != 0.0
         completed = (failed >= NEVER_FAILED) & np.isfinite(states[:physical]).all(axis=0)
         self.is_completed[members] = completed
         end = asked.interval * (asked.samples - 1)
@@ -130,13 +148,14 @@ def _asked(plain: Batch, request: Request) -> _Asked:
     there = {
         name: kind for name, kind in request.metrics.items() if program.has_reference or REFERENCE not in kind.channels
     }
-    meters = dict.fromkeys(meter for kind in there.values() for meter in kind.meters)
+    # In one order, so that the same metrics are one program in whatever order they are asked for.
+    meters = sorted({meter.name: meter for kind in there.values() for meter in kind.meters}.items())
     looked_back = dict.fromkeys(channel for kind in there.values() for channel in kind.traced)
     interval = intervals(plain)
     stride = _stride(interval, request) if request.bands else 1
-    traced = dict.fromkeys((*looked_back, *request.bands))
+    traced = sorted({*looked_back, *request.bands})
     trace_every = 0 if not traced else 1 if looked_back else stride
-    batch = metered(plain, tuple(meters), tuple(traced), trace_every)
+    batch = metered(plain, [meter for _, meter in meters], traced, trace_every)
     return _Asked(batch, there, interval, samples_of(plain), stride if looked_back else 1)
 
 

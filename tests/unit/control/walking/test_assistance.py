@@ -5,11 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.control.controllers.feedback_linearisation import FeedbackLinearisationState
+from ppafo.control.controllers.feedback_linearisation import FeedbackLinearisationState, restart
 from ppafo.control.walking import assistance
 from ppafo.control.walking.assistance import Assistance, Hold
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.control.walking.event_feedback_linearisation import restarted
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
 from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
 from ppafo.engine.rows import rebuild
@@ -123,8 +122,8 @@ def test_a_law_forgets_where_another_task_begins(name: str) -> None:
 
 def test_a_new_task_has_no_rate_of_the_torque_wanted_for_the_inverted_chambers() -> None:
     law = FeedbackLinearisationState(4.0, 1.6, 0.3, 1.0)
-    assert restarted(law, -2.0, 0.0) == FeedbackLinearisationState(-2.0, 1.6, 0.3, 1.0)
-    assert restarted(law, -2.0, 1.0) == law
+    assert restart(law, -2.0, 0.0) == FeedbackLinearisationState(-2.0, 1.6, 0.3, 1.0)
+    assert restart(law, -2.0, 1.0) == law
 
 
 def test_nothing_is_done_once_safety_has_vented() -> None:

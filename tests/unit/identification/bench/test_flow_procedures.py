@@ -16,9 +16,7 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
-from ppafo.identification.bench.gas_flow import orifice_shape
-from ppafo.identification.bench.leak_laws import LINEAR, Chambers, difference_in_time
-from ppafo.identification.bench.leak_opening import Opening
+from ppafo.identification.bench.flow_laws import LINEAR, Chambers, Opening, difference_in_time, orifice_shape
 from ppafo.identification.source import Source
 
 VOLUME = 60e-6
@@ -61,7 +59,7 @@ def test_gauge_pressures_passed_for_absolute_are_refused(planted: ModuleType) ->
     source = planted.flow()
     gauge = changed(source, "downstream_pressure", source.recording["downstream_pressure"] - planted.ROOM)
     gauge = changed(gauge, "downstream_pressure", np.minimum(gauge.recording["downstream_pressure"], 0.0))
-    with pytest.raises(IdentificationError, match="at sample 1, which is not absolute"):
+    with pytest.raises(IdentificationError, match="at sample 1, which is not an absolute pressure"):
         open_valve_flow((gauge,), OpenValveFlowSettings(planted.CO2))
 
 
@@ -69,7 +67,7 @@ def test_exchanged_pressures_are_told(planted: ModuleType) -> None:
     source = planted.flow()
     first, second = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
     turned = changed(changed(source, "upstream_pressure", second), "downstream_pressure", first)
-    with pytest.raises(IdentificationError, match="are the two columns exchanged"):
+    with pytest.raises(IdentificationError, match="are the two columns swapped"):
         open_valve_flow((turned,), OpenValveFlowSettings(planted.CO2))
 
 
@@ -98,7 +96,7 @@ def test_a_command_that_only_rises_leaves_hysteresis_unknown(planted: ModuleType
 
 
 def test_flow_with_the_wrong_sign_is_told(planted: ModuleType) -> None:
-    with pytest.raises(IdentificationError, match="turn the sign of one of them round"):
+    with pytest.raises(IdentificationError, match="reverse the sign of one of them"):
         valve_map((planted.sweep(sign=-1.0),), ValveMapSettings(planted.CO2))
 
 
@@ -180,7 +178,7 @@ def test_a_pressure_that_rises_is_no_tight_chamber_and_hardly_ever_said_of_one(p
 
 def test_a_tight_chamber_among_leaking_ones_is_named(planted: ModuleType) -> None:
     sources = (planted.leak("linear", 0.05), nearly_tight(planted, 1))
-    with pytest.raises(IdentificationError, match=r"tight: vane_leak: no leak shows.*its own procedure"):
+    with pytest.raises(IdentificationError, match=r"tight: vane-leak: no leak is visible.*a procedure of its own"):
         vane_leak(sources, VaneLeakSettings(planted.CO2))
 
 
@@ -218,7 +216,7 @@ def test_one_decay_cannot_tell_a_relaxation_from_a_linear_leak_behind_a_sensor_t
     result = vane_leak(towards(planted, [3e5], 2e4, 0.0, 1), VaneLeakSettings(planted.CO2))
     told = next(check for check in result.checks if check.name == "leak or relaxation")
     assert not told.holds
-    assert "a linear leak of 0.08 1/s and sensors whose difference is off by" in told.statement
+    assert "a linear leak of 0.08 1/s and a sensor offset of" in told.statement
     assert "the same curve" in told.statement
 
 
@@ -240,7 +238,7 @@ def test_decays_from_one_pressure_are_said_not_to_tell_them_apart(planted: Modul
     result = vane_leak(towards(planted, [3e5, 3e5], 2e4, 0.0, 3), VaneLeakSettings(planted.CO2))
     told = next(check for check in result.checks if check.name == "leak or relaxation")
     assert not told.holds
-    assert "explain these decays alike" in told.statement
+    assert "explain these decays equally well" in told.statement
 
 
 def test_the_line_of_a_failed_law_has_the_reason_that_decided(planted: ModuleType) -> None:
@@ -322,7 +320,7 @@ def test_a_steady_laminar_leak_gets_no_area(planted: ModuleType) -> None:
 
 
 def test_steady_flow_with_the_wrong_sign_is_told(planted: ModuleType) -> None:
-    with pytest.raises(IdentificationError, match="turn its sign round"):
+    with pytest.raises(IdentificationError, match="reverse its sign"):
         vane_leak((steady(planted, "linear", -1.0e-10),), VaneLeakSettings(planted.CO2))
 
 
@@ -360,7 +358,7 @@ def test_flow_is_antisymmetric_under_exchange_of_sides() -> None:
 def test_a_leak_below_zero_absolute_pressure_is_refused(planted: ModuleType) -> None:
     source = planted.leak("linear", 0.05)
     gauge = replace(changed(source, "pressure_2", source.recording["pressure_2"] - 2.0e5))
-    with pytest.raises(IdentificationError, match=r"'pressure_2' is .* at sample 1, which is not absolute"):
+    with pytest.raises(IdentificationError, match=r"'pressure_2' is .* at sample 1, which is not an absolute pressure"):
         vane_leak((gauge,), VaneLeakSettings(planted.CO2))
 
 
@@ -379,7 +377,7 @@ def test_calibration_widens_areas_and_leaves_commands_and_ratios(planted: Module
 
 
 def test_a_decay_has_no_use_for_a_calibration_and_says_why(planted: ModuleType) -> None:
-    with pytest.raises(IdentificationError, match="a gain that both sensors share leaves its rate as it is"):
+    with pytest.raises(IdentificationError, match="a gain common to both sensors does not change its rate"):
         vane_leak((planted.leak("orifice", 0.05),), VaneLeakSettings(planted.CO2, calibration=0.01))
 
 

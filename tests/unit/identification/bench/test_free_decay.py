@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import FreeDecaySettings, free_decay
-from ppafo.identification.bench.decay_motion import angle_of_decay, stop_time, velocity_of_decay
+from ppafo.identification.bench.decay import angle_of_decay, stop_time, velocity_of_decay
 from ppafo.identification.source import Source
 
 
@@ -84,7 +84,7 @@ def test_gravity_fails_the_residual_check(planted: ModuleType) -> None:
 
 def test_an_angle_that_never_moves_is_refused(planted: ModuleType) -> None:
     still = planted.source("still", np.arange(100.0), angle=(np.full(100, 0.3), "rad"))
-    with pytest.raises(IdentificationError, match=r"still: free_decay: channel 'angle' is 0\.3 rad throughout"):
+    with pytest.raises(IdentificationError, match=r"still: free-decay: channel 'angle' is 0\.3 rad throughout"):
         free_decay((still,))
 
 

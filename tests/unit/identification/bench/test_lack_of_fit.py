@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
-from ppafo.identification.bench.lack_of_fit import jackknifed, lack_of_fit
-from ppafo.identification.bench.regression import labels_of, regress
+from ppafo.identification.bench.curve_fit import CurveFit, fit_curve, jackknife, lack_of_fit
+from ppafo.identification.bench.static_readings import labels_of, regress
 
 TIME = np.linspace(0.0, 1.0, 400)
 
@@ -65,7 +64,7 @@ def test_intervals_cover_the_slope_that_a_slow_error_hides() -> None:
 def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
     values = np.array([1.0, 2.0, 4.0, 7.0])
     without = [np.array([np.delete(values, index).mean()]) for index in range(4)]
-    assert jackknifed(without, 0.95)[0] == pytest.approx(3.1824 * values.std(ddof=1) / 2.0, rel=1e-4)
+    assert jackknife(without, 0.95)[0] == pytest.approx(3.1824 * values.std(ddof=1) / 2.0, rel=1e-4)
 
 
 @pytest.mark.parametrize("count", [3, 10, 15])

@@ -100,7 +100,7 @@ def test_a_bent_characteristic_fails_its_check(planted: ModuleType) -> None:
 def test_a_missing_falling_branch_is_named(planted: ModuleType) -> None:
     source = planted.static()
     rising = changed(source, "direction", np.maximum(source.recording["direction"], 0.0))
-    with pytest.raises(IdentificationError, match="static: static_torque: the falling branch is missing"):
+    with pytest.raises(IdentificationError, match="static: static-torque: the falling branch is missing"):
         static_torque((rising,))
 
 
@@ -110,7 +110,7 @@ def test_a_missing_channel_is_named_with_what_the_file_has(planted: ModuleType) 
 
 
 def test_a_direction_that_is_turned_round_is_told_and_not_fitted(planted: ModuleType) -> None:
-    with pytest.raises(IdentificationError, match="turn the sign of channel 'direction'"):
+    with pytest.raises(IdentificationError, match="reverse the sign of channel 'direction'"):
         static_torque((planted.static(sign=-1.0),))
 
 

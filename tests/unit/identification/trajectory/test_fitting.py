@@ -16,11 +16,13 @@ from ppafo.identification.trajectory import (
     TrajectoryFit,
     TrajectoryProblem,
     fit,
+    search,
 )
-from ppafo.identification.trajectory.columns import run_with, trajectories
+from ppafo.identification.trajectory.experiment import number_at
 from ppafo.identification.trajectory.fitting import residuals_of
-from ppafo.identification.trajectory.paths import number_at
 from ppafo.identification.trajectory.preparation import FIT_TOLERANCE
+from ppafo.identification.trajectory.residuals import run_with, trajectories
+from ppafo.identification.trajectory.search import Optimum
 from ppafo.signals.recording import Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -51,6 +53,26 @@ def test_three_planted_values_are_found_and_called_identified(three: TrajectoryF
         # Three standard errors: 3/1.96 half widths.
         assert abs(estimate.value - number_at(step, estimate.path)) < 3.0 / 1.96 * estimate.half_width
         assert estimate.recordings == ("synthetic step-response",)
+
+
+@pytest.mark.parametrize("goes_on", [False, True])
+def test_a_search_that_ends_above_a_fit_with_a_number_held_goes_on_from_there_or_has_not_settled(
+    experiment: Experiment, monkeypatch: pytest.MonkeyPatch, goes_on: bool
+) -> None:
+    residuals = residuals_of(TrajectoryProblem((FLOW, INERTIA), (experiment,)))
+    start = np.array([item.coordinate(item.start) for item in residuals.ranges])
+
+    def cost(point: np.ndarray) -> float:
+        return 0.5 * float(np.sum(np.square(residuals.of_data(point[None, :]))))
+
+    def stuck(_residuals: object, point: np.ndarray, _search: Search) -> Optimum:
+        end = point if goes_on else start
+        return Optimum(residuals, end, cost(end), 1, np.eye(2), True)
+
+    monkeypatch.setattr(search, "_refine", stuck)
+    found = search.optimum(residuals, Search())
+    assert found.has_converged == goes_on
+    assert (found.cost < 0.9 * cost(start)) == goes_on
 
 
 def test_residuals_are_white_and_as_large_as_the_noise(three: TrajectoryFit) -> None:
@@ -112,13 +134,13 @@ def test_all_torques_together_are_not_identifiable_without_a_known_one(experimen
     static, dynamic = FreeParameter("friction.static_torque"), FreeParameter("friction.dynamic_torque")
     found = fitted(experiment, torque, INERTIA, DAMPING, static, dynamic)
     assert found.estimate("actuator.torque_constant").verdict == "not identifiable"
-    assert "trades against" in found.estimate("foot_plate.inertia").explanation
+    assert "trades off against" in found.estimate("foot_plate.inertia").explanation
 
 
 def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: Experiment) -> None:
     found = fitted(experiment, INERTIA, FreeParameter("supply.dorsiflexion_pressure"))
     assert found.estimate("supply.dorsiflexion_pressure").verdict == "not identifiable"
-    assert "hardly react" in found.estimate("supply.dorsiflexion_pressure").explanation
+    assert "hardly sensitive" in found.estimate("supply.dorsiflexion_pressure").explanation
 
 
 def test_a_bound_that_keeps_the_truth_out_is_named(experiment: Experiment) -> None:
@@ -207,7 +229,7 @@ def test_the_same_problem_gives_the_same_numbers(experiment: Experiment) -> None
 
 def test_a_search_that_is_cut_short_says_so(experiment: Experiment) -> None:
     found = fitted(experiment, FLOW, INERTIA, DAMPING, search=Search(most_evaluations=2))
-    assert any("before it settled" in remark for remark in found.remarks)
+    assert any("before it converged" in remark for remark in found.remarks)
 
 
 def test_half_widths_of_a_logarithm_are_ratios(three: TrajectoryFit) -> None:

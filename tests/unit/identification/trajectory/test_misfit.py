@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.intervals import noisy_recordings, planted_problem, two_step_responses
+from benchmarks.intervals.calibration import FIVE_PARAMETERS, Task, repetition
 from ppafo.cli.main import main
-from ppafo.identification.identify import identify
 from ppafo.identification.trajectory import Experiment, FreeParameter, Prior, TrajectoryFit, TrajectoryProblem, fit
-from ppafo.identification.trajectory.beforehand import prospects_of
+from ppafo.identification.trajectory.experiment import with_numbers
 from ppafo.identification.trajectory.fitting import residuals_of
 from ppafo.identification.trajectory.misfit import ALARM
-from ppafo.identification.trajectory.paths import with_numbers
+from ppafo.identification.trajectory.outcome import prospects_of
+from ppafo.questions.identify.solve import identify
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.recordings import read_recording
-from ppafo.studies.trajectory import noisy_recordings, planted_problem, two_step_responses
-from ppafo.studies.trajectory.calibration import FIVE_PARAMETERS, Task, repetition
 
 DEAD_VOLUME = "actuator.dead_volume_1"
 PARAMETERS = tuple(FreeParameter(path) for path in FIVE_PARAMETERS)
@@ -130,8 +130,8 @@ def test_what_cannot_be_had_is_said_before_the_search(experiment: Experiment) ->
     found = {one.name: one for one in prospects_of(residuals_of(problem), problem.search)}
     assert found["foot_plate.inertia"].can_be_had
     assert not found["supply.dorsiflexion_pressure"].can_be_had
-    assert "hardly react" in found["supply.dorsiflexion_pressure"].statement
-    assert "trades against valves.proportional.area" in found["valves.proportional.discharge_coefficient"].statement
+    assert "hardly sensitive" in found["supply.dorsiflexion_pressure"].statement
+    assert "trades off against valves.proportional.area" in found["valves.proportional.discharge_coefficient"].statement
     assert all(found[f"{name} of step"].can_be_had for name in ("angle", "pressure_1", "pressure_2"))
     known = dataclasses.replace(both[1], prior=Prior(31.6e-6, 0.316e-6))
     told = prospects_of(residuals_of(dataclasses.replace(problem, parameters=(both[0], known))), problem.search)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from benchmarks.intervals.calibration import FIVE_PARAMETERS, Task, repetition
+from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit
-from ppafo.identification.trajectory.hum import hum_of
-from ppafo.identification.trajectory.posterior import LinearModel, drawn_posterior
+from ppafo.identification.trajectory.posterior import LinearModel, draw_posterior
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.sensor_noise import SensorNoise, sensor_noise, t_likelihood
+from ppafo.identification.trajectory.weighing import hum_of
 from ppafo.identification.trajectory.whitening import AutoRegression, Drift, from_coefficients, reflections_of, t_nodes
 from ppafo.signals.recording import Channel, Recording
-from ppafo.studies.trajectory.calibration import FIVE_PARAMETERS, Task, repetition
-from ppafo.studies.trajectory.noise_kinds import NOISE_KINDS, noise_kind
 
 COUNT = 500
 
@@ -157,7 +157,7 @@ def test_with_white_noise_the_posterior_is_that_of_least_squares() -> None:
     slopes[:, 2] *= 1e-3
     left = random.standard_normal(COUNT)
     model = LinearModel(np.column_stack([slopes, left]), ((slice(0, COUNT),),), np.zeros(3), np.zeros((3, 3)))
-    found, _ = drawn_posterior(model, [sensor_noise([left])], 3, 1)
+    found, _ = draw_posterior(model, [sensor_noise([left])], 3, 1)
     assert found.mean == pytest.approx(-np.linalg.lstsq(slopes, left, rcond=None)[0], rel=1e-6)
     assert found.covariance == pytest.approx(np.linalg.inv(slopes.T @ slopes), rel=0.1)
     error = math.sqrt(found.covariance[0, 0])
@@ -169,7 +169,7 @@ def test_bounds_cut_the_interval_and_a_direction_that_nothing_fixes_stays_finite
     one = random.standard_normal(COUNT)
     columns = np.column_stack([one, one, random.standard_normal(COUNT)])
     model = LinearModel(columns, ((slice(0, COUNT),),), np.zeros(2), np.zeros((2, 2)))
-    found, _ = drawn_posterior(model, [sensor_noise([columns[:, 2]])], 2, 1)
+    found, _ = draw_posterior(model, [sensor_noise([columns[:, 2]])], 2, 1)
     assert np.isfinite(found.covariance).all()
     assert math.sqrt(found.covariance[0, 0]) > 1e3
     assert np.abs(found.mean).max() < 1.0

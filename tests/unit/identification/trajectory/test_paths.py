@@ -1,7 +1,7 @@
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.paths import (
+from ppafo.identification.trajectory.experiment import (
     TIME_OFFSET,
     broken_order,
     declaration_of,

@@ -5,7 +5,7 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import Experiment, FreeParameter, Prior, TrajectoryProblem, fit
-from ppafo.identification.trajectory.preparation import FIT_TOLERANCE, halved, noise_of, prepare
+from ppafo.identification.trajectory.preparation import FIT_TOLERANCE, noise_of, prepare, with_half_steps
 from ppafo.identification.trajectory.problem import ranges_of
 from ppafo.simulation.simulate import simulate
 
@@ -29,7 +29,7 @@ def test_bounds_and_scale_follow_from_the_declaration(experiment: Experiment) ->
     ("parameter", "message"),
     [
         (FreeParameter("foot_plate.inertia", low=1.0, high=2.0), "must lie between the bounds"),
-        (FreeParameter("foot_plate.inertia", high=5.0e3), "leave what is allowed"),
+        (FreeParameter("foot_plate.inertia", high=5.0e3), "exceed what is allowed"),
         (FreeParameter("friction.static_torque", start=0.0, scale="log"), "log scale"),
         (FreeParameter("friction.static_torque", start=0.0), "a start at 0 needs bounds"),
         (FreeParameter("foot_plate.inertia", start=float("nan")), "must be finite"),
@@ -52,7 +52,7 @@ def test_a_parameter_that_makes_no_sense_is_refused(
         ({"channels": ("torque",)}, "channel 'torque' cannot be fitted"),
         ({"channels": ()}, "no channel"),
         ({"noise": {"angle": 0.0}}, "must be above 0"),
-        ({"inputs": ("comand",)}, "no measured input, did you mean 'command'"),
+        ({"inputs": ("comand",)}, "not a measured input, did you mean 'command'"),
         ({"inputs": ("supply_pressure",)}, "has no channel 'supply_pressure' to follow"),
     ],
 )
@@ -111,7 +111,7 @@ def test_samples_off_the_grid_lie_between_two_records(experiment: Experiment) ->
 
 def test_half_the_step_has_a_quarter_of_the_allowed_error_and_the_same_samples(experiment: Experiment) -> None:
     prepared = prepare(experiment, {})
-    finer = halved(prepared, {"actuator.dead_volume_1": 1.0e-6})
+    finer = with_half_steps(prepared, {"actuator.dead_volume_1": 1.0e-6})
     assert (prepared.run.tolerance, finer.run.tolerance) == (FIT_TOLERANCE, 0.25 * FIT_TOLERANCE)
     assert finer.run.step == pytest.approx(0.5 * prepared.run.step)
     assert finer.time is prepared.time

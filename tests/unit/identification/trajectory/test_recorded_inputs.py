@@ -8,9 +8,9 @@ import pytest
 
 from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit, profile
-from ppafo.identification.trajectory.columns import trajectories
 from ppafo.identification.trajectory.fitting import residuals_of
 from ppafo.identification.trajectory.preparation import prepare
+from ppafo.identification.trajectory.residuals import trajectories
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
@@ -109,7 +109,7 @@ def test_along_a_recorded_angle_a_wrong_inertia_does_not_matter(
     path = "valves.proportional.discharge_coefficient"
     assert fit(TrajectoryProblem((FLOW,), (led,))).values[path] == pytest.approx(0.113, rel=5e-3)
     assert abs(fit(TrajectoryProblem((FLOW,), (free,))).values[path] / 0.113 - 1.0) > 0.03
-    with pytest.raises(IdentificationError, match="led along the recorded angle, which is then not compared"):
+    with pytest.raises(IdentificationError, match="is prescribed by the recording, so it cannot be compared"):
         TrajectoryProblem((FLOW,), (dataclasses.replace(free, inputs=("angle",)),))
 
 
@@ -189,6 +189,6 @@ def test_steps_that_are_long_for_the_noise_are_said(experiment: Experiment, step
     noise = {"angle": 2e-7, "pressure_1": 0.4, "pressure_2": 0.4}
     quiet = dataclasses.replace(experiment, recording=clean, noise=noise)
     remarks = fit(TrajectoryProblem((FLOW,), (quiet,))).remarks
-    assert any("are long for so little noise" in remark for remark in remarks)
+    assert any("are too long for so little noise" in remark for remark in remarks)
     fine = dataclasses.replace(quiet, scenario=dataclasses.replace(step, time_step=2e-5))
-    assert not any("are long" in remark for remark in fit(TrajectoryProblem((FLOW,), (fine,))).remarks)
+    assert not any("are too long" in remark for remark in fit(TrajectoryProblem((FLOW,), (fine,))).remarks)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ppafo.identification.trajectory import Experiment, FreeParameter, Search, TrajectoryFit, TrajectoryProblem, fit
+from ppafo.identification.trajectory.follow_up import profile
 from ppafo.identification.trajectory.information import ROBUST_SCALE, loss_weights
 from ppafo.identification.trajectory.problem import Loss
-from ppafo.identification.trajectory.profiles import profile
 
 PARAMETERS = (FreeParameter("valve.discharge_coefficient"), FreeParameter("foot_plate.inertia"))
 

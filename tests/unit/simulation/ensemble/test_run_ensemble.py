@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from ppafo.engine.metering import metered
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
-from ppafo.simulation.ensemble import COMPLETED, DIVERGED, REFUSED, EnsembleResult, run_ensemble
+from ppafo.simulation.ensemble import COMPLETED, DIVERGED, REFUSED, EnsembleResult, run_ensemble, running
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import TIMES, declared_numbers, with_numbers
 from ppafo.simulation.result import Result
@@ -148,6 +149,25 @@ def test_a_run_is_the_same_in_any_order_on_any_number_of_threads_and_in_any_chun
         assert np.array_equal(values, np.concatenate([part.metrics[name] for part in parts]), equal_nan=True)
         assert np.array_equal(values, backwards.metrics[name][::-1], equal_nan=True)
     assert np.unique(whole.metrics["rms_error_hold"]).size == 100
+
+
+def test_metrics_and_traces_in_another_order_are_the_same_program_and_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    programs = []
+    monkeypatch.setattr(
+        running,
+        "metered",
+        lambda *given: programs.append((batch := metered(*given)).program) or batch,  # type: ignore[func-returns-value]
+    )
+    base = load_scenario(TASK, ["run.duration=0.1 s"])
+    columns = {"valve.area": np.array([1e-5, 2e-5])}
+    one = run_ensemble(base, columns, METERS, BANDS, 0.05)
+    other = run_ensemble(base, columns, METERS[::-1], BANDS[::-1], 0.05)
+    assert len(programs) == 2
+    assert programs[0] == programs[1]
+    for name in METERS:
+        assert np.array_equal(one.metrics[name], other.metrics[name], equal_nan=True), name
+    for name in BANDS:
+        assert np.array_equal(one.traces[name], other.traces[name], equal_nan=True), name
 
 
 def test_a_scenario_that_was_changed_in_python_runs_as_it_is() -> None:

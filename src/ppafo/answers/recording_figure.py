@@ -1,0 +1,184 @@
+"""The figure of a recording: one panel a quantity over a common time, each in the unit that the field uses."""
+
+import textwrap
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ppafo.answers.layout import Margins, figure_of_panels
+from ppafo.answers.style import (
+    ACTUAL,
+    CHAMBER_1,
+    CHAMBER_2,
+    GREEN,
+    ORANGE,
+    VERMILION,
+    WANTED,
+    house_style,
+    label_lines,
+    mark_kind,
+    rendered,
+)
+from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.errors import DataError
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+from ppafo.storage import StoredResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FIGURE_FORMATS = ("png", "svg", "pdf")
+
+_WIDTH, _LEFT, _RIGHT = 7.2, 0.62, 0.2
+_PANEL, _GAP, _TOP, _BOTTOM, _REMARK_LINE = 1.15, 0.42, 0.75, 0.55, 0.17
+"""Inches."""
+
+_REMARK_WIDTH = 100
+_HEADROOM = 0.06
+_MOST_TICKS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of a panel: channel, name in the legend, colour, and whether it keeps its value between samples."""
+
+    channel: str
+    name: str
+    colour: str
+    is_held: bool = False
+    style: str = "-"
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One panel: title with unit, how an SI value becomes a value in that unit, and its lines.
+
+    ``smallest_span`` of the axis keeps what hardly changes from looking wild; ``always_shown`` are values that the axis
+    reaches in any case. Both are in the unit of the axis.
+    """
+
+    title: str
+    smallest_span: float
+    convert: Callable[[Floats, float], Floats]
+    lines: tuple[Line, ...]
+    always_shown: tuple[float, ...] = ()
+
+
+def _as_it_is(values: Floats, atmosphere: float) -> Floats:  # noqa: ARG001  # all conversions share one signature
+    return values
+
+
+def _degrees(values: Floats, atmosphere: float) -> Floats:  # noqa: ARG001
+    return np.degrees(values)
+
+
+def _gauge(values: Floats, atmosphere: float) -> Floats:
+    return (values - atmosphere) / PASCALS_PER_PSI
+
+
+def _grams(values: Floats, atmosphere: float) -> Floats:  # noqa: ARG001
+    return values * GRAMS_PER_KILOGRAM
+
+
+PANELS = (
+    Panel("Ankle angle (deg)", 10.0, _degrees, (Line("angle", "", ACTUAL),)),
+    Panel(
+        "Pressure (psig)",
+        5.0,
+        _gauge,
+        (Line("pressure_1", "chamber 1", CHAMBER_1), Line("pressure_2", "chamber 2", CHAMBER_2)),
+        (0.0,),
+    ),
+    Panel(
+        "Actuator torque (N m)",
+        0.5,
+        _as_it_is,
+        (Line("torque", "actuator", ACTUAL), Line("reference", "reference", WANTED, style="--")),
+    ),
+    Panel("Valve command (-1 to 1)", 2.0, _as_it_is, (Line("command", "", ACTUAL, is_held=True),), (-1.0, 1.0)),
+    Panel(
+        "Gas since the start (g)",
+        0.01,
+        _grams,
+        (
+            Line("supplied_mass", "supplied", ACTUAL),
+            Line("vented_mass", "vented", ORANGE),
+            Line("leaked_mass", "leaked past the vane", GREEN),
+        ),
+    ),
+)
+
+
+def recording_figure(
+    recording: Recording, title: str = "", remark: str = "", atmosphere: float = STANDARD_ATMOSPHERE
+) -> "Figure":
+    """Return the figure of a recording, with a panel for every quantity that it has.
+
+    ``remark`` stands below the title, for example why a run stopped early. Gauge pressure counts from ``atmosphere``
+    [Pa absolute].
+    """
+    panels = [panel for panel in PANELS if any(line.channel in recording for line in panel.lines)]
+    if not panels:
+        drawn = ", ".join(line.channel for panel in PANELS for line in panel.lines)
+        raise DataError(f"{recording.label}: has nothing to draw; a figure shows {drawn}")
+    with house_style():
+        figure, grid = _grid(len(panels), title or recording.label, remark)
+        for panel, axes in zip(panels, grid, strict=True):
+            _draw(axes, panel, recording, atmosphere)
+        grid[-1].set_xlabel("Time (s)")
+        mark_kind(figure, recording.kind)
+        if recording.duration > 0.0:
+            grid[-1].set_xlim(recording.time[0], recording.time[-1])
+        return figure
+
+
+def stored_figure(stored: StoredResult) -> "Figure":
+    """Return the figure of a saved result: the same that ``Result.plot`` gave."""
+    status = stored.document.get("status", {})
+    scenario = stored.document.get("scenario", {})
+    remark = "" if status.get("kind") == "completed" else str(status.get("message", ""))
+    supply = scenario.get("device", {}).get("supply", {})
+    atmosphere = float(supply.get("atmospheric_pressure", STANDARD_ATMOSPHERE))
+    return recording_figure(stored.recording, str(scenario.get("name", "")), remark, atmosphere)
+
+
+def figure_files(figure: "Figure") -> dict[str, bytes]:
+    """Return the files that a result folder keeps of its figure, by name."""
+    return {f"figure.{file_format}": content for file_format, content in rendered(figure, ("png", "svg")).items()}
+
+
+def _grid(count: int, title: str, remark: str) -> "tuple[Figure, list[Axes]]":
+    """Return a figure with a title, an optional remark below the time axis and ``count`` panels over one time axis."""
+    remarks = textwrap.wrap(remark, _REMARK_WIDTH)
+    bottom = _BOTTOM + _REMARK_LINE * len(remarks)
+    height = _TOP + count * _PANEL + (count - 1) * _GAP + bottom
+    figure, rows = figure_of_panels((_WIDTH, height), Margins(_LEFT, _RIGHT, _TOP, bottom, _GAP), count)
+    figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, ha="left", va="top", fontsize=13, fontweight="bold")
+    figure.text(0.12 / _WIDTH, 0.1 / height, "\n".join(remarks), ha="left", va="bottom", fontsize=9, color=VERMILION)
+    return figure, [axes for (axes,) in rows]
+
+
+def _draw(axes: "Axes", panel: Panel, recording: Recording, atmosphere: float) -> None:
+    shown = [line for line in panel.lines if line.channel in recording]
+    for line in shown:
+        values = panel.convert(recording[line.channel], atmosphere)
+        steps = "steps-post" if line.is_held else "default"
+        axes.plot(recording.time, values, line.style, color=line.colour, label=line.name, drawstyle=steps)
+    axes.set_title(panel.title)
+    _set_limits(axes, panel)
+    if len(shown) > 1:
+        label_lines(axes)
+
+
+def _set_limits(axes: "Axes", panel: Panel) -> None:
+    """Set the limits of the value axis to what is drawn and what is always shown, with some air, and few ticks."""
+    shown = (*axes.dataLim.intervaly, *panel.always_shown)
+    span = max(shown) - min(shown)
+    missing = max(0.0, panel.smallest_span - span)
+    air = _HEADROOM * (span + missing) + 0.5 * missing
+    axes.set_ylim(min(shown) - air, max(shown) + air)
+    axes.locator_params(axis="y", nbins=_MOST_TICKS)

@@ -1,0 +1,103 @@
+"""In which unit a person is shown a quantity: the only table of it. Files and data stay in SI."""
+
+import math
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.units import from_si
+
+Floats = NDArray[np.float64]
+
+QUANTITIES: MappingProxyType[str, tuple[str, str]] = MappingProxyType(
+    {
+        "acceleration": ("m/s^2", "m/s^2"),
+        "angle": ("rad", "deg"),
+        "angular acceleration": ("rad/s^2", "rad/s^2"),
+        "angular velocity": ("rad/s", "deg/s"),
+        "area": ("m^2", "mm^2"),
+        "duration": ("s", "min"),
+        "energy": ("J", "J"),
+        "force": ("N", "N"),
+        "fraction": ("1", "%"),
+        "frequency": ("Hz", "Hz"),
+        "gas mass": ("kg", "g"),
+        "gas mass per energy": ("kg/J", "g/J"),
+        "length": ("m", "mm"),
+        "mass": ("kg", "kg"),
+        "mass flow": ("kg/s", "g/s"),
+        "part mass": ("kg", "g"),
+        "power": ("W", "W"),
+        "pressure": ("Pa_a", "psi_g"),
+        "pressure change": ("Pa_d", "psi_d"),
+        "temperature": ("K", "degC"),
+        "time": ("s", "s"),
+        "torque": ("N m", "N m"),
+        "velocity": ("m/s", "m/s"),
+        "volume": ("m^3", "cm^3"),
+        "volume per angle": ("m^3/rad", "cm^3/rad"),
+        "volume flow": ("m^3/s", "L/min"),
+        "body length": ("m", "cm"),
+        "conductance": ("m^3/(s Pa)", "L/(s bar)"),
+    }
+)
+"""Kind of quantity to its unit in SI and the unit in which people of the field think of it."""
+
+_NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
+_OF_UNIT = {si: quantity for quantity, (si, _) in QUANTITIES.items() if quantity not in _NAMED}
+_OF_UNIT |= {"Pa": "pressure", "kg": "mass"}
+
+
+def quantity_of_unit(si_unit: str) -> str:
+    """Return the kind of quantity that has a unit in SI, empty for a plain number or a unit that is shown as it is.
+
+    ``kg`` is a mass and ``s`` a time; those of gas and parts, shown in grams, and what lasts minutes have to be named.
+    """
+    return _OF_UNIT.get(si_unit, "")
+
+
+def shown_unit(quantity: str) -> str:
+    """Return the unit in which a quantity is shown, as a table writes it; empty for a plain number."""
+    return QUANTITIES[quantity][1].removesuffix("_d") if quantity else ""
+
+
+def drawn_unit(quantity: str) -> str:
+    """Return the unit in which a quantity is shown, as the label of an axis writes it."""
+    words = {"psi_g": "psi gauge", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
+    unit = shown_unit(quantity)
+    return words.get(unit, unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$"))
+
+
+def shown(value: float, quantity: str) -> float:
+    """Return a value in SI in the unit in which it is shown."""
+    si, unit = QUANTITIES.get(quantity, ("", ""))
+    return float(value) if si == unit or not math.isfinite(value) else from_si(float(value), unit, si)
+
+
+def shown_change(value: float, quantity: str) -> float:
+    """Return a difference of two values in SI in the unit in which it is shown."""
+    return shown(value, quantity) - shown(0.0, quantity)
+
+
+def shown_values(values: Floats, quantity: str) -> Floats:
+    """Return values in SI (any shape) in the unit in which they are shown."""
+    zero, one = shown(0.0, quantity), shown(1.0, quantity)
+    return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
+
+
+def titled(words: str, quantity: str) -> str:
+    """Return a name with the unit in which its quantity is shown: ``Gas supplied (g)``."""
+    unit = shown_unit(quantity)
+    return f"{words} ({unit})" if unit else words
+
+
+def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
+    """Return a value in SI as text with the unit in which it is shown."""
+    return f"{shown(value, quantity):{form}} {shown_unit(quantity)}".rstrip()
+
+
+def change_text(value: float, quantity: str, form: str = ".3g") -> str:
+    """Return a difference of two values in SI as text with the unit in which it is shown."""
+    unit = "psi" if quantity == "pressure" else shown_unit(quantity)
+    return f"{shown_change(value, quantity):{form}} {unit}".rstrip()

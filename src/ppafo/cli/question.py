@@ -1,0 +1,103 @@
+"""The one runner of questions: arguments in, solved with progress on the side, answered as text, JSON and folder."""
+
+import argparse
+import inspect
+import logging
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from ppafo.cli.output import (
+    EXIT_GOOD,
+    add_json_argument,
+    add_output_arguments,
+    check_output,
+    deliver_answer,
+    print_result,
+)
+from ppafo.cli.quick_imports import load_compiler, load_drawing
+from ppafo.documents.toml_text import TomlKind
+from ppafo.progress import ProgressLine
+from ppafo.questions.question import Question, loaded
+
+
+def add_arguments(parser: argparse.ArgumentParser, question: Question) -> None:
+    """Add the arguments of a question and of every command."""
+    for argument in question.arguments:
+        argument.add_to(parser)
+    if question.library:
+        parser.add_argument("--list", action="store_true", help="list the files that come with the package")
+    (add_json_argument if question.fills_folder else add_output_arguments)(parser)
+
+
+def run(parsed: argparse.Namespace, question: Question) -> int:
+    """Solve, print and write; 1 where the answer has not passed."""
+    if question.library:
+        library = loaded(question.library)
+        if parsed.list:
+            return _list(parsed, library, question.listing)
+        _check_named(parsed, question, library)
+    if question.compiles:
+        load_compiler()
+    solve = question.solver()
+    values = {argument.parameter: getattr(parsed, argument.parameter) for argument in question.arguments}
+    if question.fills_folder:
+        load_drawing()
+    else:
+        if parsed.out is None and question.default_folder:
+            parsed.out = loaded(question.default_folder)(values)
+        check_output(parsed)
+    with progress_line() as progress:
+        if "progress" in inspect.signature(solve).parameters:
+            values["progress"] = progress
+        solved = solve(**values).answer()
+    if question.fills_folder:
+        return deliver_answer(solved, parsed, filled=solved.data["folder"])
+    return deliver_answer(solved, parsed)
+
+
+@contextmanager
+def progress_line() -> Iterator[ProgressLine]:
+    """Show progress on the side for the length of a ``with`` block; what is logged begins on a line of its own."""
+    line = ProgressLine(sys.stderr)
+    logger = logging.getLogger("ppafo")
+
+    def end_line(_record: logging.LogRecord) -> bool:
+        line.close()
+        return True
+
+    logger.addFilter(end_line)
+    try:
+        yield line
+    finally:
+        logger.removeFilter(end_line)
+        line.close()
+
+
+def _check_named(parsed: argparse.Namespace, question: Question, library: TomlKind) -> None:
+    """Refuse a command without its file, which only ``--list`` does without."""
+    for argument in question.arguments:
+        if argument.nargs == "?" and getattr(parsed, argument.parameter) is None:
+            names = ", ".join(library.names())
+            raise library.error(f"no {library.noun} was given: name one ({names}) or give a .toml file")
+
+
+def _list(parsed: argparse.Namespace, library: TomlKind, listing: str) -> int:
+    from ppafo.answers.text import aligned
+
+    listed: list[dict[str, Any]] = loaded(listing)() if listing else _words_of_files(library)
+    rows = [[f"{value:,} {key}" if isinstance(value, int) else value for key, value in item.items()] for item in listed]
+    rows = rows if listing else [[row[0], row[-1]] for row in rows]
+    plural = f"{library.noun[:-1]}ies" if library.noun.endswith("y") else f"{library.noun}s"
+    print_result("\n".join(aligned(rows, len(rows[0]))), {plural: listed}, parsed.json)
+    return EXIT_GOOD
+
+
+def _words_of_files(library: TomlKind) -> list[dict[str, Any]]:
+    """Return the name of each file, and its description or else its title."""
+    files = {name: library.parse(library.read(name), name) for name in library.names()}
+    return [
+        {"name": name} | {key: str(file[key]) for key in ("title", "description") if key in file}
+        for name, file in files.items()
+    ]

@@ -1,0 +1,131 @@
+"""A torque law that walks: the phases of the gait say which torque is wanted, safety watches, the law follows it.
+
+The frame is one for all laws. What differs is data: the law, its gains for walking, and what it remembers where another
+task of the gait begins.
+"""
+
+import collections
+import functools
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from ppafo.control.kind import ControllerKind
+from ppafo.control.walking import assistance, phases, safety
+from ppafo.control.walking.assistance import Assistance, Wish
+from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
+from ppafo.control.walking.phases import PhaseRules, PhaseState
+from ppafo.control.walking.safety import SafetyRules, SafetyState
+from ppafo.errors import ScenarioError
+from ppafo.model.gait_sensors import GaitMeasurement
+
+
+class LawParameters(NamedTuple):
+    """The law, what is wanted, and the rules of phases and safety; ``row_with_law`` makes one for each law."""
+
+    law: Any
+    assistance: Assistance
+    phases: PhaseRules
+    safety: SafetyRules
+
+
+class LawState(NamedTuple):
+    """Phase, safety, the torque wanted, and the state of the law; ``row_with_law`` makes one for each law."""
+
+    phase: PhaseState
+    safety: SafetyState
+    wish: Wish
+    law: Any
+
+
+def law_update(parameters: Any, state: Any, reference: float, measurement: Any, period: float) -> tuple[float, Any]:
+    """Stand for the law, which ``bound`` puts here: command and next state of a torque law."""
+    raise NotImplementedError
+
+
+def law_restart(state: Any, wanted: float, goes_on: float) -> Any:
+    """Stand for what the law remembers, at a torque wanted [N m], where another task may begin (``goes_on`` 0)."""
+    raise NotImplementedError
+
+
+LAW_START = None
+"""Stands for the start of the law's state."""
+
+
+def restart(state: Any, wanted: float, goes_on: float) -> Any:
+    """The state of a law that begins anew where another task begins (``goes_on`` 0, else 1)."""
+    return state if goes_on > 0.5 else LAW_START
+
+
+def keep(state: Any, wanted: float, goes_on: float) -> Any:
+    """The state of a law that remembers nothing, and so has none to begin anew with."""
+    return state
+
+
+def update(
+    parameters: Any, state: LawState, reference: float, measurement: GaitMeasurement, period: float
+) -> tuple[float, LawState]:
+    """Command from -1 to 1, or ``VENT``; the reference is not used."""
+    assisted = assistance.followed(parameters, state, measurement, period)
+    wanted = assisted.wish.torque
+    law = law_restart(state.law, wanted, assisted.goes_on)
+    seen = assistance.torque_seen(measurement)
+    command, law = law_update(parameters.law, law, wanted, seen, period)
+    command, watch = assistance.given(assisted, command, period)
+    return command, LawState(phase=assisted.phase, safety=watch, wish=assisted.wish, law=law)
+
+
+def bound(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Callable[..., Any]:
+    """Return the function of a frame with other pieces in the place of some names of this module.
+
+    It is the same code: only what those names stand for differs, so that the engine compiles it as any other function.
+    """
+    assert isinstance(frame, types.FunctionType), "a frame is a plain function"
+    made = types.FunctionType(frame.__code__, {**frame.__globals__, **pieces}, name)
+    made.__qualname__ = name
+    made.__module__ = frame.__module__
+    made.__annotations__ = frame.__annotations__
+    return made
+
+
+def row_with_law(name: str, row: Any, law: type) -> Any:
+    """Return a NamedTuple class as ``row`` is one, whose field ``law`` is of the class that one law has."""
+    made: Any = collections.namedtuple(name, row._fields, module=__name__)  # type: ignore[misc]
+    made.__annotations__ = {**row.__annotations__, "law": law}
+    return made
+
+
+def shared_settings(law: ControllerKind) -> set[str]:
+    """Return the settings of a torque law that have the name of one that every controller of walking has."""
+    return {item.name for item in law.quantities} & {item.name for item in ASSISTING_QUANTITIES}
+
+
+@functools.cache
+def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple[str, float], ...]) -> ControllerKind:
+    """Return a torque law as a controller of walking, with ``gains`` in place of its own defaults, in SI units.
+
+    ScenarioError where a setting of the law has the name of one of walking.
+    """
+    taken = shared_settings(law)
+    if taken:
+        raise ScenarioError(
+            f"controller '{law.name}' cannot walk: its setting '{min(taken)}' has the name of one that every "
+            f"controller of walking has"
+        )
+    title = "".join(part.capitalize() for part in name.split("_"))
+    parameters = row_with_law(f"{title}Parameters", LawParameters, law.parameters)
+    state = row_with_law(f"{title}State", LawState, type(law.initial))
+    anew = bound(restart, f"restart_{name}", {"LAW_START": law.initial}) if len(law.initial) else keep
+    pieces = {"law_update": law.update, "law_restart": law.restart or anew, "LawState": state}
+    return replace(
+        law,
+        name=name,
+        summary=summary,
+        source=f"the paper, figure 1A (phases); {law.source}",
+        quantities=(*with_defaults(law.quantities, dict(gains)), *ASSISTING_QUANTITIES),
+        parameters=parameters,
+        initial=state(phase=phases.START, safety=safety.START, wish=assistance.START, law=law.initial),
+        update=bound(update, f"update_{name}", pieces),
+        restart=None,
+    )

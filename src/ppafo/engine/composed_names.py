@@ -1,0 +1,196 @@
+"""Replaces the names of a function from outside by what they stand for: numbers, generated names, ``math``."""
+
+import ast
+import builtins
+import inspect
+import math
+import types
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.plain_python import refusal
+from ppafo.errors import ProgramError, nearest_name
+
+COMPILED_BUILTINS = frozenset(
+    {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "sum", "zip"}
+)
+_INSIDE = object()
+"""Stands for a value that is known only while the function runs."""
+
+
+def is_row(candidate: object) -> bool:
+    """True for a NamedTuple class."""
+    return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")
+
+
+class Composer(ast.NodeTransformer):
+    """Rewrites the body of one function; ``add`` adds another to the module, ``note`` keeps what was looked up."""
+
+    def __init__(
+        self,
+        function: types.FunctionType,
+        add: Callable[[Any], str],
+        note: Callable[[Mapping[str, Any], str, Any], None],
+    ) -> None:
+        self.function = function
+        self.add = add
+        self.note = note
+        self.local = frozenset(function.__code__.co_varnames)
+
+    def refuse(self, where: ast.AST, problem: str) -> ProgramError:
+        """The error for a place in the function."""
+        return refusal(self.function.__code__.co_filename, where, problem)
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
+        """Leave the annotation away."""
+        if node.value is None:
+            return ast.copy_location(ast.Pass(), node)
+        return ast.copy_location(ast.Assign([node.target], self.visit(node.value)), node)
+
+    def visit_Expr(self, node: ast.Expr) -> ast.stmt:
+        """Leave a text that stands alone away."""
+        if isinstance(node.value, ast.Constant):
+            return ast.copy_location(ast.Pass(), node)
+        return ast.copy_location(ast.Expr(self.visit(node.value)), node)
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Replace a name from outside."""
+        value = self.value_of(node)
+        return node if value is _INSIDE else self.stand_in(value, node)
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        """Replace ``module.name``."""
+        value = self.value_of(node)
+        if value is not _INSIDE:
+            return self.stand_in(value, node)
+        owner = self.value_of(node.value)
+        if owner is not _INSIDE and not isinstance(owner, tuple):
+            raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which is not compiled")
+        return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        """Check the arguments of what is called; those that a NamedTuple has of its own are written out."""
+        called = self.value_of(node.func)
+        if called is _INSIDE:
+            if isinstance(node.func, ast.Attribute):
+                raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which is not compiled")
+            return self.generic_visit(node)  # type: ignore[return-value]
+        own: list[ast.expr] = []
+        if isinstance(called, types.FunctionType) or is_row(called):
+            own = self.own_arguments(called, node)
+        function = self.stand_in(called, node.func)
+        arguments = [self.visit(item) for item in node.args]
+        if not own:
+            named = [ast.keyword(item.arg, self.visit(item.value)) for item in node.keywords]
+            return ast.Call(function, arguments, named)
+        return ast.Call(function, [*arguments, *own], [])
+
+    def own_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
+        """Fields of a NamedTuple after those given by place, where some have the defaults of its class; else none."""
+        if any(isinstance(item, ast.Starred) for item in node.args):
+            return []  # how many there are is known only to the compiler
+        is_function = isinstance(called, types.FunctionType)
+        takes: tuple[str, ...] = _parameters(called.__code__) if is_function else called._fields
+        if len(node.args) == len(takes) and not node.keywords and not (is_function and called.__kwdefaults__):
+            return []
+        given = {item.arg: item.value for item in node.keywords if item.arg is not None}
+        try:
+            inspect.signature(called).bind(*node.args, **given)
+        except TypeError as error:
+            unknown = next((name for name in given if name not in takes), None)
+            problem = f"has no '{unknown}'{nearest_name(unknown, takes)}" if unknown else str(error)
+            raise self.refuse(node, f"{called.__name__}({', '.join(takes)}): {problem}") from error
+        if is_function or len(node.args) + len(given) == len(takes):
+            return []
+        return [
+            self.visit(given[name]) if name in given else self.literal(called._field_defaults[name], node, name)
+            for name in takes[len(node.args) :]
+        ]
+
+    def value_of(self, node: ast.expr) -> Any:
+        """What a name or ``module.name`` stands for outside the function."""
+        if isinstance(node, ast.Name):
+            return self.global_value(node)
+        if not isinstance(node, ast.Attribute):
+            return _INSIDE
+        owner = self.value_of(node.value)
+        if not isinstance(owner, types.ModuleType):
+            return _INSIDE
+        if not hasattr(owner, node.attr):
+            hint = nearest_name(node.attr, dir(owner))
+            raise self.refuse(node, f"module '{owner.__name__}' has no '{node.attr}'{hint}")
+        value = getattr(owner, node.attr)
+        self.note(vars(owner), node.attr, value)
+        return value
+
+    def global_value(self, node: ast.Name) -> Any:
+        """What a global name stands for now."""
+        if node.id in self.local:
+            return _INSIDE
+        scope = self.function.__globals__
+        if node.id in scope:
+            self.note(scope, node.id, scope[node.id])
+            return scope[node.id]
+        if node.id not in COMPILED_BUILTINS:
+            if hasattr(builtins, node.id):
+                raise self.refuse(node, f"'{node.id}' is not compiled")
+            hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
+            raise self.refuse(node, f"there is no '{node.id}'{hint}")
+        return getattr(builtins, node.id)
+
+    def stand_in(self, value: Any, node: ast.expr) -> ast.expr:
+        """What is written for a value from outside."""
+        # ``inf`` and ``nan`` of math are written by name, as they are in most sources.
+        if isinstance(node, ast.Attribute) and self.value_of(node.value) is math:
+            return self.written("math", node.attr, node)
+        own = str(getattr(value, "__name__", ""))
+        if isinstance(value, types.BuiltinFunctionType) and getattr(math, own, None) is value:
+            return self.written("math", own, node)
+        if own in COMPILED_BUILTINS and getattr(builtins, own) is value:
+            return self.written("", own, node)
+        if isinstance(value, types.FunctionType) or is_row(value):
+            return self.written("", self.add(value), node)
+        name = ast.unparse(node)
+        if getattr(value, "__module__", "") == "numpy" or own.startswith("numpy"):
+            raise self.refuse(
+                node, f"'{name}' is of numpy, which is not compiled here; 'math' has its functions of one number"
+            )
+        return self.literal(value, node, f"'{name}'")
+
+    def written(self, module: str, name: str, node: ast.expr) -> ast.expr:
+        """A name of the generated module, which no local name may hide."""
+        first = module or name
+        if first in self.local:
+            raise self.refuse(node, f"the local name '{first}' hides '{ast.unparse(node)}'; give it another name")
+        if not module:
+            return ast.Name(name, ast.Load())
+        return ast.Attribute(ast.Name(module, ast.Load()), name, ast.Load())
+
+    def literal(self, value: Any, where: ast.AST, name: str) -> ast.expr:
+        """A constant, to the last bit: a number, or a tuple or NamedTuple of them."""
+        if type(value) in (float, np.float64):
+            size: ast.expr = ast.Constant(abs(float(value)))
+            return ast.UnaryOp(ast.USub(), size) if math.copysign(1.0, value) < 0.0 else size
+        if type(value) is int and value < 0:
+            return ast.UnaryOp(ast.USub(), ast.Constant(-value))
+        if type(value) in (bool, int):
+            return ast.Constant(value)
+        if type(value) is tuple:
+            return ast.Tuple([self.literal(item, where, name) for item in value], ast.Load())
+        if is_row(type(value)):
+            fields = [self.literal(item, where, name) for item in value]
+            return ast.Call(ast.Name(self.add(type(value)), ast.Load()), fields, [])
+        if isinstance(value, types.FunctionType):
+            return ast.Name(self.add(value), ast.Load())
+        raise self.refuse(
+            where,
+            f"cannot compile {self.function.__qualname__}: {name} is not a number, a tuple of numbers, a plain "
+            f"function, a NamedTuple or the module math",
+        )
+
+
+def _parameters(code: types.CodeType) -> tuple[str, ...]:
+    """Names of the parameters of a function."""
+    return code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]

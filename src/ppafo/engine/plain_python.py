@@ -1,0 +1,168 @@
+"""The part of Python that the engine compiles, and the line in which a user is told about anything else."""
+
+import ast
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from ppafo.errors import ProgramError, one_line
+
+_PLAIN = {
+    *(ast.Return, ast.Assign, ast.AugAssign, ast.AnnAssign, ast.For, ast.While, ast.If, ast.Break, ast.Continue),
+    *(ast.Pass, ast.Expr, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.IfExp, ast.Compare, ast.Call, ast.keyword),
+    *(ast.Constant, ast.Attribute, ast.Subscript, ast.Name, ast.Tuple, ast.Slice, ast.Starred),
+}
+_WORDS: dict[type[ast.AST], str] = {
+    ast.Dict: "a dictionary",
+    ast.Set: "a set",
+    ast.List: "a list",
+    ast.JoinedStr: "an f-string",
+    ast.Try: "'try'",
+    ast.With: "'with'",
+    ast.Raise: "'raise'",
+    ast.Assert: "'assert'",
+    ast.Import: "'import' in a function",
+    ast.ImportFrom: "'import' in a function",
+    ast.Global: "'global'",
+    ast.Nonlocal: "'nonlocal'",
+    ast.Delete: "'del'",
+    ast.Lambda: "a lambda",
+    ast.ClassDef: "a class in a function",
+    ast.FunctionDef: "a function in a function",
+    ast.AsyncFunctionDef: "a function in a function",
+    ast.ListComp: "a list",
+    ast.SetComp: "a set",
+    ast.DictComp: "a dictionary",
+    ast.GeneratorExp: "a generator",
+    ast.Yield: "'yield'",
+    ast.YieldFrom: "'yield'",
+    ast.NamedExpr: "':='",
+    ast.Match: "'match'",
+}
+_INSTEAD = "a law is made of numbers, tuples, NamedTuples, 'math' and other plain functions"
+
+
+def refusal(file: str, where: ast.AST | int, problem: str) -> ProgramError:
+    """The error for a place in a file: one line that begins as ``my_law.py:12: ``."""
+    line = where if isinstance(where, int) else getattr(where, "lineno", 0)
+    return ProgramError(f"{place(file, line)}: {one_line(problem)}")
+
+
+def place(file: str, line: int) -> str:
+    """A line as messages name it: its file from the working folder where it lies below that, else by its name."""
+    path = Path(file)
+    try:
+        path = path.relative_to(Path.cwd())
+    except (ValueError, OSError):
+        path = Path(path.name)
+    return f"{one_line(path)}:{line}"
+
+
+def check_grammar(tree: ast.FunctionDef, file: str) -> None:
+    """Refuse what is not compiled, the first of it in the file."""
+    problems = list(_problems(tree))
+    if problems:
+        where, problem = min(problems, key=lambda item: (item[0].lineno, item[0].col_offset))
+        raise refusal(file, where, problem)
+
+
+def _problems(tree: ast.FunctionDef) -> Iterator[tuple[ast.stmt | ast.expr | ast.keyword, str]]:
+    if tree.args.vararg or tree.args.kwarg or getattr(tree, "type_params", None):
+        yield tree, f"'{tree.name}' takes any number of arguments, which is not compiled; name each of them"
+    left_away: set[ast.AST] = set()
+    for node in (node for statement in tree.body for node in ast.walk(statement)):
+        if isinstance(node, ast.AnnAssign):  # Python does not run the annotation of a local name
+            left_away.update(ast.walk(node.annotation))
+        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            left_away.add(node.value)
+        elif isinstance(node, ast.stmt | ast.expr | ast.keyword) and node not in left_away:
+            problem = _problem(node)
+            if problem:
+                yield node, problem
+
+
+def _problem(node: ast.AST) -> str:
+    if type(node) not in _PLAIN:
+        word = _WORDS.get(type(node), f"'{type(node).__name__}'")
+        return f"{word} is not compiled; {_INSTEAD}"
+    if isinstance(node, ast.Starred) and not isinstance(node.ctx, ast.Load):
+        return f"'*' on the left is not compiled; {_INSTEAD}"
+    if isinstance(node, ast.keyword) and node.arg is None:
+        return f"'**' is not compiled; {_INSTEAD}"
+    if isinstance(node, ast.Constant) and not isinstance(node.value, bool | int | float | None):
+        return f"a constant of type {type(node.value).__name__} is not compiled; {_INSTEAD}"
+    if isinstance(node, ast.Attribute | ast.Subscript) and not isinstance(node.ctx, ast.Load):
+        return f"'{ast.unparse(node)}' cannot be changed: a NamedTuple is a value; make a new one"
+    return ""
+
+
+def check_flow(tree: ast.FunctionDef, file: str, local: Iterable[str]) -> None:
+    """Refuse a function that can end without a value, or read one of its ``local`` names before it has a value."""
+    arguments = tree.args
+    given = {item.arg for item in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)}
+    if _Flow(file, set(local)).end_of(tree.body, given) is not None:
+        raise refusal(file, tree, f"'{tree.name}' can end without 'return'; every way through it returns a value")
+
+
+class _Flow:
+    """Follows which names have a value; those after a return are of no interest (None)."""
+
+    def __init__(self, file: str, local: set[str]) -> None:
+        self.file = file
+        self.local = local
+
+    def end_of(self, body: list[ast.stmt], bound: set[str]) -> set[str] | None:
+        """Names that have a value after some statements, None where they do not end."""
+        now: set[str] | None = set(bound)
+        for statement in body:
+            if now is None:
+                return None
+            now = self.after(statement, now)
+        return now
+
+    def after(self, statement: ast.stmt, bound: set[str]) -> set[str] | None:
+        """Names that have a value after a statement, None where it does not end."""
+        if isinstance(statement, ast.If):
+            self.read(statement.test, bound)
+            ends = [self.end_of(branch, bound) for branch in (statement.body, statement.orelse)]
+            going_on = [end for end in ends if end is not None]
+            return set.intersection(*going_on) if going_on else None
+        if isinstance(statement, ast.For | ast.While):
+            return self.after_loop(statement, bound)
+        if isinstance(statement, ast.Return) and getattr(statement.value, "value", statement) is None:
+            raise refusal(self.file, statement, "'return' gives no value")
+        if isinstance(statement, ast.AugAssign) and statement.target.id not in bound:  # type: ignore[union-attr]
+            raise self.unbound(statement, ast.unparse(statement.target))
+        given = getattr(statement, "value", None)
+        if isinstance(given, ast.expr):
+            self.read(given, bound)
+        ends_here = isinstance(statement, ast.Return | ast.Break | ast.Continue)
+        targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
+        stored = set() if given is None else {name for item in targets if item is not None for name in _stored(item)}
+        return None if ends_here else bound | stored
+
+    def after_loop(self, statement: ast.For | ast.While, bound: set[str]) -> set[str] | None:
+        """Names that have a value after a loop, which may be gone through not once."""
+        if isinstance(statement, ast.For):
+            self.read(statement.iter, bound)
+            self.end_of(statement.body, bound | _stored(statement.target))
+            return self.end_of(statement.orelse, bound)
+        self.read(statement.test, bound)
+        self.end_of(statement.body, bound)
+        is_endless = isinstance(statement.test, ast.Constant) and bool(statement.test.value)
+        breaks = any(isinstance(node, ast.Break) for node in ast.walk(statement))
+        return None if is_endless and not breaks else self.end_of(statement.orelse, bound)
+
+    def read(self, node: ast.AST, bound: set[str]) -> None:
+        """Refuse the reading of a local name that may have no value yet."""
+        missing = self.local - bound
+        for item in ast.walk(node) if missing else ():
+            if isinstance(item, ast.Name) and item.id in missing:
+                raise self.unbound(item, item.id)
+
+    def unbound(self, where: ast.AST, name: str) -> ProgramError:
+        """The error for a name without a value."""
+        return refusal(self.file, where, f"'{name}' may have no value here; give it one before, on every way")
+
+
+def _stored(target: ast.AST) -> set[str]:
+    return {item.id for item in ast.walk(target) if isinstance(item, ast.Name)}

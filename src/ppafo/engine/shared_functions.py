@@ -1,0 +1,90 @@
+"""Functions of generated programs that are compiled once in a process, however many programs call them.
+
+Most of a program's functions are those of other programs too. Each is known by a hash of its text and of all that it
+calls, so that what is shared is the same to the last bit; the hash is in its symbol, so that nothing else has its name.
+"""
+
+import ast
+import gc
+import hashlib
+from types import ModuleType
+from typing import Any
+
+from ppafo.engine.source_text import without_origins
+
+_LENGTH = 24
+_SHARED: dict[str, Any] = {}
+
+
+def run_text(source: str, path: str, module: ModuleType) -> None:
+    """Run the text of a module, which was generated here."""
+    exec(compile(source, path, "exec"), module.__dict__)
+
+
+def compile_text(source: str, path: str, module: ModuleType) -> None:
+    """Run the text of a module that is to be compiled; raises what the compiler raises."""
+    from numba.core.errors import NumbaError
+
+    before = dict(module.__dict__)
+    is_collecting = gc.isenabled()
+    gc.disable()  # a tenth of the time: the compiler makes much, and most of it goes without
+    try:
+        _run_with_shared(source, path, module)
+    except NumbaError:
+        # Once more and alone, so that the lines in the report are this program's.
+        _SHARED.clear()
+        module.__dict__.clear()
+        module.__dict__.update(before)
+        run_text(source, path, module)
+    finally:
+        if is_collecting:
+            gc.enable()
+
+
+def _run_with_shared(source: str, path: str, module: ModuleType) -> None:
+    """Run the text of a generated module in ``module``; what was defined before, with the same callees, is taken."""
+    names = module.__dict__
+    lines = source.split("\n")
+    keys: dict[str, str] = {}
+    for node in ast.parse(source, path).body:
+        name = _shared_name(node)
+        if not name:
+            before = set(names)
+            exec(compile(ast.Module([node], []), path, "exec"), names)
+            is_alike = isinstance(node, ast.Import | ast.ImportFrom | ast.Assign)
+            keys |= dict.fromkeys(set(names) - before, ast.unparse(node) if is_alike else path)
+            continue
+        used = {item.id: names[item.id] for item in ast.walk(node) if isinstance(item, ast.Name) and item.id in names}
+        first = min([node.lineno, *(item.lineno for item in getattr(node, "decorator_list", ()))])
+        text = without_origins("\n".join(lines[first - 1 : node.end_lineno]))
+        described = "\n".join([text, *(f"{item} {keys.get(item, '')}" for item in sorted(used))])
+        key = hashlib.sha256(described.encode()).hexdigest()[:_LENGTH]
+        if key not in _SHARED:
+            _SHARED[key] = _defined(node, path, name, key, used)
+        names[name], keys[name] = _SHARED[key], key
+
+
+def _shared_name(node: ast.stmt) -> str:
+    """Name of a function that other compiled ones call, or of a row; empty for what belongs to one program."""
+    if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and isinstance(node.targets[0], ast.Name):
+        return node.targets[0].id if ast.unparse(node.value.func) == "namedtuple" else ""
+    if not isinstance(node, ast.FunctionDef) or len(node.decorator_list) != 1:
+        return ""
+    decorator = ast.unparse(node.decorator_list[0])
+    # What is compiled for given types, or kept on disk, is a program's own.
+    is_called = decorator == "njit" or (decorator.startswith("njit(") and "cache=" not in decorator)
+    has_types = isinstance(node.decorator_list[0], ast.Call) and bool(node.decorator_list[0].args)
+    return node.name if is_called and not has_types else ""
+
+
+def _defined(node: ast.stmt, path: str, name: str, key: str, used: dict[str, Any]) -> Any:
+    """The function or row, with what it uses as its globals.
+
+    Their module is one that every process can import: a kept program names it, and is loaded without the others.
+    """
+    scope = {"__name__": __name__, **used}
+    exec(compile(ast.Module([node], []), path, "exec"), scope)
+    made = scope[name]
+    if isinstance(node, ast.FunctionDef):
+        made.py_func.__qualname__ = f"{name}_{key}"
+    return made

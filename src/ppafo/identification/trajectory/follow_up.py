@@ -1,0 +1,232 @@
+"""Questions to a finished fit: the profile likelihood of a number, and which further experiment would say most."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ppafo.errors import IdentificationError, nearest_name
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, full_path
+from ppafo.identification.trajectory.information import covariance, data_information, directions_for
+from ppafo.identification.trajectory.preparation import Floats, Measured, PreparedExperiment, Samples, prepare_times
+from ppafo.identification.trajectory.problem import Range, reach_of
+from ppafo.identification.trajectory.residuals import Residuals, coordinate_bounds, trajectories
+from ppafo.identification.trajectory.result import TrajectoryFit
+from ppafo.identification.trajectory.search import descend, is_at_bound
+from ppafo.identification.trajectory.uncertainty import interval_factor
+from ppafo.simulation.scenario import Scenario
+
+POINTS_PER_SIDE = 4
+REACH = 2.6
+"""Standard errors on each side that a profile covers; a 95 % interval ends at 1.96 of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Rise of the misfit over its least, by number held, all others fitted anew.
+
+    ``numbers`` in ``unit`` grow; ``rises`` are twice the log likelihood lost [-], over the inflation of the fit;
+    ``low`` and ``high`` bound the interval in which the rise stays below ``threshold``, None where the profile never
+    reaches it on that side: the recordings do not bound the number there.
+    """
+
+    path: str
+    unit: str
+    numbers: Floats
+    rises: Floats
+    threshold: float
+    low: float | None
+    high: float | None
+
+
+def profile(fit: TrajectoryFit, path: str) -> Profile:
+    """Return the profile likelihood of one fitted number; each of its points is a search over all the others.
+
+    Numbers are in the SI unit of the parameter. IdentificationError for a path that was not fitted.
+    """
+    index = _index(fit, path)
+    item, at = fit.optimum.residuals.ranges[index], float(fit.optimum.point[index])
+    below, above = (dict(_side(fit, index, coordinates)) for coordinates in _held_coordinates(fit, index))
+    rises = {**below, at: 0.0, **above}
+    places = np.array(sorted(rises))
+    heights = np.array([rises[place] for place in places])
+    threshold = interval_factor(fit.problem.search.confidence) ** 2
+    middle = int(np.searchsorted(places, at))
+    return Profile(
+        path=item.name,
+        unit=item.unit,
+        numbers=np.array([item.number(float(place)) for place in places]),
+        rises=heights,
+        threshold=threshold,
+        low=_crossing(item, places[middle::-1], heights[middle::-1], threshold),
+        high=_crossing(item, places[middle:], heights[middle:], threshold),
+    )
+
+
+def _index(fit: TrajectoryFit, path: str) -> int:
+    names = [item.name for item in fit.optimum.residuals.ranges]
+    full = full_path(path, fit.scenarios[0])
+    if full not in names:
+        raise IdentificationError(f"'{path}' was not fitted{nearest_name(full, names)}; fitted: {', '.join(names)}")
+    return names.index(full)
+
+
+def _held_coordinates(fit: TrajectoryFit, index: int) -> tuple[Floats, Floats]:
+    """Return the coordinates at which a number is held, below and above its estimate, going away from it."""
+    at = float(fit.optimum.point[index])
+    low, high = (float(side[index]) for side in coordinate_bounds(fit.optimum.residuals.ranges))
+    error = float(np.sqrt(fit.uncertainty.covariance[index, index]))
+    shares = np.arange(1, POINTS_PER_SIDE + 1) / POINTS_PER_SIDE
+    down, up = min(REACH * error, at - low), min(REACH * error, high - at)
+    return (at - down * shares if down > 0.0 else shares[:0]), (at + up * shares if up > 0.0 else shares[:0])
+
+
+def _side(fit: TrajectoryFit, index: int, coordinates: Floats) -> list[tuple[float, float]]:
+    """Return coordinate and rise on one side; each search starts where the last one ended, moved along the valley."""
+    best, curvature = fit.optimum, fit.uncertainty.curvature
+    point = best.point.copy()
+    others = np.arange(len(point)) != index
+    inflation = _inflation(fit, index)
+    valley = _valley(curvature, index, others)
+    found = []
+    for coordinate in coordinates:
+        point[others] += valley * (coordinate - point[index])
+        point[index] = coordinate
+        cost, point[others] = _best_of_others(fit, index, point)
+        found.append((float(coordinate), max(0.0, 2.0 * (cost - best.cost)) / inflation))
+    return found
+
+
+def _inflation(fit: TrajectoryFit, index: int) -> float:
+    """Return the variance of a coordinate over what the curvature of the cost alone would make it."""
+    uncertainty = fit.uncertainty
+    return float(uncertainty.covariance[index, index] / covariance(uncertainty.curvature)[index, index])
+
+
+def _valley(information: Floats, index: int, others: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> Floats:
+    """Return how the other coordinates follow one that is moved, along the floor of the valley."""
+    if not others.any():
+        return np.zeros(0)
+    return np.asarray(-covariance(information[np.ix_(others, others)]) @ information[others, index])
+
+
+def _best_of_others(fit: TrajectoryFit, index: int, point: Floats) -> tuple[float, Floats]:
+    """Return the least cost with one coordinate held, and where the others are then."""
+    residuals, search = fit.optimum.residuals, replace(fit.problem.search, loss="linear")
+    others = np.arange(len(point)) != index
+    held = residuals.hold({index: float(point[index])})
+    prior = _half_square(residuals.of_priors(point)) - _half_square(held.of_priors(point[others]))
+    if not held.ranges:
+        return _half_square(residuals.of_data(point[None, :])[:, 0]) + prior, point[others]
+    low, high = coordinate_bounds(held.ranges)
+    start = np.clip(point[others], low, high)
+    part = fit.uncertainty.curvature[np.ix_(others, others)]
+    done = descend(held, start, directions_for(part, is_at_bound(start, held.ranges)), search)
+    return done.cost + prior, done.point
+
+
+def _half_square(values: Floats) -> float:
+    return 0.5 * float(values @ values)
+
+
+def _crossing(item: Range, places: Floats, heights: Floats, threshold: float) -> float | None:
+    """Return the number at which the rise passes the threshold, going away from the estimate; None if it never does.
+
+    Between two points the square root of the rise, a straight line for a parabola, is interpolated.
+    """
+    roots, wanted = np.sqrt(heights), np.sqrt(threshold)
+    over = np.flatnonzero(roots >= wanted)
+    if not over.size or over[0] == 0:
+        return None
+    last = int(over[0])
+    share = (wanted - roots[last - 1]) / (roots[last] - roots[last - 1])
+    return item.number(float(places[last - 1] + share * (places[last] - places[last - 1])))
+
+
+_WIDEST = math.log(100.0)
+"""Half width in coordinates that a number is allowed at most: what is not known at all is known to a factor of 100."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An experiment that could be done: its scenario, the noise of each channel [rad], [Pa], time between samples [s].
+
+    The devices of candidates are those of their scenarios with the fitted numbers put in.
+    """
+
+    label: str
+    scenario: Scenario
+    noise: Mapping[str, float]
+    interval: float = 1.0e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What a candidate would bring.
+
+    ``gain`` is half the growth of the logarithm of the determinant of the information [-] (D-optimality): the volume of
+    the region of all parameters shrinks by exp(gain). ``shrinkage`` is, by parameter, the standard error afterwards
+    over the one now. ``most_helped`` names the parameter that gains most.
+    """
+
+    label: str
+    gain: float
+    shrinkage: Mapping[str, float]
+    most_helped: str
+
+
+def expected_information(fit: TrajectoryFit, candidates: Sequence[Candidate]) -> tuple[Expected, ...]:
+    """Return what each candidate would bring, the most informative first.
+
+    IdentificationError for a candidate without noise in a channel that can be fitted.
+    """
+    ranges, point = fit.optimum.residuals.ranges, fit.optimum.point
+    known = _known_information(fit) + _what_bounds_say(ranges)
+    directions = directions_for(known, is_at_bound(point, ranges))
+    brought = [_expect(fit, known, candidate, directions) for candidate in candidates]
+    return tuple(sorted(brought, key=lambda one: -one.gain))
+
+
+def _known_information(fit: TrajectoryFit) -> Floats:
+    """Return the information that the covariance of a fit stands for."""
+    return covariance(fit.uncertainty.covariance)
+
+
+def _expect(fit: TrajectoryFit, known: Floats, candidate: Candidate, directions: Floats) -> Expected:
+    ranges, point = fit.optimum.residuals.ranges, fit.optimum.point
+    acting = tuple(item for item in ranges if not item.recordings)
+    place = [index for index, item in enumerate(ranges) if not item.recordings]
+    residuals = Residuals((_imagine(candidate, acting, point[place]),), acting)
+    part = np.diag(np.max(np.abs(directions[place]), axis=1)) if len(place) < len(ranges) else directions
+    jacobian = residuals.around(point[place], part).jacobian_of_data()
+    after = known.copy()
+    after[np.ix_(place, place)] += data_information(jacobian, np.ones(len(jacobian)))
+    errors, errors_after = (np.sqrt(np.diag(covariance(matrix))) for matrix in (known, after))
+    shrinkage = {item.name: float(share) for item, share in zip(ranges, errors_after / errors, strict=True)}
+    gain = 0.5 * float(np.linalg.slogdet(after)[1] - np.linalg.slogdet(known)[1])
+    return Expected(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))
+
+
+def _imagine(candidate: Candidate, ranges: tuple[Range, ...], point: Floats) -> PreparedExperiment:
+    """Return the candidate as an experiment whose samples are the model's own."""
+    unknown = [name for name in candidate.noise if name not in FITTED_CHANNELS]
+    if unknown or not candidate.noise or not all(noise > 0.0 for noise in candidate.noise.values()):
+        raise IdentificationError(
+            f"candidate '{candidate.label}': noise must be above 0 for at least one of {', '.join(FITTED_CHANNELS)}"
+        )
+    count = math.floor(candidate.scenario.duration / candidate.interval + 1.0e-6)
+    time: Floats = candidate.interval * np.arange(count + 1, dtype=np.float64)
+    numbers = {item.path: item.number(float(z)) for item, z in zip(ranges, point, strict=True)}
+    empty = tuple(Measured(name, np.zeros(time.size), noise) for name, noise in candidate.noise.items())
+    samples = Samples(time, empty, reach_of(ranges))
+    prepared = prepare_times(candidate.label, candidate.scenario, samples, numbers)
+    signals = trajectories([prepared], ranges, point[None, :])[0]
+    filled = tuple(Measured(one.name, signals[one.name][:, 0], one.noise) for one in empty)
+    return replace(prepared, samples=replace(samples, channels=filled))
+
+
+def _what_bounds_say(ranges: Sequence[Range]) -> Floats:
+    """Return the information of the bounds alone, as of an even distribution between them; it keeps all finite."""
+    low, high = coordinate_bounds(ranges)
+    return np.diag(12.0 / np.square(np.minimum(high - low, 2.0 * _WIDEST)))

@@ -1,0 +1,154 @@
+"""Catalogues of kinds: those of this package, and those that other packages offer, found when they are asked for.
+
+Another package offers a kind as an entry point of the catalogue's group; a module that is no package is named with its
+object, ``my_module:KIND``. Nothing is looked for before a name is asked for that is not here.
+"""
+
+import importlib
+import logging
+import re
+import sys
+from collections.abc import Iterable, Iterator, MutableMapping
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+from ppafo.errors import KindError, one_line
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+logger = logging.getLogger("ppafo")
+
+_OBJECT = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
+
+
+class Named(Protocol):
+    """What a catalogue holds has a name."""
+
+    @property
+    def name(self) -> str:
+        """Its name in files and on the command line."""
+
+
+Kind = TypeVar("Kind", bound=Named)
+
+
+class Kinds(MutableMapping[str, Kind], Generic[Kind]):
+    """Kinds by name. Looking a name up finds those of other packages too; going through all gives what is loaded.
+
+    ``group`` is that of the entry points, ``word`` what messages call a kind, ``kind_type`` what each of them is.
+    """
+
+    def __init__(self, group: str, word: str, kind_type: type[Kind], own: Iterable[Kind]) -> None:
+        self.group = group
+        self.word = word
+        self._kind_type = kind_type
+        self._kinds = {kind.name: kind for kind in own}
+        self._own = frozenset(self._kinds)
+
+    def __getitem__(self, name: str) -> Kind:
+        """Return a kind; KeyError where there is none, KindError where it is there and cannot be used."""
+        if name not in self._kinds:
+            found = self._found(name)
+            if found is None:
+                raise KeyError(name)
+            self._kinds[name] = found
+        return self._kinds[name]
+
+    def __setitem__(self, name: str, kind: Kind) -> None:
+        """Add a kind for as long as the program runs."""
+        self._kinds[name] = kind
+
+    def __delitem__(self, name: str) -> None:
+        """Forget a kind."""
+        del self._kinds[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the kinds that are loaded, those of this package first."""
+        return iter(tuple(self._kinds))
+
+    def __len__(self) -> int:
+        """Return how many kinds are loaded."""
+        return len(self._kinds)
+
+    def load_all(self) -> tuple[str, ...]:
+        """Load every kind that is installed; return one line for each that cannot be used, and log it."""
+        problems = []
+        for point in _entry_points(self.group, tuple(sys.path)):
+            try:
+                self._check_name(point)
+                if point.name not in self._kinds:
+                    self._kinds[point.name] = self._loaded(point)
+            except KindError as error:
+                logger.warning("ppafo: %s", error)
+                problems.append(str(error))
+        return tuple(problems)
+
+    def _found(self, name: str) -> Kind | None:
+        if not name:
+            return None
+        if _OBJECT.fullmatch(name):
+            from importlib.metadata import EntryPoint
+
+            point = EntryPoint(name, name, self.group)
+            with _with_working_folder():
+                return self._loaded(point)
+        points = [point for point in _entry_points(self.group, tuple(sys.path)) if point.name == name]
+        if len({(point.value, _package(point)) for point in points}) > 1:
+            packages = ", ".join(sorted({_package(point) for point in points}))
+            raise KindError(f"{self.word} '{one_line(name)}' is offered by several packages: {packages}")
+        if not points:
+            self.load_all()
+            return None
+        return self._loaded(points[0])
+
+    def _check_name(self, point: "EntryPoint") -> None:
+        if point.name in self._own:
+            raise KindError(
+                f"{self.word} '{one_line(point.name)}' of {_package(point)} has the name of one of ppafo's own; "
+                "it needs another name"
+            )
+
+    def _loaded(self, point: "EntryPoint") -> Kind:
+        where = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
+        try:
+            kind = point.load()
+        except Exception as error:  # what another package does when it is imported is anybody's guess
+            raise KindError(f"{where} cannot be loaded: {type(error).__name__}: {one_line(error)}") from error
+        if not isinstance(kind, self._kind_type):
+            is_a = f"is of type {type(kind).__name__}, not {self._kind_type.__name__}"
+            raise KindError(f"{where} {is_a}")
+        if ":" not in point.name and kind.name != point.name:
+            raise KindError(f"{where} calls itself '{one_line(kind.name)}'; entry point and kind need one name")
+        return kind
+
+
+@lru_cache(maxsize=32)
+def _entry_points(group: str, _path: tuple[str, ...]) -> tuple["EntryPoint", ...]:
+    """Entry points of a group for a search path, in the order of their names."""
+    from importlib.metadata import entry_points
+
+    found = entry_points(group=group)
+    return tuple(sorted(found, key=lambda point: (point.name, point.value)))
+
+
+def _package(point: "EntryPoint") -> str:
+    distribution: Any = point.dist
+    return f"'{point.module}'" if distribution is None else f"package '{one_line(distribution.name)}'"
+
+
+@contextmanager
+def _with_working_folder() -> Iterator[None]:
+    """Let modules be found in the working folder, after all others, as ``python -m`` does."""
+    folder = str(Path.cwd())
+    if folder in sys.path or "" in sys.path:
+        yield
+        return
+    sys.path.append(folder)
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)

@@ -1,0 +1,92 @@
+"""How far long work is: one kind of report for all of it, and the line that shows it on the side."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TextIO, final
+
+_BETWEEN_LINES = 10.0
+"""Seconds between two lines where the output is not a terminal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """What is being done, how much of it is done, and how long that took.
+
+    ``total`` is 0 where nobody knows it. Of ``done``, ``earlier`` were there at the start and ``failed`` failed;
+    ``elapsed`` are the seconds since the start.
+    """
+
+    activity: str = ""
+    done: int = 0
+    total: int = 0
+    failed: int = 0
+    earlier: int = 0
+    elapsed: float = 0.0
+    noun: str = "runs"
+
+    @property
+    def is_complete(self) -> bool:
+        """True where all of a known total is done."""
+        return 0 < self.total == self.done
+
+    def line(self) -> str:
+        """Return the state in words."""
+        words = [f"{self.activity} ..."] if self.activity and not self.total else [self.activity] * bool(self.activity)
+        if self.total:
+            words.append(f"{self.done:,} of {self.total:,} {self.noun} ({100.0 * self.done / self.total:.0f} %)")
+        if self.total and self.done > self.earlier and self.elapsed > 0.0:
+            rate = (self.done - self.earlier) / self.elapsed
+            words += [f"{rate:,.0f} {self.noun}/s"] * (rate >= 10.0)
+            words.append(f"{time_text((self.total - self.done) / rate)} left")
+        if self.failed:
+            words.append(f"{self.failed:,} failed")
+        return ", ".join(words)
+
+
+Report = Callable[[Progress], None]
+"""What long work calls now and then; it may raise KeyboardInterrupt."""
+
+
+def report_nothing(_progress: Progress) -> None:
+    """Watch nothing: where nobody asked for progress."""
+
+
+@final
+class ProgressLine:
+    """Shows progress on a stream: in one line of a terminal, or now and then in a line of its own."""
+
+    def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
+        self._stream, self._clock = stream, clock
+        self._written, self._activity = -_BETWEEN_LINES, ""
+        self._open = False
+
+    def __call__(self, progress: Progress) -> None:
+        """Show the state."""
+        if self._stream.isatty():
+            self._stream.write(f"\r\x1b[Kppafo: {progress.line()}")
+            self._open = True
+        elif self._is_due(progress):
+            self._stream.write(f"ppafo: {progress.line()}\n")
+            self._written, self._activity = self._clock(), progress.activity
+        self._stream.flush()
+
+    def close(self) -> None:
+        """End the line of a terminal, so that what comes next begins on one of its own."""
+        if self._open:
+            self._stream.write("\n")
+            self._open = False
+
+    def _is_due(self, progress: Progress) -> bool:
+        is_late = self._clock() - self._written >= _BETWEEN_LINES
+        return is_late or progress.is_complete or progress.activity != self._activity
+
+
+def time_text(seconds: float) -> str:
+    """Return a time in the two units that matter: 42 s, 3 min 10 s, 5 h 20 min."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600:,} h {whole % 3600 // 60} min"

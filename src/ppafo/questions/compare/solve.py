@@ -1,0 +1,279 @@
+"""Configurations side by side: each as it is, and all of them over the same uncertain values."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ppafo.answers import Solved
+from ppafo.errors import StudyError
+from ppafo.metrics import METRICS, Metric
+from ppafo.progress import Report
+from ppafo.questions.compare.paired import Paired, best_shares, compare_pairs
+from ppafo.simulation.numbers import number_at
+from ppafo.simulation.result import Status
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import OPEN_LOOP, simulate_many
+from ppafo.studies.configurations import (
+    Configurations,
+    ConfiguredTask,
+    choose_configurations,
+    valid_baseline,
+    with_overrides,
+)
+from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import Uncertainty, study_of, uncertainty_of, with_new_noise
+from ppafo.studies.intervals import Interval
+from ppafo.studies.noise import NOISE
+from ppafo.studies.outcomes import (
+    Outcomes,
+    Tally,
+    check_confidence,
+    check_draws,
+    check_failures,
+    check_fraction,
+    scenario_model,
+)
+from ppafo.studies.study import Study
+
+COMPARED: dict[str, int] = {
+    "rms_error": -1,
+    "rms_error_ramp": -1,
+    "rms_error_hold": -1,
+    "peak_error": -1,
+    "gas_supplied": -1,
+    "mechanical_work": 0,
+    "gas_per_work": -1,
+    "switchings": -1,
+}
+"""Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""
+AS_WRITTEN = "as written"
+"""What the task of a configuration is called where no other is requested."""
+DEFAULT_DRAWS = 4096
+FEWEST_DRAWS = 32
+DEFAULT_SEED = 1
+NOISE_DRAWS = 512
+"""Draws that are run once more with other noise, at most."""
+
+Source = Study | str | Path | Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A configuration on a task: its metrics by name, how the run ended, and its runs over the draws, if any.
+
+    ``renoised`` are the first draws again, each with another noise stream; None where no controller receives noise.
+    """
+
+    task: str
+    configuration: str
+    scenario: Scenario
+    metrics: Mapping[str, Metric]
+    status: Status
+    outcomes: Outcomes | None
+    renoised: Outcomes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison(Solved):
+    """All cases, task by task in the order of the configurations, one of which is the ``baseline``.
+
+    ``draws`` is 0 without uncertainty; ``varied`` are the uncertain paths but the noise; ``confidence`` is that of
+    the intervals.
+    """
+
+    metrics: tuple[str, ...]
+    configurations: tuple[str, ...]
+    baseline: str
+    tasks: Mapping[str, tuple[str, ...]]
+    cases: tuple[Case, ...]
+    draws: int
+    seed: int
+    varied: tuple[str, ...]
+    confidence: float
+
+    def of_task(self, task: str) -> tuple[Case, ...]:
+        """Return the cases of a task."""
+        return tuple(case for case in self.cases if case.task == task)
+
+    def pairs(self, task: str, configuration: str) -> list[Paired]:
+        """Return the statistics of a configuration against the baseline on a task; none without uncertainty."""
+        baseline, other = (self._case(task, name) for name in (self.baseline, configuration))
+        first, second = baseline.outcomes, other.outcomes
+        if first is None or second is None:
+            return []
+        again: dict[str, tuple[Floats, Floats]] = {}
+        if baseline.renoised is not None and other.renoised is not None:
+            sides = (baseline.renoised.metrics, other.renoised.metrics)
+            again = {name: (sides[0][name], sides[1][name]) for name in self.metrics}
+        found = [
+            compare_pairs(
+                name, first.metrics[name], second.metrics[name], COMPARED[name], self.confidence, again.get(name)
+            )
+            for name in self.metrics
+        ]
+        return [item for item in found if item is not None]
+
+    def best(self, task: str, metric: str) -> dict[str, Interval]:
+        """Return the probability of each configuration to be the best in a metric on a task."""
+        drawn = [self._case(task, name).outcomes for name in self.configurations]
+        values: list[Floats] = [item.metrics[metric] for item in drawn if item is not None]
+        if len(values) < len(drawn) or not COMPARED[metric]:
+            return {}
+        return dict(zip(self.configurations, best_shares(values, COMPARED[metric], self.confidence), strict=False))
+
+    def _case(self, task: str, configuration: str) -> Case:
+        return next(case for case in self.of_task(task) if case.configuration == configuration)
+
+
+def compare(
+    configurations: Configurations | None = None,
+    study: Source | None = None,
+    tasks: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str]]] = (),
+    overrides: Sequence[str] = (),
+    baseline: str | None = None,
+    draws: int = DEFAULT_DRAWS,
+    seed: int | None = None,
+    confidence: float = 0.95,
+    maximum_failed: float = 0.01,
+    threads: int | None = None,
+    progress: Report | None = None,
+) -> Comparison:
+    """Compare configurations on tasks, and over the distributions of a study with common random numbers.
+
+    ``configurations`` are scenarios by name (or a list of names, files or Scenario objects); those of the study by
+    default. ``study`` is a study file, name or Study, whose distributions hold in all of them. ``tasks`` has
+    overrides by name, such as ``{"slow": ["reference.ramp_time=2 s"]}``; ``overrides`` change every configuration.
+    ``baseline`` is the configuration that all others are compared with, by default the first. Draws are randomised
+    Sobol replicates whatever the study's sampling method; where a controller receives noise, each has a noise stream of
+    its own, the same in all configurations, and without a study the noise alone is drawn. StudyError for bad input and
+    where more than the fraction ``maximum_failed`` of a configuration's runs fails; fewer are left out in pairs.
+    """
+    check_draws(draws, FEWEST_DRAWS)
+    check_confidence(confidence)
+    known = study_of(study) if study is not None else None
+    chosen = choose_configurations(configurations or None, known, overrides)
+    names = tuple(item.name for item in chosen)
+    reference = valid_baseline(baseline, names)
+    wanted = _tasks(tasks)
+    placed = [
+        ConfiguredTask(task, item.name, with_overrides(item.scenario, texts))
+        for task, texts in wanted.items()
+        for item in chosen
+    ]
+    metrics = compared_metrics([place.scenario for place in placed])
+    drawing = _drawing(known, placed, draws, seed, check_fraction(maximum_failed, "maximum_failed"))
+    outcomes = (
+        _outcomes(placed, metrics, drawing, threads, progress) if drawing is not None else [_UNDRAWN] * len(placed)
+    )
+    results = simulate_many([place.scenario for place in placed], threads)
+    return Comparison(
+        metrics=metrics,
+        configurations=names,
+        baseline=reference,
+        tasks=wanted,
+        cases=tuple(
+            Case(place.task, place.configuration, place.scenario, result.metrics, result.status, *runs)
+            for place, result, runs in zip(placed, results, outcomes, strict=True)
+        ),
+        draws=drawing.draws if drawing is not None else 0,
+        seed=drawing.seed if drawing is not None else 0,
+        varied=tuple(path for path in drawing.uncertainty.paths if path != NOISE) if drawing is not None else (),
+        confidence=confidence,
+    )
+
+
+def _tasks(tasks: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str]]]) -> dict[str, tuple[str, ...]]:
+    """Return the overrides of each task by its name; as the scenarios are written where there is none."""
+    pairs = list(tasks.items() if isinstance(tasks, Mapping) else tasks) or [(AS_WRITTEN, ())]
+    names = [name for name, _ in pairs]
+    repeated = next((name for name in names if names.count(name) > 1), None)
+    if repeated is not None:
+        raise StudyError(f"there are two tasks named '{repeated}'; give each its own name")
+    return {name: tuple(texts) for name, texts in pairs}
+
+
+def compared_metrics(scenarios: list[Scenario]) -> tuple[str, ...]:
+    """Return those metrics of the table that all scenarios can have: without a reference there is no error."""
+    has_reference = all(scenario.control.kind != OPEN_LOOP for scenario in scenarios)
+    return tuple(name for name in COMPARED if has_reference or "reference" not in METRICS[name].channels)
+
+
+_SAME = 1.0e-9
+"""Values that differ by less than this fraction are one."""
+_UNDRAWN = (None, None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Drawing:
+    """What is drawn: distributions, where they hold, number of draws, random seed, fraction that may fail."""
+
+    study: Study | None
+    uncertainty: Uncertainty
+    draws: int
+    seed: int
+    most_failed: float
+
+    def varies(self, path: str, configuration: str) -> bool:
+        """Tell whether a path is drawn in a configuration; the noise is in all of them."""
+        return self.study is None or path == NOISE or self.study.varies(path, configuration)
+
+
+def _drawing(
+    study: Study | None, placed: Sequence[ConfiguredTask], draws: int, seed: int | None, most_failed: float
+) -> _Drawing | None:
+    """Return what is drawn; None without a study, or where nothing in it varies, if no controller receives noise."""
+    known = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
+    uncertainty = known.with_noise_of([place.scenario for place in placed])
+    if not uncertainty.drawn:
+        return None
+    usual = study.sample.seed if study is not None else DEFAULT_SEED
+    return _Drawing(study, uncertainty, draws, usual if seed is None else seed, most_failed)
+
+
+def _check_set_or_drawn(placed: Sequence[ConfiguredTask], study: Study) -> None:
+    """Refuse cases that differ in a value that the study draws for all of them: the difference would not count."""
+    shared = [path for path in study.paths if not path.startswith("valve.") and path != NOISE]
+    for path in shared:
+        places = [place for place in placed if study.varies(path, place.configuration)]
+        values = [value for place in places if (value := _value_at(path, place.scenario)) is not None]
+        lowest, highest = min(values, default=0.0), max(values, default=0.0)
+        if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
+            raise StudyError(
+                f"the study draws '{path}' for every configuration, so the different values of the configurations "
+                f"({lowest:.6g} and {highest:.6g} in SI units) would be ignored; use a study that does not draw it"
+            )
+
+
+def _value_at(path: str, scenario: Scenario) -> float | None:
+    try:
+        return number_at(scenario, path)
+    except (AttributeError, KeyError, TypeError):
+        return None
+
+
+def _outcomes(
+    placed: Sequence[ConfiguredTask],
+    metrics: Sequence[str],
+    drawing: _Drawing,
+    threads: int | None,
+    progress: Report | None,
+) -> list[tuple[Outcomes, Outcomes | None]]:
+    """Return the runs of every case, all over the same draws, and the first of them again with other noise."""
+    if drawing.study is not None:
+        _check_set_or_drawn(placed, drawing.study)
+    columns = drawing.uncertainty.replicated_columns(0, drawing.draws, drawing.seed)
+    again = with_new_noise(columns, NOISE_DRAWS) if drawing.uncertainty.has_noise else {}
+    tally = Tally((drawing.draws + (min(NOISE_DRAWS, drawing.draws) if again else 0)) * len(placed), progress)
+    found: list[tuple[Outcomes, Outcomes | None]] = []
+    for place in placed:
+        name = place.configuration
+        model = scenario_model(place.scenario, metrics, threads, tally.add)
+        own = {path: column for path, column in columns.items() if drawing.varies(path, name)}
+        unchanged = {"supply.pressure": np.full(drawing.draws, place.scenario.device.supply.pressure)}
+        outcomes = model(own or unchanged)
+        check_failures(outcomes, drawing.most_failed, f"configuration '{name}', task '{place.task}'")
+        found.append((outcomes, model({path: again[path] for path in own}) if again else None))
+    return found

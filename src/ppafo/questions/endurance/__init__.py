@@ -1,0 +1,71 @@
+"""How long does one bottle of gas last, how cold does it get, and why does it end?"""
+
+from pathlib import Path
+
+from ppafo.questions.question import SET, Argument, Question, quantity
+
+QUESTION = Question(
+    solve="ppafo.questions.endurance.solve:endurance",
+    arguments=(
+        Argument(
+            ("RECORDING",),
+            "recordings",
+            "a .csv or .nc file with supplied_mass, or the result folder of a run or a walk; repeated until the "
+            "bottle ends; several are compared side by side",
+            metavar="RECORDING",
+            type=Path,
+            nargs="*",
+        ),
+        Argument(("--gas-per-step",), "gas_per_step", "gas per step, for example '0.3 g'", "MASS", type=quantity("kg")),
+        Argument(
+            ("--step-time",),
+            "step_time",
+            "time of one step; default: '1.1 s', the whole recording, or one stride of a walk",
+            metavar="TIME",
+            type=quantity("s"),
+        ),
+        Argument(
+            ("--peak-flow",),
+            "peak_flow",
+            "largest flow, for example '4.5 g/s'; default: the mean flow",
+            metavar="FLOW",
+            type=quantity("kg/s"),
+        ),
+        Argument(
+            ("--bottle",),
+            "bottle",
+            "name of a bottle or a .toml file; default: the paper's bottle",
+            metavar="BOTTLE",
+            default="paper-co2-9oz",
+        ),
+        Argument(
+            ("--walk",),
+            "walk",
+            "time of walking between two rests; default '10 min'",
+            "TIME",
+            quantity("s"),
+            default=600.0,
+        ),
+        Argument(("--rest",), "rest", "time of each rest; default '0 s' (no rest)", "TIME", quantity("s"), default=0.0),
+        Argument(
+            ("--longest",),
+            "longest",
+            "maximum simulated time; default '1440 min'",
+            metavar="TIME",
+            type=quantity("s"),
+            default=86400.0,
+        ),
+        Argument(
+            ("--reuse",),
+            "reuse",
+            "reuse the exhaust for dorsiflexion, for example 'reservoir_volume=50 cm^3'; values of the chambers "
+            "that are not given are taken from the walk; may be repeated",
+            metavar="NAME=VALUE",
+            action="append",
+            default=(),
+        ),
+        SET,
+    ),
+    library="ppafo.questions.endurance.file:FILE",
+    compiles=False,
+)

@@ -1,0 +1,226 @@
+"""The answer about a bottle: how long it lasts and why it ends, its values with their sources; several side by side."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.shown_units import quantity_text, shown
+from ppafo.questions.endurance.discharge import Discharge
+from ppafo.questions.endurance.figure import endurance_figure
+from ppafo.questions.endurance.reuse import GIVEN, Reuse
+from ppafo.questions.endurance.solve import Endurance, Endurances
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.units import format_quantity
+from ppafo.version import __version__
+
+FORMAT = "ppafo endurance"
+
+_LEFT_OUT = (
+    "Not in the model: cooling of the regulator itself, liquid carried out with the vapour, a bottle held upside "
+    "down, leaking connections, and ice on the outside of the bottle."
+)
+_REUSE_ASSUMES = (
+    "A balance for ideal gas at constant temperature: pressures equalise, check valves have no losses, nothing "
+    "leaks, and the reservoir has settled over many steps."
+)
+_CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
+_USE = (Column("gas use"), Column("gas per step", "gas mass", ".3g"))
+_REUSED = (
+    Column("gas saved", "gas mass", ".3g"),
+    Column("walking with reuse", "duration"),
+    Column("steps with reuse", form=".0f"),
+)
+_COURSE = (Column("walking", "duration"), Column("steps", form=".0f"))
+
+
+def answer_of(found: Endurance | Endurances) -> Answer:
+    """Return the answer for one gas use, or for several side by side."""
+    return _answer_of_one(found) if isinstance(found, Endurance) else _answer_of_several(found)
+
+
+def _answer_of_one(found: Endurance) -> Answer:
+    figure = Figure("endurance", _CAPTION, lambda: endurance_figure(found))
+    return Answer(
+        name="endurance",
+        kicker="Endurance",
+        title="How long the bottle lasts",
+        lead=(found.bottle.title, f"gas use: {found.draw.origin}"),
+        sections=(
+            Section(table=Table((), tuple(_facts(found)))),
+            Section("The bottle over time", figure=figure, remarks=(_LEFT_OUT,), is_detail=True),
+            _values_section(found),
+            *([] if found.reuse is None else [_reuse_section(found.reuse)]),
+        ),
+        data=_data(found),
+        files={"bottle.csv": lambda: marked_csv_bytes(found.discharge.recording)},
+    )
+
+
+def _answer_of_several(several: Endurances) -> Answer:
+    uses = several.uses
+    first = next(iter(uses.values()))
+    head = (*_USE, *_COURSE, *(_REUSED if first.reuse else ()), Column("ended"))
+    chambers = tuple(f"{name}: {_chambers(one.reuse)}" for name, one in uses.items() if one.reuse is not None)
+    return Answer(
+        name="endurance",
+        kicker="Endurance",
+        title="How long the bottle lasts",
+        lead=(first.bottle.title,),
+        sections=(
+            Section(table=Table(head, tuple((name, *_cells(one)) for name, one in uses.items()))),
+            Section(remarks=chambers),
+            Section("What is not in the model", (_LEFT_OUT,), is_detail=True),
+        ),
+        data={"recordings": {name: _data(one) for name, one in uses.items()}},
+    )
+
+
+def _cells(one: Endurance) -> tuple[str | float, ...]:
+    course = one.discharge
+    last = (course.walking_time, course.steps)
+    if one.reuse is None or one.without_reuse is None:
+        return one.draw.mass_per_step, *last, course.ending.kind
+    saved, before = one.reuse.balance.returned_mass, one.without_reuse
+    return one.draw.mass_per_step + saved, before.walking_time, before.steps, saved, *last, course.ending.kind
+
+
+def _facts(found: Endurance) -> list[tuple[str, str]]:
+    """Return name and value of everything that a reader wants first."""
+    course, draw = found.discharge, found.draw
+    recording = course.recording
+    flows = [quantity_text(flow, "mass flow") for flow in (draw.mean_flow, draw.peak_flow)]
+    rows = [
+        ("run time", f"{_minutes(course.walking_time)} of walking, {_minutes(course.total_time)} in total"),
+        ("steps", f"{course.steps:.0f}"),
+        ("steps without cooling", f"{found.steps_when_warm:.0f} (a bottle that stays at room temperature)"),
+        ("ended", course.ending.message),
+        ("gas", f"{_gas(draw.mass_per_step)} a step, {flows[0]}, largest {flows[1]}"),
+        (
+            "lowest temperature of the content",
+            quantity_text(float(np.min(recording["bottle_temperature"])), "temperature", ".1f"),
+        ),
+        ("pressure at the end", quantity_text(float(recording["bottle_pressure"][-1]), "pressure", ".0f")),
+    ]
+    if "liquid_mass" in recording:
+        rows.append(("liquid used up", _dry_since(course)))
+    return rows + (_reuse_facts(found, found.reuse, found.without_reuse) if found.reuse and found.without_reuse else [])
+
+
+def _reuse_facts(found: Endurance, reused: Reuse, without: Discharge) -> list[tuple[str, str]]:
+    balance = reused.balance
+    before = found.draw.mass_per_step + balance.returned_mass
+    saved = f"{_gas(balance.returned_mass)} a step, {balance.returned_mass / before:.1%} of {_gas(before)}"
+    return [
+        ("exhaust reused", f"{saved}; the exhaust holds {_gas(balance.exhausted_mass)}"),
+        ("chambers", _chambers(reused)),
+        ("without reuse", f"{_minutes(without.walking_time)} of walking, {without.steps:.0f} steps"),
+    ]
+
+
+def _dry_since(course: Discharge) -> str:
+    liquid = course.recording["liquid_mass"]
+    dry = np.flatnonzero(liquid <= 0.0)
+    if not dry.size:
+        return f"no, {_gas(float(liquid[-1]))} left"
+    return f"after {_minutes(float(course.recording.time[dry[0]]))}"
+
+
+def _values_section(found: Endurance) -> Section:
+    head = tuple(map(Column, ("value", "", "origin", "source")))
+    rows = tuple(
+        (path, format_quantity(entry.value, entry.unit), entry.origin, entry.source)
+        for path, entry in found.bottle.entries.items()
+    )
+    properties = f"Gas properties: {found.bottle.fluid.source}."
+    return Section("Values", table=Table(head, rows, left=4), remarks=(properties,), is_detail=True)
+
+
+def _reuse_section(reused: Reuse) -> Section:
+    """Return the values on which the reuse of the exhaust rests, with where they come from."""
+    pressures = ("exhaust_pressure", "fill_pressure", "atmospheric_pressure")
+    kinds = dict.fromkeys(pressures, "pressure") | dict.fromkeys(
+        ("exhaust_volume", "fill_volume", "reservoir_volume"), "volume"
+    )
+    rows = tuple(
+        (name, quantity_text(getattr(reused.cycle, name), kind), reused.origins.get(name, "standard"))
+        for name, kind in kinds.items()
+    )
+    head = tuple(map(Column, ("value", "", "origin")))
+    return Section("Reuse of the exhaust", (_REUSE_ASSUMES,), Table(head, rows, left=3), is_detail=True)
+
+
+def _chambers(reused: Reuse) -> str:
+    """Return what the chambers hold when they vent and when they are filled, and where the numbers come from."""
+    cycle = reused.cycle
+    exhaust, fill = (
+        f"{quantity_text(pressure, 'pressure', '.1f')} in {quantity_text(volume, 'volume', '.1f')}"
+        for pressure, volume in (
+            (cycle.exhaust_pressure, cycle.exhaust_volume),
+            (cycle.fill_pressure, cycle.fill_volume),
+        )
+    )
+    return f"exhaust at {exhaust}, filled to {fill}, {_origin(reused)}"
+
+
+def _origin(reused: Reuse) -> str:
+    """Return where the values of the chambers come from, once where it is the same for all."""
+    origins = {name: text for name, text in reused.origins.items() if name != "reservoir_volume"}
+    if len(set(origins.values())) == 1:
+        return next(iter(origins.values()))
+    given = ", ".join(name for name, text in origins.items() if text == GIVEN)
+    return f"{next(text for text in origins.values() if text != GIVEN)}; {given} {GIVEN}"
+
+
+def _data(found: Endurance) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "format": FORMAT,
+        "schema_version": 1,
+        "kind": "simulated",
+        "ppafo": __version__,
+        "result": _course_data(found.discharge) | {"steps_when_warm": found.steps_when_warm},
+        "draw": asdict(found.draw) | {"mean_flow": found.draw.mean_flow},
+        "schedule": asdict(found.schedule),
+        "bottle": _bottle_data(found),
+    }
+    if found.reuse is not None and found.without_reuse is not None:
+        cycle, balance = found.reuse.cycle._asdict(), found.reuse.balance._asdict()
+        data["reuse"] = {"cycle": cycle, "balance": balance, "without_reuse": _course_data(found.without_reuse)}
+        data["reuse"]["origins"] = dict(found.reuse.origins)
+    return data
+
+
+def _course_data(course: Discharge) -> dict[str, Any]:
+    recording = course.recording
+    return {
+        "walking_time": course.walking_time,
+        "total_time": course.total_time,
+        "steps": course.steps,
+        "ending": asdict(course.ending),
+        "coldest_temperature": float(np.min(recording["bottle_temperature"])),
+        "at_end": {name: float(recording[name][-1]) for name in recording.names},
+        "balance": asdict(course.balance),
+    }
+
+
+def _bottle_data(found: Endurance) -> dict[str, Any]:
+    bottle = found.bottle
+    return {
+        "name": bottle.name,
+        "title": bottle.title,
+        "fluid": bottle.fluid.name,
+        "properties": bottle.fluid.source,
+        "gas_mass": bottle.mass,
+        "volume": bottle.volume,
+        "values": {path: entry.model_dump() for path, entry in bottle.entries.items()},
+    }
+
+
+def _minutes(seconds: float) -> str:
+    """Return minutes with three digits, and whole ones where there are more."""
+    return quantity_text(seconds, "duration", ".0f" if shown(seconds, "duration") >= 999.5 else ".3g")
+
+
+def _gas(mass: float) -> str:
+    return quantity_text(mass, "gas mass")

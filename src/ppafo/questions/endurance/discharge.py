@@ -1,0 +1,239 @@
+"""The course of a bottle from full to the moment at which it no longer holds the supply pressure."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.errors import ParameterError, SimulationError
+from ppafo.model.fluid_table import has_liquid
+from ppafo.model.source import (
+    BottleContent,
+    BottleState,
+    bottle_content,
+    bottle_rates,
+    content_energy,
+    content_temperature,
+    delivered_pressure,
+)
+from ppafo.questions.endurance.draw import Draw, Schedule
+from ppafo.questions.endurance.ending import Ending, Stop, ending, flow_limit, frozen_below, reserve
+from ppafo.questions.endurance.file import Bottle
+from ppafo.signals import Channel, Recording
+from ppafo.signals.recording import Floats
+
+MOST_STRETCHES = 2000
+SAMPLES = 1001
+_RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
+_ABOVE_FREEZING = 0.02
+"""Kelvin above the cold end of the table at which a run stops, so that the end is approached and not sat on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A time [s] of one draw [kg/s], the solution in it and at its end, and what stopped it before its time.
+
+    The solution is mass [kg] and energy [J] of the content, temperature of the wall [K], and the sums of gas [kg], its
+    enthalpy [J] and heat from the room [J] that crossed the border.
+    """
+
+    start: float
+    end: float
+    draw: float
+    solution: Callable[[Any], Any]
+    last: Floats
+    stopped_by: Stop | None
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """What crossed the border of bottle and wall from start to end, and how much more there is inside.
+
+    Crossed: gas [kg], its enthalpy [J], heat from the room [J]. Inside: mass [kg], energy of content and wall [J].
+    """
+
+    drawn_mass: float
+    outflow_energy: float
+    room_heat: float
+    mass_change: float
+    content_energy_change: float
+    wall_energy_change: float
+
+
+@dataclass(frozen=True, slots=True)
+class Discharge:
+    """The course of a bottle: its recording, time of walking and of all [s], steps, how it ended, and the balance."""
+
+    recording: Recording
+    walking_time: float
+    total_time: float
+    steps: float
+    ending: Ending
+    balance: Balance
+
+
+def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
+    """Return the course of a full bottle under a draw; walking takes the mean flow of a step.
+
+    Steps are a second long and bottles cool in minutes, so the mean stands for the pulses; the regulator is judged by
+    the largest flow. SimulationError where the solver fails.
+    """
+    _check(schedule)
+    _check_flow(bottle, draw)
+    start = full_bottle(bottle)
+    stretches: list[Stretch] = []
+    time, values, walking = 0.0, start, True
+    reason: Stop | None = None
+    while reason is None:
+        length = schedule.longest if schedule.rest == 0.0 else (schedule.walk if walking else schedule.rest)
+        end = min(time + length, schedule.longest)
+        stretch = solve_stretch(bottle, draw, time, end, values, walking)
+        stretches.append(stretch)
+        time, values, walking = stretch.end, stretch.last, not walking
+        reason = stretch.stopped_by or ("time" if time >= schedule.longest else None)
+    return _gather(bottle, draw, stretches, start, reason)
+
+
+def _check(schedule: Schedule) -> None:
+    for name, value, least in (("walk", schedule.walk, 1.0), ("longest", schedule.longest, 1.0)):
+        if not least <= value < float("inf"):
+            raise ParameterError(f"{name} must be at least {least:g} s and finite, it is {value:g} s")
+    if not 0.0 <= schedule.rest < float("inf"):
+        raise ParameterError(f"rest must be at least 0 s and finite, it is {schedule.rest:g} s")
+    if schedule.rest > 0.0 and 2.0 * schedule.longest / (schedule.walk + schedule.rest) > MOST_STRETCHES:
+        raise ParameterError(
+            f"walking {schedule.walk:g} s and resting {schedule.rest:g} s over {schedule.longest:g} s are more "
+            f"than {MOST_STRETCHES} periods: choose longer periods, or a smaller longest time"
+        )
+
+
+def _check_flow(bottle: Bottle, draw: Draw) -> None:
+    content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
+    if reserve(bottle, draw, content.pressure, content.temperature) <= 0.0:
+        most = flow_limit(bottle, content.pressure, content.temperature) * GRAMS_PER_KILOGRAM
+        raise ParameterError(
+            f"even the full bottle cannot maintain the supply pressure at the largest flow, "
+            f"{draw.peak_flow * GRAMS_PER_KILOGRAM:.3g} g/s: its regulator passes {most:.3g} g/s (regulator.area)"
+        )
+
+
+def _gather(
+    bottle: Bottle,
+    draw: Draw,
+    stretches: list[Stretch],
+    start: Floats,
+    reason: Stop,
+) -> Discharge:
+    last = stretches[-1].last
+    walking = sum(stretch.end - stretch.start for stretch in stretches if stretch.draw > 0.0)
+    change = last - start
+    balance = Balance(
+        drawn_mass=float(last[3]),
+        outflow_energy=float(last[4]),
+        room_heat=float(last[5]),
+        mass_change=float(change[0]),
+        content_energy_change=float(change[1]),
+        wall_energy_change=float(change[2]) * bottle.wall.wall_heat_capacity,
+    )
+    return Discharge(
+        recording=_recording(bottle, stretches),
+        walking_time=walking,
+        total_time=stretches[-1].end,
+        steps=walking / draw.step_time,
+        ending=ending(bottle, draw, float(last[0]), content_of(bottle, float(last[0]), float(last[1])), reason),
+        balance=balance,
+    )
+
+
+def _recording(bottle: Bottle, stretches: list[Stretch]) -> Recording:
+    """Return the course at evenly spaced times, and exactly at its end."""
+    times = np.linspace(0.0, stretches[-1].end, SAMPLES)
+    ends = np.array([stretch.end for stretch in stretches])
+    places = np.minimum(np.searchsorted(ends, times, side="left"), len(stretches) - 1)
+    rows = np.array([stretches[place].solution(time) for place, time in zip(places, times, strict=True)])
+    contents = [content_of(bottle, float(row[0]), float(row[1])) for row in rows]
+    flows = [stretches[place].draw for place in places]
+    supply = [
+        delivered_pressure(bottle.regulator, content.pressure, flow)
+        for content, flow in zip(contents, flows, strict=True)
+    ]
+    channels = {
+        "bottle_mass": (rows[:, 0], "kg"),
+        "bottle_temperature": ([content.temperature for content in contents], "K"),
+        "wall_temperature": (rows[:, 2], "K"),
+        "bottle_pressure": ([content.pressure for content in contents], "Pa"),
+        "supply_pressure": (supply, "Pa"),
+        "supplied_mass": (rows[:, 3], "kg"),
+    }
+    if has_liquid(bottle.fluid.table):
+        channels["liquid_mass"] = ([content.liquid_mass for content in contents], "kg")
+    named = {name: Channel(np.asarray(values, dtype=np.float64), unit) for name, (values, unit) in channels.items()}
+    return Recording(f"bottle {bottle.name}", times, named, kind="simulated")
+
+
+def full_bottle(bottle: Bottle) -> Floats:
+    """Return the solution at the start: a full bottle at the temperature of the room."""
+    energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
+    return np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
+
+
+def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
+    """Return what the bottle holds with a mass [kg] of an energy [J]."""
+    table = bottle.fluid.table
+    return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
+
+
+def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: Floats, walking: bool) -> Stretch:
+    """Return one stretch; walking, it may end early where the supply pressure is no longer maintained."""
+    from scipy.integrate import solve_ivp
+
+    flow = draw.mean_flow if walking else 0.0
+    events = _events(bottle, draw)[: 2 if walking else 1]
+    if walking and events[1](start, values) <= 0.0:
+        return Stretch(start, start, flow, lambda _times: values, values, "supply")
+    solution = solve_ivp(
+        _rates(bottle, flow),
+        (start, end),
+        values,
+        method="LSODA",
+        events=events,
+        dense_output=True,
+        rtol=_RELATIVE,
+        atol=_ABSOLUTE,
+    )
+    if solution.status < 0:
+        raise SimulationError(f"the bottle could not be simulated beyond {solution.t[-1]:.4g} s: {solution.message}")
+    stopped: Stop = "frozen" if len(solution.t_events[0]) else "supply"
+    last = np.asarray(solution.y[:, -1])
+    return Stretch(start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None)
+
+
+def _rates(bottle: Bottle, flow: float) -> Callable[[float, Floats], list[float]]:
+    """Return the right-hand side for mass, energy, wall temperature, and the sums of what crossed the border."""
+
+    def rates(_time: float, y: Floats) -> list[float]:
+        state = BottleState(float(y[0]), float(y[1]), float(y[2]))
+        content = content_of(bottle, state.mass, state.energy)
+        now = bottle_rates(content, state, flow, bottle.wall, bottle.room_temperature)
+        inside = (now.mass_rate, now.content_energy_rate, now.wall_temperature_rate)
+        return [*inside, flow, now.outflow_power, now.room_heat]
+
+    return rates
+
+
+def _events(bottle: Bottle, draw: Draw) -> list[Any]:
+    """Return what ends a stretch where it falls through 0: kelvins above freezing, and what the supply has to spare."""
+
+    def above_freezing(_time: float, y: Floats) -> float:
+        return content_of(bottle, float(y[0]), float(y[1])).temperature - frozen_below(bottle) - _ABOVE_FREEZING
+
+    def to_spare(_time: float, y: Floats) -> float:
+        content = content_of(bottle, float(y[0]), float(y[1]))
+        return reserve(bottle, draw, content.pressure, content.temperature)
+
+    events: list[Any] = [above_freezing, to_spare]
+    for event in events:
+        event.terminal, event.direction = True, -1.0
+    return events

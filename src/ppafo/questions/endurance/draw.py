@@ -1,0 +1,261 @@
+"""How much gas a device takes in a step: from numbers, from a recording, from a walk; when it walks and rests."""
+
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.errors import DataError, ParameterError
+from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+from ppafo.storage.owned_folder import read_json
+from ppafo.storage.recordings import read_recording
+from ppafo.walking import WalkResult
+from ppafo.walking.strides import SETTLING
+
+PEAK_WINDOW = 0.1
+"""Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
+
+_MOST_FALLEN = 0.1
+"""Fraction of the gas used that may flow back: it waits in the line before the valve, and the next step takes it."""
+
+WALK_FILE = "walk.json"
+FORMAT = "ppafo walk"
+_VOLUMES = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
+_CHANNELS = ("angle", "pressure_1", "pressure_2", "supplied_mass")
+_LEAST = 1.0e-12
+"""Gas [kg] by which a walk that takes none may come out below 0: rounding of its totals."""
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """Gas use: mass per step [kg], time of a step [s], largest flow [kg/s], and where the numbers come from.
+
+    A step is one cycle of the device's leg, heel strike to heel strike of the same foot.
+    """
+
+    mass_per_step: float
+    step_time: float
+    peak_flow: float
+    origin: str
+
+    @property
+    def mean_flow(self) -> float:
+        """Mass flow [kg/s] while walking, averaged over a step."""
+        return self.mass_per_step / self.step_time
+
+    def less(self, saved: float) -> "Draw":
+        """Return the draw with a mass [kg] saved in every step; the largest flow stays, which is the safe side."""
+        return replace(self, mass_per_step=self.mass_per_step - saved)
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """Walking and resting in turn [s], for at most ``longest`` [s]; a rest of 0 s is walking without a break."""
+
+    walk: float
+    rest: float
+    longest: float
+
+
+def draw_of_numbers(mass_per_step: float, step_time: float, peak_flow: float | None) -> Draw:
+    """Return the draw of given numbers [kg, s, kg/s]; without a largest flow the mean one is taken for it."""
+    for name, value in (("gas per step", mass_per_step), ("step time", step_time)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise ParameterError(f"{name} must be above 0, it is {value:g}")
+    mean = mass_per_step / step_time
+    if peak_flow is not None and not (math.isfinite(peak_flow) and peak_flow >= mean):
+        raise ParameterError(
+            f"the largest flow, {peak_flow * GRAMS_PER_KILOGRAM:.4g} g/s, must be at least the mean flow, "
+            f"{mean * GRAMS_PER_KILOGRAM:.4g} g/s"
+        )
+    return Draw(mass_per_step, step_time, mean if peak_flow is None else peak_flow, "numbers given")
+
+
+def draw_of_recording(recording: Recording, step_time: float | None) -> Draw:
+    """Return the draw of a recording with ``supplied_mass``, repeated for ever; all of it is one step by default."""
+    if "supplied_mass" not in recording:
+        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; there are {', '.join(recording.names)}")
+    supplied = _gas_use(recording)
+    gain = float(supplied[-1] - supplied[0])
+    if recording.duration <= 0.0 or gain <= 0.0:
+        raise DataError(f"{recording.label}: no gas was taken from the supply, so a bottle would never be empty")
+    fallen = -float(np.minimum(np.diff(supplied), 0.0).sum())
+    if fallen > _MOST_FALLEN * gain:
+        raise DataError(
+            f"{recording.label}: supplied_mass falls by {fallen * GRAMS_PER_KILOGRAM:.3g} g in total while it "
+            f"gains {gain * GRAMS_PER_KILOGRAM:.3g} g; it must be cumulative from the start of the recording to "
+            "its end"
+        )
+    step = recording.duration if step_time is None else step_time
+    if not 0.0 < step <= recording.duration:
+        raise DataError(
+            f"{recording.label}: a step of {step:g} s does not fit into a recording of {recording.duration:g} s"
+        )
+    mean = gain / recording.duration
+    peak = max(mean, largest_flow(recording))
+    return Draw(mean * step, step, peak, f"recording '{recording.label}', {recording.kind}, repeated")
+
+
+def _gas_use(recording: Recording) -> Floats:
+    """Return the gas [kg] that left the bottle: through its regulator, where there is a line between that and valve."""
+    return recording["regulated_mass" if "regulated_mass" in recording else "supplied_mass"]
+
+
+def largest_flow(recording: Recording) -> float:
+    """Return the largest flow [kg/s], averaged over the window or over a recording that is shorter."""
+    window = min(PEAK_WINDOW, recording.duration)
+    starts = recording.time[recording.time <= recording.time[-1] - window]
+    starts = np.append(starts, recording.time[-1] - window)
+    ends = np.interp(starts + window, recording.time, _gas_use(recording))
+    begins = np.interp(starts, recording.time, _gas_use(recording))
+    return float(np.max(ends - begins) / window)
+
+
+@dataclass(frozen=True, slots=True)
+class Actuator:
+    """What the volumes of the chambers follow from: stops [rad], volume per angle [m^3/rad], dead volumes [m^3]."""
+
+    angle_min: float
+    angle_max: float
+    volume_per_angle: float
+    dead_volume_1: float
+    dead_volume_2: float
+
+
+@dataclass(frozen=True, slots=True)
+class WalkGas:
+    """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride, and the actuator.
+
+    ``gas_per_stride`` is 0 where the walk took none.
+    """
+
+    name: str
+    recording: Recording
+    gas_per_stride: float
+    stride_time: float
+    actuator: Actuator
+
+
+@dataclass(frozen=True, slots=True)
+class FullChambers:
+    """Absolute pressure [Pa] and volume [m^3] of each chamber when it is fullest, mean over so many strides."""
+
+    exhaust_pressure: float
+    exhaust_volume: float
+    fill_pressure: float
+    fill_volume: float
+    strides: int
+
+
+def walk_gas(result: WalkResult) -> WalkGas:
+    """Return the gas of a walk."""
+    configuration, gas = result.configuration, result.metrics.get("gas")
+    actuator = configuration.device.actuator
+    return WalkGas(
+        configuration.name,
+        result.recording,
+        0.0 if gas is None else gas.value,
+        configuration.gait.stride_time,
+        Actuator(**{name: getattr(actuator, name) for name in Actuator.__slots__}),
+    )
+
+
+def is_walk_folder(path: Path) -> bool:
+    """Return True for a folder that ``ppafo walk`` wrote for one wearer."""
+    return path.is_dir() and (path / WALK_FILE).is_file()
+
+
+def read_walk_gas(folder: Path) -> WalkGas:
+    """Return the gas of a walk from the folder that ``ppafo walk`` wrote; DataError where it says too little."""
+    path = folder / WALK_FILE
+    document = read_json(path)
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{FORMAT}')")
+    status = _table(document, "status", path).get("kind", "completed")
+    if status != "completed":
+        raise DataError(f"{path}: the walk {status}, so it cannot be repeated")
+    actuator = Actuator(
+        *(_number(document, f"configuration.device.actuator.{name}", path) for name in ("angle_min", "angle_max")),
+        *(_number(document, f"configuration.device.actuator.{name}", path, 0.0) for name in _VOLUMES),
+    )
+    has_gas = "gas" in _table(document, "metrics", path)
+    gas = _number(document, "metrics.gas.value", path, -_LEAST) if has_gas else 0.0
+    stride_time = _number(document, "configuration.gait.stride_time", path, 0.0)
+    name = document["configuration"].get("name", folder.name)
+    return WalkGas(str(name), _recording(folder), gas, stride_time, actuator)
+
+
+def _recording(folder: Path) -> Recording:
+    recording = read_recording(folder)
+    for name in _CHANNELS:
+        if name not in recording:
+            raise DataError(f"{recording.label}: has no channel '{name}'; write the walk again")
+    return recording
+
+
+def _table(document: Mapping[str, Any], name: str, file: Path) -> Mapping[str, Any]:
+    node = document.get(name, {})
+    if not isinstance(node, Mapping):
+        raise DataError(f"{file}: '{name}' is not a table of names and values; write the walk again")
+    return node
+
+
+def _number(document: Mapping[str, Any], path: str, file: Path, above: float = -math.inf) -> float:
+    node: Any = document
+    for part in path.split("."):
+        node = node.get(part) if isinstance(node, Mapping) else None
+    if isinstance(node, bool) or not isinstance(node, int | float) or not abs(node) <= sys.float_info.max:
+        raise DataError(f"{file}: has no number at '{path}'; write the walk again")
+    if node <= above:
+        raise DataError(f"{file}: '{path}' is {node:g}, which is impossible for a walk; write the walk again")
+    return float(node)
+
+
+def draw_of_walk(walk: WalkGas) -> Draw:
+    """Return the gas use of a walk that continues: a step is a stride of the leg with the device."""
+    if walk.gas_per_stride <= 0.0:
+        raise DataError(f"walk '{walk.name}': no gas was taken from the supply, so a bottle would never be empty")
+    # An open valve may let gas back into the supply for moments, so the largest flow is that of a tenth of a second.
+    peak = max(largest_flow(walk.recording), walk.gas_per_stride / walk.stride_time)
+    draw = draw_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
+    return Draw(
+        draw.mass_per_step, draw.step_time, draw.peak_flow, f"walk '{walk.name}', {walk.recording.kind}, repeated"
+    )
+
+
+def full_chambers(walk: WalkGas) -> FullChambers:
+    """Return how full the chambers get, mean over strides: what can be reused, and what for.
+
+    The plantarflexion chamber is fullest when it begins to vent, at the end of push-off; the other one when it has been
+    filled. The first strides, in which the controller learns, are left out. DataError where no whole stride is left.
+    """
+    recording, actuator = walk.recording, walk.actuator
+    angle = recording["angle"]
+    volume_1 = chamber_1_volume(angle, actuator.angle_min, actuator.volume_per_angle, actuator.dead_volume_1)
+    volume_2 = chamber_2_volume(angle, actuator.angle_max, actuator.volume_per_angle, actuator.dead_volume_2)
+    edges = np.arange(SETTLING, recording.time[-1] / walk.stride_time + 1.0e-9) * walk.stride_time
+    if edges.size < 2:
+        raise DataError(
+            f"walk '{walk.name}': {recording.duration:.3g} s contain no complete stride after the first {SETTLING}"
+        )
+    bounds = np.searchsorted(recording.time, edges)
+    exhaust = _fullest(recording["pressure_1"], np.asarray(volume_1), bounds)
+    fill = _fullest(recording["pressure_2"], np.asarray(volume_2), bounds)
+    return FullChambers(*exhaust, *fill, strides=edges.size - 1)
+
+
+def _fullest(pressure: Floats, volume: Floats, bounds: NDArray[np.intp]) -> tuple[float, float]:
+    """Return pressure and volume where a chamber holds the most gas, mean over the strides between some samples."""
+    places = [
+        first + int(np.argmax(pressure[first:last] * volume[first:last])) for first, last in pairwise(bounds.tolist())
+    ]
+    return float(pressure[places].mean()), float(volume[places].mean())

@@ -1,0 +1,274 @@
+"""Bottles and their regulators: TOML files, each value with its unit, origin and source."""
+
+import functools
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field, ValidationError
+
+from ppafo.documents.models import NAME, optional, published_schema, table
+from ppafo.documents.problems import first_problem
+from ppafo.documents.toml_text import TomlKind, label
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
+from ppafo.model.declaration import Quantity
+from ppafo.model.fluid_table import densest_gas, fluid_pressure, has_liquid, liquid_density
+from ppafo.model.gas import SPECIES
+from ppafo.model.source import BottleWall, Regulator, bottle_content, pressure_reserve
+from ppafo.parameters.declaration import is_within
+from ppafo.parameters.provenance import Entry, TextEntry
+from ppafo.questions.endurance.fluids import Fluid, load_fluid
+from ppafo.units import format_quantity, split_quantity, to_si
+
+PAPER_BOTTLE = "paper-co2-9oz"
+
+FILE = TomlKind("bottle", "bottle", resources.files("ppafo.questions.endurance") / "bottles", ParameterError)
+_HALVINGS = 80
+
+BOTTLE = (
+    Quantity("volume", "m^3", "internal volume of the bottle", minimum=1e-6, maximum=1.0),
+    Quantity("wall_heat_capacity", "J/K", "heat capacity of the bottle's wall", minimum=1e-3, maximum=1e9),
+    Quantity("content_heat_transfer", "W/K", "heat conductance from wall to content", minimum=0.0, maximum=1e6),
+    Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the wall", minimum=0.0, maximum=1e6),
+)
+FILL_BY_MASS = (Quantity("gas_mass", "kg", "mass of gas in a full bottle", minimum=0.0, minimum_allowed=False),)
+FILL_BY_PRESSURE = (
+    Quantity("fill_pressure", "Pa_a", "pressure of a full bottle", minimum=1e5, maximum=1e8),
+    Quantity(
+        "fill_temperature", "K", "temperature at which the bottle has that pressure", minimum=200.0, maximum=400.0
+    ),
+)
+REGULATOR = (
+    Quantity("set_pressure", "Pa_a", "outlet pressure of the regulator without flow", minimum=1e5, maximum=2e7),
+    Quantity("droop", "Pa s/kg", "drop of the outlet pressure per mass flow", minimum=0.0, maximum=1e9),
+    Quantity("pressure_margin", "Pa_d", "minimum pressure drop that the regulator needs", minimum=0.0, maximum=1e7),
+    Quantity("area", "m^2", "flow area of the regulator, fully open", minimum=0.0, maximum=1e-3, minimum_allowed=False),
+    Quantity(
+        "discharge_coefficient",
+        "",
+        "discharge coefficient of the regulator",
+        minimum=0.0,
+        maximum=2.0,
+        minimum_allowed=False,
+    ),
+)
+ROOM = (Quantity("temperature", "K", "temperature of the room, and initially of bottle and gas"),)
+
+SECTIONS: dict[str, tuple[Quantity, ...]] = {
+    "bottle": BOTTLE + FILL_BY_MASS + FILL_BY_PRESSURE,
+    "regulator": REGULATOR,
+    "room": ROOM,
+}
+PATHS: dict[str, Quantity] = {
+    f"{section}.{item.name}": item for section, members in SECTIONS.items() for item in members
+}
+NEEDED = tuple(
+    f"{section}.{item.name}"
+    for section, members in (("bottle", BOTTLE), ("regulator", REGULATOR), ("room", ROOM))
+    for item in members
+)
+
+
+def _section(name: str) -> Any:
+    fields = {item.name: optional(Entry, f"{item.summary} [{item.unit or '-'}]") for item in SECTIONS[name]}
+    return table(f"{name.capitalize()}OfABottle", fields)
+
+
+@functools.cache
+def bottle_file() -> type[BaseModel]:
+    """Return the layout of a file of a bottle."""
+    fields: dict[str, Any] = {
+        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "name": (str, Field(pattern=NAME)),
+        "title": (str, Field(min_length=1)),
+        "notes": (str, ""),
+        "gas": (TextEntry, Field(description="name of the fluid, which needs a property table")),
+    }
+    fields |= {name: (_section(name), Field(description=f"section {name}")) for name in SECTIONS}
+    return table("BottleFile", fields)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a file of a bottle."""
+    return published_schema(bottle_file(), "ppafo bottle")
+
+
+@dataclass(frozen=True, slots=True)
+class Bottle:
+    """A full bottle with its regulator, in SI: volume [m^3], mass of gas [kg], temperature of the room [K].
+
+    ``entries`` are the values as they were given, with their sources, by dotted path.
+    """
+
+    name: str
+    title: str
+    fluid: Fluid
+    heat_capacity_ratio: float
+    volume: float
+    mass: float
+    wall: BottleWall
+    regulator: Regulator
+    room_temperature: float
+    entries: Mapping[str, Entry]
+
+
+def list_bottles() -> tuple[str, ...]:
+    """Return the names of the bottles that come with the package."""
+    return FILE.names()
+
+
+def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bottle:
+    """Return a bottle by its name in the package or by the path of a TOML file, with values replaced.
+
+    ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
+    """
+    file = label(str(name_or_path))
+    try:
+        parsed = bottle_file().model_validate(FILE.parse(FILE.read(name_or_path), file))
+    except ValidationError as error:
+        problem = first_problem(error.errors(include_url=False), bottle_file())
+        raise ParameterError(f"{file}: {problem}") from error
+    given = {section: getattr(parsed, section) for section in SECTIONS}
+    entries = {path: getattr(given[path.partition(".")[0]], path.partition(".")[2]) for path in PATHS}
+    found = {path: entry for path, entry in entries.items() if entry is not None}
+    for override in overrides:
+        found = _override(found, override)
+    return _build(parsed, found, file)
+
+
+def _override(entries: Mapping[str, Entry], override: str) -> dict[str, Entry]:
+    path, separator, text = (part.strip() for part in one_line(override).partition("="))
+    if not separator or not text:
+        raise ParameterError(f"override '{one_line(override)}' is not of the form PATH=VALUE")
+    if path not in PATHS:
+        raise ParameterError(f"override '{path}={text}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
+    try:
+        value, unit = split_quantity(text)
+    except UnitError as error:
+        raise ParameterError(f"override '{path}={text}': {error}") from error
+    entry = Entry(value=value, unit=unit, origin="assumed", source="override")
+    return {name: kept for name, kept in entries.items() if name not in _other_fill(path)} | {path: entry}
+
+
+def _other_fill(path: str) -> frozenset[str]:
+    """Return the values that an override drops: how full a bottle is, said in the other way."""
+    by_mass, by_pressure = ({f"bottle.{item.name}" for item in form} for form in (FILL_BY_MASS, FILL_BY_PRESSURE))
+    return frozenset(by_pressure if path in by_mass else by_mass if path in by_pressure else ())
+
+
+def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
+    """Return the bottle of these values, or report what is missing or cannot be."""
+    missing = [path for path in NEEDED if path not in entries]
+    if missing:
+        raise ParameterError(f"{file}: '{missing[0]}' is missing")
+    values = {path: _in_si(path, entry, file) for path, entry in entries.items()}
+    fluid = _fluid(parsed.gas.value, file)
+    bottle = Bottle(
+        name=parsed.name,
+        title=parsed.title,
+        fluid=fluid,
+        heat_capacity_ratio=SPECIES[fluid.name].heat_capacity_ratio,
+        volume=values["bottle.volume"],
+        mass=_mass_of_fill(values, fluid, file),
+        wall=BottleWall(*(values[f"bottle.{name}"] for name in BottleWall._fields)),
+        regulator=Regulator(
+            set_pressure=values["regulator.set_pressure"],
+            droop=values["regulator.droop"],
+            pressure_margin=values["regulator.pressure_margin"],
+            seat_area=values["regulator.area"] * values["regulator.discharge_coefficient"],
+        ),
+        room_temperature=values["room.temperature"],
+        entries=entries,
+    )
+    _check_content(bottle, file)
+    return bottle
+
+
+def _fluid(name: str, file: str) -> Fluid:
+    try:
+        return load_fluid(name)
+    except ParameterError as error:
+        raise ParameterError(f"{file}: gas = '{name}': {error}") from error
+
+
+def _in_si(path: str, entry: Entry, file: str) -> float:
+    quantity = PATHS[path]
+    given = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
+    try:
+        value = to_si(entry.value, entry.unit, quantity.unit)
+    except UnitError as error:
+        raise ParameterError(f"{given}: {error}") from error
+    if not (math.isfinite(value) and is_within(value, quantity)):
+        lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
+        upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
+        raise ParameterError(f"{given}: {quantity.summary} must be {lower}{upper} {quantity.unit}".rstrip())
+    return value
+
+
+def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float:
+    """Return the mass of gas [kg] in a full bottle, given as such or by pressure and temperature."""
+    by_pressure = [f"bottle.{item.name}" for item in FILL_BY_PRESSURE]
+    given = [path for path in by_pressure if path in values]
+    if ("bottle.gas_mass" in values) == bool(given):
+        raise ParameterError(f"{file}: give either bottle.gas_mass or {' and '.join(by_pressure)}")
+    if not given:
+        return values["bottle.gas_mass"]
+    missing = [path for path in by_pressure if path not in values]
+    if missing:
+        raise ParameterError(f"{file}: '{missing[0]}' is missing beside {given[0]}")
+    pressure, temperature = (values[path] for path in by_pressure)
+    _check_temperature("bottle.fill_temperature", temperature, fluid, file)
+    if fluid_pressure(fluid.table, temperature, math.inf) < pressure:
+        most = fluid_pressure(fluid.table, temperature, math.inf)
+        raise ParameterError(
+            f"{file}: bottle.fill_pressure: {fluid.name} is gas up to {most:.4g} Pa at {temperature:g} K; "
+            "give bottle.gas_mass instead"
+            if has_liquid(fluid.table)
+            else f"{file}: bottle.fill_pressure: the table of {fluid.name} ends at {most:.4g} Pa at {temperature:g} K"
+        )
+    return values["bottle.volume"] * gas_density(fluid, temperature, pressure)
+
+
+def gas_density(fluid: Fluid, temperature: float, pressure: float) -> float:
+    """Return the density [kg/m^3] of gas at a temperature [K] and an absolute pressure [Pa], by halving."""
+    low, high = 0.0, densest_gas(fluid.table, temperature)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if fluid_pressure(fluid.table, temperature, middle) < pressure:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def _check_temperature(path: str, temperature: float, fluid: Fluid, file: str) -> None:
+    coldest, hottest = fluid.table.temperatures[0], fluid.table.temperatures[-1]
+    if not coldest < temperature <= hottest:
+        raise ParameterError(
+            f"{file}: {path} = {temperature:g} K: the properties of {fluid.name} are known above {coldest:g} K "
+            f"and up to {hottest:g} K"
+        )
+
+
+def _check_content(bottle: Bottle, file: str) -> None:
+    """Refuse a bottle that is overfull, or that cannot even begin."""
+    fluid, temperature = bottle.fluid, bottle.room_temperature
+    _check_temperature("room.temperature", temperature, fluid, file)
+    wet = has_liquid(fluid.table)
+    most = bottle.volume * (liquid_density if wet else densest_gas)(fluid.table, temperature)
+    if bottle.mass >= most:
+        raise ParameterError(
+            f"{file}: {bottle.mass:.4g} kg of {fluid.name} do not fit into {bottle.volume:.4g} m^3 at "
+            f"{temperature:g} K: {'liquid would fill it at' if wet else 'the property table ends at'} {most:.4g} kg; "
+            "set bottle.gas_mass or room.temperature lower"
+        )
+    content = bottle_content(fluid.table, bottle.mass, bottle.volume, temperature)
+    if pressure_reserve(bottle.regulator, content.pressure, 0.0) <= 0.0:
+        needed = bottle.regulator.set_pressure + bottle.regulator.pressure_margin
+        raise ParameterError(
+            f"{file}: the full bottle has {content.pressure:.4g} Pa at {temperature:g} K, but its regulator needs "
+            f"{needed:.4g} Pa: regulator.set_pressure and regulator.pressure_margin"
+        )

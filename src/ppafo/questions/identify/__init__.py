@@ -1,0 +1,10 @@
+"""What do bench recordings say about the device, and how surely?"""
+
+from pathlib import Path
+
+from ppafo.questions.question import Argument, Question
+
+QUESTION = Question(
+    solve="ppafo.questions.identify.solve:identify",
+    arguments=(Argument(("PROBLEM",), "problem", "a .toml file; 'ppafo schema identification'", "PROBLEM", Path),),
+)

@@ -1,0 +1,144 @@
+"""How the league of the torque task is presented."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ppafo.answers import Column
+from ppafo.answers.shown_units import quantity_text, shown, titled
+from ppafo.metrics import METRICS
+from ppafo.questions.league.lower_bound import LowerBound
+from ppafo.questions.league.presentation import Look, Presentation, TableColumn, measure, of_draws
+from ppafo.questions.league.solve import League
+from ppafo.questions.league.standing import Bounded, Robustness, Standing
+from ppafo.questions.league.torque_contest import TorqueContest
+
+_ERROR, _GAS = "rms_error", "gas_supplied"
+
+
+def bound_sentence(valve: str, bounded: Bounded[LowerBound]) -> str:
+    """Return the minimum error of a valve in one sentence, and how well the engine agrees."""
+    bound = bounded.bound
+    least = quantity_text(bound.least_error.rms_error, "torque", ".4g")
+    gas = quantity_text(bound.least_error.gas, "gas mass", ".4g")
+    finding = (
+        f"an RMS error of {least}, which counts as zero, takes at least {gas}"
+        if bound.is_attainable
+        else f"no control reaches an RMS error below {least}, and that takes {gas}"
+    )
+    text = (
+        f"lower bound, {valve}: {finding}; {bound.intervals} intervals, changed by "
+        f"{quantity_text(bound.moved, 'fraction', '.2g')} in the last refinement"
+    )
+    if not bounded.played:
+        return f"{text}; for a valve that switches infinitely fast, so no run can confirm it"
+    error, gas = (quantity_text(share, "fraction", ".2g") for share in disagreement(bounded))
+    return f"{text}; in the simulation the error agrees within {error}, the gas within {gas}"
+
+
+def disagreement(bounded: Bounded[LowerBound]) -> tuple[float, float]:
+    """Return the largest fractions by which error and gas of a played optimal command differ from the optimiser's."""
+    pairs = list(zip(bounded.points, bounded.played, strict=True))
+    error = max(abs(run.rms_error / optimum.rms_error - 1.0) for optimum, run in pairs)
+    return error, max(abs(run.gas / optimum.gas - 1.0) for optimum, run in pairs)
+
+
+def _task_data(league: League) -> dict[str, Any]:
+    return {"scenario": league.contest.name, "overrides": list(league.contest.overrides)}
+
+
+def _task_remarks(league: League) -> Sequence[str]:
+    assert isinstance(league.contest, TorqueContest), "a league of the torque task"
+    return (f"device: {league.contest.device}",)
+
+
+def _bound_data(bounded: Bounded[LowerBound]) -> dict[str, Any]:
+    bound = bounded.bound
+    optima = (bound.least_error, *bound.curve)
+    return {
+        "intervals": bound.intervals,
+        "moved": bound.moved,
+        "unmeasurable_error": bound.unmeasurable,
+        "least_error_first": [
+            {"rms_error": item.rms_error, "gas": item.gas, "overlap": item.overlap} for item in optima
+        ],
+        "played": [{"rms_error": run.rms_error, "gas": run.gas} for run in bounded.played],
+    }
+
+
+def _standing_data(_league: League, standing: Standing) -> dict[str, Any]:
+    learning = standing.learning
+    return {
+        "status": standing.status,
+        "metrics": {name: {"value": value, "unit": METRICS[name].unit} for name, value in standing.measures.items()},
+        "learning": None
+        if learning is None
+        else {"errors": list(learning.errors), "best": learning.best, "is_converged": learning.is_converged},
+    }
+
+
+def _robustness_data(robust: Robustness) -> dict[str, Any]:
+    return {
+        "median": _finite(robust.not_exceeded(_ERROR, 0.5)),
+        "quantile_95": _finite(robust.not_exceeded(_ERROR, 0.95)),
+        "errors": [_finite(value) for value in robust.values(_ERROR, math.inf)],
+    }
+
+
+def _learning_remarks(_league: League, standing: Standing) -> Sequence[str]:
+    learning = standing.learning
+    if learning is None:
+        return ()
+    ended = "stopped improving" if learning.is_converged else "was still improving"
+    first, best = (shown(learning.errors[place], "torque") for place in (0, learning.best))
+    unit = titled("", "torque").strip(" ()")
+    return (
+        f"{standing.entrant.name}: RMS error {first:.4f} {unit} in the first repetition, {best:.4f} {unit} in "
+        f"repetition {learning.best + 1}; after {len(learning.errors)} it {ended}",
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if value < math.inf else None
+
+
+TORQUE = Presentation(
+    format="ppafo league",
+    introduction=(
+        "Every controller was simulated on the device. 'Above minimum' is the distance to the lower bound of the "
+        "controller's own valve: to the minimum error of any control, and to the minimum gas for its own error."
+    ),
+    caption=(
+        "A mark for each controller; thin lines: 5 to 95 % of its error on drawn devices. Lines: lower bounds for "
+        "each valve, for the nominal device; drawn devices may lie beyond them."
+    ),
+    draws_remark="median and 95 %: RMS errors on {draws} random devices, each value varied either way within: {spread}",
+    look=Look(
+        size=(8.0, 5.4),
+        right=0.66,
+        error=_ERROR,
+        error_label=titled("RMS torque error", "torque"),
+        gas_label=titled("Gas taken from the supply", "gas mass"),
+        title="Error against gas: nothing below and left of a line is possible",
+        is_logarithmic=True,
+    ),
+    columns=(
+        measure("RMS", _ERROR, "torque", ".4f"),
+        measure("ramp", "rms_error_ramp", "torque", ".4f"),
+        measure("hold", "rms_error_hold", "torque", ".4f"),
+        measure("peak", "peak_error", "torque", ".4f"),
+        TableColumn(Column("error above minimum", "torque", ".4f"), League.error_above_least),
+        measure("gas", _GAS, "gas mass", ".3f"),
+        TableColumn(Column("gas above minimum", "gas mass", "z.3f"), League.gas_above_least),
+        measure("switchings", "switchings", "", ".0f"),
+        of_draws("median", "torque", ".4f", lambda robust: robust.not_exceeded(_ERROR, 0.5)),
+        of_draws("95 %", "torque", ".4f", lambda robust: robust.not_exceeded(_ERROR, 0.95)),
+    ),
+    task_data=_task_data,
+    task_remarks=_task_remarks,
+    bound_sentence=bound_sentence,
+    bound_data=_bound_data,
+    standing_data=_standing_data,
+    standing_remarks=_learning_remarks,
+    robustness_data=_robustness_data,
+)

@@ -1,0 +1,211 @@
+"""The optimal control problem of a stride: chambers all the way, the foot where it is free, as one programme."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.lanes import Floats
+from ppafo.engine.run import Run, Walk
+from ppafo.engine.scheme.ankle_torque import Direction, leg_torque
+from ppafo.model.contact import QUARTER_TURN, foot_angle
+from ppafo.model.gait import GaitNow
+from ppafo.model.plant import PlantParameters, chamber_volumes
+from ppafo.model.vane import actuator_torque
+from ppafo.questions.league.bound_problem import MARGIN, ChamberRates, Openings, Volumes, chamber_rates
+from ppafo.questions.league.walking.stride import DEGREE, Grid, Stride
+from ppafo.walking.posture import AnklePath
+
+STICKING_SPEED = 0.05
+"""Angular velocity [rad/s] about which the largest friction falls from the breakaway torque to that of motion. Within
+the largest the programme chooses the friction, which is more than a vane can have."""
+FASTEST = 40.0
+"""Angular velocity [rad/s] that no foot has."""
+TINY = 1.0e-9
+"""Time [s] that a window without any point counts as."""
+HIGHEST = 3.0
+"""Largest pressure over the highest of the source: a vane that is pushed may compress its gas."""
+
+MODES = 3
+"""What a valve can do, each for a fraction of the time: feed chamber 1, feed chamber 2, vent both."""
+
+
+def proportional_openings(towards_1: Any, towards_2: Any, vents: Any) -> tuple[Any, Any, Any, Any]:
+    """Openings of the spool valve with its dump valve."""
+    return towards_1, towards_2 + vents, towards_2, towards_1 + vents
+
+
+def solenoid_openings(towards_1: Any, towards_2: Any, _vents: Any) -> tuple[Any, Any, Any, Any]:
+    """Openings of the solenoid pair: a chamber that is not fed is vented, whatever else."""
+    return towards_1, 1.0 - towards_1, towards_2, 1.0 - towards_2
+
+
+OPENINGS: dict[str, Openings] = {"proportional": proportional_openings, "solenoid": solenoid_openings}
+"""By the kind of the valve."""
+
+
+@dataclass(frozen=True, slots=True)
+class Programme:
+    """The nonlinear programme of a stride.
+
+    Unknowns, in this order: two pressures over ``scale`` [Pa] at every point; angle [rad], angular velocity [rad/s] and
+    friction over the largest at that speed at every free point; three openings on every interval. ``equal_to_zero`` are
+    the equations, ``openings_sum`` is at most 1, ``heights`` [m] are those of the toes over the ground where that is
+    requested, ``landed`` [rad] is at most 0 before the foot is flat. ``mean_square`` error of the torque and
+    ``free_square`` the torque's own in mid-stance [N^2 m^2], ``gas`` [g]. ``sticking`` is a parameter: the fraction
+    of the breakaway torque that counts, 0 or 1.
+    """
+
+    unknowns: Any
+    sticking: Any
+    equal_to_zero: Any
+    openings_sum: Any
+    heights: Any
+    landed: Any
+    mean_square: Any
+    free_square: Any
+    gas: Any
+    lowest: Floats
+    highest: Floats
+    scale: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Unknowns:
+    """Symbols: pressures (2, points), angle, rate and friction (1, free points) each, openings (3, intervals)."""
+
+    pressures: Any
+    angle: Any
+    rate: Any
+    friction: Any
+    openings: Any
+
+
+def programme(run: Run, valve: str, stride: Stride, path: AnklePath) -> Programme:
+    """The programme of a stride for the plant and the leg of a run, equations (1) and (11).
+
+    ``path`` places the toes over the ground.
+    """
+    import casadi
+
+    assert run.walk is not None, "a stride is walked"
+    plant, grid = run.plant, stride.grid
+    scale = max(plant.supply_pressure, plant.dorsiflexion_pressure)
+    unknowns, sticking = _unknowns(grid), casadi.SX.sym("sticking")
+    rates = _chamber_rates(plant, OPENINGS[valve], stride, unknowns, scale)
+    pressures = unknowns.pressures
+    slopes = casadi.vertcat(rates.pressure_1, rates.pressure_2) / scale
+    torque = actuator_torque(scale * pressures[0, :], scale * pressures[1, :], plant.torque_constant)
+    motion = casadi.vertcat(unknowns.angle, unknowns.rate)
+    turning = casadi.vertcat(unknowns.rate, _accelerations(run.walk, plant, stride, unknowns, torque, sticking))
+    flat = [_flat_angle(run.walk, now) for now in stride.now[: grid.free_points]]
+    left = [
+        casadi.vec(_residuals(grid, pressures, pressures[:, -1], slopes)),
+        casadi.vec(_residuals(grid, motion, casadi.DM(stride.begin[:2]), turning)),
+        unknowns.angle[-1] - flat[-1],
+    ]
+    asked = np.flatnonzero(stride.asks_height).tolist()
+    error = casadi.DM(stride.wanted).T - torque
+    weights, free_weights = grid.weights * stride.asks_torque, grid.weights * stride.asks_freedom
+    lowest, highest = _limits(plant, grid, scale)
+    return Programme(
+        unknowns=casadi.vertcat(
+            casadi.vec(pressures), unknowns.angle.T, unknowns.rate.T, unknowns.friction.T, casadi.vec(unknowns.openings)
+        ),
+        sticking=sticking,
+        equal_to_zero=casadi.vertcat(*left),
+        openings_sum=casadi.vec(casadi.sum1(unknowns.openings)),
+        heights=casadi.vertcat(*[_toe_height(path, stride, place, unknowns.angle[place]) for place in asked]),
+        landed=casadi.vertcat(*[unknowns.angle[place] - flat[place] for place in stride.before_landing]),
+        mean_square=casadi.mtimes(error * error, casadi.DM(weights)) / float(np.sum(weights)),
+        free_square=casadi.mtimes(torque * torque, casadi.DM(free_weights)) / max(float(np.sum(free_weights)), TINY),
+        gas=1.0e3 * casadi.mtimes(rates.supplied, casadi.DM(grid.weights)),
+        lowest=lowest,
+        highest=highest,
+        scale=scale,
+    )
+
+
+def _unknowns(grid: Grid) -> _Unknowns:
+    import casadi
+
+    angle, rate, friction = (casadi.SX.sym(name, 1, grid.free_points) for name in ("angle", "rate", "friction"))
+    return _Unknowns(
+        casadi.SX.sym("pressures", 2, grid.times.size),
+        angle,
+        rate,
+        friction,
+        casadi.SX.sym("openings", MODES, grid.starts.size),
+    )
+
+
+def _limits(plant: PlantParameters, grid: Grid, scale: float) -> tuple[Floats, Floats]:
+    """Lowest and highest value of every unknown."""
+    free = grid.free_points
+    counts = (2 * grid.times.size, free, free, free, MODES * grid.starts.size)
+    lowest = ((1.0 - MARGIN) * plant.atmospheric_pressure / scale, plant.angle_min, -FASTEST, -1.0, 0.0)
+    highest = (HIGHEST, plant.angle_max, FASTEST, 1.0, 1.0)
+    return np.repeat(lowest, counts), np.repeat(highest, counts)
+
+
+def _chamber_rates(
+    plant: PlantParameters, openings: Openings, stride: Stride, unknowns: _Unknowns, scale: float
+) -> ChamberRates:
+    """Rates of both chambers at every point, as rows; their volumes run with the free foot or with the ground."""
+    import casadi
+
+    angle = casadi.horzcat(unknowns.angle, casadi.DM([item.angle for item in stride.led]).T)
+    rate = casadi.horzcat(unknowns.rate, casadi.DM([item.rate for item in stride.led]).T)
+    volumes = Volumes(*chamber_volumes(plant, angle), plant.volume_per_angle * rate)
+    here = casadi.reshape(casadi.repmat(unknowns.openings, DEGREE, 1), MODES, stride.grid.times.size)
+    pressures = (scale * unknowns.pressures[0, :], scale * unknowns.pressures[1, :])
+    return chamber_rates(plant, openings, volumes, pressures, tuple(casadi.vertsplit(here)))
+
+
+def _accelerations(
+    walk: Walk, plant: PlantParameters, stride: Stride, unknowns: _Unknowns, torque: Any, sticking: Any
+) -> Any:
+    """Angular accelerations [rad/s^2] of the free foot at every free point, by the engine's own torque of the leg."""
+    import casadi
+
+    found, breakaway = [], sticking * (plant.static_torque - plant.dynamic_torque)
+    for place in range(stride.grid.free_points):
+        angle, rate, now = unknowns.angle[place], unknowns.rate[place], stride.now[place]
+        standing = foot_angle(now.shank, angle)
+        foot = Direction(casadi.sin(standing), casadi.cos(standing))
+        added = leg_torque(walk.leg, walk.share, stride.contacts[place], now, angle, foot)
+        largest = plant.dynamic_torque + breakaway * casadi.exp(-((rate / STICKING_SPEED) ** 2))
+        slowed = unknowns.friction[place] * largest + plant.viscous_damping * rate
+        found.append((torque[place] + added - slowed) / plant.inertia)
+    return casadi.horzcat(*found)
+
+
+def _flat_angle(walk: Walk, now: GaitNow) -> float:
+    """Ankle angle [rad] with which the foot is flat."""
+    return now.shank + QUARTER_TURN - walk.timing.ground_angle
+
+
+def _toe_height(path: AnklePath, stride: Stride, place: int, angle: Any) -> Any:
+    """Toes over the ground [m] at a free point, as ``AnklePath.toe_height`` has them."""
+    import casadi
+
+    now = stride.now[place]
+    level = now.shank + QUARTER_TURN - path.ground_angle
+    ankle = float(path.toe_height(np.array(now.phase), np.array(now.shank), np.array(level))) + path.height
+    tilt = foot_angle(now.shank, angle) - path.ground_angle
+    return ankle + path.toe_lever * casadi.sin(tilt) - path.height * casadi.cos(tilt)
+
+
+def _residuals(grid: Grid, states: Any, begin: Any, slopes: Any) -> Any:
+    """What equations leave over at every collocation point of the first intervals; states (rows, points)."""
+    import casadi
+
+    left = []
+    for interval in range(states.shape[1] // DEGREE):
+        place = DEGREE * interval
+        before = begin if interval == 0 else states[:, place - 1]
+        nodes = [before, *(states[:, place + point] for point in range(DEGREE))]
+        for point in range(DEGREE):
+            slope = sum(float(grid.slopes[index, point]) * node for index, node in enumerate(nodes))
+            left.append(slope - float(grid.lengths[interval]) * slopes[:, place + point])
+    return casadi.horzcat(*left)

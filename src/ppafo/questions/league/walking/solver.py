@@ -1,0 +1,219 @@
+"""Solves the programme of a stride with IPOPT, for one landing of the foot."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from ppafo.engine.lanes import Floats
+from ppafo.engine.run import Run
+from ppafo.errors import SimulationError
+from ppafo.model.command import VENTS_ABOVE
+from ppafo.questions.league.bound_solver import AS_GOOD, MEASURABLE, OPTIONS, STRATEGIES, TIE_BREAK
+from ppafo.questions.league.walking.programme import MODES, Programme, programme
+from ppafo.questions.league.walking.stride import Stride
+from ppafo.questions.league.walking.task import PROFILE_KIND, PROFILE_VALVE, WalkingTask
+from ppafo.walking.posture import AnklePath
+from ppafo.walking.walk import walk
+
+MOST_ITERATIONS = 600
+FREE = 0.1
+"""RMS torque [N m] in mid-stance that counts as free."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Guess:
+    """One stride, from which the optimiser starts: each (samples,) at ``phases`` from the heel strike.
+
+    Pressures [Pa], angle [rad], angular velocity [rad/s]; ``openings`` (times, 3) at phases ``middles`` of their own.
+    """
+
+    phases: Floats
+    pressure_1: Floats
+    pressure_2: Floats
+    angle: Floats
+    angular_velocity: Floats
+    middles: Floats
+    openings: Floats
+
+    def unknowns(self, built: Programme, stride: Stride) -> Floats:
+        """The stride as the unknowns of a programme have it."""
+        phases, free = stride.phases % 1.0, stride.grid.free_points
+        pressures = np.array([self._at(phases, row) for row in (self.pressure_1, self.pressure_2)])
+        angle, rate = (self._at(phases[:free], row) for row in (self.angle, self.angular_velocity))
+        middles = stride.middle_phases % 1.0
+        openings = [np.interp(middles, self.middles, row, period=1.0) for row in self.openings.T]
+        parts = (pressures.T.ravel() / built.scale, angle, rate, np.sign(rate), np.array(openings).T.ravel())
+        guess: Floats = np.clip(np.concatenate(parts), built.lowest, built.highest)
+        return guess
+
+    def _at(self, phases: Floats, row: Floats) -> Floats:
+        return np.asarray(np.interp(phases, self.phases, row, period=1.0), dtype=np.float64)
+
+
+def guess_from_walk(task: WalkingTask) -> Guess:
+    """The last whole stride of a controlled walk; SimulationError where it has none."""
+    result = walk(task.configuration(PROFILE_KIND, PROFILE_VALVE), task.seconds / 60.0)
+    if not result.status.is_completed:
+        raise SimulationError(f"the walk used as the optimiser's starting point ended early: {result.status.message}")
+    stride = slice(int(result.starts[-2]), int(result.starts[-1]))
+    recorded = result.recording
+    phases = np.arange(stride.stop - stride.start) / (stride.stop - stride.start)
+    return Guess(
+        phases,
+        np.array(recorded["pressure_1"][stride]),
+        np.array(recorded["pressure_2"][stride]),
+        np.array(recorded["angle"][stride]),
+        np.array(recorded["angular_velocity"][stride]),
+        phases,
+        _openings(np.array(recorded["command"][stride])),
+    )
+
+
+def _openings(command: Floats) -> Floats:
+    """Openings (samples, 3) of commands (samples,)."""
+    vents = command > VENTS_ABOVE
+    return np.array([np.where(vents, 0.0, np.maximum(command, 0.0)), np.maximum(-command, 0.0), 1.0 * vents]).T
+
+
+@dataclass(frozen=True, slots=True)
+class Strike:
+    """The leg at heel strike: angle [rad], angular velocity [rad/s], pressures [Pa]."""
+
+    angle: float
+    angular_velocity: float
+    pressure_1: float
+    pressure_2: float
+
+
+@dataclass(frozen=True, slots=True)
+class StrideOptimum:
+    """One optimal stride: RMS torque error [N m], gas [kg], and the phase at which the foot lands flat.
+
+    ``height`` [m] is what was requested of the toes. ``openings`` (intervals, 3) towards chamber 1, towards chamber 2
+    and to the atmosphere are held from each of ``times`` [s] after toe-off on, in a stride of ``period`` [s];
+    ``strike`` is the state at heel strike, ``guess`` the stride as a start for another.
+    """
+
+    rms_error: float
+    gas: float
+    height: float
+    landing: float
+    period: float
+    times: Floats
+    openings: Floats
+    strike: Strike
+    guess: Guess
+
+
+@final
+class StrideSolver:
+    """Optimal strides of one landing on one grid; ``guess`` are unknowns that are near a stride, see ``guessed``."""
+
+    def __init__(self, run: Run, valve: str, stride: Stride, path: AnklePath, guess: Guess) -> None:
+        import casadi
+
+        built = programme(run, valve, stride, path)
+        weights = casadi.SX.sym("weights", 2)
+        limited = (
+            built.equal_to_zero,
+            built.openings_sum,
+            built.landed,
+            built.heights,
+            built.mean_square,
+            built.free_square,
+        )
+        problem = {
+            "x": built.unknowns,
+            "p": casadi.vertcat(weights, built.sticking),
+            "f": weights[0] * built.mean_square + weights[1] * built.gas,
+            "g": casadi.vertcat(*limited),
+        }
+        options = OPTIONS | {"ipopt.max_iter": MOST_ITERATIONS}
+        self._solver = casadi.nlpsol("stride", "ipopt", problem, options | STRATEGIES[0])
+        self._measures = casadi.Function("measures", [built.unknowns], [built.mean_square, built.gas])
+        self._counts = tuple(item.numel() for item in limited)
+        self._programme, self._stride = built, stride
+        self._first = guess.unknowns(built, stride)
+        self._near: Any = self._first
+        self.unmeasurable = MEASURABLE * float(np.max(np.abs(stride.wanted * stride.asks_torque)))
+        asked = stride.grid.weights * stride.asks_torque
+        self.idle_error = float(np.sqrt(np.sum(stride.wanted**2 * asked) / np.sum(asked)))
+
+    def start_from(self, guess: Guess) -> None:
+        """Start the next search near a stride."""
+        self._near = guess.unknowns(self._programme, self._stride)
+
+    def least_error(self, height: float) -> StrideOptimum | None:
+        """The thriftiest stride of those with the minimum RMS error; None where the optimiser finds none."""
+        least = self._solve((1.0, TIE_BREAK), np.inf, height, FREE)
+        if least is None:
+            return None
+        return self.least_gas(max(AS_GOOD * least.rms_error, self.unmeasurable), height)
+
+    def least_gas(self, rms_error: float, height: float, resistance: float = FREE) -> StrideOptimum | None:
+        """The minimum gas at an RMS error [N m] of at most this and toes at least so high [m]; None if not found.
+
+        ``resistance`` [N m] is the RMS torque that mid-stance may have.
+        """
+        return self._solve((TIE_BREAK, 1.0), rms_error * rms_error, height, resistance)
+
+    def _solve(
+        self, weights: tuple[float, float], most_square: float, height: float, resistance: float
+    ) -> StrideOptimum | None:
+        built = self._programme
+        zeros, sums, landed, heights, _, _ = self._counts
+        limits: dict[str, Any] = {
+            "lbx": built.lowest,
+            "ubx": built.highest,
+            "lbg": [0.0] * zeros + [-np.inf] * (sums + landed) + [height] * heights + [-np.inf] * 2,
+            "ubg": [0.0] * zeros
+            + [1.0] * sums
+            + [0.0] * landed
+            + [np.inf] * heights
+            + [most_square, resistance * resistance],
+        }
+        found = self._stepwise(weights, limits)
+        optima = [self._optimum(solution, height) for solution in found]
+        return min(optima, key=lambda item: weights[0] * item.rms_error**2 + weights[1] * item.gas, default=None)
+
+    def _stepwise(self, weights: tuple[float, float], limits: Mapping[str, Any]) -> list[Any]:
+        """Solutions without the breakaway torque and, from there, with it: sticking alone has many local optima."""
+        for start in (self._near, self._first):
+            sliding = self._solver(x0=start, p=[*weights, 0.0], **limits)
+            if self._solver.stats()["success"]:
+                self._near = sliding["x"]
+                sticking = self._solver(x0=sliding["x"], p=[*weights, 1.0], **limits)
+                return [sliding["x"], sticking["x"]] if self._solver.stats()["success"] else [sliding["x"]]
+        return []
+
+    def _optimum(self, solution: Any, height: float) -> StrideOptimum:
+        grid, scale = self._stride.grid, self._programme.scale
+        square, gas = (float(item) for item in self._measures(solution))
+        values = np.array(solution).ravel()
+        count, free = grid.times.size, grid.free_points
+        pressures = scale * values[: 2 * count].reshape(-1, 2)
+        motion = values[2 * count : 2 * (count + free)].reshape(2, -1)
+        openings = values[2 * count + 3 * free :].reshape(-1, MODES)
+        strike = self._stride.before_landing[0]
+        return StrideOptimum(
+            rms_error=float(np.sqrt(max(square, 0.0))),
+            gas=1.0e-3 * gas,
+            height=height,
+            landing=self._stride.landing,
+            period=float(np.sum(grid.lengths)),
+            times=grid.starts,
+            openings=openings,
+            strike=Strike(*(float(value) for value in (*motion[:, strike], *pressures[strike]))),
+            guess=self._guess(pressures, motion, openings),
+        )
+
+    def _guess(self, pressures: Floats, motion: Floats, openings: Floats) -> Guess:
+        stride = self._stride
+        led = np.array([item[:2] for item in stride.led]).T
+        angle, rate = np.concatenate([motion, led], axis=1)
+        phases, middles = stride.phases % 1.0, stride.middle_phases % 1.0
+        order, held = np.argsort(phases), np.argsort(middles)
+        first, second = pressures[order].T
+        return Guess(phases[order], first, second, angle[order], rate[order], middles[held], openings[held])

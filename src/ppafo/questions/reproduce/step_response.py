@@ -1,0 +1,249 @@
+"""What the text tells of the step response, looked for in a recording. Works on measured recordings too.
+
+The text (section 'PPAFO Model Validation', figure 7): pressure 1 rises until the vane breaks away, falls while the vane
+moves, then goes to the supply; pressure 2 falls, slows while chamber 2 is compressed, then goes to the atmosphere.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ppafo.constants import PASCALS_PER_PSI
+from ppafo.questions.reproduce.claim import Observation
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+
+RESOLUTION = 1.0e-6
+"""Smallest part of the travel that counts as motion in a simulated recording; a measured one needs more."""
+
+_SMALLEST_TRAVEL = 1.0e-3
+_FIRST_ANGLE, _LAST_ANGLE, _SAME_ANGLE = 20.0, 130.0, 0.5
+"""What figure 7 says [deg], and how near to it counts."""
+
+_CLEAR = 0.05
+_SAME = 0.01
+_NOTABLE_TIME = 2.0e-3
+"""Shares of the pressure range: a change has to be clear, a level that is reached or kept may be off by the second."""
+_SLOWED = 0.5
+"""The fall has slowed where its rate is at most this fraction of the steepest before and after."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepEvents:
+    """When the vane breaks away and when it comes to rest [s], as numbers of samples too."""
+
+    breakaway: int
+    stop: int
+    breakaway_time: float
+    stop_time: float
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """Supply and atmosphere [Pa absolute], between which a step response runs."""
+
+    supply: float
+    atmosphere: float
+
+    @property
+    def range(self) -> float:
+        """Pressure range [Pa]."""
+        return self.supply - self.atmosphere
+
+    def gauge(self, pressure: float) -> float:
+        """Gauge pressure [psi]."""
+        return (pressure - self.atmosphere) / PASCALS_PER_PSI
+
+
+def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEvents | None:
+    """Return breakaway and stop of a vane that goes from one rest to another; None where it does not.
+
+    Breakaway is the last sample at which the angle is where it started, stop the first from which on it is where it
+    ends, both within ``resolution`` times the travel.
+    """
+    angle = recording["angle"]
+    travel = abs(float(angle[-1] - angle[0]))
+    if travel < _SMALLEST_TRAVEL:
+        return None
+    breakaway = int(np.flatnonzero(np.abs(angle - angle[0]) > resolution * travel)[0]) - 1
+    away = np.flatnonzero(np.abs(angle - angle[-1]) > resolution * travel)
+    stop = int(away[-1]) + 1
+    if stop >= len(recording) - 1 or stop - breakaway < 2 or breakaway < 1:
+        return None
+    return StepEvents(breakaway, stop, float(recording.time[breakaway]), float(recording.time[stop]))
+
+
+def step_observations(recording: Recording, levels: Levels, events: StepEvents | None) -> list[Observation]:
+    """Return each sentence of the text with whether the recording shows it; none holds where the vane does not move."""
+    if events is None:
+        return [said.judge(False, "the vane does not move from rest to rest") for said in _SAID]
+    step = _Step(recording, levels, events)
+    judged = [said.judge(*judge(step)) for said, judge in zip(_SAID, _JUDGES, strict=True)]
+    differences = {_RISES: _fills_early(step), _FALLS_IN_MOTION: _rises_again(step), _SLOWS: _more_than_slows(step)}
+    return [replace(observation, difference=differences.get(observation.id, "")) for observation in judged]
+
+
+@dataclass(frozen=True, slots=True)
+class _Sentence:
+    """What the text says, and where."""
+
+    id: str
+    statement: str
+    source: str
+
+    def judge(self, holds: bool, evidence: str) -> Observation:
+        return Observation(self.id, self.statement, holds, evidence, self.source)
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """What the sentences are held against."""
+
+    recording: Recording
+    levels: Levels
+    events: StepEvents
+
+    def gauge(self, pressure: float) -> str:
+        return f"{self.levels.gauge(pressure):.1f}"
+
+    def milliseconds(self, index: int) -> str:
+        return f"{1e3 * self.recording.time[index]:.0f} ms"
+
+    def standing(self, name: str) -> Floats:
+        return self.recording[name][: self.events.breakaway + 1]
+
+    def moving(self, name: str) -> Floats:
+        return self.recording[name][self.events.breakaway : self.events.stop + 1]
+
+    def at_stop(self, name: str) -> Floats:
+        return self.recording[name][self.events.stop :]
+
+    def is_same(self, pressure: float, other: float) -> bool:
+        return bool(abs(pressure - other) < _SAME * self.levels.range)
+
+    def only_rises(self, pressure: Floats) -> bool:
+        fallen_back = float(np.max(np.maximum.accumulate(pressure) - pressure))
+        return bool(pressure[-1] > pressure[0] and fallen_back < _SAME * self.levels.range)
+
+
+def _fills_early(step: _Step) -> str:
+    """Chamber 1 stands at the supply before the vane leaves: then it is chamber 2 that decides when."""
+    before = step.standing("pressure_1")
+    full = int(np.argmax(before > step.levels.supply - _SAME * step.levels.range))
+    waits = step.recording.time[step.events.breakaway] - step.recording.time[full]
+    if before[full] <= step.levels.supply - _SAME * step.levels.range or waits < _NOTABLE_TIME:
+        return ""
+    return (
+        f"it reaches the supply pressure after {step.milliseconds(full)} already, so small is the volume at the stop, "
+        "and what starts the vane is the falling pressure in chamber 2"
+    )
+
+
+def _rises_again(step: _Step) -> str:
+    moving = step.moving("pressure_1")
+    rise = float(moving[-1] - np.min(moving))
+    if rise < _SAME * step.levels.range:
+        return ""
+    return f"it rises again by {rise / PASCALS_PER_PSI:.1f} psi before the stop"
+
+
+def _more_than_slows(step: _Step) -> str:
+    moving = step.moving("pressure_2")
+    rise = float(np.max(moving - np.minimum.accumulate(moving)))
+    if rise < _SAME * step.levels.range:
+        return ""
+    return f"it does more than slow: it rises by {rise / PASCALS_PER_PSI:.1f} psi"
+
+
+def _turns(step: _Step) -> tuple[bool, str]:
+    start, end = (float(np.degrees(step.recording["angle"][index])) for index in (0, -1))
+    holds = abs(start - _FIRST_ANGLE) < _SAME_ANGLE and abs(end - _LAST_ANGLE) < _SAME_ANGLE
+    taken = 1e3 * (step.events.stop_time - step.events.breakaway_time)
+    return holds, f"from {start:.1f} to {end:.1f} deg in {taken:.0f} ms"
+
+
+def _rises(step: _Step) -> tuple[bool, str]:
+    before, breakaway = step.standing("pressure_1"), step.events.breakaway
+    holds = step.only_rises(before) and before[-1] - before[0] > _CLEAR * step.levels.range
+    share = (before[-1] - step.levels.atmosphere) / step.levels.range
+    has_torque = "torque" in step.recording
+    torque = f", at a torque of {step.recording['torque'][breakaway]:.2f} N m" if has_torque else ""
+    return bool(holds), (
+        f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig, {100.0 * share:.0f} % of the supply; "
+        f"the vane breaks away after {step.milliseconds(breakaway)}{torque}"
+    )
+
+
+def _falls_in_motion(step: _Step) -> tuple[bool, str]:
+    moving = step.moving("pressure_1")
+    lowest = int(np.argmin(moving))
+    holds = moving[0] - moving[lowest] > _CLEAR * step.levels.range
+    at = step.milliseconds(step.events.breakaway + lowest)
+    return bool(holds), f"from {step.gauge(moving[0])} psig down to {step.gauge(moving[lowest])} psig at {at}"
+
+
+def _to_supply(step: _Step) -> tuple[bool, str]:
+    after = step.at_stop("pressure_1")
+    holds = step.only_rises(after) and step.is_same(after[-1], step.levels.supply)
+    return holds, (
+        f"from {step.gauge(after[0])} psig at the stop ({step.milliseconds(step.events.stop)}) to "
+        f"{step.gauge(after[-1])} psig; the supply is {step.gauge(step.levels.supply)} psig"
+    )
+
+
+def _falls(step: _Step) -> tuple[bool, str]:
+    before = step.standing("pressure_2")
+    holds = step.is_same(before[0], step.levels.supply) and bool(np.all(np.diff(before) < 0.0))
+    return holds, f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig until breakaway"
+
+
+def _slows(step: _Step) -> tuple[bool, str]:
+    """The slowest fall in motion lies between two steeper ones; gas that only vents would fall ever more slowly."""
+    rate = -np.diff(step.recording["pressure_2"]) / np.diff(step.recording.time)
+    start, end = step.events.breakaway, step.events.stop
+    slowest = start + int(np.argmin(rate[start:end]))
+    before, after = float(np.max(rate[: slowest + 1])), float(np.max(rate[slowest:]))
+    holds = rate[slowest] <= _SLOWED * min(before, after)
+    first, least, last = (value / (1e3 * PASCALS_PER_PSI) for value in (before, rate[slowest], after))
+    at = step.milliseconds(slowest)
+    slowed = f"rises by {-least:.2f} psi/ms" if least < 0.0 else f"falls by {least:.2f} psi/ms"
+    return bool(
+        holds
+    ), f"falls by {first:.2f} psi/ms at first, {slowed} at {at}, falls by up to {last:.1f} psi/ms later"
+
+
+def _to_atmosphere(step: _Step) -> tuple[bool, str]:
+    last = float(step.at_stop("pressure_2")[-1])
+    return step.is_same(last, step.levels.atmosphere), f"{step.levels.gauge(last):.2f} psig at the end"
+
+
+def _builds_up(step: _Step) -> tuple[bool, str]:
+    difference = step.recording["pressure_1"] - step.recording["pressure_2"]
+    change = float(difference[-1] - difference[0])
+    first, last = (float(difference[index]) / PASCALS_PER_PSI for index in (0, -1))
+    return abs(
+        change - 2.0 * step.levels.range
+    ) < 2.0 * _SAME * step.levels.range, f"from {first:.1f} to {last:.1f} psi"
+
+
+_TEXT = "section 'PPAFO Model Validation'"
+_RISES, _FALLS_IN_MOTION, _SLOWS = (
+    "pressure_1_rises_until_breakaway",
+    "pressure_1_falls_in_motion",
+    "pressure_2_slows_in_motion",
+)
+_SAID = (
+    _Sentence("vane_turns_through_its_range", "The vane turns from 20 to 130 deg.", "figure 7, panel A"),
+    _Sentence(_RISES, "The pressure in chamber 1 rises until the vane breaks away.", _TEXT),
+    _Sentence(_FALLS_IN_MOTION, "While the vane moves, the pressure in chamber 1 falls.", _TEXT),
+    _Sentence(
+        "pressure_1_goes_to_supply", "After the vane has stopped, the pressure in chamber 1 rises to the supply.", _TEXT
+    ),
+    _Sentence(
+        "pressure_2_falls_from_supply", "The pressure in chamber 2, at first the supply's, begins to fall.", _TEXT
+    ),
+    _Sentence(_SLOWS, "Its fall slows for a while, as the moving vane compresses chamber 2.", _TEXT),
+    _Sentence("pressure_2_goes_to_atmosphere", "Then the pressure in chamber 2 goes to the atmosphere.", _TEXT),
+    _Sentence("difference_builds_up", "The pressure difference builds up as the flow switches.", "figure 7, panel B"),
+)
+_JUDGES = (_turns, _rises, _falls_in_motion, _to_supply, _falls, _slows, _to_atmosphere, _builds_up)

@@ -1,0 +1,12 @@
+"""Which valve, supply pressure and bottle are just enough for a torque profile and hours of use?"""
+
+from ppafo.questions.question import THREADS, Argument, Question
+
+QUESTION = Question(
+    solve="ppafo.questions.size.solve:size",
+    arguments=(
+        Argument(("SIZING",), "problem", "name of a sizing file, or a .toml file", "SIZING", nargs="?"),
+        THREADS,
+    ),
+    library="ppafo.questions.size.file:FILE",
+)

@@ -1,0 +1,260 @@
+"""A sizing file: torque profile, use, limits, parts to choose from; as it is written, and as a problem in SI units."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
+
+from ppafo.control.catalog import CONTROLLERS
+from ppafo.documents.models import NAME, STRICT, Text, Texts, published_schema, read_model
+from ppafo.documents.toml_text import TomlKind
+from ppafo.errors import StudyError, UnitError
+from ppafo.parameters.parts import Catalogue, Part, load_catalogue
+from ppafo.parameters.parts.catalogue import DEFAULT
+from ppafo.questions.size.profile import ProfileTable, TorqueProfile, read_profile
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.units import parse_quantity, split_quantity
+
+FILE = TomlKind("sizing", "size", resources.files("ppafo.questions.size") / "library", StudyError)
+
+_Names = Annotated[tuple[Text, ...], Field(strict=False, min_length=1)]
+_Factor = Annotated[float, Field(ge=0.0, le=1000.0)]
+_SECONDS_PER_HOUR = 3600.0
+_LARGEST_DENOMINATOR = 10**6
+
+
+class UseTable(BaseModel):
+    """How much is done with one bottle."""
+
+    model_config = STRICT
+
+    repetitions: Annotated[
+        int | None, Field(gt=0, description="number of repetitions of the profile, such as steps")
+    ] = None
+    hours: Annotated[float | None, Field(gt=0.0, description="hours of continuous use, instead of repetitions")] = None
+    reserve: Annotated[
+        float, Field(ge=0.0, le=10.0, description="gas to be left in the bottle, as a fraction of the gas used")
+    ] = 0.1
+
+
+class LimitsTable(BaseModel):
+    """What must be kept."""
+
+    model_config = STRICT
+
+    rms_error: Annotated[Text, Field(description="largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")]
+
+
+class SizingPartsTable(BaseModel):
+    """Names of parts in the catalogue."""
+
+    model_config = STRICT
+
+    valves: Annotated[_Names, Field(description="valves to choose from, of the kind that the scenario has")]
+    bottles: Annotated[_Names, Field(description="bottles to choose from")]
+    actuator: Annotated[str | None, Field(description="actuator; default: that of the scenario's device")] = None
+    regulators: Annotated[Texts, Field(description="regulators that are carried (all of those listed)")] = ()
+
+
+class PressureTable(BaseModel):
+    """Supply pressures to choose from; both regulators have the same."""
+
+    model_config = STRICT
+
+    lowest: Annotated[Text, Field(description="lowest supply pressure")] = "10 psi_g"
+    highest: Annotated[Text, Field(description="highest supply pressure")] = "120 psi_g"
+
+
+class SizingFile(BaseModel):
+    """A sizing file, as it is written."""
+
+    model_config = STRICT
+
+    schema_version: Annotated[Literal[1], Field(description="version of this layout")]
+    name: Annotated[str, Field(pattern=NAME, max_length=100)]
+    description: str = ""
+    scenario: Annotated[Text, Field(description="device, motion, controller and sensors: a name, or a path")]
+    overrides: Annotated[Texts, Field(description="changes to the scenario")] = ()
+    catalogue: Annotated[str, Field(description="catalogue of parts: a name, or a path relative to this file")] = (
+        DEFAULT
+    )
+    profile: ProfileTable
+    use: UseTable
+    limits: LimitsTable
+    parts: SizingPartsTable
+    pressure: PressureTable = PressureTable()
+    gain_factors: Annotated[
+        tuple[_Factor, ...],
+        Field(
+            strict=False,
+            min_length=1,
+            max_length=12,
+            description="factors by which each gain of the controller is multiplied",
+        ),
+    ] = (0.0, 0.5, 1.0, 3.0, 8.0)
+    simulated: Annotated[
+        int, Field(ge=1, le=1000, description="repetitions to simulate; the first fills the lines")
+    ] = 3
+
+
+def read_sizing_file(name_or_path: str | Path) -> tuple[SizingFile, str]:
+    """Return a sizing file by its name in the package or by its path, and what messages call it."""
+    return read_model(FILE, SizingFile, name_or_path)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a sizing file."""
+    return published_schema(SizingFile, "ppafo sizing")
+
+
+@dataclass(frozen=True, slots=True)
+class SizingProblem:
+    """What to size for, in SI.
+
+    ``scenario`` follows the profile for ``simulated`` repetitions. ``repetitions`` is what one bottle has to last for,
+    with ``reserve`` [-] left. ``largest_error`` [N m] is the limit; pressures [Pa absolute]. ``gains`` are the paths of
+    the controller's gains; every combination of ``gain_factors`` on them is tried.
+    """
+
+    name: str
+    description: str
+    file: str
+    scenario: Scenario
+    profile: TorqueProfile
+    simulated: int
+    repetitions: float
+    reserve: float
+    largest_error: float
+    valves: tuple[Part, ...]
+    bottles: tuple[Part, ...]
+    actuator: Part | None
+    regulators: tuple[Part, ...]
+    lowest_pressure: float
+    highest_pressure: float
+    gains: tuple[str, ...]
+    gain_factors: tuple[float, ...]
+
+    @property
+    def torque_constant(self) -> float:
+        """Torque constant [m^3] of the actuator."""
+        own = self.scenario.device.actuator.torque_constant
+        return own if self.actuator is None else self.actuator.values["torque_constant"]
+
+    @property
+    def hours(self) -> float:
+        """Time that the repetitions take without a pause [h]."""
+        return self.repetitions * self.profile.period / _SECONDS_PER_HOUR
+
+
+def load_sizing(name_or_path: str | Path) -> SizingProblem:
+    """Return the problem of a sizing file, by its name in the package or its path; paths in it begin in its folder."""
+    document, file = read_sizing_file(name_or_path)
+    folder = Path(name_or_path).parent
+    catalogue = load_catalogue(_place(document.catalogue, folder))
+    profile = read_profile(document.profile, folder, file)
+    scenario = _scenario(document, profile, folder, file)
+    parts = document.parts
+    valves = _valves(parts, catalogue, scenario, file)
+    gains = tuple(f"controller.{name}" for name in _gain_names(scenario))
+    lowest, highest = _pressures(document, scenario, file)
+    return SizingProblem(
+        name=document.name,
+        description=document.description,
+        file=file,
+        scenario=scenario,
+        profile=profile,
+        simulated=document.simulated,
+        repetitions=_repetitions(document.use, profile, file),
+        reserve=document.use.reserve,
+        largest_error=_largest_error(document.limits.rms_error, profile, file),
+        valves=valves,
+        bottles=tuple(catalogue.part("bottles", name) for name in dict.fromkeys(parts.bottles)),
+        actuator=None if parts.actuator is None else catalogue.part("actuators", parts.actuator),
+        regulators=tuple(catalogue.part("regulators", name) for name in parts.regulators),
+        lowest_pressure=lowest,
+        highest_pressure=highest,
+        gains=gains,
+        gain_factors=tuple(sorted(set(document.gain_factors))) if gains else (1.0,),
+    )
+
+
+def _place(name: str, folder: Path) -> str:
+    """Return a name of the package as it is, and a path relative to the file that names it."""
+    is_path = Path(name).suffix == ".toml" or "/" in name
+    return str(folder / name) if is_path else name
+
+
+def _scenario(document: SizingFile, profile: TorqueProfile, folder: Path, file: str) -> Scenario:
+    """Return the scenario with the profile as its reference, for a whole number of samples over all repetitions."""
+    name = _place(document.scenario, folder)
+    plain = load_scenario(name, document.overrides)
+    if plain.control.kind == OPEN_LOOP:
+        raise StudyError(f"{file}: scenario '{plain.name}' follows no reference (controller '{OPEN_LOOP}')")
+    grain = _common_multiple(plain.control.period, plain.output_interval)
+    count = math.ceil(Fraction(document.simulated * profile.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
+    duration = f"run.duration={float(count * grain)!r} s"
+    return load_scenario(name, (*document.overrides, *profile.overrides(), duration))
+
+
+def _common_multiple(first: float, second: float) -> Fraction:
+    a, b = (Fraction(time).limit_denominator(_LARGEST_DENOMINATOR) for time in (first, second))
+    return Fraction(math.lcm(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator)
+
+
+def _valves(parts: SizingPartsTable, catalogue: Catalogue, scenario: Scenario, file: str) -> tuple[Part, ...]:
+    valves = tuple(catalogue.part("valves", name) for name in dict.fromkeys(parts.valves))
+    kind = scenario.device.valve.kind
+    for valve in valves:
+        if valve.kind != kind:
+            raise StudyError(
+                f"{file}: parts.valves: '{valve.name}' is a {valve.kind} valve; scenario '{scenario.name}' and its "
+                f"controller are for a {kind} one"
+            )
+    return valves
+
+
+def _gain_names(scenario: Scenario) -> list[str]:
+    """Return the controller's settings that multiply a torque error."""
+    return [item.name for item in CONTROLLERS[scenario.control.kind].quantities if "(N m" in item.unit]
+
+
+def _pressures(document: SizingFile, scenario: Scenario, file: str) -> tuple[float, float]:
+    atmosphere = scenario.device.supply.atmospheric_pressure
+    values = []
+    for key in ("lowest", "highest"):
+        text = getattr(document.pressure, key)
+        try:
+            values.append(parse_quantity(text, "Pa_a", atmosphere))
+        except UnitError as error:
+            raise StudyError(f"{file}: pressure.{key} = '{text}': {error}") from error
+    lowest, highest = values
+    if not atmosphere < lowest < highest:
+        raise StudyError(
+            f"{file}: pressure.lowest = '{document.pressure.lowest}' must be above the atmosphere and below "
+            f"pressure.highest = '{document.pressure.highest}'"
+        )
+    return lowest, highest
+
+
+def _repetitions(use: UseTable, profile: TorqueProfile, file: str) -> float:
+    if (use.repetitions is None) == (use.hours is None):
+        raise StudyError(f"{file}: use: give either repetitions or hours")
+    return float(use.repetitions) if use.repetitions else _SECONDS_PER_HOUR * float(use.hours or 0.0) / profile.period
+
+
+def _largest_error(text: str, profile: TorqueProfile, file: str) -> float:
+    place = f"{file}: limits.rms_error = '{text}'"
+    try:
+        _, unit = split_quantity(text)
+        value = parse_quantity(text, "") * profile.largest if unit in ("%", "percent") else parse_quantity(text, "N m")
+    except UnitError as error:
+        raise StudyError(f"{place}: {error}; write '0.5 N m' or '5 %'") from error
+    if value <= 0.0:
+        raise StudyError(f"{place}: must be more than 0")
+    return value

@@ -1,0 +1,29 @@
+"""How are the metrics of a study distributed over many runs, and how do they depend on what varies?"""
+
+from ppafo.questions.question import SET, THREADS, Argument, Question, counting_number
+
+QUESTION = Question(
+    solve="ppafo.questions.sweep.solve:sweep_into_folder",
+    arguments=(
+        Argument(("STUDY",), "study", "name of a study, or a .toml file", "STUDY", nargs="?"),
+        Argument(
+            ("--out",), "out", "folder or address for the results; default out/NAME with the name of the study", "DIR"
+        ),
+        SET,
+        Argument(("--runs",), "runs", "number of draws, instead of the number in the file", "N", counting_number),
+        THREADS,
+        Argument(
+            ("--scheduler",), "scheduler", "address of a Dask scheduler whose workers compute the chunks", "ADDRESS"
+        ),
+        Argument(
+            ("--yes",),
+            "agreed",
+            "start even if the results will take much of the disk",
+            action="store_true",
+            default=False,
+        ),
+    ),
+    library="ppafo.studies.loading:STUDY_FILES",
+    listing="ppafo.questions.sweep.solve:studies_of_the_package",
+    fills_folder=True,
+)

@@ -1,0 +1,14 @@
+"""Which gains are best? A search over bounds, for a weighted objective with constraints, robust where asked."""
+
+from ppafo.questions.question import SEED, SET, THREADS, Argument, Question
+
+QUESTION = Question(
+    solve="ppafo.questions.tune.solve:tune",
+    arguments=(
+        Argument(("TUNING",), "tuning", "name of a tuning, or a .toml file", "TUNING", nargs="?"),
+        SET,
+        SEED,
+        THREADS,
+    ),
+    library="ppafo.questions.tune.file:TUNING",
+)

@@ -1,0 +1,276 @@
+"""A tuning file: its layout, and the way from a name, a file or plain data to a tuning in SI units."""
+
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ppafo.documents.models import NAME, published_schema
+from ppafo.documents.problems import first_problem
+from ppafo.documents.toml_text import TomlKind, label
+from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice
+from ppafo.questions.tune import problem as values
+from ppafo.questions.tune.problem import Problem, Spread
+from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.simulation.numbers import number_at
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.draws import Uncertainty, uncertainty_of
+from ppafo.studies.loading import list_studies, load_study
+from ppafo.studies.noise import NOISE
+from ppafo.studies.outcomes import check_metrics, difference_of, level_of
+from ppafo.studies.varying import varied_path
+
+LARGEST_SEED = 2**32 - 1
+MOST_DRAWS = 4096
+
+_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+_Text = Annotated[str, Field(min_length=1)]
+_Texts = Annotated[tuple[_Text, ...], Field(strict=False)]
+_Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
+_Metric = Annotated[_Text, Field(description="name of a metric, such as 'rms_error'")]
+
+
+class Searched(BaseModel):
+    """A number that is searched, with the bounds between which it may lie."""
+
+    model_config = _STRICT
+
+    path: Annotated[_Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
+    minimum: _Value
+    maximum: _Value
+    spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
+
+
+class Goal(BaseModel):
+    """A term of the objective: weight times metric over scale; less is better, with a weight below 0 more is."""
+
+    model_config = _STRICT
+
+    metric: _Metric
+    weight: float = 1.0
+    scale: Annotated[_Text | None, Field(description="value that is scaled to 1; default: the value before tuning")] = (
+        None
+    )
+
+
+class Constraint(BaseModel):
+    """A metric that must not be above, or below, a value."""
+
+    model_config = _STRICT
+
+    metric: _Metric
+    at_most: Annotated[_Text | None, Field(description="largest value with its unit")] = None
+    at_least: Annotated[_Text | None, Field(description="smallest value with its unit")] = None
+
+
+class Robust(BaseModel):
+    """Every candidate is run over the same draws from a study, and judged by the bad end of what comes from it."""
+
+    model_config = _STRICT
+
+    study: Annotated[_Text, Field(description="name of a study, or a path relative to this file")]
+    measure: Annotated[
+        Literal["mean_and_deviations", "quantile"],
+        Field(description="mean plus 'deviations' standard deviations, or the 'share' quantile"),
+    ] = "mean_and_deviations"
+    deviations: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
+    share: Annotated[float, Field(ge=0.5, lt=1.0)] = 0.9
+    draws: Annotated[int, Field(ge=8, le=MOST_DRAWS)] = 64
+
+
+class Effort(BaseModel):
+    """How long is searched: independent starts, generations of each at most, candidates of a generation per gain."""
+
+    model_config = _STRICT
+
+    starts: Annotated[int, Field(ge=1, le=100)] = 3
+    generations: Annotated[int, Field(ge=1, le=100_000)] = 100
+    candidates_per_gain: Annotated[int, Field(ge=4, le=1000)] = 10
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 1
+
+
+class TuningFile(BaseModel):
+    """A tuning file, as it is written."""
+
+    model_config = _STRICT
+
+    schema_version: Annotated[Literal[1], Field(description="version of this layout")]
+    name: Annotated[str, Field(pattern=NAME, max_length=100)]
+    description: str = ""
+    scenario: Annotated[_Text, Field(description="name of a scenario, or a path relative to this file")]
+    overrides: Annotated[_Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
+    search: Annotated[tuple[Searched, ...], Field(strict=False, min_length=1)]
+    objective: Annotated[tuple[Goal, ...], Field(strict=False, min_length=1)]
+    constraints: Annotated[tuple[Constraint, ...], Field(strict=False)] = ()
+    robust: Annotated[
+        Robust | None, Field(description="uncertainty to be robust against; default: the nominal device")
+    ] = None
+    effort: Effort = Effort()
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a tuning file."""
+    return published_schema(TuningFile, "ppafo tuning")
+
+
+TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "questions" / "tune" / "library", StudyError)
+
+NOISE_DRAWS = 16
+"""Noise streams over which every candidate is judged where nothing else is uncertain."""
+
+Refusal = Callable[[object], StudyError]
+
+
+def list_tunings() -> tuple[str, ...]:
+    """Return the names of the tunings that come with the package."""
+    return TUNING.names()
+
+
+def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Problem:
+    """Return a tuning by its name in the package, by the path of a TOML file, or from data laid out as such a file.
+
+    ``overrides`` change the scenario. StudyError for anything that is not usable.
+    """
+    if isinstance(tuning, Mapping):
+        TUNING.check_depth(tuning, "tuning")
+        return _problem(copy.deepcopy(dict(tuning)), "tuning", Path(), overrides)
+    file = label(str(tuning))
+    return _problem(TUNING.parse(TUNING.read(tuning), file), file, Path(tuning).parent, overrides)
+
+
+def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Sequence[str]) -> Problem:
+    def refusal(text: object) -> StudyError:
+        return StudyError(f"{file}: {text}")
+
+    try:
+        parsed = TuningFile.model_validate(document)
+    except ValidationError as error:
+        raise refusal(first_problem(error.errors(include_url=False), TuningFile)) from error
+    try:
+        scenario = load_scenario(_resolve(parsed.scenario, list_scenarios(), folder), (*parsed.overrides, *overrides))
+        check_metrics(_once([*parsed.objective, *parsed.constraints]), scenario)
+    except (ScenarioError, ParameterError, StudyError) as error:
+        raise refusal(error) from error
+    searched = _search_variables(parsed, scenario, refusal)
+    return Problem(
+        name=parsed.name,
+        description=" ".join(parsed.description.split()),
+        scenario=scenario,
+        overrides=(*parsed.overrides, *overrides),
+        searched=searched,
+        goals=tuple(_goal(item, refusal) for item in parsed.objective),
+        constraints=tuple(_constraint(item, refusal) for item in parsed.constraints),
+        spread=_spread(parsed, folder, [item.path for item in searched], scenario, refusal),
+        effort=values.Effort(**parsed.effort.model_dump()),
+    )
+
+
+def _resolve(name: str, known: Sequence[str], folder: Path) -> str:
+    """Return a name of the package as it is, and a path as it is from here."""
+    return name if name in known or (Path(name).suffix != ".toml" and "/" not in name) else str(folder / name)
+
+
+def _once(items: Sequence[Goal | Constraint]) -> list[str]:
+    return list(dict.fromkeys(item.metric for item in items))
+
+
+def _search_variables(parsed: TuningFile, scenario: Scenario, refusal: Refusal) -> tuple[values.Searched, ...]:
+    paths = [item.path for item in parsed.search]
+    repeated = first_twice(paths)
+    if repeated is not None:
+        raise refusal(f"'{repeated}' is searched twice; give it only one [[search]]")
+    return tuple(_search_variable(item, scenario, refusal) for item in parsed.search)
+
+
+def _search_variable(item: Searched, scenario: Scenario, refusal: Refusal) -> values.Searched:
+    try:
+        place = varied_path(item.path, scenario)
+        minimum, maximum = place.level(item.minimum), place.level(item.maximum)
+        before = present_value(item.path, scenario)
+    except (UnitError, ScenarioError) as error:
+        raise refusal(f"search '{item.path}': {error}") from error
+    if item.path == NOISE:
+        raise refusal(f"search '{item.path}': all candidates get the same noise, so it cannot be searched")
+    if minimum >= maximum:
+        raise refusal(f"search '{item.path}': minimum = {item.minimum!r} must be less than maximum = {item.maximum!r}")
+    is_logarithmic = item.spacing == "logarithmic"
+    if is_logarithmic and minimum <= 0.0:
+        raise refusal(f"search '{item.path}': spacing = 'logarithmic' needs a minimum above 0, not {item.minimum!r}")
+    return values.Searched(item.path, minimum, maximum, is_logarithmic, before, place)
+
+
+def _goal(item: Goal, refusal: Refusal) -> values.Goal:
+    if item.weight == 0.0:
+        raise refusal(f"objective '{item.metric}': weight = 0 has no effect; omit it")
+    if item.scale is None:
+        return values.Goal(item.metric, item.weight, None)
+    try:
+        scale = difference_of(item.scale, item.metric, f"objective '{item.metric}': scale = '{item.scale}'")
+    except StudyError as error:
+        raise refusal(error) from error
+    if scale <= 0.0:
+        raise refusal(f"objective '{item.metric}': scale = '{item.scale}' must be more than 0")
+    return values.Goal(item.metric, item.weight, scale)
+
+
+def _constraint(item: Constraint, refusal: Refusal) -> values.Constraint:
+    given = [text for text in (item.at_most, item.at_least) if text is not None]
+    if len(given) != 1:
+        raise refusal(
+            f"constraint '{item.metric}': needs either at_most or at_least, it has {'both' if given else 'none'}"
+        )
+    try:
+        limit = level_of(given[0], item.metric, f"constraint '{item.metric}' = '{given[0]}'")
+    except StudyError as error:
+        raise refusal(error) from error
+    return values.Constraint(item.metric, limit, item.at_most is not None, given[0])
+
+
+def _spread(
+    parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario, refusal: Refusal
+) -> Spread | None:
+    """Return what the candidates are judged over: draws of a study, of the noise, of both, or nothing."""
+    robust = parsed.robust
+    if robust is None:
+        noise = Uncertainty(()).with_noise_of([scenario])
+        return Spread(noise, "", NOISE_DRAWS, parsed.effort.seed, 0.0, None) if noise.drawn else None
+    try:
+        study = load_study(_resolve(robust.study, list_studies(), folder))
+        uncertainty = _without_restriction(uncertainty_of(study), study.only).with_noise_of([scenario])
+    except StudyError as error:
+        raise refusal(f"robust: {error}") from error
+    both = next((path for path in uncertainty.paths if path in searched), None)
+    if both is not None:
+        raise refusal(f"robust: study '{study.name}' draws '{both}', which is searched here; it cannot be both")
+    share = robust.share if robust.measure == "quantile" else None
+    return Spread(uncertainty, study.name, robust.draws, study.sample.seed, robust.deviations, share)
+
+
+def _without_restriction(uncertainty: Uncertainty, only: Mapping[str, Sequence[str]]) -> Uncertainty:
+    if only:
+        path = next(iter(only))
+        raise StudyError(
+            f"'{path}' varies only in some configurations of the study; a tuning needs a study without 'only'"
+        )
+    return uncertainty
+
+
+def present_value(path: str, scenario: Scenario) -> float:
+    """Return the value [SI] of a scenario at a path as in overrides; ScenarioError where it has none there."""
+    if path == "controller.rate":
+        return 1.0 / scenario.control.period
+    of_clock = {
+        "controller.period": scenario.control.period,
+        "run.duration": scenario.duration,
+        "run.step": scenario.time_step,
+        "run.output_interval": scenario.output_interval,
+    }
+    try:
+        return float(of_clock[path]) if path in of_clock else number_at(scenario, path)
+    except (AttributeError, KeyError, TypeError) as error:
+        raise ScenarioError(
+            f"scenario '{scenario.name}' has no value for '{path}'; set one with an override"
+        ) from error

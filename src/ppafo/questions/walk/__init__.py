@@ -1,0 +1,25 @@
+"""What does the device do for a wearer who walks: with it, without it, and as the healthy gait would have it?"""
+
+from ppafo.questions.question import SET, Argument, Question, counting_number, minutes, whole_number
+
+QUESTION = Question(
+    solve="ppafo.questions.walk.solve:walk_with_and_without",
+    arguments=(
+        Argument(
+            ("--config",),
+            "configuration",
+            "name of a walk configuration, or a .toml file; default solenoid",
+            metavar="NAME",
+            default="solenoid",
+        ),
+        Argument(("--gait",), "gait", "name of a gait, or a gait file; default: the gait of the configuration", "GAIT"),
+        Argument(("--minutes",), "minutes", "time to walk; default 1", "N", minutes, 1.0),
+        Argument(
+            ("--wearers",), "wearers", "number of different wearers to simulate instead of one", "N", counting_number
+        ),
+        Argument(("--seed",), "seed", "random seed of the wearers; default 1", "N", whole_number, 1),
+        SET,
+    ),
+    library="ppafo.walking.loading:FILE",
+    default_folder="ppafo.questions.walk.solve:default_folder",
+)

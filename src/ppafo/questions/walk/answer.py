@@ -1,0 +1,225 @@
+"""The answer of a walk: the numbers with the device, without it and healthy, the leg, the phases, the mean stride."""
+
+import platform
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.shown_units import shown, titled
+from ppafo.metrics import Metric
+from ppafo.questions.endurance.draw import FORMAT
+from ppafo.questions.endurance.solve import Endurance
+from ppafo.questions.walk.solve import WalkPair, Wearers
+from ppafo.questions.walk.wearers import wearers_answer
+from ppafo.signals.recording import Floats
+from ppafo.simulation.document import UNITS, plain
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.version import __version__
+from ppafo.walking.comparison import Comparison
+from ppafo.walking.figures.animation import animation
+from ppafo.walking.figures.legs import frames_figure
+from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.figures.phases import strip_figure
+from ppafo.walking.strides import PER_STRIDE, PHASES
+from ppafo.walking.walk import WalkResult
+
+SCHEMA_VERSION = 1
+_HEAD = ("", "with", "without", "healthy")
+_ROWS = (
+    ("gas", "Gas per stride", "gas mass", 3),
+    ("push_off_work", "Work on the wearer in push-off", "energy", 2),
+    ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
+    ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
+    ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
+    ("toe_landing", "Strides that begin on the toes", "fraction", 0),
+    ("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
+)
+"""Metric, title, kind of quantity and digits behind the point of each row."""
+
+_EXPLAINED = (
+    "'Without' is the same wearer with the same device and both chambers vented. 'Healthy' is the gait itself. The "
+    "first strides, in which the controller learns the stride time, are left out. The device is on one leg, so a "
+    "stride is one step of that leg."
+)
+_LEGS = "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground: they would drag."
+_MOVING = "Two strides at half speed. A dark red foot drags."
+_PHASES = (
+    "The functional tasks of the paper's figure 1A: 1 control of the foot at heel strike, 2 propulsion, 3 support of "
+    "the foot in the swing, 4 free motion. A block that does not fill the height occurs only in some of the strides."
+)
+_MEAN = (
+    "Mean over the strides with the standard deviation as a band. A deterministic walk on a perfectly regular gait "
+    "has almost none."
+)
+_LIMITS = (
+    "The gait is prescribed: the device moves the ankle where the foot is free, and cannot change how the wearer walks."
+)
+
+
+def answer_of(solved: WalkPair | Wearers) -> Answer:
+    """Return the answer of one wearer's walks, or of many wearers."""
+    return wearers_answer(solved.population) if isinstance(solved, Wearers) else _pair_answer(solved)
+
+
+def _pair_answer(pair: WalkPair) -> Answer:
+    """Return the answer of a walk; one that diverged has numbers and no pictures, and has not passed."""
+    comparison = pair.comparison
+    worn, bare = comparison.with_device, comparison.without_device
+    configuration = worn.configuration
+    strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
+    remarks = [_bottle(pair.life), _safety(comparison)]
+    remarks += [
+        f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
+    ]
+    return Answer(
+        name="walk",
+        kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
+        title=f"Walking with {configuration.name}",
+        lead=(f"{configuration.name}: {worn.status.kind}, {strides} of {configuration.gait.name}",),
+        sections=(
+            Section(paragraphs=_set_up(comparison), is_detail=True),
+            Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
+            Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
+            *(_pictures(comparison) if worn.averages and bare.averages else ()),
+            *_assumptions_section(configuration.assumed),
+        ),
+        data=_data(comparison, pair.life),
+        passed=comparison.is_completed,
+        files={
+            "recording.nc": lambda: netcdf_bytes(worn.recording, None),
+            "recording.csv": lambda: marked_csv_bytes(worn.recording),
+            "recording-off.nc": lambda: netcdf_bytes(bare.recording, None),
+            "strides.csv": lambda: strides_csv(worn),
+            "strides-off.csv": lambda: strides_csv(bare),
+            "mean-stride.csv": lambda: mean_stride_csv(worn),
+            "mean-stride-off.csv": lambda: mean_stride_csv(bare),
+        },
+    )
+
+
+def _set_up(comparison: Comparison) -> tuple[str, ...]:
+    configuration = comparison.with_device.configuration
+    gait, title = configuration.gait.name, configuration.gait.title
+    changed = f"values changed for this walk: {', '.join(configuration.overrides)}" if configuration.overrides else ""
+    worn = f"device '{configuration.device.name}', gait '{gait}'{f' ({title})' if title else ''}"
+    return tuple(text for text in (configuration.description, worn, configuration.controller.summary, changed) if text)
+
+
+def comparison_table(comparison: Comparison) -> Table:
+    """Return a row for each number: with the device, without it, and of a healthy ankle."""
+    healthy = dict(comparison.healthy)
+    if "push_off_work" in healthy:
+        healthy["push_off_share"] = Metric(1.0, "-", "")
+    columns = (comparison.with_device.metrics, comparison.without_device.metrics, healthy)
+    rows = [
+        (titled(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
+        for name, title, quantity, digits in _ROWS
+    ]
+    return Table(tuple(map(Column, _HEAD)), tuple(rows))
+
+
+def _cell(metric: Metric | None, quantity: str, digits: int) -> str | None:
+    """Return a cell, without the sign of a number that is rounded to zero."""
+    if metric is None:
+        return None
+    text = f"{shown(metric.value, quantity):.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _pictures(comparison: Comparison) -> tuple[Section, ...]:
+    legs = Figure("legs", _LEGS, lambda: frames_figure(comparison))
+    moving = Figure("legs-moving", _MOVING, lambda: animation(comparison))
+    phases = Figure("gait-phases", _PHASES, lambda: strip_figure(comparison.with_device))
+    walks = {"with the device": comparison.with_device, "without": comparison.without_device}
+    mean = Figure("mean-stride", _MEAN, lambda: walk_figure(walks))
+    return (
+        Section("The leg", figure=legs, is_detail=True),
+        Section(figure=moving, is_detail=True),
+        Section("What the device does in each phase", figure=phases, is_detail=True),
+        Section("The mean stride", figure=mean, is_detail=True),
+    )
+
+
+def _assumptions_section(assumed: Mapping[str, str]) -> tuple[Section, ...]:
+    if not assumed:
+        return ()
+    table = Table((Column("value"), Column("why")), tuple(assumed.items()), left=2)
+    return (Section("What is assumed", table=table, is_detail=True),)
+
+
+def _safety(comparison: Comparison) -> str:
+    """Return what there is to say of the safe state; empty where the controller never went into it."""
+    metrics = comparison.with_device.metrics
+    if "safe_state_time" not in metrics:
+        return ""
+    return f"safe state: {metrics['safe_state_time'].summary}, at {metrics['safe_state_time'].value:.2f} s"
+
+
+def _bottle(life: Endurance | None) -> str:
+    """Return how long one bottle lasts on the walk; empty where it took no gas."""
+    if life is None:
+        return ""
+    course = life.discharge
+    return (
+        f"one bottle ({life.bottle.name}, {1.0e3 * life.bottle.mass:.0f} g): {course.walking_time / 60.0:.1f} min, "
+        f"{course.steps:.0f} strides of this leg; {course.ending.message}"
+    )
+
+
+def _bottle_data(life: Endurance | None) -> dict[str, Any] | None:
+    """Return the same as data, in SI units."""
+    if life is None:
+        return None
+    course = life.discharge
+    return {
+        "bottle": life.bottle.name,
+        "gas_per_stride": life.draw.mass_per_step,
+        "walking_time": course.walking_time,
+        "strides": course.steps,
+        "ending": course.ending.kind,
+        "message": course.ending.message,
+    }
+
+
+def _data(comparison: Comparison, life: Endurance | None) -> dict[str, Any]:
+    configuration = comparison.with_device.configuration
+    return {
+        "format": FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        "units": UNITS,
+        "status": plain(comparison.with_device.status),
+        "status_off": plain(comparison.without_device.status),
+        "minutes": float(comparison.with_device.recording.time[-1]) / 60.0,
+        "metrics": plain(dict(comparison.with_device.metrics)),
+        "bottle": _bottle_data(life),
+        "metrics_off": plain(dict(comparison.without_device.metrics)),
+        "healthy": plain(dict(comparison.healthy)),
+        "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
+        "configuration": plain(configuration) | {"controller": configuration.controller.name},
+    }
+
+
+def strides_csv(result: WalkResult) -> bytes:
+    """Return the numbers of each whole stride; the start of each is the sample right after its heel strike."""
+    count = result.strides["gas"].size
+    columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
+    columns |= {f"{name} [{item.unit}]": result.strides[name] for name, item in PER_STRIDE.items()}
+    return _csv(columns)
+
+
+def mean_stride_csv(result: WalkResult) -> bytes:
+    """Return mean and standard deviation over strides of each channel, at every percent of the stride."""
+    columns = {"phase [-]": PHASES} if result.averages else {"phase [-]": PHASES[:0]}
+    for name, curves in result.averages.items():
+        columns[f"{name} [{curves.unit}]"] = curves.mean
+        columns[f"{name}_deviation [{curves.unit}]"] = curves.deviation
+    return _csv(columns)
+
+
+def _csv(columns: Mapping[str, Floats]) -> bytes:
+    lines = ["# simulated: a model's own output, not measured", ",".join(columns)]
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return ("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]) + "\n").encode()

@@ -1,0 +1,72 @@
+"""Walks of one wearer with and without the device, or of many wearers."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ppafo.answers import Solved
+from ppafo.progress import Progress, Report, report_nothing
+from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
+from ppafo.walking.comparison import Comparison, compare_walks
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.loading import load_walk
+from ppafo.walking.population import Population, walk_population
+
+_LONG = 12.0
+"""Minutes above which a walk reports how far it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkPair(Solved):
+    """A walk with the device and without it; ``life`` is how long one bottle lasts, None where no gas was taken."""
+
+    comparison: Comparison
+    life: Endurance | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wearers(Solved):
+    """What many wearers get."""
+
+    population: Population
+
+
+def walk_with_and_without(
+    configuration: Configuration | str | Path,
+    minutes: float = 1.0,
+    gait: str | Path | None = None,
+    wearers: int | None = None,
+    seed: int = 1,
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+) -> WalkPair | Wearers:
+    """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
+
+    ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min]; ``gait`` one
+    in place of the configuration's; ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError for
+    bad input; a walk that diverges is an answer that has not passed.
+    """
+    chosen = configuration
+    if not isinstance(chosen, Configuration):
+        chosen = load_walk(chosen, overrides, gait)
+    report = progress or report_nothing
+    if wearers is not None:
+        advance = _reporter(report, "walking", "wearers", 0.0)
+        return Wearers(walk_population(chosen, minutes, wearers, seed, advance))
+    comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
+    return WalkPair(comparison, endurance_of_walk(comparison.with_device))
+
+
+def default_folder(values: Mapping[str, Any]) -> Path:
+    """Return where the command writes by default: by the name of the configuration."""
+    configuration = load_walk(values["configuration"], values["overrides"], values["gait"])
+    return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}"
+
+
+def _reporter(report: Report, activity: str, noun: str, above: float) -> "Any":
+    def forward(done: float, total: float) -> None:
+        if total > above:
+            report(Progress(activity, round(done), round(total), noun=noun))
+
+    return forward

@@ -1,1 +1,0 @@
-"""Results for people: figures, tables and pages."""

@@ -1,0 +1,146 @@
+"""Draws from the distributions of a study, as columns of values for an ensemble."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ppafo.errors import StudyError, nearest_name
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.distributions import Floats
+from ppafo.studies.loading import load_study
+from ppafo.studies.noise import NOISE, other_noise, with_noise
+from ppafo.studies.sampling import correlate, uniform_numbers
+from ppafo.studies.study import Configuration, Drawn, Sample, Study, with_followers
+
+MOST_DRAWS = 2**26
+REPLICATES = 16
+"""Independent scrambles of the Sobol sequence among which draws are dealt out in turn."""
+
+Columns = dict[str, Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """Distributions of some paths, and the Cholesky factor of the correlation of their normal scores (None: none).
+
+    ``same`` has the path that a path follows, by path.
+    """
+
+    drawn: tuple[Drawn, ...]
+    scores: tuple[tuple[float, ...], ...] | None = None
+    same: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The uncertain paths."""
+        return tuple(item.path for item in self.drawn)
+
+    def columns(self, uniform: Floats) -> Columns:
+        """Return values [SI] (draws,) by path for uniform numbers in (0, 1), shape (draws, paths)."""
+        shares = uniform if self.scores is None else correlate(uniform, self.scores)
+        values = {item.path: item.distribution.values(shares[:, row]) for row, item in enumerate(self.drawn)}
+        return with_followers(values, self.same)
+
+    def random_columns(self, first: int, count: int, seed: int) -> Columns:
+        """Return independent draws number ``first`` to ``first + count - 1`` of the stream that ``seed`` names."""
+        sample = Sample("random", first + count, seed)
+        return self.columns(uniform_numbers(sample, len(self.drawn), first, count))
+
+    def replicated_columns(self, first: int, count: int, seed: int) -> Columns:
+        """Return draws number ``first`` to ``first + count - 1`` of randomised Sobol replicates.
+
+        Draw j is number j // REPLICATES of the scramble j % REPLICATES. The scrambles are independent, so that the
+        spread between their means says how well a mean is known (Owen, 1997).
+        """
+        numbers = np.arange(first, first + count)
+        uniform = np.empty((count, len(self.drawn)))
+        for replicate in range(REPLICATES):
+            own = numbers % REPLICATES == replicate
+            if own.any():
+                start, length = int(numbers[own][0]) // REPLICATES, int(np.count_nonzero(own))
+                sample = Sample("sobol", start + length, replicate_seed(seed, replicate))
+                uniform[own] = uniform_numbers(sample, len(self.drawn), start, length)
+        return self.columns(uniform)
+
+    def with_noise_of(self, scenarios: Iterable[Scenario]) -> "Uncertainty":
+        """Return the same with a noise stream for each draw, where any of some scenarios is noisy."""
+        drawn, scores = with_noise(self.drawn, self.scores, scenarios, self.paths)
+        return replace(self, drawn=drawn, scores=scores)
+
+    @property
+    def has_noise(self) -> bool:
+        """Tell whether each draw has a noise stream of its own."""
+        return NOISE in self.paths
+
+
+def replicate_seed(seed: int, replicate: int) -> int:
+    """Return the seed of one of several independent replicates."""
+    return int(np.random.SeedSequence([seed, replicate]).generate_state(1, np.uint64)[0])
+
+
+def with_new_noise(columns: Columns, most: int) -> Columns:
+    """Return the first draws, at most so many, each with another noise stream and all else as it was."""
+    first = {path: column[:most] for path, column in columns.items()}
+    return first | {NOISE: other_noise(first[NOISE])}
+
+
+def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Study:
+    """Return a study: as it is, or by name, file or data, with overrides in every configuration."""
+    if not isinstance(study, Study):
+        return load_study(study, overrides)
+    if overrides:
+        raise StudyError("a loaded Study takes no overrides; give its name or file, or load it with the overrides")
+    return study
+
+
+def uncertainty_of(study: Study) -> Uncertainty:
+    """Return the distributions of a study; StudyError where it has none, or has a grid, which has no probability."""
+    if study.axes:
+        raise StudyError(
+            f"study '{study.name}': '{study.axes[0].path}' is varied over a grid or list, which has no "
+            "probability; give it a distribution, or omit it"
+        )
+    if not study.drawn:
+        raise StudyError(f"study '{study.name}': nothing in it has a distribution; give it a [[vary]] of kind 'normal'")
+    return Uncertainty(study.drawn, study.scores, study.same)
+
+
+def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
+    """Return the distributions that hold in one configuration; StudyError where none does."""
+    whole = uncertainty_of(study)
+    kept = [row for row, item in enumerate(whole.drawn) if study.varies(item.path, configuration.name)]
+    if not kept:
+        raise StudyError(
+            f"study '{study.name}': nothing has a distribution in the configuration '{configuration.name}'"
+        )
+    same = study.same_in(configuration.name)
+    if len(kept) == len(whole.drawn):
+        return replace(whole, same=same)
+    return Uncertainty(tuple(whole.drawn[row] for row in kept), _factor_of_some(whole.scores, kept), same)
+
+
+def choose_configuration(study: Study, name: str | None) -> Configuration:
+    """Return a configuration by its name; without a name the only one. StudyError where that leaves a choice."""
+    names = [item.name for item in study.configurations]
+    if name is None:
+        if len(names) > 1:
+            raise StudyError(f"study '{study.name}' has several configurations; choose one: {', '.join(names)}")
+        return study.configurations[0]
+    if name not in names:
+        hint = nearest_name(name, names)
+        raise StudyError(f"study '{study.name}' has no configuration '{name}'{hint}; known are {', '.join(names)}")
+    return study.configurations[names.index(name)]
+
+
+def _factor_of_some(
+    factor: tuple[tuple[float, ...], ...] | None, kept: Sequence[int]
+) -> tuple[tuple[float, ...], ...] | None:
+    """Return the Cholesky factor of the correlation among some of the paths."""
+    if factor is None:
+        return None
+    lower = np.asarray(factor)
+    correlation = (lower @ lower.T)[np.ix_(kept, kept)]
+    return tuple(tuple(float(number) for number in row) for row in np.linalg.cholesky(correlation))

@@ -1,0 +1,266 @@
+"""From a name, a file or plain data to a study in SI units; every mistake is one clear line."""
+
+import copy
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ppafo.documents.problems import first_problem
+from ppafo.documents.toml_text import TomlKind, label
+from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, nearest_name
+from ppafo.metrics import METRICS
+from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.studies import declaration as declared
+from ppafo.studies.noise import with_noise
+from ppafo.studies.outputs import valid_outputs
+from ppafo.studies.sampling import MOST_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix
+from ppafo.studies.study import Axis, Configuration, Drawn, Sample, Study
+from ppafo.studies.varying import VariedPath, axis_or_distribution, stated_normal, varied_path
+
+STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / "library", StudyError)
+
+
+def list_studies() -> tuple[str, ...]:
+    """Return the names of the studies that come with the package."""
+    return STUDY_FILES.names()
+
+
+def load_study(study: str | Path | Mapping[str, Any], overrides: Sequence[str] = (), runs: int | None = None) -> Study:
+    """Return a study by its name in the package, by the path of a TOML file, or from data laid out as such a file.
+
+    ``overrides`` as on the command line change every configuration; ``runs`` is the number of draws in place of that
+    of the file. StudyError for anything that is not usable.
+    """
+    if isinstance(study, Mapping):
+        STUDY_FILES.check_depth(study, "study")
+        document, source = copy.deepcopy(dict(study)), _Source("study", Path(), b"")
+    else:
+        source = _Source(label(str(study)), Path(study).parent, STUDY_FILES.read(study))
+        document = STUDY_FILES.parse(source.text, source.file)
+    return _build(_apply_overrides(_with_kinds(document), overrides, runs, source.file), source)
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """What messages call a study file, where relative paths in it begin, and its bytes."""
+
+    file: str
+    folder: Path
+    text: bytes
+
+    def refusal(self, text: object) -> StudyError:
+        """Return an error that names the file."""
+        return StudyError(f"{self.file}: {text}")
+
+
+def _with_kinds(document: dict[str, Any]) -> dict[str, Any]:
+    """Return the document; a table that has ``same_as`` needs no kind beside it."""
+    tables = document.get("vary")
+    for table in tables if isinstance(tables, list | tuple) else ():
+        if isinstance(table, dict) and "same_as" in table:
+            table.setdefault("kind", "same_as")
+    return document
+
+
+def _apply_overrides(document: dict[str, Any], overrides: Sequence[str], runs: int | None, file: str) -> dict[str, Any]:
+    """Return the document as if what the command line changes stood in the file."""
+    parsed = _parse(document, file)
+    if overrides:
+        for table in document["configurations"]:
+            table["overrides"] = [*table.get("overrides", []), *overrides]
+    if runs is not None:
+        if parsed.sample is None:
+            raise StudyError(
+                f"{file}: has no [sample], so the number of runs is that of its grid and cannot be changed"
+            )
+        document["sample"]["runs"] = runs
+    return document
+
+
+def _parse(document: Mapping[str, Any], file: str) -> declared.StudyFile:
+    try:
+        return declared.StudyFile.model_validate(document)
+    except ValidationError as error:
+        text = first_problem(error.errors(include_url=False), declared.StudyFile)
+        raise StudyError(f"{file}: {text}") from error
+
+
+def _build(document: dict[str, Any], source: _Source) -> Study:
+    parsed = _parse(document, source.file)
+    configurations = _configurations(parsed, source)
+    _check_requests(parsed, source)
+    _check_set_or_varied(parsed, source)
+    places = {item.path: _place(item, configurations, source) for item in parsed.vary}
+    moving = [item for item in parsed.vary if not isinstance(item, declared.SameAs)]
+    varied = [_axis_or_drawn(item, places[item.path], configurations, source) for item in moving]
+    own = tuple(item for item in varied if isinstance(item, Drawn))
+    drawn, scores = own, _scores(parsed, own, source)
+    if own:
+        scenarios = [item.scenario for item in configurations]
+        drawn, scores = with_noise(own, scores, scenarios, [item.path for item in parsed.vary])
+    units = {path: place.quantity.unit or "-" for path, place in places.items()}
+    return Study(
+        name=parsed.name,
+        description=" ".join(parsed.description.split()),
+        configurations=configurations,
+        axes=tuple(item for item in varied if isinstance(item, Axis)),
+        drawn=drawn,
+        same=_followers(parsed, places, source),
+        scores=scores,
+        sample=_sample(parsed, drawn, source),
+        outputs=valid_outputs(parsed.outputs, [item.scenario for item in configurations], source.refusal),
+        runs_of_chunk=parsed.runs_of_chunk,
+        units=units | {item.path: "-" for item in drawn if item.path not in units},
+        only={item.path: item.only for item in parsed.vary if item.only},
+        document=document,
+        text=source.text,
+    )
+
+
+def _check_set_or_varied(parsed: declared.StudyFile, source: _Source) -> None:
+    """Refuse a value that is set in a configuration in which it also varies: it would not count."""
+    for each in parsed.configurations:
+        given = {text.partition("=")[0].strip() for text in each.overrides}
+        for item in parsed.vary:
+            if item.path in given and item.kind != "stated" and (not item.only or each.name in item.only):
+                raise source.refusal(
+                    f"configuration '{each.name}': '{item.path}' is both set and varied, so the set value would be "
+                    "ignored; omit one, or restrict the [[vary]] to the other configurations with 'only'"
+                )
+
+
+def _configurations(parsed: declared.StudyFile, source: _Source) -> tuple[Configuration, ...]:
+    names = [item.name for item in parsed.configurations]
+    repeated = first_twice(names)
+    if repeated is not None:
+        raise source.refusal(f"there are two configurations named '{repeated}'; give each its own name")
+    return tuple(Configuration(item.name, _scenario(item, source)) for item in parsed.configurations)
+
+
+def _scenario(item: declared.Configuration, source: _Source) -> Any:
+    is_path = item.scenario not in list_scenarios() and (Path(item.scenario).suffix == ".toml" or "/" in item.scenario)
+    try:
+        return load_scenario(str(source.folder / item.scenario) if is_path else item.scenario, item.overrides)
+    except (ScenarioError, ParameterError) as error:
+        raise source.refusal(f"configuration '{item.name}': {error}") from error
+
+
+def _check_requests(parsed: declared.StudyFile, source: _Source) -> None:
+    outputs = parsed.outputs
+    if not (outputs.metrics or outputs.trajectories or outputs.bands):
+        known = ", ".join(list(METRICS)[:4])
+        raise source.refusal(f"[outputs] requests nothing: give metrics (such as {known}), trajectories or bands")
+    if not parsed.vary and len(parsed.configurations) == 1:
+        raise source.refusal("varies nothing: give at least one [[vary]] or a second configuration")
+    paths = [item.path for item in parsed.vary]
+    if "run.duration" in paths and (outputs.trajectories or outputs.bands):
+        raise source.refusal("'run.duration' cannot vary where trajectories or bands are kept: they need one length")
+    repeated = first_twice(paths)
+    if repeated is not None:
+        raise source.refusal(f"'{repeated}' is varied twice; give it only one [[vary]]")
+
+
+def _place(item: declared.Varied, configurations: Sequence[Configuration], source: _Source) -> VariedPath:
+    """Return the path with its declaration, which must be the same in all configurations that vary it."""
+    names = [configuration.name for configuration in configurations]
+    for name in item.only:
+        if name not in names:
+            hint = nearest_name(name, names)
+            raise source.refusal(f"vary '{item.path}': only: there is no configuration '{name}'{hint}")
+    try:
+        places = [varied_path(item.path, each.scenario) for each in _varying(item, configurations)]
+    except ScenarioError as error:
+        raise source.refusal(f"vary '{item.path}': {error}") from error
+    if any(place != places[0] for place in places):
+        raise source.refusal(
+            f"vary '{item.path}': has different units, limits or atmospheres in different configurations"
+        )
+    return places[0]
+
+
+def _axis_or_drawn(
+    item: declared.Varied, place: VariedPath, configurations: Iterable[Configuration], source: _Source
+) -> Axis | Drawn:
+    try:
+        if isinstance(item, declared.Stated):
+            return _stated_distribution(item, place, _varying(item, configurations))
+        return axis_or_distribution(item, place)
+    except UnitError as error:
+        raise source.refusal(f"vary '{item.path}': {error}") from error
+
+
+def _stated_distribution(item: declared.Stated, place: VariedPath, configurations: Iterable[Configuration]) -> Drawn:
+    found = {stated_normal(place, each.scenario) for each in configurations}
+    if len(found) > 1:
+        raise UnitError(
+            "the parameter sets of the configurations state different values; use 'only', or give the values"
+        )
+    return Drawn(item.path, found.pop())
+
+
+def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath], source: _Source) -> dict[str, str]:
+    """Return the path that a path follows, by path; refuses one that does not vary, or has another unit."""
+    own = [item.path for item in parsed.vary if not isinstance(item, declared.SameAs)]
+    same: dict[str, str] = {}
+    for item in parsed.vary:
+        if not isinstance(item, declared.SameAs):
+            continue
+        if item.same_as not in own:
+            hint = nearest_name(item.same_as, own) or f"; there are {', '.join(own) or 'none'}"
+            raise source.refusal(
+                f"vary '{item.path}': same_as = '{item.same_as}' does not vary independently here{hint}"
+            )
+        unit, other = places[item.path].quantity.unit, places[item.same_as].quantity.unit
+        if unit != other:
+            raise source.refusal(
+                f"vary '{item.path}': same_as = '{item.same_as}' is in '{other or '-'}', this path in '{unit or '-'}'"
+            )
+        same[item.path] = item.same_as
+    return same
+
+
+def _varying(item: declared.Varied, configurations: Iterable[Configuration]) -> list[Configuration]:
+    """Return the configurations in which a path varies."""
+    return [each for each in configurations if not item.only or each.name in item.only]
+
+
+def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn], source: _Source) -> Factor | None:
+    if not parsed.correlations:
+        return None
+    paths = [item.path for item in drawn]
+    coefficients: dict[tuple[str, str], float] = {}
+    for item in parsed.correlations:
+        one, other = item.between
+        for path in item.between:
+            if path not in paths:
+                raise source.refusal(
+                    f"correlations: '{path}' has no distribution here{nearest_name(path, paths)}; there are {paths}"
+                )
+        if one == other or (one, other) in coefficients or (other, one) in coefficients:
+            raise source.refusal(
+                f"correlations: between = ['{one}', '{other}'] must name two different paths, and each pair only once"
+            )
+        coefficients[one, other] = item.coefficient
+    factor = cholesky_factor(correlation_matrix(paths, coefficients))
+    if factor is None:
+        shown = ", ".join(f"{one} with {other}: {value:g}" for (one, other), value in coefficients.items())
+        raise source.refusal(
+            f"correlations: contradict each other, their matrix is not positive definite ({shown}); make them smaller"
+        )
+    return factor
+
+
+def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn], source: _Source) -> Sample:
+    if not drawn:
+        if parsed.sample is not None:
+            raise source.refusal("[sample] is given, but nothing has a distribution; omit it")
+        return Sample(None, 1, 0)
+    if parsed.sample is None:
+        raise source.refusal("'sample' is missing: distributions need [sample] with method and runs")
+    if parsed.sample.method == "sobol" and len(drawn) > MOST_SOBOL_DIMENSIONS:
+        raise source.refusal(f"sample.method = 'sobol' allows at most {MOST_SOBOL_DIMENSIONS} distributions")
+    return Sample(parsed.sample.method, parsed.sample.runs, parsed.sample.seed)

@@ -1,0 +1,153 @@
+"""Uniform numbers of the draws from ``first`` on, in any order of asking: draw number j is always the same.
+
+Random numbers come from Philox, a generator that can start anywhere (Salmon et al., SC 2011). SciPy's Sobol sequence
+can only be wound forward, which is kept cheap by remembering where it stands. SciPy's Latin hypercube holds all draws
+in memory at once; here the order of the strata is a permutation of 0 .. n - 1 that gives the place of one number
+without making the others: a Feistel network on the next even number of bits, followed until the result is below n
+(cycle walking; Black and Rogaway, CT-RSA 2002). The mixing is that of SplitMix64 (Steele et al., OOPSLA 2014).
+
+Correlations are those of normal scores: a Gaussian copula, which leaves each distribution as it was.
+"""
+
+import threading
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.studies.distributions import Floats
+from ppafo.studies.study import Sample
+
+Words = NDArray[np.uint64]
+Factor = tuple[tuple[float, ...], ...]
+_ROUNDS = 6
+_WORDS_PER_STEP = 4
+_FRACTION_BITS = 53
+_SOBOL_BITS = 32
+MOST_SOBOL_DIMENSIONS = 21201
+_MOST_ENGINES = 64
+"""Wound engines that are remembered; the one that was made first goes first."""
+
+
+def uniform_numbers(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
+    """Return numbers in (0, 1), shape (count, dimensions), for the draws from ``first`` on."""
+    if sample.method == "sobol":
+        return _sobol(sample, dimensions, first, count)
+    uniform = _random(sample.seed, dimensions, first, count)
+    if sample.method == "latin_hypercube":
+        return _in_strata(uniform, sample, first)
+    return uniform
+
+
+def _random(seed: int, dimensions: int, first: int, count: int) -> Floats:
+    """Return Philox numbers: a draw takes a whole number of its steps of four words."""
+    steps = -(-dimensions // _WORDS_PER_STEP)
+    generator = np.random.Philox(key=seed)
+    generator.advance(first * steps)
+    words = np.asarray(generator.random_raw(count * steps * _WORDS_PER_STEP), dtype=np.uint64)
+    top = (words >> np.uint64(64 - _FRACTION_BITS)).astype(np.float64)
+    uniform = np.clip((top + 0.5) * 2.0**-_FRACTION_BITS, None, 1.0 - 2.0**-_FRACTION_BITS)
+    return uniform.reshape(count, steps * _WORDS_PER_STEP)[:, :dimensions]
+
+
+def _in_strata(uniform: Floats, sample: Sample, first: int) -> Floats:
+    """Return a Latin hypercube: in every dimension each of the ``runs`` strata holds one draw."""
+    draws = np.arange(first, first + uniform.shape[0], dtype=np.uint64)
+    strata = np.stack([permute(draws, sample.runs, sample.seed, axis) for axis in range(uniform.shape[1])], axis=1)
+    return (strata.astype(np.float64) + uniform) / sample.runs
+
+
+@dataclass(slots=True)
+class _Wound:
+    """Scipy's Sobol engines by what made them, wound to where they were last asked."""
+
+    engines: dict[tuple[int, int], Any]
+    lock: Any
+
+
+_WOUND = _Wound({}, threading.Lock())
+
+
+def _sobol(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
+    """Return scrambled Sobol numbers, moved by half of their last bit so that none is 0."""
+    from scipy.stats import qmc
+
+    key = (sample.seed, dimensions)
+    with _WOUND.lock:
+        engine = _WOUND.engines.get(key)
+        if engine is None or engine.num_generated > first:
+            engine = qmc.Sobol(dimensions, scramble=True, bits=_SOBOL_BITS, rng=np.random.default_rng(sample.seed))
+            _WOUND.engines[key] = engine
+            if len(_WOUND.engines) > _MOST_ENGINES:
+                del _WOUND.engines[next(iter(_WOUND.engines))]
+        if first > engine.num_generated:
+            engine.fast_forward(first - engine.num_generated)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # that a stretch of the sequence is no power of two
+            return np.asarray(engine.random(count)) + 2.0 ** -(_SOBOL_BITS + 1)
+
+
+def permute(numbers: Words, size: int, seed: int, stream: int) -> Words:
+    """Return the places of numbers below ``size``; another seed or stream is another permutation."""
+    half = np.uint64(max(1, -(-(size - 1).bit_length() // 2)))
+    keys = _mix(np.arange(1, _ROUNDS + 1, dtype=np.uint64) + np.uint64((seed << 24) + (stream << 8)))
+    result = _through_rounds(numbers, half, keys)
+    outside = np.flatnonzero(result >= size)
+    while outside.size:
+        result[outside] = _through_rounds(result[outside], half, keys)
+        outside = outside[result[outside] >= size]
+    return result
+
+
+def _through_rounds(numbers: Words, half: np.uint64, keys: Words) -> Words:
+    mask = (np.uint64(1) << half) - np.uint64(1)
+    left, right = numbers >> half, numbers & mask
+    for key in keys:
+        left, right = right, left ^ (_mix(right ^ key) & mask)
+    return (left << half) | right
+
+
+def _mix(words: Words) -> Words:
+    words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return words ^ (words >> np.uint64(31))
+
+
+def correlation_matrix(paths: Sequence[str], coefficients: Mapping[tuple[str, str], float]) -> Floats:
+    """Return the correlation of the normal scores, shape (paths, paths)."""
+    matrix = np.eye(len(paths))
+    for (one, other), coefficient in coefficients.items():
+        row, column = paths.index(one), paths.index(other)
+        matrix[row, column] = matrix[column, row] = coefficient
+    return matrix
+
+
+def cholesky_factor(matrix: Floats) -> Factor | None:
+    """Return the lower factor, row by row; None where the matrix is not positive definite."""
+    try:
+        factor = np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        return None
+    return tuple(tuple(float(number) for number in row) for row in factor)
+
+
+def correlate(uniform: Floats, factor: Factor) -> Floats:
+    """Return uniform numbers of the same shape (draws, paths) with correlated normal scores.
+
+    Summed term by term: a matrix product may round otherwise for another number of draws.
+    """
+    from scipy.special import ndtr, ndtri
+
+    scores = ndtri(uniform)
+    columns = []
+    for row in factor:
+        total = row[0] * scores[:, 0]
+        for column in range(1, len(row)):
+            if row[column] != 0.0:
+                total = total + row[column] * scores[:, column]
+        columns.append(total)
+    smallest = 2.0**-53
+    return np.asarray(np.clip(ndtr(np.stack(columns, axis=1)), smallest, 1.0 - smallest))

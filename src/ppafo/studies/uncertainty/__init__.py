@@ -1,1 +1,0 @@
-"""What all questions about uncertainty share: draws from a study's distributions, runs of them, intervals."""

@@ -1,0 +1,268 @@
+"""What a study varies: paths with units and limits, tables ``[[vary]]`` as axes and distributions in SI units."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ppafo.errors import ScenarioError, UnitError, nearest_name
+from ppafo.model.declaration import Quantity
+from ppafo.parameters import apply_overrides, load_parameter_set
+from ppafo.parameters.declaration import alternatives, is_within
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
+from ppafo.parameters.provenance import Entry
+from ppafo.simulation import declaration
+from ppafo.simulation.building import set_name
+from ppafo.simulation.numbers import declared_numbers
+from ppafo.simulation.overriding import is_of_device, split_override
+from ppafo.simulation.reading import WRITTEN_UNITS
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies import declaration as declared
+from ppafo.studies.distributions import (
+    Distribution,
+    LogNormalAround,
+    LogUniformBetween,
+    NormalAround,
+    NormalBetween,
+    OneOf,
+    TriangularBetween,
+    UniformBetween,
+    WholeNumbersBetween,
+)
+from ppafo.studies.noise import NOISE
+from ppafo.studies.study import Axis, Drawn
+from ppafo.units import from_si, parse_quantity, split_quantity
+
+_UNIT_OF_DIFFERENCE = {"Pa_a": "Pa_d"}
+_OFFSET_UNITS = ("degC", "°C")
+DEVIATIONS_IN_HALF_WIDTH = 1.959963984540054
+"""Standard deviations of a normal distribution in the half width of its 95 % interval."""
+
+_STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "K"}
+
+
+@dataclass(frozen=True, slots=True)
+class VariedPath:
+    """A path with its declaration, and the pressure [Pa absolute] from which gauge pressures count."""
+
+    path: str
+    quantity: Quantity
+    atmosphere: float
+
+    def level(self, value: str | float) -> float:
+        """Return a value of the path in SI; UnitError where the unit does not fit or the path does not allow it."""
+        number = self._in_si(value, self.quantity)
+        if not is_within(number, self.quantity):
+            raise UnitError(f"{self.path} must be {self._limits()}")
+        return number
+
+    def distance(self, value: str | float) -> float:
+        """Return a difference of two values of the path in SI, such as a standard deviation."""
+        unit = _UNIT_OF_DIFFERENCE.get(self.quantity.unit, self.quantity.unit)
+        if isinstance(value, str) and split_quantity(value)[1] in _OFFSET_UNITS:
+            raise UnitError("a difference of temperatures is given in K")
+        return self._in_si(value, replace(self.quantity, unit=unit))
+
+    def shown(self, value: float) -> str:
+        """Return a value of the path as messages write it."""
+        unit = WRITTEN_UNITS.get(self.quantity.unit, self.quantity.unit) if self.quantity.unit != "Pa_a" else "Pa_a"
+        return f"{from_si(value, unit, self.quantity.unit, self.atmosphere):.6g} {unit}".rstrip()
+
+    def _in_si(self, value: str | float, quantity: Quantity) -> float:
+        if isinstance(value, str):
+            return _parse(value, quantity, self.atmosphere)
+        if quantity.unit not in declaration.PLAIN:
+            raise UnitError(f"a number without a unit; give a text with a unit such as {quantity.unit}")
+        return float(value)
+
+    def _limits(self) -> str:
+        lowest, highest = self.quantity.minimum, self.quantity.maximum
+        word = "at least" if self.quantity.minimum_allowed else "more than"
+        parts = [f"{word} {self.shown(lowest)}"] if math.isfinite(lowest) else []
+        return " and ".join([*parts, f"at most {self.shown(highest)}"] if math.isfinite(highest) else parts)
+
+
+def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
+    """Return a text in SI, in any of the units that a parameter set may use too."""
+    refused: UnitError | None = None
+    for unit in alternatives(quantity):
+        try:
+            return parse_quantity(text, unit, atmosphere)
+        except UnitError as error:
+            refused = refused or error
+    raise refused or UnitError(f"'{quantity.name}' has no unit")
+
+
+def varied_path(path: str, scenario: Scenario) -> VariedPath:
+    """Return a path of a scenario; ScenarioError with the nearest one where there is none."""
+    known = declared_numbers(scenario)
+    if path not in known:
+        section = path.partition(".")[0]
+        near = [name for name in known if name.startswith(f"{section}.")]
+        hint = nearest_name(path, known) or f"; for example {', '.join(near[:6] or list(known)[:6])}"
+        raise ScenarioError(f"scenario '{scenario.name}' has no number '{path}'{hint}")
+    return VariedPath(path, known[path], scenario.device.supply.atmospheric_pressure)
+
+
+def axis_or_distribution(item: declared.Varied, place: VariedPath) -> Axis | Drawn:
+    """Return what a table asks for; UnitError with the key where a value is not usable or contradicts another."""
+    _check_whole(item)
+    if isinstance(item, declared.Grid):
+        return Axis(item.path, _all_whole(item.path, _grid(item, place)))
+    if isinstance(item, declared.Listed):
+        levels = tuple(_level("values", value, place) for value in item.values)
+        return Axis(item.path, _all_whole(item.path, levels))
+    return Drawn(item.path, _DISTRIBUTIONS[item.kind](item, place))
+
+
+def _check_whole(item: declared.Varied) -> None:
+    """Refuse kinds that give a seed no whole numbers, and whole numbers for what is not counted."""
+    is_seed, is_whole = item.path == NOISE, item.kind == "whole_numbers"
+    if is_whole and not is_seed:
+        raise UnitError(f"kind = 'whole_numbers' is for '{NOISE}' alone; use 'choice' or 'uniform'")
+    if is_seed and item.kind not in ("grid", "list", "choice", "whole_numbers"):
+        raise UnitError(f"kind = '{item.kind}' gives no whole numbers, which a random seed needs; use 'whole_numbers'")
+
+
+def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
+    broken = [value for value in values if path == NOISE and value != math.floor(value)]
+    if broken:
+        raise UnitError(f"{broken[0]:g} must be a whole number")
+    return values
+
+
+def _grid(item: declared.Grid, place: VariedPath) -> tuple[float, ...]:
+    first, last = _key(item, "first", place), _key(item, "last", place)
+    if first == last:
+        raise UnitError(f"first and last are both {item.first!r}; a grid needs two different ends")
+    if item.spacing == "linear":
+        return tuple(np.linspace(first, last, item.count).tolist())
+    if min(first, last) <= 0.0:
+        raise UnitError("spacing = 'logarithmic' needs both ends above 0")
+    return tuple(np.geomspace(first, last, item.count).tolist())
+
+
+def _uniform(item: declared.Uniform, place: VariedPath) -> Distribution:
+    return UniformBetween(*_bounds(item, place))
+
+
+def _log_uniform(item: declared.LogUniform, place: VariedPath) -> Distribution:
+    minimum, maximum = _bounds(item, place)
+    if minimum <= 0.0:
+        raise UnitError(f"minimum = {item.minimum!r}: a log-uniform distribution needs both bounds above 0")
+    return LogUniformBetween(minimum, maximum)
+
+
+def _normal(item: declared.Normal, place: VariedPath) -> Distribution:
+    return NormalAround(_key(item, "mean", place), _deviation(item, place))
+
+
+def _truncated_normal(item: declared.TruncatedNormal, place: VariedPath) -> Distribution:
+    minimum, maximum = _bounds(item, place)
+    return NormalBetween(_key(item, "mean", place), _deviation(item, place), minimum, maximum)
+
+
+def _log_normal(item: declared.LogNormal, place: VariedPath) -> Distribution:
+    median = _key(item, "median", place)
+    if median <= 0.0:
+        raise UnitError(f"median = {item.median!r} must be above 0")
+    return LogNormalAround(median, item.factor)
+
+
+def _triangular(item: declared.Triangular, place: VariedPath) -> Distribution:
+    minimum, maximum = _bounds(item, place)
+    mode = _key(item, "mode", place)
+    if not minimum <= mode <= maximum:
+        raise UnitError(f"mode = {item.mode!r} must lie between minimum {item.minimum!r} and maximum {item.maximum!r}")
+    return TriangularBetween(minimum, mode, maximum)
+
+
+def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
+    values = _all_whole(item.path, tuple(_level("values", value, place) for value in item.values))
+    weights = item.weights or (1.0,) * len(values)
+    if len(weights) != len(values):
+        raise UnitError(
+            f"weights has {len(weights)} numbers, values has {len(values)}; there must be one weight for each value"
+        )
+    if min(weights) < 0.0 or math.fsum(weights) <= 0.0:
+        raise UnitError(f"weights = {list(weights)} must be at least 0, and not all of them 0")
+    shares = np.cumsum(weights) / np.sum(weights)
+    return OneOf(values, tuple(shares.tolist()))
+
+
+def _whole_numbers(item: declared.WholeNumbers, place: VariedPath) -> Distribution:
+    return WholeNumbersBetween(*_bounds(item, place))
+
+
+_DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
+    "uniform": _uniform,
+    "log_uniform": _log_uniform,
+    "normal": _normal,
+    "truncated_normal": _truncated_normal,
+    "log_normal": _log_normal,
+    "triangular": _triangular,
+    "choice": _choice,
+    "whole_numbers": _whole_numbers,
+}
+"""What builds each kind. To add one: a table in ``declaration``, a class in ``sampling.distributions``, a line here."""
+
+
+def _bounds(item: Any, place: VariedPath) -> tuple[float, float]:
+    minimum, maximum = _key(item, "minimum", place), _key(item, "maximum", place)
+    if minimum >= maximum:
+        raise UnitError(f"minimum = {item.minimum!r} must be less than maximum = {item.maximum!r}")
+    return minimum, maximum
+
+
+def _deviation(item: Any, place: VariedPath) -> float:
+    try:
+        deviation = place.distance(item.standard_deviation)
+    except UnitError as error:
+        raise UnitError(f"standard_deviation = {item.standard_deviation!r}: {error}") from error
+    if deviation <= 0.0:
+        raise UnitError(f"standard_deviation = {item.standard_deviation!r} must be more than 0")
+    return deviation
+
+
+def _key(item: Any, key: str, place: VariedPath) -> float:
+    return _level(key, getattr(item, key), place)
+
+
+def _level(key: str, value: str | float, place: VariedPath) -> float:
+    try:
+        return place.level(value)
+    except UnitError as error:
+        raise UnitError(f"{key} = {value!r}: {error}") from error
+
+
+def stated_normal(place: VariedPath, scenario: Scenario) -> NormalAround:
+    """Return the distribution of a path; UnitError where the set of the scenario states no uncertainty for it."""
+    entry, mean = _stated_entry(place.path, scenario)
+    if entry is None or not entry.uncertainty:
+        why = "was changed by an override" if entry is not None and entry.source == "override" else "has none"
+        raise UnitError(
+            f"kind 'stated' needs an uncertainty in the parameter set '{scenario.origin.parameter_set}', which {why}"
+        )
+    unit = _STATED_DIFFERENCES.get(entry.unit, entry.unit)
+    if unit.endswith(("_g", "_a")):
+        unit = f"{unit[:-2]}_d"
+    half_width = place.distance(f"{entry.uncertainty!r} {unit}".strip())
+    return NormalAround(mean, half_width / DEVIATIONS_IN_HALF_WIDTH)
+
+
+def _stated_entry(path: str, scenario: Scenario) -> tuple[Entry | None, float]:
+    """Return what the set, with the overrides of the scenario, reports of a path, and the value in SI."""
+    origin = scenario.origin
+    folder = Path(origin.file).parent if origin.file is not None else Path()
+    own = [text for text in origin.overrides if is_of_device(split_override(text)[0])]
+    parameters = load_parameter_set(set_name(origin.parameter_set, folder))
+    for given in (origin.content["device"].get("overrides", ()), own):
+        parameters = apply_overrides(parameters, given, origin.valve)
+    inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+    entry = parameters.numbers.get(inside)
+    if entry is None:
+        return None, 0.0
+    return entry, entry_in_si(entry, parameters.declared()[inside], atmospheric_pressure(parameters))

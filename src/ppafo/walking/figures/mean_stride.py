@@ -1,0 +1,130 @@
+"""The mean stride of walks beside the healthy gait: ankle, torques, pressures and toes, mean with band."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from ppafo.answers.layout import Margins, figure_of_panels
+from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.constants import PASCALS_PER_PSI
+from ppafo.metrics import Metric
+from ppafo.signals import Recording
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.strides import PHASES, Curves
+from ppafo.walking.walk_metrics import healthy_toe_height
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WITH, WITHOUT, HEALTHY = BLUE, VERMILION, BLACK
+STANCE = "#f1f1f1"
+_WIDTH = 7.4
+_MARGINS = Margins(left=0.68, right=0.2, top=0.78, bottom=0.52, row_gap=0.4, label=0.5)
+_PANEL = 1.3
+_PERCENT = 100.0 * PHASES
+
+
+@dataclass(frozen=True, slots=True)
+class _Panel:
+    """One panel: channels drawn for every walk, and how SI becomes the unit of the title."""
+
+    title: str
+    channels: tuple[str, ...]
+    factor: float = 1.0
+    level: float | None = None
+
+
+_DEGREES = float(np.degrees(1.0))
+_PANELS = (
+    _Panel("Ankle angle (deg, 90 neutral, growing in plantarflexion)", ("angle",), _DEGREES, 90.0),
+    _Panel("Torque on the wearer, $T_{ex}$ (N m)", ("external_torque",), 1.0, 0.0),
+    _Panel("Torque of the actuator (N m)", ("torque",), 1.0, 0.0),
+    _Panel("Chambers (psi, gauge; full: plantarflexion, dashed: dorsiflexion)", ("pressure_1", "pressure_2")),
+    _Panel("Toes over the ground (cm; they drag more than 1 cm below 0)", ("toe_height",), 100.0, 0.0),
+)
+
+
+class Strides(Protocol):
+    """What is drawn of a walk."""
+
+    @property
+    def configuration(self) -> Configuration:
+        """Who walks with what."""
+
+    @property
+    def recording(self) -> Recording:
+        """Every sample."""
+
+    @property
+    def averages(self) -> Mapping[str, Curves]:
+        """Mean and deviation of each channel over the stride."""
+
+    @property
+    def metrics(self) -> Mapping[str, Metric]:
+        """Numbers of the whole walk."""
+
+
+def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
+    """Return the mean stride of one or two walks of the same wearer by name, and the healthy gait beside them."""
+    height = len(_PANELS) * _PANEL + (len(_PANELS) - 1) * _MARGINS.row_gap + _MARGINS.top + _MARGINS.bottom
+    first = next(iter(walks.values()))
+    with house_style():
+        figure, grid = figure_of_panels((_WIDTH, height), _MARGINS, len(_PANELS))
+        for panel, (axes,) in zip(_PANELS, grid, strict=True):
+            _background(axes, first, panel)
+            for (name, result), colour in zip(walks.items(), (WITH, WITHOUT), strict=False):
+                _draw(axes, panel, result, name, colour)
+        _healthy(grid[0][0], grid[-1][0], first)
+        grid[-1][0].set_xlabel("Stride (%)")
+        grid[-1][0].set_xlim(0.0, 100.0)
+        _head(figure, grid[0][0], first, height)
+        mark_kind(figure, first.recording.kind)
+        return figure
+
+
+def _background(axes: "Axes", result: Strides, panel: _Panel) -> None:
+    share = 100.0 * result.configuration.gait.stance_share
+    axes.axvspan(0.0, share, color=STANCE, zorder=0, linewidth=0.0)
+    if panel.level is not None:
+        axes.axhline(panel.level, color=GREY, linewidth=0.8)
+    axes.set_title(panel.title)
+    axes.locator_params(axis="y", nbins=5)
+
+
+def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) -> None:
+    """Draw mean and band; pressures of a device that is switched off stay at the atmosphere and are left out."""
+    pressures = len(panel.channels) > 1
+    if not result.averages or (pressures and not np.any(result.recording["supplied_mass"])):
+        return
+    atmosphere = result.configuration.device.supply.atmospheric_pressure
+    for channel, style in zip(panel.channels, ("-", (0, (4, 2))), strict=False):
+        curves = result.averages[channel]
+        factor, zero = (1.0 / PASCALS_PER_PSI, atmosphere) if pressures else (panel.factor, 0.0)
+        mean, band = factor * (curves.mean - zero), factor * curves.deviation
+        axes.fill_between(_PERCENT, mean - band, mean + band, color=colour, alpha=0.2, linewidth=0.0)
+        axes.plot(_PERCENT, mean, color=colour, linestyle=style, label=name)
+
+
+def _healthy(angle: "Axes", toes: "Axes", result: Strides) -> None:
+    gait = result.configuration.gait
+    look: dict[str, Any] = {"color": HEALTHY, "linewidth": 1.2, "linestyle": (0, (1, 1.2)), "label": "healthy gait"}
+    curve = _DEGREES * gait.ankle_angle.sampled(PHASES)
+    angle.plot(_PERCENT, curve, **look)
+    band = _DEGREES * gait.ankle_angle.deviation
+    angle.fill_between(_PERCENT, curve - band, curve + band, color=GREY, alpha=0.15, linewidth=0.0)
+    toes.plot(_PERCENT, 100.0 * healthy_toe_height(result.configuration), **look)
+
+
+def _head(figure: "Figure", axes: "Axes", result: Strides, height: float) -> None:
+    configuration = result.configuration
+    counted = result.metrics["strides"].value
+    title = f"{configuration.name}: {configuration.gait.name}, {counted:.0f} strides"
+    figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
+    handles, labels = axes.get_legend_handles_labels()
+    place = (0.1 / _WIDTH, 1.0 - 0.3 / height)
+    figure.legend(handles, labels, loc="upper left", bbox_to_anchor=place, ncols=3, borderaxespad=0.0, handlelength=1.8)
+    remark = "band: standard deviation; grey: stance"
+    figure.text(1.0 - 0.2 / _WIDTH, 1.0 - 0.34 / height, remark, ha="right", va="top", fontsize=8.5, color=GREY)

@@ -1,0 +1,171 @@
+"""Figure 1A's strip of gait phases with the timing of a walk: tasks, controller, foot on the ground, and valve."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.answers.layout import Margins, figure_of_panels
+from ppafo.answers.style import CHAMBER_1, CHAMBER_2, GREY, house_style, mark_kind
+from ppafo.constants import PASCALS_PER_PSI
+from ppafo.model.command import VENTS_ABOVE
+from ppafo.signals.recording import Floats
+from ppafo.walking.figures.legs import GHOST, draw_ground, leg_artists, legs_of, settled_turns
+from ppafo.walking.figures.mean_stride import WITH
+from ppafo.walking.strides import PHASES, SETTLING, times_of_phases
+from ppafo.walking.walk import WalkResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_SIZE = (9.4, 6.0)
+_MARGINS = Margins(left=1.3, right=0.2, top=0.55, bottom=0.52, row_gap=0.22, label=0.5)
+_HEIGHTS = (1.75, 0.7, 0.7, 0.7, 1.35)
+_PERCENT = 100.0 * PHASES
+_FRAMES = 8
+_NARROW, _NARROWEST = 9.0, 2.5
+"""Percent of the stride below which a block's name stands upright, and below which it is left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """One state of a row: name, the same for a narrow block, colour, and where a channel's values belong to it."""
+
+    name: str
+    short: str
+    colour: str
+    holds: Callable[[Floats], NDArray[np.bool_]]
+
+
+def _is(value: float) -> Callable[[Floats], NDArray[np.bool_]]:
+    return lambda values: values == value
+
+
+_FREE, _DORSI, _PLANTAR = "#e4e4e4", "#f0b48a", "#8fbfe0"
+_ROWS: Mapping[str, tuple[str, tuple[State, ...]]] = {
+    "Controller": (
+        "controller_phase",
+        (
+            State("1 heel strike", "1 heel", "#f6d5bd", _is(1.0)),
+            State("4 free motion", "4 free", _FREE, _is(2.0)),
+            State("2 push-off", "2 push", _PLANTAR, _is(3.0)),
+            State("3 swing", "3 swing", _DORSI, _is(0.0)),
+        ),
+    ),
+    "Foot": (
+        "contact",
+        (
+            State("on the heel", "heel", "#cfe3c9", _is(1.0)),
+            State("flat", "flat", "#9fcf94", _is(2.0)),
+            State("on the toes", "toes", "#63ad59", _is(3.0)),
+            State("in the air", "air", "#f3f3f3", _is(0.0)),
+        ),
+    ),
+    "Valve": (
+        "command",
+        (
+            State("vented", "vented", _FREE, lambda command: command > VENTS_ABOVE),
+            State("closed", "closed", "#ffffff", _is(0.0)),
+            State("plantarflexion", "plantar", _PLANTAR, lambda command: (command > 0.0) & (command <= VENTS_ABOVE)),
+            State("dorsiflexion", "dorsi", _DORSI, lambda command: command < 0.0),
+        ),
+    ),
+}
+
+
+def strip_figure(result: WalkResult) -> "Figure":
+    """Return the strip of gait phases of a walk; a share of strides where they differ."""
+    with house_style():
+        figure, grid = figure_of_panels(_SIZE, _MARGINS, len(_HEIGHTS), heights=_HEIGHTS)
+        rows = [axes for (axes,) in grid]
+        _legs(rows[0], result)
+        for axes, (label, (channel, states)) in zip(rows[1:4], _ROWS.items(), strict=True):
+            _band(axes, label, _shares(result, channel, states), states)
+        _pressures(rows[4], result)
+        rows[4].set_xlabel("Stride (%)")
+        rows[4].set_xlim(0.0, 100.0)
+        width, height = _SIZE
+        title = f"{result.configuration.name}: functional tasks of the paper's figure 1A over the stride"
+        figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
+        remark = "height of a colour: share of the strides"
+        figure.text(0.12 / width, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=8.5, color=GREY)
+        mark_kind(figure, result.recording.kind)
+        return figure
+
+
+def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floats:
+    """Share of the strides in each state at ``PHASES``, shape (states, phases); none where nothing is known."""
+    starts = result.starts[SETTLING:]
+    if channel not in result.recording or starts.size < 2:
+        return np.zeros((len(states), PHASES.size))
+    time = result.recording.time
+    found = np.searchsorted(time, times_of_phases(time, starts), side="right") - 1
+    values = result.recording[channel][found]
+    return np.array([np.mean(state.holds(values), axis=0) for state in states])
+
+
+def _band(axes: "Axes", label: str, shares: Floats, states: tuple[State, ...]) -> None:
+    below = np.zeros(PHASES.size)
+    for state, share in zip(states, shares, strict=True):
+        axes.fill_between(_PERCENT, below, below + share, color=state.colour, linewidth=0.0, step="mid")
+        _name_blocks(axes, state, share, below + 0.5 * share)
+        below = below + share
+    if not below.any():
+        axes.text(50.0, 0.5, "none that follows phases", ha="center", va="center", fontsize=9.0, color=GREY)
+    axes.set_ylim(0.0, 1.0)
+    axes.set_yticks([])
+    axes.grid(visible=False)
+    axes.spines["left"].set_visible(False)
+    axes.tick_params(axis="x", length=0.0)
+    axes.set_ylabel(label, rotation=0, ha="right", va="center")
+    axes.yaxis.set_label_coords(-0.012, 0.5)
+
+
+def _name_blocks(axes: "Axes", state: State, share: Floats, middle: Floats) -> None:
+    """Write the name into every block that is wide enough and holds for most strides."""
+    inside = np.flatnonzero(np.diff(np.concatenate([[0], (share > 0.5).astype(int), [0]])))
+    for first, last in zip(inside[::2], inside[1::2], strict=True):
+        left, right = _PERCENT[first], _PERCENT[last - 1]
+        if right - left >= _NARROWEST:
+            text, turn = (state.name, 0) if right - left >= _NARROW else (state.short, 90)
+            place = 0.5 * (left + right), float(np.mean(middle[first:last]))
+            axes.text(*place, text, ha="center", va="center", fontsize=9.0 if turn == 0 else 8.0, rotation=turn)
+
+
+def _legs(axes: "Axes", result: WalkResult) -> None:
+    """Stick figures over the strip, each over its instant, in an axes of metres that shares the percent below."""
+    turns = settled_turns(result, 1, _FRAMES) + 0.5 / _FRAMES
+    legs = legs_of(result, turns)
+    panel_width = _SIZE[0] - _MARGINS.left - _MARGINS.right
+    panel_height = axes.get_position().height * _SIZE[1]
+    height = 0.7
+    metres = height * panel_width / panel_height
+    inner = axes.inset_axes((0.0, 0.0, 1.0, 1.0))
+    draw_ground(inner, 0.0, metres)
+    for index in range(turns.size):
+        offset = legs.healthy.ankle[index, 0] - metres * (turns[index] % 1.0)
+        leg_artists(inner, GHOST, 1.6, is_ghost=True).place(legs.healthy, index, offset)
+        leg_artists(inner, WITH, 2.6).place(legs.worn, index, offset)
+    inner.set_xlim(0.0, metres)
+    inner.set_ylim(-0.12, height - 0.12)
+    inner.set_axis_off()
+    axes.set_axis_off()
+
+
+def _pressures(axes: "Axes", result: WalkResult) -> None:
+    atmosphere = result.configuration.device.supply.atmospheric_pressure
+    for channel, name, colour in (
+        ("pressure_1", "plantarflexion", CHAMBER_1),
+        ("pressure_2", "dorsiflexion", CHAMBER_2),
+    ):
+        if channel in result.averages:
+            curve = (result.averages[channel].mean - atmosphere) / PASCALS_PER_PSI
+            axes.plot(_PERCENT, curve, color=colour, label=name)
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    axes.set_ylabel("Chambers\n(psi, gauge)", rotation=0, ha="right", va="center")
+    axes.yaxis.set_label_coords(-0.045, 0.5)
+    axes.locator_params(axis="y", nbins=4)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.1, handlelength=1.6)

@@ -1,0 +1,100 @@
+"""The commands of the repository refuse as those of the package do; the package names them where it had them once."""
+
+import importlib
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from benchmarks import __main__ as speed
+from ppafo.cli.main import main as package
+from ppafo.storage.owned_folder import MARK, write_marked_folder
+from scripts import interval_coverage as coverage
+
+Command = Callable[[Sequence[str]], int]
+COMMANDS: dict[str, tuple[Command, list[str], str]] = {
+    "bench": (speed.main, ["--quick"], "benchmarks.study.measure_speed"),
+    "coverage": (coverage.main, ["--draws", "1"], "benchmarks.intervals.calibration.run_tasks"),
+}
+
+
+@pytest.fixture(params=COMMANDS)
+def refuses(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], bool]:
+    """Whether a command refuses an output folder, in one line and before any work."""
+    main, words, work = COMMANDS[request.param]
+
+    def never(*_arguments: object) -> None:
+        raise AssertionError("it ran")
+
+    importlib.import_module(work.rpartition(".")[0])
+    monkeypatch.setattr(work, never)
+    return lambda out: main([*words, "--out", str(out)]) == 2
+
+
+@pytest.mark.parametrize("theirs", ["notes.txt", "bench.md", "fits-fixed-2026.jsonl", MARK])
+def test_a_folder_of_others_is_refused_before_anything_runs(
+    refuses: Callable[[Path], bool], theirs: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / theirs).write_text("mine")
+    assert refuses(out)
+    said = capsys.readouterr().err
+    assert str(out) in said
+    assert len(said.splitlines()) == 1
+    assert [path.read_text() for path in out.iterdir()] == ["mine"]
+
+
+def test_a_result_of_another_command_is_refused(refuses: Callable[[Path], bool], tmp_path: Path) -> None:
+    assert package(["schema", "scenario", "--out", str(tmp_path / "out")]) == 0
+    before = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    assert refuses(tmp_path / "out")
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+
+
+@pytest.mark.parametrize("deeper", ["", "deeper"])
+def test_a_file_in_the_place_of_the_folder_is_refused(
+    refuses: Callable[[Path], bool], deeper: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.write_text("mine")
+    assert refuses(file / deeper)
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+    assert file.read_text() == "mine"
+
+
+@pytest.mark.parametrize("main", [speed.main, coverage.main])
+def test_a_mistyped_option_is_one_line_and_exit_code_2(main: Command, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--jsom"]) == 2
+    said = capsys.readouterr().err
+    assert "did you mean '--json'" in said
+    assert said.count("\n") == 1
+
+
+def test_a_folder_that_the_command_of_the_package_left_goes_on(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    known = {"kind": "white", "number": 0, "below": [0.5] * 5, "width": [1.0] * 5, "verdicts": ["identified"] * 5}
+    fit = known | {"alarm": False, "chance": 0.5, "noise": "angle white", "seconds": 0.25}
+    write_marked_folder(out, {"fits-fixed-2026.jsonl": f"{json.dumps(fit)}\n".encode()}, "coverage")
+    assert coverage.main(["--noise", "white", "--draws", "1", "--out", str(out)]) == 1
+    (kind,) = json.loads((out / "coverage.json").read_text())["kinds"]
+    assert kind["fits"] == 1
+    assert "0.2 s a fit" in (out / "coverage.txt").read_text()  # of the old fit: none was made anew
+
+
+@pytest.mark.parametrize(
+    ("word", "place"), [("bench", "python -m benchmarks"), ("coverage", "scripts/interval_coverage.py")]
+)
+@pytest.mark.parametrize("more", [[], ["--help"], ["--draws", "1"]])
+def test_the_package_names_the_new_place_of_a_command_that_it_had(
+    word: str, place: str, more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert package([word, *more]) == 2
+    captured = capsys.readouterr()
+    assert f"'{word}' is no longer a command of the package" in captured.err
+    assert place in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""

@@ -1,0 +1,194 @@
+"""Every entry of every catalogue does the same compiled as it does in Python: all of them in one small module."""
+
+import itertools
+import math
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.engine.cache import load_generated
+from ppafo.engine.reference.source import HEADER
+from ppafo.engine.rows import numbers, rebuild
+from ppafo.engine.source_text import SourceCollector
+from ppafo.metrics import METRICS
+from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSeen, GaitSensors, measure_gait
+from ppafo.model.sensors import Measurement, SensorParameters, SensorRates, SensorState, follow_signals, measure
+from ppafo.model.valves.catalog import VALVES
+from ppafo.signals.meter import Course, MeterKind, Sample
+
+QUICKLY = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
+ROUNDING = 1.0e-12
+"""Relative difference that the last bits of sines and exponentials may make."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A function of a catalogue and the arguments that it is tried with."""
+
+    name: str
+    function: Callable[..., Any]
+    arguments: list[tuple[Any, ...]]
+
+
+def settings(kind: Any, draw: random.Random) -> list[float]:
+    """Defaults of the quantities, or a number from 0.1 to 1 where there is none."""
+    return [draw.uniform(0.1, 1.0) if item.default is None else item.default for item in kind.quantities]
+
+
+def controllers(draw: random.Random) -> Iterator[Entry]:
+    """Laws of the torque task and of walking, each through a hundred samples of its own state."""
+    for kind in [*CONTROLLERS.values(), *WALKING_CONTROLLERS.values()]:
+        walks = kind.name in WALKING_CONTROLLERS
+        parameters, state, tried = rebuild(kind.parameters, settings(kind, draw)), kind.initial, []
+        for sample in range(100):
+            pressures = [draw.uniform(1.0e5, 4.5e5) for _ in range(2)]
+            seen: Any = Measurement(draw.uniform(0.9, 1.8), *pressures, draw.uniform(-8.0, 8.0))
+            if walks:
+                heel, toe = (400.0 * (sample // 10 % phases == 0) for phases in (2, 3))
+                seen = GaitMeasurement(*seen, heel + draw.uniform(0.0, 9.0), toe + draw.uniform(0.0, 9.0))
+            tried.append((parameters, state, draw.uniform(-5.0, 5.0), seen, 2.0e-3))
+            _, state = kind.update(*tried[-1])
+        yield Entry(kind.name, kind.update, tried)
+
+
+def profiles(draw: random.Random) -> Iterator[Entry]:
+    """Functions of time."""
+    for kind in PROFILES.values():
+        points = {f"time_{number:02}": 0.07 * number for number in range(1, 40)} | {"period": 1.7}
+        drawn = zip(kind.quantities, settings(kind, draw), strict=True)
+        parameters = kind.parameters(*(points.get(item.name, value or draw.uniform(0.1, 2.0)) for item, value in drawn))
+        yield Entry(kind.name, kind.value, [(parameters, 0.031 * step) for step in range(60)])
+
+
+def valves(draw: random.Random) -> Iterator[Entry]:
+    """Every model that a valve chooses, for the engine and for the reference solver."""
+    for kind in VALVES.values():
+        plain = {item.name: item.default or 0.0 for item in kind.quantities}
+        busy = {item.name: min(item.maximum, max(item.minimum, 0.01)) for item in kind.quantities}
+        busy |= {"spool_frequency": 80.0} if "spool_frequency" in busy else {}
+        models = {id(kind.choose(given)): (kind.choose(given), given) for given in (plain, busy)}
+        for number, (model, given) in enumerate(models.values()):
+            valve, state = model.prepare(given), model.initial()
+            stepped, instants, events, shifts = [], [], [], []
+            for step in range(60):
+                command, time = draw.choice([-1.0, 0.0, 1.0, draw.uniform(-1.0, 1.0)]), 1.0e-3 * step
+                state = model.settle(valve, state, command, time)
+                stepped.append((valve, state, command, time, 1.0e-3))
+                instants.append((valve, state, command))
+                events.append((valve, state, command, time))
+                before, (_, state) = state, model.advance(*stepped[-1])
+                shifts.append((before, state))
+            name = f"{kind.name}_{number}"
+            yield Entry(f"{name}_advance", model.advance, stepped)
+            yield Entry(f"{name}_instant", model.instant, instants)
+            yield Entry(f"{name}_rates", model.rates, instants)
+            yield Entry(f"{name}_next_event", model.next_event, events)
+            yield Entry(f"{name}_settle", model.settle, events)
+            if model.shift is not None:
+                yield Entry(f"{name}_shift", model.shift, shifts)
+
+
+def sensors(draw: random.Random) -> Iterator[Entry]:
+    """Sensors of the torque task, slow ones, and those of a walk with noise, lost samples and faults."""
+    noisy = SensorParameters(0.01, 500.0, 0.002, 300.0, 12345.0)
+    fault = Fault(0.02, 1.0, 0.0)
+    gait = GaitSensors(
+        50.0, 2.0, 1.0, 0.2, 0.3, 0.3, 0.2, 0.2, fault, *(Fault(9.0, 0.0, 1.0),) * 3, Fault(0.03, 0.0, 2e5)
+    )
+    shown, slow = GaitSeen(*(0.0,) * 8), SensorState(1.3, 1e5, 1e5, 1.3, 1e5, 1e5)
+    readings, walking, following = [], [], []
+    for sample in range(50):
+        now = draw.uniform(0.9, 1.8), draw.uniform(1e5, 4e5), draw.uniform(1e5, 4e5)
+        readings.append((noisy, *now, 2.5e-5, sample))
+        walking.append(
+            (noisy, gait, shown, *now, draw.uniform(0, 400), draw.uniform(0, 400), 2.5e-5, 1e-3 * sample, sample)
+        )
+        _, shown = measure_gait(*walking[-1])
+        following.append((SensorRates(300.0, 0.0 if sample % 2 else 600.0), slow, *now, 1e-3))
+        slow = follow_signals(*following[-1])
+    yield Entry("measure", measure, readings)
+    yield Entry("measure_gait", measure_gait, walking)
+    yield Entry("follow_signals", follow_signals, following)
+
+
+def meters(draw: random.Random) -> Iterator[Entry]:
+    """What is worked out sample by sample for the metrics."""
+    course = Course(2.0, 2.0, 1.0e-6, 20.0)
+    samples = [
+        Sample(
+            float(number),
+            *(draw.uniform(-2.0, 2.0) for _ in range(6)),
+            min(0.1 * number, 2.0),
+            *(draw.uniform(250.0, 350.0) for _ in range(2)),
+        )
+        for number in range(60)
+    ]
+    kinds: dict[str, MeterKind] = {meter.name: meter for kind in METRICS.values() for meter in kind.meters}
+    for name, kind in kinds.items():
+        state = kind.start(course, samples[0])
+        tried = []
+        for sample in samples[1:]:
+            tried.append((state, course, sample))
+            state = kind.update(*tried[-1])
+        yield Entry(f"{name}_start", kind.start, [(course, sample) for sample in samples])
+        yield Entry(f"{name}_update", kind.update, tried)
+
+
+def entries() -> list[Entry]:
+    """All that there is, drawn anew in the same way each time."""
+    draw = random.Random(20260)
+    return [entry for part in (controllers, profiles, valves, sensors, meters) for entry in part(draw)]
+
+
+ENTRIES = {f"{number}_{entry.name}": entry for number, entry in enumerate(entries())}
+
+
+def written(value: Any, cells: Iterator[int], collector: SourceCollector) -> str:
+    """Text that makes an argument from the numbers in ``x``."""
+    if isinstance(value, tuple):
+        inner = ", ".join(written(item, cells, collector) for item in value)
+        return f"{collector.add(type(value))}({inner})" if value else "()"
+    return f"int(x[{next(cells)}])" if isinstance(value, int) else f"x[{next(cells)}]"
+
+
+def places(value: Any, path: str) -> list[str]:
+    """Where the numbers of a result are, by index."""
+    if not isinstance(value, tuple):
+        return [path]
+    return [place for number, item in enumerate(value) for place in places(item, f"{path}[{number}]")]
+
+
+@pytest.fixture(scope="module")
+def compiled() -> Any:
+    """One module whose ``run(which, x, y)`` calls the entry of that number."""
+    collector = SourceCollector(QUICKLY)
+    lines = []
+    for number, entry in enumerate(ENTRIES.values()):
+        given = ", ".join(
+            written(value, cells, collector) for cells in [itertools.count()] for value in entry.arguments[0]
+        )
+        result = f"result_{number}"
+        paths = places(entry.function(*entry.arguments[0]), result)
+        lines += [f"    if which == {number}:", f"        {result} = {collector.add(entry.function)}({given})"]
+        lines += [f"        y[{place}] = {path}" for place, path in enumerate(paths)]
+    loop = '@njit("void(int64, float64[::1], float64[::1])", cache=True, error_model="numpy")\ndef run(which, x, y):'
+    return load_generated("contract", "\n".join([HEADER, collector.text(), loop, *lines]) + "\n")
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_an_entry_gives_the_same_compiled_and_interpreted(compiled: Any, name: str) -> None:
+    entry = ENTRIES[name]
+    results = set()
+    for arguments in entry.arguments:
+        expected = numbers(result if isinstance(result := entry.function(*arguments), tuple) else (result,))
+        found = np.full(len(expected), math.nan)
+        compiled.run(list(ENTRIES).index(name), np.array(numbers(arguments)), found)
+        assert found == pytest.approx(expected, rel=ROUNDING, abs=1.0e-15)
+        results.add(tuple(expected))
+    assert len(results) > 1 or entry.name in ("off", "constant") or entry.name.endswith(("_rates", "_next_event"))

@@ -1,0 +1,103 @@
+"""``ppafo new``."""
+
+import json
+import shlex
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from ppafo import load_device, load_parameter_set, load_scenario, load_study, load_walk
+from ppafo.cli.main import build_parser, main
+from ppafo.cli.new import KINDS
+from ppafo.parameters.audit import audit
+from ppafo.questions.question import loaded
+
+SHIPPED = [
+    (kind, Path(item.name).stem)
+    for kind, new in KINDS.items()
+    for item in resources.files("ppafo").joinpath(*new.shipped.split("/")).iterdir()
+    if item.name.endswith(".toml")
+]
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_there_is_one_template_for_each_kind() -> None:
+    templates = (resources.files("ppafo.cli") / "templates").iterdir()
+    assert {item.name for item in templates} == {f"{kind}.toml" for kind in KINDS}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_template_loads_as_it_is_under_its_new_name(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", kind, "my-own", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["file"] == "my-own.toml"
+    made = loaded(KINDS[kind].load)("my-own.toml")
+    assert getattr(made, "name", "my-own") == "my-own"
+    text = Path("my-own.toml").read_text(encoding="utf-8")
+    assert 'name = "template"' not in text
+    assert text.count("#") > 3
+
+
+def test_the_set_of_the_template_passes_the_audit() -> None:
+    main(["new", "set", "bench"])
+    assert {finding.severity for finding in audit(load_parameter_set("bench.toml"))} == {"note"}
+    assert load_device("bench.toml").valve.kind == "proportional"
+
+
+@pytest.mark.parametrize(("kind", "source"), SHIPPED)
+def test_every_file_of_the_package_is_copied_under_a_new_name_and_loads(kind: str, source: str) -> None:
+    assert main(["new", kind, "my-own", "--from", source]) == 0
+    made = Path("my-own.toml").read_text(encoding="utf-8")
+    first = (resources.files("ppafo").joinpath(*KINDS[kind].shipped.split("/")) / f"{source}.toml").read_text("utf-8")
+    differing = [line for old, line in zip(first.split("\n"), made.split("\n"), strict=True) if old != line]
+    assert 'name = "my-own"' in differing
+    assert all(line == 'name = "my-own"' or line.startswith("#   ppafo ") for line in differing)
+
+
+def test_a_copy_has_the_values_of_its_source() -> None:
+    for words in (["scenario", "a", "--from", "step-response"], ["walk", "b", "--from", "solenoid"]):
+        main(["new", *words])
+    main(["new", "study", "c", "--from", "pressure-and-area"])
+    assert load_scenario("a.toml").device == load_scenario("step-response").device
+    assert load_walk("b.toml").settings == load_walk("solenoid").settings
+    assert load_study("c.toml").paths == load_study("pressure-and-area").paths
+
+
+def test_a_file_of_ones_own_is_copied_too_and_only_its_own_name_is_changed() -> None:
+    main(["new", "study", "first"])
+    Path("first.toml").write_text(Path("first.toml").read_text().replace('name = "first"', "name = 'first'"))
+    assert main(["new", "study", "second", "--from", "first.toml"]) == 0
+    study = load_study("second.toml")
+    assert study.name == "second"
+    assert [item.name for item in study.configurations] == ["proportional", "solenoid"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_next_command_is_one_that_there_is(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", kind, "my-own", "--out", "out of the way/mine.toml"]) == 0
+    line = capsys.readouterr().out.splitlines()
+    assert len(line) == 1
+    words = shlex.split(line[0].partition("; next: ")[2])
+    assert "out of the way/mine.toml" in words
+    assert build_parser(words[1]).parse_args(words[1:]).command == words[1]
+
+
+def test_a_file_that_is_there_is_not_overwritten(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("mine.toml").write_text("mine")
+    assert main(["new", "scenario", "mine"]) == 2
+    assert "mine.toml: is there already" in capsys.readouterr().err
+    assert Path("mine.toml").read_text() == "mine"
+
+
+def test_a_copy_that_does_not_load_is_not_left(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["new", "set", "bench"])
+    main(["new", "scenario", "task"])
+    text = Path("task.toml").read_text().replace('"ppafo2011"', '"bench.toml"').replace('"proportional"', '"main"')
+    Path("task.toml").write_text(text)
+    assert main(["new", "scenario", "task", "--from", "task.toml", "--out", "other/task.toml"]) == 2
+    assert "bench.toml" in capsys.readouterr().err
+    assert not list(Path().glob("other/*"))

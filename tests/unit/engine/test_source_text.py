@@ -1,0 +1,430 @@
+"""The composer compiles what Python runs, or refuses it by file and line."""
+
+import functools
+import importlib.util
+import math
+import re
+import struct
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.engine.cache import load_generated
+from ppafo.engine.source_text import SourceCollector, without_origins
+from ppafo.errors import PpafoError, ProgramError
+
+HEADER = "import math\nfrom collections import namedtuple\nfrom numba import njit\n\n\n"
+Write = Callable[..., types.ModuleType]
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
+    """Writes a module, imports it, and returns it."""
+
+    def module_of(text: str, name: str = "my_law") -> types.ModuleType:
+        file = tmp_path / f"{name}.py"
+        file.write_text(text)
+        spec = importlib.util.spec_from_file_location(name, file)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, name, module)
+        spec.loader.exec_module(module)
+        return module
+
+    return module_of
+
+
+def generated(function: Any) -> Callable[..., Any]:
+    """The function as the generated text has it, run by Python."""
+    collector = SourceCollector("")
+    name = collector.add(function)
+    names: dict[str, Any] = {}
+    exec(HEADER.replace("from numba import njit\n", "") + collector.text(), names)
+    return names[name]
+
+
+def refused(function: Any) -> str:
+    """What the composer says about a function that it refuses."""
+    with pytest.raises(ProgramError) as caught:
+        SourceCollector("").add(function)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def test_a_wrapped_function_is_refused(write: Write) -> None:
+    module = write(
+        "import functools\n\n\ndef half(f):\n    @functools.wraps(f)\n    def inner(x):\n        return 0.5 * f(x)\n\n"
+        "    return inner\n\n\n@half\ndef law(x):\n    return 3.0 * x\n"
+    )
+    assert module.law(1.0) == 1.5
+    assert refused(module.law).startswith("my_law.py:")
+    assert "'law' is wrapped by a decorator" in refused(module.law)
+
+
+def test_a_decorated_function_is_refused_even_where_it_hides_that_it_was(write: Write) -> None:
+    module = write("def same(f):\n    return f\n\n\n@same\ndef law(x):\n    return 3.0 * x\n")
+    assert refused(module.law).startswith("my_law.py:6: 'law' is decorated")
+    cached = functools.lru_cache(module.same)
+    assert "plain function" in refused(cached)
+
+
+def test_a_function_of_a_function_is_refused_by_the_names_that_it_takes_from_there(write: Write) -> None:
+    module = write("def make(gain):\n    def law(x):\n        return gain * x\n\n    return law\n")
+    assert refused(module.make(2.0)) == (
+        "my_law.py:2: 'make.<locals>.law' uses 'gain' of the function around it, which is not compiled; "
+        "make it a parameter"
+    )
+
+
+def test_bound_methods_partial_functions_and_objects_are_refused(write: Write) -> None:
+    module = write(
+        "class Law:\n    def update(self, x=1.0):\n        return x\n\n    def __call__(self):\n        return 1.0\n"
+    )
+    for candidate in (module.Law().update, functools.partial(module.Law.update, None), module.Law()):
+        assert "plain function" in refused(candidate)
+
+
+def test_defaults_are_those_that_the_function_has(write: Write) -> None:
+    module = write("GAIN = 2.0\n\n\ndef law(x, gain=GAIN, *, offset=GAIN):\n    return gain * x + offset * GAIN\n")
+    module.GAIN = 100.0
+    assert generated(module.law)(1.0) == module.law(1.0) == 202.0
+    module.law.__defaults__ = (7.0,)
+    module.law.__kwdefaults__ = {"offset": -0.5}
+    assert generated(module.law)(1.0) == module.law(1.0) == -43.0
+
+
+def test_a_default_that_is_no_constant_is_refused(write: Write) -> None:
+    module = write("def law(x, gains=[1.0]):\n    return x\n")
+    assert "a default is not a number" in refused(module.law)
+
+
+def test_two_functions_whose_dotted_names_join_to_one_are_refused(write: Write) -> None:
+    first = write("def c(x):\n    return x\n", "a_b")
+    second = write("def b_c(x):\n    return 2.0 * x\n", "a")
+    collector = SourceCollector("")
+    collector.add(first.c)
+    with pytest.raises(ProgramError, match=r"a.py:1: 'a.b_c' and 'a_b.c' at a_b.py:1 both get the name"):
+        collector.add(second.b_c)
+
+
+def test_a_function_redefined_under_one_name_is_refused_beside_the_first(write: Write) -> None:
+    module = write("def law(x):\n    return x\n\n\nfirst = law\n\n\ndef law(x):\n    return 2.0 * x\n")
+    collector = SourceCollector("")
+    collector.add(module.first)
+    with pytest.raises(ProgramError, match="both get the name"):
+        collector.add(module.law)
+    assert generated(module.first)(3.0) == 3.0
+    assert generated(module.law)(3.0) == 6.0
+
+
+def test_a_module_of_a_user_named_as_one_of_the_package_is_another(write: Write) -> None:
+    from ppafo.model import vane
+
+    module = write("def actuator_torque(a, b, c):\n    return 0.0\n", "model.vane")
+    collector = SourceCollector("")
+    assert collector.add(vane.actuator_torque) != collector.add(module.actuator_torque)
+
+
+def test_a_module_that_was_loaded_anew_is_the_same_where_its_text_is(write: Write) -> None:
+    text = "from typing import NamedTuple\n\n\nclass Row(NamedTuple):\n    a: float\n"
+    text += "\n\ndef law(r):\n    return Row(r.a)\n"
+    first, second = write(text), write(text)
+    collector = SourceCollector("")
+    assert collector.add(first.law) == collector.add(second.law)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [-1.5, -0.0, 0.0, 1e400, -1e400, 5e-324, 0.1, 1 / 3, -7, 2, True, (1.0, -2.0), ((1, 2.5), -0.0)],
+    ids=repr,
+)
+def test_constants_are_written_to_the_last_bit_whatever_stands_around_them(write: Write, value: Any) -> None:
+    module = write("import math\n\nVALUE = 0.0\n\n\ndef law(x):\n    return VALUE\n")
+    module.VALUE = value
+    assert repr(generated(module.law)(1.0)) == repr(module.law(1.0))
+    assert type(generated(module.law)(1.0)) is type(value)
+
+
+def test_what_is_no_number_stays_none(write: Write) -> None:
+    module = write("VALUE = float('nan')\n\n\ndef law(x):\n    return VALUE\n")
+    assert math.isnan(generated(module.law)(1.0))
+
+
+def test_a_power_of_a_negative_constant_is_the_power_of_all_of_it(write: Write) -> None:
+    module = write("BASE = -1.5\n\n\ndef law(x):\n    return BASE**2 + BASE**x\n")
+    assert generated(module.law)(4) == module.law(4) == 2.25 + 5.0625
+
+
+def test_a_number_of_numpy_is_its_number_and_other_kinds_of_numbers_are_refused(write: Write) -> None:
+    module = write(
+        "import enum\nimport numpy as np\n\nGAIN = np.float64(-0.1)\n\n\nclass Level(enum.IntEnum):\n    LOW = 1\n\n\n"
+        "LOW = Level.LOW\n\n\ndef law(x):\n    return GAIN * x\n\n\ndef level(x):\n    return LOW\n"
+    )
+    assert struct.pack("d", generated(module.law)(1.0)) == struct.pack("d", -0.1)
+    assert refused(module.level).startswith("my_law.py:19: cannot compile level: 'LOW' is not a number")
+
+
+def test_a_module_under_another_name_and_functions_of_math_are_found(write: Write) -> None:
+    module = write(
+        "import math as m\nfrom math import pi, sqrt\nfrom math import *\n\n\ndef law(x):\n"
+        "    return sqrt(x) + m.sin(pi) + m.tau + floor(x) + m.inf * 0.0 * 0.0 if x < 0.0 else cos(x)\n"
+    )
+    for value in (-0.0, 2.5):
+        assert generated(module.law)(value) == module.law(value)
+
+
+def test_a_local_name_that_hides_what_is_needed_is_refused(write: Write) -> None:
+    module = write(
+        "from math import sqrt\n\n\ndef other(x):\n    return x\n\n\n"
+        "def law(x):\n    math = 2.0\n    return sqrt(x) * math\n\n\n"
+        "def second(foreign_my_law_other):\n    return other(foreign_my_law_other)\n"
+    )
+    assert "the local name 'math' hides 'sqrt'" in refused(module.law)
+    assert "hides 'other'" in refused(module.second)
+
+
+def test_local_names_hide_global_ones_as_in_python(write: Write) -> None:
+    module = write("x = 5.0\ngain = 3.0\n\n\ndef law(x):\n    gain = 2.0 * x\n    return gain + x\n")
+    assert generated(module.law)(1.0) == module.law(1.0) == 3.0
+
+
+def test_a_function_that_hides_a_builtin_one_is_taken(write: Write) -> None:
+    module = write("def min(a, b):\n    return a * b\n\n\ndef law(x):\n    return min(x, 2.0) + max(x, 2.0)\n")
+    assert generated(module.law)(3.0) == module.law(3.0) == 9.0
+
+
+def test_defaults_of_a_named_tuple_are_written_where_it_is_made(write: Write) -> None:
+    module = write(
+        "from typing import NamedTuple\n\nGAIN = 2.0\n\n\nclass Row(NamedTuple):\n    a: float\n    b: float = GAIN\n"
+        "    c: float = -1.0\n\n\ndef law(x):\n    return Row(x), Row(a=x), Row(x, c=4.0), Row(x, 5.0, 6.0)\n"
+    )
+    module.GAIN = 9.0
+    assert generated(module.law)(1.0) == module.law(1.0) == ((1, 2, -1), (1, 2, -1), (1, 2, 4), (1, 5, 6))
+
+
+def test_a_named_tuple_that_does_more_than_hold_numbers_is_refused(write: Write) -> None:
+    module = write(
+        "from typing import NamedTuple\n\n\nclass Vector(NamedTuple):\n    x: float\n\n    def __add__(self, other):\n"
+        "        return Vector(self.x + other.x)\n\n\nclass Base(NamedTuple):\n    x: float\n\n\nclass Doubled(Base):\n"
+        "    def __new__(cls, x):\n        return super().__new__(cls, 2.0 * x)\n\n\ndef law(x):\n"
+        "    return Vector(x) + Vector(x)\n\n\ndef doubled(x):\n    return Doubled(x)\n"
+    )
+    assert "gives __add__ a meaning" in refused(module.law)
+    assert "must be a NamedTuple itself" in refused(module.doubled)
+
+
+def test_attributes_of_classes_are_refused(write: Write) -> None:
+    module = write(
+        "from typing import NamedTuple\n\n\nclass Row(NamedTuple):\n    a: float\n\n\n"
+        "class Config:\n    gain = 2.0\n\n\n"
+        "def law(x):\n    return Config.gain * x\n\n\ndef other(x):\n    return Row._make((x,))\n"
+    )
+    assert refused(module.law).startswith("my_law.py:13: 'Config.gain'")
+    assert refused(module.other).startswith("my_law.py:17: 'Row._make")
+
+
+def test_names_of_packages_are_followed_to_their_end(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    write("GAIN = 3.0\n\n\ndef twice(x):\n    return 2.0 * x\n", "pack.gains")
+    package = types.ModuleType("pack")
+    package.gains = sys.modules["pack.gains"]  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pack", package)
+    module = write("import pack\n\n\ndef law(x):\n    return pack.gains.twice(x) * pack.gains.GAIN\n")
+    assert generated(module.law)(1.0) == module.law(1.0) == 6.0
+
+
+def test_a_file_that_changed_since_it_was_loaded_is_refused(write: Write) -> None:
+    module = write("def law(x):\n    return 2.0 * x\n")
+    Path(module.__file__ or "").write_text("def law(x):\n    return 3.0 * x\n")
+    assert "the file has changed since it was loaded" in refused(module.law)
+
+
+def test_code_that_was_exchanged_is_refused(write: Write) -> None:
+    module = write("def law(x):\n    return 2.0 * x\n\n\ndef other(x):\n    return 3.0 * x\n")
+    module.law.__code__ = module.other.__code__.replace(co_name="law")
+    assert generated_or_refused(module.law, 1.0) in ("refused", 3.0)
+
+
+def generated_or_refused(function: Any, value: float) -> Any:
+    """What the generated function gives, or that there is none."""
+    try:
+        return generated(function)(value)
+    except PpafoError:
+        return "refused"
+
+
+def test_a_lambda_is_refused(write: Write) -> None:
+    module = write("def make(x): return lambda x: 2.0 * x\n\n\nlaw = lambda x: 3.0 * x\n")
+    for candidate in (module.law, module.make(1.0)):
+        assert "must be a plain function" in refused(candidate)
+
+
+def test_functions_that_call_themselves_are_refused(write: Write) -> None:
+    module = write(
+        "def law(x):\n    return law(x - 1.0) if x > 0.0 else 0.0\n\n\ndef one(x):\n    return two(x)\n\n\n"
+        "def two(x):\n    return one(x)\n"
+    )
+    assert "'law' calls itself" in refused(module.law)
+    assert "'one' calls itself" in refused(module.one)
+
+
+@pytest.mark.parametrize(
+    ("body", "word"),
+    [
+        ("return {1: x}[1]", "a dictionary"),
+        ("return [x][0]", "a list"),
+        ("return sum([y for y in (x, x)])", "a list"),
+        ("return sum(y for y in (x, x))", "a generator"),
+        ("return (lambda y: y)(x)", "a lambda"),
+        ("return len(f'{x}')", "an f-string"),
+        ("return len('text')", "a constant of type str"),
+        ("return len(b'text')", "a constant of type bytes"),
+        ("return (y := x)", "':='"),
+        ("a, *b = x, x\n    return a", "'*' on the left"),
+        ("return max(**{})", "'**'"),
+        ("global LEVEL\n    LEVEL = x\n    return x", "'global'"),
+        ("import math\n    return math.sin(x)", "'import' in a function"),
+        ("try:\n        return x\n    except ValueError:\n        return x", "'try'"),
+        ("with x:\n        return x", "'with'"),
+        ("assert x > 0.0\n    return x", "'assert'"),
+        ("raise ValueError", "'raise'"),
+        ("yield x", "'yield'"),
+        ("match x:\n        case _:\n            return x", "'match'"),
+        ("def inner():\n        return x\n    return inner()", "a function in a function"),
+        ("print(x)\n    return x", "'print'"),
+        ("x.real = 1.0\n    return x", "cannot be changed"),
+        ("return x.is_integer()", "is a method"),
+    ],
+)
+def test_what_is_not_compiled_is_named_with_its_line(write: Write, body: str, word: str) -> None:
+    module = write(f"LEVEL = 1.0\n\n\ndef law(x):\n    {body}\n")
+    message = refused(module.law)
+    assert re.match(r"my_law\.py:\d+: ", message)
+    assert word in message
+
+
+def test_notes_and_types_of_local_names_are_left_away(write: Write) -> None:
+    module = write(
+        'def law(x: "Undefined", /) -> "Undefined":\n    """Docstring."""\n    y: "Undefined" = 2.0 * x\n    z: float\n'
+        '    if x > 0.0:\n        "a note"\n    z = 1.0\n    return y + z\n'
+    )
+    assert generated(module.law)(1.5) == module.law(1.5) == 4.0
+
+
+def test_origins_say_from_which_line_each_generated_line_comes_and_do_not_count(write: Write) -> None:
+    text = (
+        "def law(\n    x,\n):\n    # a remark\n    if x > 0.0:\n        y = (\n            x\n        )\n"
+        "    elif x < -1.0:\n"
+        "        y = 1.0\n    else:\n        y = 2.0\n    return y\n"
+    )
+    collector = SourceCollector("@njit")
+    collector.add(write(text).law)
+    first, *rest = collector.text().split("\n")
+    assert first.endswith(": 1 5 6 9 10 12 12 13 14")
+    assert len(rest) == 1 + 8
+    moved = SourceCollector("@njit")
+    moved.add(write("\n\n\n" + text).law)
+    assert without_origins(moved.text()) == without_origins(collector.text()) == "\n".join(rest)
+
+
+def test_a_rebound_number_or_function_is_noticed(write: Write) -> None:
+    text = "import math\n\nGAIN = 2.0\n\n\ndef other(x, y=1.0):\n    return x\n\n\n"
+    text += "def law(x):\n    return GAIN * other(x)\n"
+    for change in ("GAIN = 3.0", "other = math.sin", "other.__defaults__ = (3.0,)", "other.__code__ = law.__code__"):
+        module = write(text)
+        collector = SourceCollector("")
+        collector.add(module.law)
+        assert collector.is_current()
+        exec(change, vars(module))
+        assert not collector.is_current(), change
+
+
+def compiled_law(module: types.ModuleType, call: str = "law(measurement, x[0])") -> None:
+    """Compile ``law`` as a model does: called from a loop with a measurement and a number."""
+    collector = SourceCollector('@njit(error_model="numpy")')
+    row, law = collector.add(module.Measurement), collector.add(module.law)
+    call = call.replace("law", law)
+    loop = f'@njit("void(float64[::1])")\ndef advance(x):\n    measurement = {row}(x[0], x[1])\n    x[0] = {call}\n'
+    load_generated("test", f"{HEADER}{collector.text()}\n\n\n{loop}")
+
+
+MEASUREMENT = (
+    "import math\nfrom typing import NamedTuple\n\nimport numpy as np\n\n\nclass Measurement(NamedTuple):\n"
+    "    angle: float\n    torque: float\n\n\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        (
+            "def law(measurement, x):\n    return (\n        x\n        - measurement.torqe\n    )\n",
+            "my_law.py:15: measurement has no 'torqe', did you mean 'torque'?",
+        ),
+        (
+            "def law(measurement, x):\n    return mat.sin(x)\n",
+            "my_law.py:13: there is no 'mat', did you mean 'math'?",
+        ),
+        (
+            "def clamp(x):\n    return x\n\n\ndef law(measurement, x):\n    return clmp(x)\n",
+            "my_law.py:17: there is no 'clmp', did you mean 'clamp'?",
+        ),
+        (
+            "def clamp(x, low):\n    return x\n\n\ndef law(measurement, x):\n    return clamp(x)\n",
+            "my_law.py:17: clamp(x, low): missing a required argument: 'low'",
+        ),
+        (
+            "def law(measurement, x):\n    if x > 0.0:\n        return x\n",
+            "my_law.py:12: 'law' can end without 'return'; every way through it returns a value",
+        ),
+        (
+            "def law(measurement, x):\n    if x > 0.0:\n        return x, x\n    return x\n",
+            "my_law.py:14: the ways through the function return different things: a number or a tuple",
+        ),
+        (
+            "def law(measurement, x):\n    return {0: x}[0]\n",
+            "my_law.py:13: a dictionary is not compiled; a law is made of numbers, tuples, NamedTuples, 'math' and "
+            "other plain functions",
+        ),
+        (
+            "def law(measurement, x):\n    return np.clip(x, 0.0, 1.0)\n",
+            "my_law.py:13: 'np.clip' is of numpy, which is not compiled here; 'math' has its functions of one number",
+        ),
+        (
+            "def law(measurement, x):\n    return measurement / x\n",
+            "my_law.py:13: '/' is not compiled for a Measurement and a number, in 'return measurement / x'",
+        ),
+        (
+            "def law(measurement, x):\n    return Measurement(x, torqe=x).torque\n",
+            "my_law.py:13: Measurement(angle, torque): has no 'torqe', did you mean 'torque'?",
+        ),
+        (
+            "def law(measurement, x):\n    if x > 0.0:\n        y = x\n    return y\n",
+            "my_law.py:15: 'y' may have no value here; give it one before, on every way",
+        ),
+        (
+            "def law(measurement, x):\n    a, b = x\n    return a\n",
+            "my_law.py:13: 'a, b = x' needs as many values as there are names, not a number",
+        ),
+        (
+            "def law(measurement, x):\n    return math.fsum((x, x))\n",
+            "my_law.py:13: 'math.fsum' is not compiled",
+        ),
+        (
+            "def law(measurement, x, y):\n    return x\n",
+            "my_law.py:12: law(measurement, x, y): the engine calls it with (measurement, x[0]): missing a required "
+            "argument: 'y'",
+        ),
+    ],
+    ids=lambda value: value.split(":")[0] if value.startswith("my_law") else "",
+)
+@pytest.mark.usefixtures("fresh_cache")
+def test_the_commonest_mistakes_in_a_law_are_one_line_about_its_file(write: Write, law: str, message: str) -> None:
+    with pytest.raises(PpafoError) as caught:
+        compiled_law(write(MEASUREMENT + law))
+    assert str(caught.value) == message

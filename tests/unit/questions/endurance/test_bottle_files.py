@@ -1,0 +1,123 @@
+"""Files of bottles: those of the package, overrides, and mistakes in one line."""
+
+import re
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from ppafo.errors import ParameterError
+from ppafo.questions.endurance.file import PAPER_BOTTLE, json_schema, list_bottles, load_bottle
+
+TEXT = (resources.files("ppafo.questions.endurance") / "bottles" / f"{PAPER_BOTTLE}.toml").read_text(encoding="utf-8")
+
+
+def changed(tmp_path: Path, old: str, new: str) -> Path:
+    """The paper's bottle with one text replaced."""
+    assert old in TEXT
+    path = tmp_path / "mine.toml"
+    path.write_text(TEXT.replace(old, new, 1), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", list_bottles())
+def test_every_bottle_is_whole_and_says_why_each_value_is_what_it_is(name: str) -> None:
+    bottle = load_bottle(name)
+    assert bottle.name == name
+    assert bottle.mass > 0.0
+    assert all(entry.source for entry in bottle.entries.values())
+
+
+def test_what_the_paper_prints_of_its_bottle_is_published_and_nothing_else() -> None:
+    bottle = load_bottle(PAPER_BOTTLE)
+    published = {path for path, entry in bottle.entries.items() if entry.origin == "published"}
+    assert bottle.mass == pytest.approx(0.255)
+    assert published == {"bottle.gas_mass", "regulator.set_pressure", "room.temperature"}
+
+
+def test_a_value_is_replaced_and_a_pressure_replaces_a_mass() -> None:
+    assert load_bottle(PAPER_BOTTLE, ["bottle.gas_mass=100 g"]).mass == pytest.approx(0.1)
+    filled = load_bottle("air-48ci-3000psi", ["bottle.gas_mass=50 g"])
+    assert filled.mass == pytest.approx(0.05)
+    assert "bottle.fill_pressure" not in filled.entries
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("bottle.volum=1 L", "did you mean 'bottle.volume'"),
+        ("bottle.volume=1 kg", "does not fit"),
+        ("bottle.volume", "PATH=VALUE"),
+        ("bottle.volume=0 L", "must be at least"),
+        ("bottle.volume=300 cm^3", "liquid would fill it"),
+        ("room.temperature=40 degC", "known above 216.592 K and up to 303.9 K"),
+        ("regulator.set_pressure=70 bar_g", "its regulator needs"),
+        ("regulator.set_pressure=50 psi", "does not say which pressure"),
+    ],
+)
+def test_overrides_that_cannot_be_are_refused_in_one_line(override: str, words: str) -> None:
+    with pytest.raises(ParameterError, match=re.escape(words)) as caught:
+        load_bottle(PAPER_BOTTLE, [override])
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[bottle.volume]", "[bottle.volumen]", "unknown key 'bottle.volumen', did you mean 'volume'"),
+        ('value = "CO2"', 'value = "C02"', "no property table of 'C02', did you mean 'CO2'"),
+        ('unit = "J/K"', 'unit = "J"', "bottle.wall_heat_capacity = 400 J"),
+        ("schema_version = 1", "schema_version = 2", "schema_version"),
+        (
+            '[bottle.gas_mass]\nvalue = 255.0\nunit = "g"',
+            '[bottle.fill_pressure]\nvalue = 30.0\nunit = "bar_a"',
+            "'bottle.fill_temperature' is missing",
+        ),
+    ],
+)
+def test_mistakes_in_a_file_are_named(tmp_path: Path, old: str, new: str, words: str) -> None:
+    path = changed(tmp_path, old, new)
+    with pytest.raises(ParameterError, match=re.escape(words)) as caught:
+        load_bottle(path)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_a_missing_value_is_named(tmp_path: Path) -> None:
+    start = TEXT.index("[regulator.droop]")
+    end = TEXT.index("[regulator.pressure_margin]")
+    path = tmp_path / "mine.toml"
+    path.write_text(TEXT[:start] + TEXT[end:], encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"'regulator.droop' is missing"):
+        load_bottle(path)
+
+
+def test_both_ways_of_saying_how_full_a_bottle_is_are_one_too_many(tmp_path: Path) -> None:
+    extra = (
+        '[bottle.fill_pressure]\nvalue = 8.0\nunit = "bar_a"\norigin = "assumed"\nsource = "test"\n\n[bottle.volume]'
+    )
+    with pytest.raises(ParameterError, match=r"give either bottle.gas_mass or"):
+        load_bottle(changed(tmp_path, "[bottle.volume]", extra))
+
+
+def test_liquid_cannot_be_filled_by_pressure(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"give bottle.gas_mass instead"):
+        load_bottle(filled_by_pressure(tmp_path, 70.0))
+
+
+def test_gas_above_no_liquid_can_be_filled_by_pressure(tmp_path: Path) -> None:
+    bottle = load_bottle(filled_by_pressure(tmp_path, 30.0))
+    assert bottle.mass / bottle.volume == pytest.approx(66.0, rel=0.05)
+
+
+def filled_by_pressure(tmp_path: Path, pressure: float) -> Path:
+    """The paper's bottle, filled with CO2 to a pressure [bar absolute] at room temperature."""
+    start, end = TEXT.index("[bottle.gas_mass]"), TEXT.index("[bottle.volume]")
+    entry = '[bottle.{0}]\nvalue = {1}\nunit = "{2}"\norigin = "assumed"\nsource = "test"\n\n'
+    filled = entry.format("fill_pressure", pressure, "bar_a") + entry.format("fill_temperature", 298.0, "K")
+    path = tmp_path / "mine.toml"
+    path.write_text(TEXT[:start] + filled + TEXT[end:], encoding="utf-8")
+    return path
+
+
+def test_the_schema_of_a_file_names_every_value() -> None:
+    assert {"bottle", "regulator", "room", "gas"} <= set(json_schema()["properties"])

@@ -1,0 +1,248 @@
+"""The gas of a walk: how full its chambers get, from its folder as from its result, and what reuse makes of it."""
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.errors import DataError, ParameterError
+from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
+from ppafo.questions.endurance.draw import (
+    FORMAT,
+    Actuator,
+    Schedule,
+    WalkGas,
+    draw_of_walk,
+    full_chambers,
+    largest_flow,
+    read_walk_gas,
+    walk_gas,
+)
+from ppafo.questions.endurance.file import PAPER_BOTTLE, load_bottle
+from ppafo.questions.endurance.solve import endurance_of_walk, endurance_of_walk_gas
+from ppafo.signals import Channel, Recording
+from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.walking import WalkResult, walk
+
+ACTUATOR = Actuator(0.35, 2.27, 5.1e-5, 2e-6, 2e-6)
+LONG = Schedule(86400.0, 0.0, 86400.0)
+STRIDE = 1.0
+
+
+@cache
+def solenoid() -> WalkResult:
+    return walk("solenoid", 0.1)
+
+
+def pulses(strides: float) -> WalkGas:
+    """A made-up walk: chamber 1 peaks at 3 bar and 1.8 rad in each stride, chamber 2 later at 4 bar and 1.5 rad."""
+    time = np.arange(0.0, strides * STRIDE + 5e-4, 1e-3)
+    phase = time % STRIDE
+    first, second = np.exp(-(((phase - 0.5) / 0.02) ** 2)), np.exp(-(((phase - 0.8) / 0.02) ** 2))
+    channels = {
+        "angle": Channel(1.6 + 0.2 * first - 0.1 * second, "rad"),
+        "pressure_1": Channel(1e5 + 2e5 * first, "Pa"),
+        "pressure_2": Channel(1e5 + 3e5 * second, "Pa"),
+        "supplied_mass": Channel(6e-4 * time / STRIDE, "kg"),
+    }
+    return WalkGas("pulses", Recording("pulses", time, channels, kind="simulated"), 6e-4, STRIDE, ACTUATOR)
+
+
+def folder_of(walk: WalkGas, path: Path) -> Path:
+    """What ``ppafo walk`` writes, as far as the gas goes."""
+    path.mkdir(parents=True)
+    actuator = {name: getattr(walk.actuator, name) for name in Actuator.__slots__}
+    configuration = {"name": walk.name, "gait": {"stride_time": walk.stride_time}, "device": {"actuator": actuator}}
+    metrics = {"gas": {"value": walk.gas_per_stride, "unit": "kg"}}
+    document = {"format": FORMAT, "configuration": configuration, "metrics": metrics}
+    (path / "walk.json").write_text(json.dumps(document))
+    (path / "recording.nc").write_bytes(netcdf_bytes(walk.recording, None))
+    return path
+
+
+def test_chambers_are_taken_where_they_are_fullest_without_the_first_strides() -> None:
+    full = full_chambers(pulses(5.0))
+    assert full.strides == 3
+    assert full.exhaust_pressure == pytest.approx(3e5, rel=1e-3)
+    assert full.fill_pressure == pytest.approx(4e5, rel=1e-3)
+    assert full.exhaust_volume == pytest.approx(chamber_1_volume(1.8, 0.35, 5.1e-5, 2e-6), rel=1e-3)
+    assert full.fill_volume == pytest.approx(chamber_2_volume(1.5, 2.27, 5.1e-5, 2e-6), rel=1e-3)
+
+
+def test_a_stride_that_differs_moves_the_mean() -> None:
+    made = pulses(5.0)
+    pressure = np.where(made.recording.time > 4.0, 0.5, 1.0) * made.recording["pressure_1"]
+    names = made.recording.names
+    channels = {name: Channel(made.recording[name], made.recording.unit(name)) for name in names}
+    changed = Recording("weak", made.recording.time, channels | {"pressure_1": Channel(pressure, "Pa")})
+    full = full_chambers(replace(made, recording=changed))
+    assert full.exhaust_pressure == pytest.approx((3e5 + 3e5 + 1.5e5) / 3.0, rel=1e-3)
+
+
+def test_a_walk_of_two_strides_says_nothing_of_a_settled_one() -> None:
+    with pytest.raises(DataError, match="contain no complete stride after the first 2"):
+        full_chambers(pulses(2.4))
+
+
+def test_a_folder_says_what_the_walk_says(tmp_path: Path) -> None:
+    here = walk_gas(solenoid())
+    read = read_walk_gas(folder_of(here, tmp_path / "walk"))
+    assert replace(read, recording=here.recording) == here
+    assert full_chambers(read) == full_chambers(here)
+    assert draw_of_walk(read) == draw_of_walk(here)
+    assert read.gas_per_stride == solenoid().metrics["gas"].value
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ('{"format": "ppafo endurance"}', "is not the result of a ppafo walk"),
+        ('{"format": "ppafo walk", "configuration": {}}', "has no number at 'configuration.device.actuator.angle_min'"),
+        ('{"format": "ppafo walk", "status": {"kind": "diverged"}}', "the walk diverged, so it cannot be repeated"),
+        ("[", "is not JSON"),
+        ('{"format": "ppafo walk", "status": "completed"}', "'status' is not a table of names and values"),
+        ('{"format": "ppafo walk", "configuration": 3}', "has no number at 'configuration.device.actuator.angle_min'"),
+    ],
+)
+def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, words: str) -> None:
+    (tmp_path / "walk.json").write_text(content)
+    with pytest.raises(DataError, match=words):
+        read_walk_gas(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("metrics", None, "'metrics' is not a table of names and values"),
+        ("metrics.gas", None, "has no number at 'metrics.gas.value'"),
+        ("metrics.gas.value", -1.0, "'metrics.gas.value' is -1, which is impossible for a walk"),
+        ("metrics.gas.value", 10**400, "has no number at 'metrics.gas.value'"),
+        ("configuration.gait.stride_time", 0, "'configuration.gait.stride_time' is 0, which is impossible for a walk"),
+        ("configuration.gait", [], "has no number at 'configuration.gait.stride_time'"),
+        (
+            "configuration.device.actuator.dead_volume_1",
+            -1e-6,
+            "dead_volume_1' is -1e-06, which is impossible for a walk",
+        ),
+    ],
+)
+def test_a_damaged_walk_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], path: str, value: object, words: str
+) -> None:
+    folder = folder_of(pulses(5.0), tmp_path / "walk")
+    file = folder / "walk.json"
+    document = json.loads(file.read_text())
+    *parts, last = path.split(".")
+    node = document
+    for part in parts:
+        node = node[part]
+    node[last] = value
+    file.write_text(json.dumps(document))
+    assert main(["endurance", str(folder)]) == 2
+    said = capsys.readouterr().err
+    assert re.search(words, said)
+    assert said.count("\n") == 1
+
+
+def test_a_recording_without_pressures_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = pulses(5.0)
+    channels = {name: Channel(made.recording[name], made.recording.unit(name)) for name in ("angle", "supplied_mass")}
+    bare = Recording("bare", made.recording.time, channels, kind="simulated")
+    folder = folder_of(replace(made, recording=bare), tmp_path / "walk")
+    assert main(["endurance", str(folder), "--reuse", "reservoir_volume=50 cm^3"]) == 2
+    assert "has no channel 'pressure_1'" in capsys.readouterr().err
+
+
+def test_reuse_takes_the_chambers_from_the_walk_and_a_given_value_overrides() -> None:
+    made = endurance_of_walk(solenoid(), reuse=["reservoir_volume=50 cm^3", "fill_pressure=20 psi_g"])
+    assert made is not None
+    assert made.reuse is not None
+    assert made.without_reuse is not None
+    full = full_chambers(walk_gas(solenoid()))
+    assert made.reuse.cycle.exhaust_pressure == full.exhaust_pressure
+    assert made.reuse.cycle.exhaust_volume == full.exhaust_volume
+    assert made.reuse.cycle.fill_volume == full.fill_volume
+    assert made.reuse.cycle.fill_pressure == pytest.approx(101325.0 + 20 * 6894.757, rel=1e-6)
+    assert made.reuse.origins["fill_pressure"] == "given"
+    assert made.reuse.origins["exhaust_volume"].startswith("from the walk, mean over ")
+    assert made.reuse.balance.exhausted_mass > made.reuse.balance.returned_mass > 1e-5
+    assert made.discharge.steps > made.without_reuse.steps
+
+
+def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = folder_of(walk_gas(solenoid()), tmp_path / "walk")
+    assert main(["endurance", str(folder), "--reuse", "reservoir_volume=50cm^3", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    made = endurance_of_walk(solenoid(), reuse=["reservoir_volume=50 cm^3"])
+    assert made is not None
+    assert document["result"]["steps"] == pytest.approx(made.discharge.steps, rel=1e-6)
+    assert document["reuse"]["origins"]["exhaust_pressure"].startswith("from the walk")
+
+
+def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one, two = (folder_of(walk_gas(solenoid()), tmp_path / name) for name in ("one", "two"))
+    assert main(["endurance", str(one), str(two), "--reuse", "reservoir_volume=50cm^3"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    titles = "gas use,gas per step (g),walking (min),steps,gas saved (g),walking with reuse (min),steps with reuse"
+    assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == [*titles.split(","), "ended"]
+    assert lines[3].split()[0] == str(one)
+    assert lines[3].split()[1:] == lines[4].split()[1:]
+    assert lines[6].startswith(f"{one}: exhaust at ")
+    assert "from the walk, mean over " in lines[6]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--step-time", "1.1 s"], "one stride of its walk"),
+        (["--peak-flow", "4 g/s"], "belongs to --gas-per-step"),
+        (["--gas-per-step", "1 g"], "give either a recording or --gas-per-step"),
+    ],
+)
+def test_what_does_not_belong_to_a_walk_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], words: str
+) -> None:
+    folder = folder_of(pulses(5.0), tmp_path / "walk")
+    assert main(["endurance", str(folder), *more]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_several_recordings_have_one_folder_and_none_comes_twice(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(folder_of(pulses(5.0), tmp_path / "walk"))
+    assert main(["endurance", folder, folder, "--out", str(tmp_path / "out")]) == 2
+    assert "given twice" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    other = str(folder_of(pulses(6.0), tmp_path / "other"))
+    assert main(["endurance", folder, other, "--out", str(tmp_path / "out")]) == 0
+    names = ["endurance.json", "endurance.txt", "ppafo.json", "report.html"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
+    assert set(json.loads((tmp_path / "out" / "endurance.json").read_text())["recordings"]) == {folder, other}
+
+
+def test_a_walk_whose_chambers_hold_more_than_it_took_is_refused() -> None:
+    little = replace(pulses(5.0), gas_per_stride=1e-5)
+    with pytest.raises(ParameterError, match=r"more than the 0\.01 g"):
+        endurance_of_walk_gas(little, load_bottle(PAPER_BOTTLE), LONG, ["reservoir_volume=50 cm^3"])
+
+
+def test_a_walk_without_gas_lasts_for_ever() -> None:
+    with pytest.raises(DataError, match="never be empty"):
+        draw_of_walk(replace(pulses(5.0), gas_per_stride=0.0))
+
+
+def test_the_largest_flow_is_that_of_the_bottles_regulator_where_there_are_lines() -> None:
+    recording = walk("solenoid-regulators", 0.1).recording
+    channels = {name: Channel(recording[name], recording.unit(name)) for name in ("supplied_mass", "regulated_mass")}
+    both = Recording("both", recording.time, channels)
+    alone = Recording("alone", recording.time, {"supplied_mass": channels["regulated_mass"]})
+    assert largest_flow(both) == largest_flow(alone)
+    assert largest_flow(both) != largest_flow(
+        Recording("valve", recording.time, {"supplied_mass": channels["supplied_mass"]})
+    )

@@ -1,0 +1,155 @@
+"""``ppafo find``: the lowest or highest value that meets a condition."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import ppafo
+from ppafo.cli.main import main
+from ppafo.errors import StudyError
+from ppafo.progress import Progress
+from ppafo.questions.find import solve
+from ppafo.questions.find.answer import remarks, stretches, verdict
+from ppafo.questions.find.solve import ACCURACY, Found, find
+from ppafo.studies.outcomes import Outcomes
+
+Floats = NDArray[np.float64]
+
+TASK = "torque-task-proportional"
+BAR = 1e5
+RANGE = "supply.pressure=2..10 bar_a"
+LIMIT = "final_error <= 1 N m"
+
+
+@pytest.fixture
+def of_curve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Found]:
+    """A search on a formula [N m] of the supply pressure [bar] in place of a simulation; nan where a run fails."""
+
+    def search(curve: Callable[[Floats], Floats], condition: str = LIMIT, **options: int) -> Found:
+        def model(columns: Mapping[str, Floats]) -> Outcomes:
+            values = curve(columns["supply.pressure"] / BAR)
+            return Outcomes(
+                {condition.split(maxsplit=1)[0]: values}, np.isnan(values), "diverged" if np.isnan(values).any() else ""
+            )
+
+        monkeypatch.setattr(solve, "scenario_model", lambda *_: model)
+        return find(TASK, RANGE, condition, **options)
+
+    return search
+
+
+@pytest.mark.parametrize(
+    ("curve", "condition", "highest", "expected"),
+    [
+        (lambda p: 6.3 - p, LIMIT, False, 5.3),
+        (lambda p: p - 6.3, LIMIT, True, 7.3),
+        (lambda p: p**2, "final_error >= 30 N m", False, np.sqrt(30.0)),
+        (lambda p: np.where(p < 4.4444, 0.0, 9.0), LIMIT, True, 4.4444),
+    ],
+)
+def test_the_value_is_found_to_a_millionth_of_the_range(
+    of_curve: Callable[..., Found], curve: Callable[[Floats], Floats], condition: str, highest: bool, expected: float
+) -> None:
+    found = of_curve(curve, condition, highest=highest)
+    assert found.value is not None
+    assert found.beyond is not None
+    assert abs(found.value / BAR - expected) <= 8.0 * ACCURACY
+    assert min(found.value, found.beyond) / BAR <= expected <= max(found.value, found.beyond) / BAR
+    assert found.condition.is_met(np.array([found.metric_at(found.value), found.metric_at(found.beyond)])).tolist() == [
+        True,
+        False,
+    ]
+    assert found.changes == 1
+    assert np.count_nonzero(found.grid) == 64
+    assert np.all(np.diff(found.values) > 0.0)
+    assert "does not" in verdict(found)
+
+
+def test_a_condition_that_is_never_met_has_no_value_and_shows_the_nearest(of_curve: Callable[..., Found]) -> None:
+    found = of_curve(lambda p: 2.0 + (p - 4.0) ** 2, grid=9)
+    assert (found.value, found.beyond, found.changes) == (None, None, 0)
+    assert found.values.size == 9
+    assert verdict(found).startswith("no supply.pressure from 14.3")
+    assert "the nearest is 2 N m at 43.3" in verdict(found)
+    assert not found.answer().passed
+
+
+@pytest.mark.parametrize(("highest", "end", "word"), [(False, 2.0, "lower"), (True, 10.0, "higher")])
+def test_a_condition_that_is_always_met_ends_where_the_range_does(
+    of_curve: Callable[..., Found], highest: bool, end: float, word: str
+) -> None:
+    found = of_curve(lambda p: 0.0 * p, highest=highest)
+    assert found.value == pytest.approx(end * BAR)
+    assert found.beyond is None
+    assert f"the end of the range: final_error is 0 N m there; a wider range may have a {word} one" in verdict(found)
+    assert "the condition is met everywhere" in remarks(found)[0]
+
+
+def test_a_condition_that_changes_more_than_once_says_so_and_shows_where_it_is_met(
+    of_curve: Callable[..., Found],
+) -> None:
+    found = of_curve(lambda p: 1.0 + np.sin(p))
+    assert found.value is not None
+    assert found.value / BAR == pytest.approx(np.pi, abs=1e-5)
+    assert found.changes == 3
+    assert "changes 3 times over the range, so it is not met everywhere above this value" in remarks(found)[1]
+    assert np.array(stretches(found)) / BAR == pytest.approx(np.array([[3.14, 6.28], [9.42, 10.0]]), abs=0.13)
+    highest = of_curve(lambda p: 1.0 + np.sin(p), highest=True)
+    assert (highest.value, highest.beyond, highest.changes) == (10.0 * BAR, None, 3)
+
+
+def test_runs_that_fail_count_as_not_met_and_are_said(of_curve: Callable[..., Found]) -> None:
+    found = of_curve(lambda p: np.where(p < 3.0, np.nan, 0.0))
+    assert found.value is not None
+    assert found.value / BAR == pytest.approx(3.0, abs=1e-5)
+    assert found.failures > 8
+    assert "runs failed and count as not met; the first: diverged" in remarks(found)[1]
+    with pytest.raises(StudyError, match="has a 'final_error'; the first: diverged"):
+        of_curve(lambda p: np.full_like(p, np.nan))
+
+
+def test_the_lower_end_takes_the_unit_of_the_upper_one() -> None:
+    base = ppafo.load_scenario(TASK)
+    for text in ("supply.pressure=20..90 psi_g", "supply.pressure = 20 psi_g .. 90 psi_g", RANGE):
+        path, low, high = solve._range(text, base)
+        assert path.path == "supply.pressure"
+        assert low < high
+    assert solve._range("valve.discharge_coefficient=0.1..0.25", base)[1:] == (0.1, 0.25)
+    assert solve._range("valve.area=1.5..2 mm^2", base)[1:] == pytest.approx((1.5e-6, 2e-6))
+
+
+def test_the_value_meets_the_condition_in_a_run_of_its_own_and_its_neighbour_does_not(tmp_path: Path) -> None:
+    heard: list[Progress] = []
+    found = find(TASK, "supply.pressure=40..80 psi_g", "final_error <= 0.3 N m", grid=16, progress=heard.append)
+    assert found.value is not None
+    for value, meets in ((found.value, True), (found.beyond, False)):
+        alone = ppafo.simulate(TASK, [f"supply.pressure={value!r} Pa_a"]).metrics["final_error"].value
+        assert (alone <= 0.3 + 1e-9) == meets or abs(alone - 0.3) < 1e-6
+    assert heard[-1].done == found.values.size
+    found.save(tmp_path / "out")
+    document = json.loads((tmp_path / "out" / "find.json").read_text())
+    assert document["value"] == found.value
+    assert len(document["tried"]) == document["runs"] == found.values.size
+    assert (tmp_path / "out" / "find.png").stat().st_size > 10_000
+    assert found.plot().axes
+
+
+def test_the_command_prints_the_value_and_fails_where_there_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+    words = [
+        "find",
+        TASK,
+        "--vary",
+        "supply.pressure=40..55 psi_g",
+        "--such-that",
+        "final_error <= 0.3 N m",
+        "--grid",
+        "4",
+    ]
+    assert main(words) == 1
+    assert "no supply.pressure from 40 psi_g to 55 psi_g meets" in capsys.readouterr().out
+    assert main([*words, "--set", "reference.level=4 N m", "--highest", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["wanted"] == "highest"

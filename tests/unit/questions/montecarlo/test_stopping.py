@@ -1,0 +1,181 @@
+"""The stopping rule: it stops when it should, and its intervals hold although it looks again and again."""
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from ppafo.errors import StudyError
+from ppafo.questions.montecarlo.answer import remarks
+from ppafo.questions.montecarlo.estimate import StoppingRule, draw_until
+from ppafo.questions.montecarlo.solve import monte_carlo, stopping_rule
+from ppafo.questions.montecarlo.statistic import Mean, Probability, Quantile, parse_statistic
+from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.outcomes import Model, Outcomes
+from ppafo.studies.study import Drawn
+
+METRIC = "rms_error"
+SIGMA = 0.5
+UNCERTAIN = Uncertainty((Drawn("x", LogNormalAround(1.0, math.exp(SIGMA))),))
+MEAN = math.exp(0.5 * SIGMA**2)
+STUDY = "torque-task-uncertainty"
+
+
+def value(columns: Mapping[str, Floats]) -> Outcomes:
+    """The uncertain value itself."""
+    return Outcomes({METRIC: columns["x"]}, np.zeros(columns["x"].size, bool), "")
+
+
+def failing(share: float) -> Model:
+    """The same, of which the largest fail."""
+
+    def run(columns: Mapping[str, Floats]) -> Outcomes:
+        failed = columns["x"] > stats.lognorm(SIGMA).ppf(1.0 - share)
+        return Outcomes({METRIC: np.where(failed, np.nan, columns["x"])}, failed, "diverged")
+
+    return run
+
+
+def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
+    rule = StoppingRule(0.05, is_relative=False, first=64, most=2**16)
+    found = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), rule, 1)
+    widths = [look.interval.width for look in found.looks]
+    assert found.is_met
+    assert widths[-1] <= 0.05 < min(widths[:-1])
+    assert [look.draws for look in found.looks] == [64 * 2**number for number in range(len(widths))]
+    assert found.values.size == found.last.draws
+    assert np.array_equal(found.values, UNCERTAIN.replicated_columns(0, found.last.draws, 1)["x"])
+
+
+def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
+    rule = StoppingRule(1e-6, is_relative=True, first=64, most=200)
+    found = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), rule, 1)
+    assert not found.is_met
+    assert [look.draws for look in found.looks] == [64, 128, 200]
+
+
+@pytest.mark.parametrize(
+    ("statistic", "truth", "width"),
+    [
+        (Mean("N m"), MEAN, 0.08),
+        (Quantile("N m", 0.9), float(stats.lognorm(SIGMA).ppf(0.9)), 0.3),
+        (Probability(1.5, True, "1.5 N m"), float(stats.lognorm(SIGMA).sf(1.5)), 0.08),
+    ],
+)
+def test_all_looks_together_hold_the_truth_as_often_as_is_said(
+    statistic: Mean | Quantile | Probability, truth: float, width: float
+) -> None:
+    rule = StoppingRule(width, is_relative=False, first=64, most=8192, confidence=0.9)
+    found = [draw_until(value, UNCERTAIN, METRIC, statistic, rule, seed) for seed in range(300)]
+    held = [all(look.interval.low <= truth <= look.interval.high for look in item.looks) for item in found]
+    assert all(item.is_met for item in found)
+    assert np.mean(held) >= 0.9
+    assert max(len(item.looks) for item in found) >= 3
+
+
+def test_without_the_correction_they_would_not() -> None:
+    rule = StoppingRule(0.08, is_relative=False, first=64, most=8192, confidence=0.9)
+    held = []
+    for seed in range(300):
+        looks = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), rule, seed).looks
+        values = UNCERTAIN.random_columns(0, looks[-1].draws, seed)["x"]
+        intervals = [Mean("N m").estimate(values[: look.draws], 0.9) for look in looks]
+        held.append(all(interval.low <= MEAN <= interval.high for interval in intervals))
+    assert np.mean(held) < 0.88
+
+
+NORMALS = Uncertainty(tuple(Drawn(f"x{number}", NormalAround(0.0, 1.0)) for number in range(6)))
+
+
+def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
+    def heavy(columns: Mapping[str, Floats]) -> Outcomes:
+        values = np.exp(2.0 * sum(columns[path] for path in NORMALS.paths) / math.sqrt(6.0))
+        return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
+
+    rule = StoppingRule(0.5, is_relative=True, first=64, most=4096)
+    found = [draw_until(heavy, NORMALS, METRIC, Mean("N m"), rule, seed) for seed in range(60)]
+    wrong = [not item.last.interval.low <= math.exp(2.0) <= item.last.interval.high for item in found]
+    narrow = [any(rule.is_narrow(look.interval) for look in item.looks) for item in found]
+    assert np.mean(narrow) > 0.3, "an interval that is narrow enough comes often"
+    assert np.mean([item.is_met and is_wrong for item, is_wrong in zip(found, wrong, strict=True)]) <= 0.05
+    warned = [item for item in found if not item.last.is_carried]
+    assert len(warned) > 50
+    assert "do not trust this interval" in remarks(warned[0])[0]
+    quiet = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), StoppingRule(0.05, False, first=512), 1)
+    assert quiet.is_met
+    assert remarks(quiet) == []
+
+
+def test_replicates_know_the_mean_of_a_smooth_function_far_better_than_independent_draws() -> None:
+    def smooth(columns: Mapping[str, Floats]) -> Floats:
+        return 3.0 + columns["x0"] + 2.0 * columns["x1"] + 3.0 * columns["x2"] + 0.1 * columns["x0"] * columns["x1"]
+
+    seeds = range(200)
+    drawn = [smooth(NORMALS.replicated_columns(0, 1024, seed)) for seed in seeds]
+    independent = [np.mean(smooth(NORMALS.random_columns(0, 1024, seed))) for seed in seeds]
+    assert np.var(independent) > 100.0 * np.var([np.mean(values) for values in drawn])
+    intervals = [Mean("N m").estimate(values, 0.9) for values in drawn]
+    held = np.mean([interval.low <= 3.0 <= interval.high for interval in intervals])
+    assert 0.85 <= held <= 0.95
+
+
+def test_replicates_in_pieces_are_those_of_the_whole() -> None:
+    whole = NORMALS.replicated_columns(0, 100, 3)
+    pieces = [NORMALS.replicated_columns(first, count, 3) for first, count in ((0, 5), (5, 40), (45, 55))]
+    for path, values in whole.items():
+        assert np.array_equal(values, np.concatenate([piece[path] for piece in pieces]))
+
+
+def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
+    rule = StoppingRule(0.1, is_relative=False, first=1024, most=2048, most_failed=0.02)
+    found = draw_until(failing(0.005), UNCERTAIN, METRIC, Mean("N m"), rule, 1)
+    assert 0 < found.last.missing <= 0.02 * found.last.draws
+    assert found.values.size == found.last.draws - found.last.missing
+    with pytest.raises(StudyError, match=r"runs failed .* more than the 2 % .*diverged"):
+        draw_until(failing(0.1), UNCERTAIN, METRIC, Mean("N m"), rule, 1)
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: StoppingRule(0.0, False), "width = 0.0"),
+        (lambda: StoppingRule(math.nan, False), "width = nan"),
+        (lambda: StoppingRule(1.0, False, first=4), "must be at least 32"),
+        (lambda: StoppingRule(1.0, False, first=512, most=256), "not more than the maximum"),
+        (lambda: StoppingRule(1.0, False, confidence=0.2), "confidence = 0.2"),
+        (lambda: parse_statistic("median", METRIC), "statistic 'median' is not known"),
+        (lambda: parse_statistic("quantile 1.5", METRIC), "a fraction above 0 and below 1"),
+        (lambda: parse_statistic("probability above 3 g", METRIC), "statistic 'probability above 3 g'"),
+        (lambda: stopping_rule(Mean("N m"), METRIC, "3 g", StoppingRule(1.0, False)), "width = '3 g'"),
+        (
+            lambda: stopping_rule(
+                parse_statistic("probability above 1 N m", METRIC), METRIC, "1 %", StoppingRule(1.0, False)
+            ),
+            "plain number, such as 0.01",
+        ),
+    ],
+)
+def test_rules_and_words_that_make_no_sense_are_one_line(make: Callable[[], object], text: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        make()
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_widths_are_read_in_the_unit_of_the_metric() -> None:
+    like = StoppingRule(1.0, False)
+    assert stopping_rule(Mean("kg"), "gas_supplied", "2 g", like).width == pytest.approx(0.002)
+    assert stopping_rule(Mean("Pa"), "largest_pressure", "1 psi_d", like).width == pytest.approx(6894.757)
+    relative = stopping_rule(Mean("kg"), "gas_supplied", "5 %", like)
+    assert (relative.width, relative.is_relative) == (pytest.approx(0.05), True)
+
+
+def test_a_scenario_is_drawn_until_its_error_is_known() -> None:
+    found = monte_carlo(STUDY, METRIC, width="10 %", configuration="proportional", first=64, maximum=1024)
+    assert found.is_met
+    assert found.last.interval.low < 0.875 < found.last.interval.high
+    again = monte_carlo(STUDY, METRIC, width="10 %", configuration="proportional", first=64, maximum=1024)
+    assert again.last == found.last

@@ -1,0 +1,271 @@
+"""Indices of functions whose indices are known, through the code that scenarios go through too."""
+
+import importlib.util
+import itertools
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from ppafo.errors import StudyError
+from ppafo.questions.sensitivity.analyse import Settings, analyse
+from ppafo.questions.sensitivity.methods import METHODS
+from ppafo.studies.distributions import (
+    Floats,
+    LogNormalAround,
+    NormalAround,
+    OneOf,
+    UniformBetween,
+)
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.outcomes import Model, Outcomes
+from ppafo.studies.study import Drawn
+
+pytest.importorskip("SALib")
+
+METRIC = "rms_error"
+A, B = 7.0, 0.1
+ANGLES = Uncertainty(tuple(Drawn(name, UniformBetween(-math.pi, math.pi)) for name in ("x1", "x2", "x3")))
+
+
+def ishigami(columns: Mapping[str, Floats]) -> Outcomes:
+    """Ishigami and Homma (1990)."""
+    first, second, third = (columns[name] for name in ("x1", "x2", "x3"))
+    values = np.sin(first) + A * np.sin(second) ** 2 + B * third**4 * np.sin(first)
+    return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
+
+
+def known_indices() -> tuple[Floats, Floats]:
+    """First-order and total indices of the Ishigami function in closed form."""
+    alone = 0.5 * (1.0 + B * math.pi**4 / 5.0) ** 2
+    with_third = B**2 * math.pi**8 * (1.0 / 18.0 - 1.0 / 50.0)
+    total = alone + A**2 / 8.0 + with_third
+    first = np.array([alone, A**2 / 8.0, 0.0]) / total
+    return first, first + np.array([with_third, 0.0, with_third]) / total
+
+
+def failing(model: Model, rows: Floats) -> Model:
+    """The model, of which some runs fail."""
+
+    def run(columns: Mapping[str, Floats]) -> Outcomes:
+        outcomes = model(columns)
+        failed = np.isin(np.arange(outcomes.runs), rows)
+        metrics = {name: np.where(failed, np.nan, values) for name, values in outcomes.metrics.items()}
+        return Outcomes(metrics, failed, "diverged at t = 1 s")
+
+    return run
+
+
+def test_sobol_indices_of_ishigami_come_out_and_settle() -> None:
+    found = analyse(ishigami, ANGLES, [METRIC], METHODS["sobol"], Settings(4096)).metrics[0]
+    first, total = known_indices()
+    assert found.indices.values["first"] == pytest.approx(first, abs=0.02)
+    assert found.indices.values["total"] == pytest.approx(total, abs=0.02)
+    for name, known in (("first", first), ("total", total)):
+        assert np.all(np.abs(found.indices.values[name] - known) <= found.indices.bands[name])
+    sizes = [each.blocks for each in found.settling]
+    assert sizes == [128, 256, 512, 1024, 2048, 4096]
+    widths = np.array([each.indices.bands["total"] for each in found.settling])
+    assert np.all(widths[-1] < 0.35 * widths[0])
+
+
+def test_the_result_is_the_same_every_time() -> None:
+    one, other = (analyse(ishigami, ANGLES, [METRIC], METHODS["sobol"], Settings(256, seed=5)) for _ in range(2))
+    assert np.array_equal(one.metrics[0].indices.values["total"], other.metrics[0].indices.values["total"])
+    assert np.array_equal(one.metrics[0].indices.bands["total"], other.metrics[0].indices.bands["total"])
+
+
+def test_morris_gives_the_slopes_of_a_linear_model() -> None:
+    slopes = {"x1": 3.0, "x2": -1.0, "x3": 0.0}
+
+    def linear(columns: Mapping[str, Floats]) -> Outcomes:
+        values = sum((slope * columns[name] for name, slope in slopes.items()), np.zeros(columns["x1"].size))
+        return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
+
+    indices = analyse(linear, ANGLES, [METRIC], METHODS["morris"], Settings(32)).metrics[0].indices
+    assert indices.values["mean_effect"] == pytest.approx([3.0 * 2 * math.pi * 0.99, 2 * math.pi * 0.99, 0.0])
+    assert indices.values["spread"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
+def test_a_distribution_without_ends_has_finite_effects() -> None:
+    normal = Uncertainty((Drawn("x1", NormalAround(0.0, 1.0)), Drawn("x2", NormalAround(5.0, 2.0))))
+
+    def first(columns: Mapping[str, Floats]) -> Outcomes:
+        return Outcomes({METRIC: columns["x1"].copy()}, np.zeros(columns["x1"].size, bool), "")
+
+    for method in METHODS.values():
+        indices = analyse(first, normal, [METRIC], method, Settings(64)).metrics[0].indices
+        assert np.all(np.isfinite(indices.values[method.shown[0]]))
+        least = 1e-9 if method.name != "shapley" else indices.bands["shapley"][1]
+        assert indices.values[method.shown[0]][1] == pytest.approx(0.0, abs=least)
+
+
+@pytest.mark.parametrize("method", ["sobol", "morris"])
+def test_a_failed_run_takes_its_whole_block_with_it(method: str) -> None:
+    settings = Settings(128, most_failed=0.02)
+    rows = METHODS[method].block_rows(3)
+    broken = np.array([0, 5 * rows + 1, 5 * rows + 2, 127 * rows + rows - 1])
+    found = analyse(failing(ishigami, broken), ANGLES, [METRIC], METHODS[method], settings)
+    assert (found.failures, found.metrics[0].dropped_runs, found.metrics[0].dropped_blocks) == (4, 4, 3)
+    assert found.metrics[0].settling[-1].used == 125
+    whole = analyse(ishigami, ANGLES, [METRIC], METHODS[method], settings).metrics[0]
+    name = METHODS[method].shown[0]
+    assert found.metrics[0].indices.values[name] == pytest.approx(whole.indices.values[name], rel=0.2, abs=0.05)
+
+
+def test_failures_at_the_beginning_only_shorten_the_course() -> None:
+    rows = METHODS["sobol"].block_rows(3)
+    model = failing(ishigami, np.arange(62) * rows)
+    found = analyse(model, ANGLES, [METRIC], METHODS["sobol"], Settings(1024)).metrics[0]
+    assert [each.blocks for each in found.settling] == [128, 256, 512, 1024]
+    assert [each.used for each in found.settling] == [66, 194, 450, 962]
+
+
+def test_a_sample_with_hardly_a_whole_block_says_nothing() -> None:
+    rows = METHODS["sobol"].block_rows(3)
+    model = failing(ishigami, np.arange(62) * rows)
+    with pytest.raises(StudyError, match=r"2 of 64 base points have 'rms_error' in all their runs, which is too few"):
+        analyse(model, ANGLES, [METRIC], METHODS["sobol"], Settings(64, most_failed=0.5))
+
+
+def test_too_many_failed_runs_are_refused() -> None:
+    model = failing(ishigami, np.arange(0, 640, 20))
+    with pytest.raises(StudyError, match=r"32 of 640 runs failed \(5 %\), more than the 2 %.*diverged at t = 1 s"):
+        analyse(model, ANGLES, [METRIC], METHODS["sobol"], Settings(128))
+
+
+def test_a_metric_that_is_always_the_same_is_refused() -> None:
+    def constant(columns: Mapping[str, Floats]) -> Outcomes:
+        return Outcomes({METRIC: np.full(columns["x1"].size, 2.0)}, np.zeros(columns["x1"].size, bool), "")
+
+    with pytest.raises(StudyError, match="'rms_error' is 2 in every run"):
+        analyse(constant, ANGLES, [METRIC], METHODS["sobol"], Settings(128))
+
+
+def test_neighbours_whose_bands_overlap_are_named() -> None:
+    def equal(columns: Mapping[str, Floats]) -> Outcomes:
+        values = columns["x1"] + columns["x2"] + 0.001 * columns["x3"]
+        return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
+
+    found = analyse(equal, ANGLES, [METRIC], METHODS["sobol"], Settings(256))
+    assert [set(pair) for pair in found.overlapping_pairs(found.metrics[0])] == [{"x1", "x2"}]
+
+
+def test_bad_settings_are_one_line() -> None:
+    def refused(uncertainty: Uncertainty, method: str, settings: Settings) -> str:
+        with pytest.raises(StudyError) as caught:
+            analyse(ishigami, uncertainty, [METRIC], METHODS[method], settings)
+        return str(caught.value)
+
+    assert "need a power of 2, such as 128" in refused(ANGLES, "sobol", Settings(100))
+    assert "morris needs 8 to" in refused(ANGLES, "morris", Settings(2))
+    assert "most_failed = 1.0" in refused(ANGLES, "morris", Settings(16, most_failed=1.0))
+    assert "seed = 0" in refused(ANGLES, "sobol", Settings(64, seed=0))
+    assert "vary two or more" in refused(Uncertainty(ANGLES.drawn[:1]), "sobol", Settings(64))
+    correlated = Uncertainty(ANGLES.drawn[:2], ((1.0, 0.0), (0.6, 0.8)))
+    assert "sobol need values that are independent" in refused(correlated, "sobol", Settings(64))
+
+
+@pytest.mark.parametrize("blocks", [256, 1024])
+def test_the_bands_of_sobol_hold_and_are_not_far_too_wide(blocks: int) -> None:
+    first, total = known_indices()
+    found = [analyse(ishigami, ANGLES, [METRIC], METHODS["sobol"], Settings(blocks, seed)) for seed in range(1, 61)]
+    for name, known in (("first", first), ("total", total)):
+        values = np.array([item.metrics[0].indices.values[name] for item in found])
+        bands = np.array([item.metrics[0].indices.bands[name] for item in found])
+        assert np.mean(np.abs(values - known) <= bands) >= 0.92
+        assert np.all(np.mean(bands, axis=0) / (1.96 * np.std(values, axis=0)) < 1.6)
+
+
+def test_the_indices_of_one_design_are_those_of_salib() -> None:
+    from SALib.analyze import sobol
+
+    design = METHODS["sobol"].design(ANGLES, 1024, 3)
+    values = ishigami(ANGLES.columns(design)).metrics[METRIC]
+    problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0.0, 1.0]] * 3}
+    known = sobol.analyze(problem, values, calc_second_order=False, num_resamples=2, seed=1)
+    found = analyse(ishigami, ANGLES, [METRIC], METHODS["sobol"], Settings(1024, 3)).metrics[0].indices
+    assert found.values["total"] == pytest.approx(known["ST"], abs=2e-3)
+    assert found.values["first"] == pytest.approx(known["S1"], abs=2e-3)
+
+
+def linear_in(slopes: Mapping[str, float]) -> Model:
+    """A sum of slopes times values."""
+
+    def run(columns: Mapping[str, Floats]) -> Outcomes:
+        values = sum((slope * columns[name] for name, slope in slopes.items()), 0.0 * columns["x1"])
+        return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
+
+    return run
+
+
+def test_the_mean_effect_of_morris_is_the_change_over_the_range_whatever_the_distribution() -> None:
+    mixed = Uncertainty(
+        (
+            Drawn("x1", NormalAround(0.0, 2.0)),
+            Drawn("x2", OneOf((3.0, 4.0), (0.5, 1.0))),
+            Drawn("x3", OneOf((0.0, 1.0), (0.9, 1.0))),
+            Drawn("x4", LogNormalAround(1.0, 2.0)),
+        )
+    )
+    model = linear_in({"x1": 1.0, "x2": -5.0, "x3": 2.0, "x4": 1.0})
+    indices = analyse(model, mixed, [METRIC], METHODS["morris"], Settings(32)).metrics[0].indices
+    normal = 2.0 * stats.norm.ppf(0.995)
+    ranges = [2.0 * normal, 5.0, 2.0, 2.0 ** (normal / 2.0) - 2.0 ** (-normal / 2.0)]
+    assert indices.values["mean_effect"] == pytest.approx(ranges)
+    assert indices.values["spread"] == pytest.approx(np.zeros(4), abs=1e-9)
+
+
+def shapley_of_linear(slopes: Floats, covariance: Floats) -> Floats:
+    """Shapley effects of a linear function of normal values, by the variance that every subset leaves."""
+    count = slopes.size
+
+    def explained(some: tuple[int, ...]) -> float:
+        rest = [item for item in range(count) if item not in some]
+        inside, across = covariance[np.ix_(some, some)], covariance[np.ix_(rest, some)]
+        left = covariance[np.ix_(rest, rest)] - (across @ np.linalg.solve(inside, across.T) if some else 0.0)
+        return float(slopes @ covariance @ slopes - slopes[rest] @ left @ slopes[rest])
+
+    effects = np.zeros(count)
+    for order in itertools.permutations(range(count)):
+        for place, item in enumerate(order):
+            effects[item] += explained(order[: place + 1]) - explained(order[:place])
+    return effects / effects.sum()
+
+
+def test_shapley_effects_of_correlated_values_are_the_known_ones_and_their_bands_hold() -> None:
+    correlation = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, -0.3], [0.0, -0.3, 1.0]])
+    slopes, sizes = np.array([1.0, 0.5, 2.0]), np.array([1.0, 2.0, 0.5])
+    truth = shapley_of_linear(slopes, correlation * np.outer(sizes, sizes))
+    factor = tuple(tuple(row) for row in np.linalg.cholesky(correlation).tolist())
+    names = ("x1", "x2", "x3")
+    drawn = tuple(Drawn(name, NormalAround(3.0, size)) for name, size in zip(names, sizes.tolist(), strict=True))
+    model = linear_in(dict(zip(names, slopes.tolist(), strict=True)))
+    held = []
+    for seed in range(1, 41):
+        settings = Settings(1024, seed)
+        found = analyse(model, Uncertainty(drawn, factor), [METRIC], METHODS["shapley"], settings).metrics[0].indices
+        assert np.sum(found.values["shapley"]) == pytest.approx(1.0)
+        held.append(np.abs(found.values["shapley"] - truth) <= found.bands["shapley"])
+        assert np.all(found.bands["shapley"] < 0.1)
+    assert np.mean(held) >= 0.9
+
+
+def test_shapley_effects_of_independent_values_share_out_what_acts_together() -> None:
+    first, total = known_indices()
+    found = analyse(ishigami, ANGLES, [METRIC], METHODS["shapley"], Settings(8192)).metrics[0].indices
+    assert found.values["shapley"] == pytest.approx(0.5 * (first + total), abs=0.03)
+
+
+def test_a_missing_library_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = importlib.util.find_spec
+
+    def without(name: str, *rest: Any) -> Any:
+        return None if name == "SALib" else real(name, *rest)
+
+    monkeypatch.setattr(importlib.util, "find_spec", without)
+    with pytest.raises(StudyError, match=r"needs SALib, which is not installed: pip install 'ppafo\[studies\]'"):
+        analyse(ishigami, ANGLES, [METRIC], METHODS["sobol"], Settings(64))

@@ -1,0 +1,187 @@
+"""The claims as a table, figures 7 and 8, and the page around them."""
+
+import dataclasses
+import html
+import re
+
+import pytest
+
+from ppafo.answers.text import text_of
+from ppafo.answers.typesetting import typeset
+from ppafo.identification.bench_figures import synthetic_figure_3
+from ppafo.questions.reproduce.answer import answer_of
+from ppafo.questions.reproduce.page import holding_torque, reproduction_page
+from ppafo.questions.reproduce.solve import Reproduction, reproduce
+from ppafo.questions.reproduce.step_response import Levels
+from ppafo.questions.reproduce.step_response_figure import step_response_figure
+from ppafo.questions.reproduce.synthetic import NoEvidence, SyntheticEvidence
+from ppafo.questions.reproduce.torque_task_figure import torque_task_figure
+
+LEVELS = Levels(480536.0, 101325.0)
+
+
+@pytest.fixture(scope="module")
+def reproduction() -> Reproduction:
+    return reproduce(completions=1000)
+
+
+@pytest.fixture(scope="module")
+def page(reproduction: Reproduction) -> str:
+    return reproduction_page(reproduction, b"<svg>seven</svg>", b"<svg>eight</svg>")
+
+
+def words(page: str) -> str:
+    """The text of a page without its tags, on one line."""
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
+
+
+def test_the_table_has_a_line_for_every_claim_and_fits_a_terminal(reproduction: Reproduction) -> None:
+    lines = text_of(answer_of(reproduction)).splitlines()
+    for claim in reproduction.claims:
+        assert sum(line.startswith(f"{claim.id} ") for line in lines) == 1
+    assert max(len(line) for line in lines) <= 100
+
+
+def test_the_table_aligns_its_columns(reproduction: Reproduction) -> None:
+    head, *rows = text_of(answer_of(reproduction)).splitlines()[: 1 + len(reproduction.claims)]
+    column = head.index("verdict")
+    assert all(row[column - 2 : column] == "  " and row[column] != " " for row in rows)
+
+
+def test_the_last_line_of_the_table_counts_the_verdicts(reproduction: Reproduction) -> None:
+    last = text_of(answer_of(reproduction)).splitlines()[-1]
+    assert last.startswith(f"{len(reproduction.claims)} claims: ")
+
+
+def test_figure_7_has_the_four_panels_of_the_paper_in_its_units(reproduction: Reproduction) -> None:
+    figure = step_response_figure(reproduction.step.recording, LEVELS, reproduction.step_events)
+    assert [axes.get_ylabel() for axes in figure.axes] == ["deg", "psi", "psig", "psig"]
+    angle, difference, pressure_1, pressure_2 = (axes.lines[0].get_ydata() for axes in figure.axes)
+    assert (angle[0], angle[-1]) == pytest.approx((20.0, 130.0), abs=0.1)
+    assert pressure_1[-1] - pressure_2[-1] == pytest.approx(difference[-1])
+    assert pressure_2[-1] == pytest.approx(0.0, abs=0.1)
+
+
+def test_figure_7_marks_breakaway_and_stop_in_every_panel(reproduction: Reproduction) -> None:
+    marked = step_response_figure(reproduction.step.recording, LEVELS, reproduction.step_events)
+    plain = step_response_figure(reproduction.step.recording, LEVELS, None)
+    assert [len(axes.lines) for axes in marked.axes] == [3] * 4
+    assert [len(axes.lines) for axes in plain.axes] == [1] * 4
+
+
+def test_figure_8_shows_torque_and_reference_of_both_valves_on_one_scale(reproduction: Reproduction) -> None:
+    solenoid, proportional = reproduction.solenoid.recording, reproduction.proportional.recording
+    figure = torque_task_figure(solenoid, proportional, 5.0, (1.1, 0.4))
+    top, bottom = figure.axes[0], figure.axes[2]
+    assert top.get_ylim() == bottom.get_ylim()
+    for axes, recording in ((top, solenoid), (bottom, proportional)):
+        drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
+        assert list(drawn["torque, simulated"]) == list(recording["torque"])
+        assert list(drawn["reference"]) == list(recording["reference"])
+
+
+def test_figure_8_shows_when_each_solenoid_valve_is_on(reproduction: Reproduction) -> None:
+    solenoid = reproduction.solenoid.recording
+    figure = torque_task_figure(solenoid, reproduction.proportional.recording, 5.0, (1.1, 0.4))
+    spans = [
+        sum(path.get_extents().width for path in collection.get_paths()) for collection in figure.axes[1].collections
+    ]
+    assert len(spans) == 2
+    assert sum(spans) == pytest.approx(solenoid.duration)
+
+
+def test_the_supply_holds_its_pressure_times_the_torque_constant(reproduction: Reproduction) -> None:
+    assert holding_torque(reproduction.solenoid) == pytest.approx(5.0, abs=0.01)
+
+
+def test_the_page_states_every_claim_with_both_numbers_and_the_verdict(reproduction: Reproduction, page: str) -> None:
+    text = words(page)
+    for claim in reproduction.claims:
+        assert words(typeset(claim.statement)) in text
+        assert words(typeset(claim.note)) in text
+    assert "contradicted" in text
+    assert "shown on synthetic data" in text
+
+
+def test_the_page_holds_both_figures_and_fetches_nothing(page: str) -> None:
+    assert page.count("data:image/svg+xml;base64,") == 2
+    assert "http" not in page
+    assert "<script" not in page
+    assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []
+
+
+def test_the_page_tells_every_observation_assumption_and_finding(reproduction: Reproduction, page: str) -> None:
+    text = words(page)
+    for observation in (*reproduction.step_observations, *reproduction.torque_observations):
+        assert words(typeset(observation.statement)) in text
+        assert words(typeset(observation.evidence)) in text
+    for value in reproduction.assumed:
+        assert value.path in text
+        assert words(typeset(value.value)) in text
+    for finding in reproduction.printed_findings:
+        assert words(typeset(finding.paragraph)) in text.replace(" )", ")").replace("( ", "(").replace(" ,", ",")
+
+
+def test_every_tag_of_the_page_is_closed(page: str) -> None:
+    for tag in ("table", "tbody", "tr", "td", "ul", "li", "p", "h2", "h3", "figure", "div", "dl", "main"):
+        assert len(re.findall(rf"<{tag}[ >]", page)) == page.count(f"</{tag}>"), tag
+
+
+def test_a_run_with_overrides_says_so_and_gives_the_command(reproduction: Reproduction, page: str) -> None:
+    changed = dataclasses.replace(reproduction, overrides=("reference.level=5 N m",))
+    told = words(reproduction_page(changed, b"", b""))
+    assert "departs from the paper" in told
+    assert "--set 'reference.level=5 N m'" in told
+    assert "departs from the paper" not in words(page)
+
+
+def test_without_the_rig_the_page_says_why_and_shows_nothing_synthetic(reproduction: Reproduction) -> None:
+    bare = dataclasses.replace(reproduction, synthetic=NoEvidence("the solver is missing"))
+    told = reproduction_page(bare, b"", b"")
+    assert "There are no synthetic measurements in this report: the solver is missing." in words(told)
+    assert 'id="identification"' not in told
+
+
+def test_the_page_shows_what_was_identified_on_both_presets_beside_what_was_planted(
+    reproduction: Reproduction, page: str
+) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    text = words(page)
+    assert "ideal-laboratory" in text
+    assert "paper-bench" in text
+    table = page.partition('id="identification"')[2].partition("</table>")[0]
+    assert table.count("<tr>") == 1 + len(evidence.bench.values)
+
+
+def test_figure_3_says_in_each_panel_that_it_is_synthetic(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    figure = synthetic_figure_3(evidence.bench.torque, evidence.bench.decay)
+    assert all("synthetic" in axes.get_title(loc="left") for axes in figure.axes)
+    rising, falling = figure.axes[0].lines[:2]
+    assert (rising.get_marker(), falling.get_marker()) == ("x", "o")
+
+
+def test_figure_7_shows_the_synthetic_measurement_as_dots_and_names_it(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    recording = reproduction.step.recording
+    figure = step_response_figure(recording, LEVELS, None, evidence.step.measured)
+    assert [axes.lines[1].get_marker() for axes in figure.axes] == ["."] * 4
+    legends = [axes.get_legend() for axes in figure.axes]
+    named = [text.get_text() for legend in legends if legend is not None for text in legend.get_texts()]
+    assert "synthetic measurement" in named
+
+
+def test_figure_8_shows_the_synthetic_experiment_with_both_valves(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    runs = (reproduction.solenoid.recording, reproduction.proportional.recording)
+    figure = torque_task_figure(*runs, 5.0, (1.1, 0.4), (evidence.solenoid, evidence.proportional))
+    for axes in (figure.axes[0], figure.axes[2]):
+        assert "torque, synthetic experiment" in {line.get_label() for line in axes.lines}
+
+
+def test_the_same_reproduction_gives_the_same_page(reproduction: Reproduction, page: str) -> None:
+    assert reproduction_page(reproduction, b"<svg>seven</svg>", b"<svg>eight</svg>") == page

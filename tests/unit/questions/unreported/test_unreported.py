@@ -1,0 +1,207 @@
+"""What the paper's results imply about the settings that it does not print."""
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from ppafo.answers.text import text_of
+from ppafo.cli.main import main
+from ppafo.errors import ScenarioError
+from ppafo.questions.unreported.evidence import GAS, IMPROVEMENT, agreement, improvement, saving
+from ppafo.questions.unreported.implications import (
+    TOO_FEW,
+    conclusions,
+    implications_of,
+    spread_of,
+    strongest_links,
+    weighted_quantiles,
+)
+from ppafo.questions.unreported.proposal import Proposal, effective, next_proposal, temper
+from ppafo.questions.unreported.settings import (
+    CELLS,
+    PROPORTIONAL,
+    SETTINGS,
+    SOLENOID,
+    columns,
+    spread,
+    values_of,
+)
+from ppafo.questions.unreported.solve import REPLICATES, Family, infer_settings
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.simulate import simulate
+from ppafo.studies.draws import replicate_seed
+from ppafo.studies.intervals import jackknife_reach
+
+PAPER = {
+    SOLENOID: {"rms_error": 1.0, "gas_supplied": 1.1e-3, "oscillations_ramp": 8.0, "oscillations_hold": 0.0},
+    PROPORTIONAL: {"rms_error": 0.85, "gas_supplied": 0.407e-3, "oscillations_ramp": 0.0, "oscillations_hold": 0.0},
+}
+
+
+def metrics_with(**changed: float) -> dict[str, dict[str, np.ndarray]]:
+    """One completion that agrees with the paper, with numbers of the solenoid pair changed."""
+    found = {valve: {name: np.array([value]) for name, value in of.items()} for valve, of in PAPER.items()}
+    found[SOLENOID] |= {name: np.array([value]) for name, value in changed.items()}
+    return found
+
+
+@pytest.fixture(scope="module")
+def family() -> Family:
+    return infer_settings(3000, seed=1)
+
+
+def test_a_completion_that_gives_what_is_printed_agrees_fully() -> None:
+    assert agreement(metrics_with())[0] > 0.95
+
+
+@pytest.mark.parametrize(
+    "changed", [{"oscillations_ramp": 2.0}, {"oscillations_hold": 5.0}, {"gas_supplied": 2.0e-3}, {"rms_error": 0.8}]
+)
+def test_a_completion_that_contradicts_the_paper_counts_for_nothing(changed: dict[str, float]) -> None:
+    assert agreement(metrics_with(**changed))[0] < 1e-3
+
+
+def test_what_is_left_out_does_not_count() -> None:
+    worse = metrics_with(rms_error=0.8)
+    assert improvement(worse)[0] < 0.0
+    assert agreement(worse, (IMPROVEMENT,))[0] > 0.95
+    assert agreement(metrics_with(gas_supplied=2.0e-3), GAS)[0] > 0.95
+
+
+def test_points_of_the_unit_cube_become_settings_within_what_is_allowed() -> None:
+    draws = values_of(spread(512, seed=3))
+    for setting in SETTINGS:
+        values = draws[setting.name]
+        if setting.choices:
+            assert set(values) == set(setting.choices)
+        else:
+            assert setting.low <= values.min() < values.max() <= setting.high
+
+
+@pytest.mark.parametrize("valve", [SOLENOID, PROPORTIONAL])
+def test_a_completion_is_the_scenario_with_the_same_overrides(family: Family, valve: str) -> None:
+    first = {name: values[:1] for name, values in family.draws.items()}
+    overrides = {path: float(values[0]) for path, values in columns(first, valve).items()}
+    units = {"motion.angle": "rad", "actuator.dead_volume_1": "m^3", "actuator.dead_volume_2": "m^3"}
+    units |= {"supply.pressure": "Pa_a", "supply.dorsiflexion_pressure": "Pa_a", "controller.rate": "Hz"}
+    units |= {"run.duration": "s", "reference.ramp_time": "s", "reference.level": "N m"}
+    texts = [f"{path}={value!r} {units.get(path, '')}".strip() for path, value in overrides.items()]
+    alone = simulate(load_scenario(f"torque-task-{valve}", texts)).metrics
+    for name, value in family.metrics[valve].items():
+        assert value[0] == pytest.approx(alone[name].value, rel=1e-9)
+
+
+def test_a_proposal_has_the_density_that_it_draws_from() -> None:
+    chance = np.random.default_rng(5)
+    cells = (0, 3)
+    proposal = Proposal(np.array([[0.3, 0.1], [0.9, 0.9]]), np.array([[0.1]]), cells)
+    points = proposal.drawn(200_000, chance)
+    even = chance.random((200_000, 2))
+    for low, high in ((0.0, 0.1), (0.1, 0.5), (0.9, 1.0)):
+        share = ((points[:, 0] >= low) & (points[:, 0] < high)).sum() / 200_000
+        inside = (even[:, 0] >= low) & (even[:, 0] < high)
+        expected = (proposal.density(even) * inside).mean()
+        assert share == pytest.approx(expected, abs=0.006)
+    assert proposal.density(even).mean() == pytest.approx(len(points) / 200_000, abs=0.01)
+
+
+def test_tempering_leaves_enough_weights_and_keeps_their_order() -> None:
+    weights = np.exp(-np.linspace(0.0, 60.0, 2000))
+    flat = temper(weights)
+    assert effective(flat) >= 99.0 > effective(weights)
+    assert (np.diff(flat) < 0.0).all()
+
+
+def test_where_nothing_agrees_there_is_no_proposal() -> None:
+    points = spread(64, seed=1)
+    assert next_proposal(points, np.zeros(64), CELLS, np.random.default_rng(1)) is None
+
+
+def test_rounds_find_what_even_draws_rarely_meet(family: Family) -> None:
+    agrees = agreement(family.metrics) > 1e-6
+    assert agrees[family.even :].mean() > 2.0 * agrees[: family.even].mean()
+    assert family.weights.sum() == pytest.approx(1.0)
+    assert family.drawn >= family.weights.size
+
+
+def test_the_conclusion_on_gas_holds_over_nearly_all_completions(family: Family) -> None:
+    better, less, both = conclusions(family)
+    assert less.of_all == pytest.approx(float((saving(family.metrics)[: family.even] > 0.0).mean()))
+    assert less.of_all > 0.9
+    assert both.of_all <= min(better.of_all, less.of_all)
+    assert better.of_weight > 0.99
+
+
+def test_every_setting_gets_a_verdict(family: Family) -> None:
+    found = implications_of(family)
+    assert [item.setting.name for item in found] == [setting.name for setting in SETTINGS]
+    assert {item.verdict for item in found} == {TOO_FEW}, "3000 draws are worth only a few"
+    ramp = found[1]
+    assert ramp.low <= ramp.median <= ramp.high
+    assert len(strongest_links(family)) == 4
+
+
+def test_every_share_has_the_error_between_searches_that_know_nothing_of_each_other(family: Family) -> None:
+    assert set(family.replicate) == set(range(REPLICATES))
+    others = family.without_each()
+    assert [set(other.replicate) for other in others] == [set(range(REPLICATES - 1))] * REPLICATES
+    shares = np.array([[item.of_all for item in conclusions(other)] for other in others])
+    reach = student(REPLICATES - 1).ppf(0.975) * np.sqrt((REPLICATES - 1) * np.var(shares, axis=0))
+    assert [item.error[0] for item in conclusions(family)] == pytest.approx(reach)
+    for item in implications_of(family):
+        errors = item.error["shares"] if item.setting.choices else item.error["median"]
+        assert max(errors) > 0.0
+    text = text_of(family.answer())
+    assert text.count("±") > 20
+    assert "8 independent searches" in text
+
+
+def test_the_share_of_all_is_within_its_error_as_often_as_is_said() -> None:
+    """Against a large even sample of a stand-in whose truth is known: the share of a corner of the cube."""
+    held = []
+    for seed in range(60):
+        points = [spread(41, replicate_seed(seed, number))[:, 3] < 0.3 for number in range(REPLICATES)]
+        sums, sizes = np.array([part.sum() for part in points]), np.array([part.size for part in points])
+        left_out = (sums.sum() - sums) / (sizes.sum() - sizes)
+        reach = jackknife_reach(left_out, 0.95)
+        held.append(abs(sums.sum() / sizes.sum() - 0.3) <= reach)
+    assert np.mean(held) >= 0.9
+
+
+def test_weighted_quantiles_are_those_of_repeated_values() -> None:
+    values, weights = np.array([3.0, 1.0, 2.0]), np.array([0.25, 0.5, 0.25])
+    assert weighted_quantiles(values, weights, (0.4, 0.6, 0.9)) == [1.0, 2.0, 3.0]
+    assert np.isnan(weighted_quantiles(values, np.zeros(3), (0.5,))[0])
+
+
+def test_the_same_seed_gives_the_same_family(family: Family) -> None:
+    again = infer_settings(3000, seed=1)
+    np.testing.assert_array_equal(again.weights, family.weights)
+
+
+def test_too_few_draws_are_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(ScenarioError, match="draws = 10"):
+        infer_settings(10)
+    assert main(["unreported", "--draws", "10"]) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+def test_the_command_writes_figure_and_document(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["unreported", "--draws", "1000", "--out", str(tmp_path / "out")]) == 0
+    assert "reference level" in capsys.readouterr().out
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {
+        "unreported.json",
+        "unreported.txt",
+        "report.html",
+        "unreported-settings.png",
+        "unreported-settings.svg",
+    } <= names
+
+
+def test_a_choice_is_implied_where_one_alone_is_left_and_open_where_all_are_alike() -> None:
+    assert spread_of([1.0, 0.0]) == pytest.approx(0.0)
+    assert spread_of([0.97, 0.03]) < 0.2
+    assert spread_of([0.5, 0.5]) == pytest.approx(1.0)
+    assert spread_of([1 / 3] * 3) == pytest.approx(1.0)
+    assert np.isnan(spread_of([0.0, 0.0]))

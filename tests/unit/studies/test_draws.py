@@ -1,0 +1,85 @@
+"""Draws: one stream, with correlations, the same in any pieces."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.errors import StudyError
+from ppafo.studies.draws import choose_configuration, study_of, uncertainty_in, uncertainty_of
+from ppafo.studies.loading import load_study
+
+
+def study(**changes: Any) -> dict[str, Any]:
+    """A small study with two uncertain values in two configurations."""
+    document: dict[str, Any] = {
+        "schema_version": 1,
+        "name": "small",
+        "configurations": [
+            {"name": "proportional", "scenario": "torque-task-proportional"},
+            {"name": "solenoid", "scenario": "torque-task-solenoid"},
+        ],
+        "vary": [
+            {"path": "supply.pressure", "kind": "normal", "mean": "50 psi_g", "standard_deviation": "2 psi_d"},
+            {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"},
+            {"path": "actuator.leak.area", "kind": "uniform", "minimum": "0.2 mm^2", "maximum": "0.4 mm^2"},
+        ],
+        "correlations": [
+            {"between": ["supply.pressure", "valve.area"], "coefficient": 0.8},
+            {"between": ["valve.area", "actuator.leak.area"], "coefficient": -0.5},
+        ],
+        "sample": {"method": "sobol", "runs": 64, "seed": 3},
+        "outputs": {"metrics": ["rms_error"]},
+    }
+    return document | changes
+
+
+def test_draws_in_pieces_are_those_of_the_whole() -> None:
+    uncertainty = uncertainty_of(load_study(study()))
+    whole = uncertainty.random_columns(0, 1000, 7)
+    pieces = [uncertainty.random_columns(first, count, 7) for first, count in ((0, 300), (300, 450), (750, 250))]
+    for path, values in whole.items():
+        assert np.array_equal(values, np.concatenate([piece[path] for piece in pieces]))
+
+
+def test_draws_have_the_distributions_and_the_correlation_of_the_study() -> None:
+    columns = uncertainty_of(load_study(study())).random_columns(0, 20_000, 1)
+    pressure, area = columns["supply.pressure"], columns["valve.area"]
+    assert np.mean(pressure) == pytest.approx(101325.0 + 50 * 6894.757, rel=1e-3)
+    assert np.std(pressure) == pytest.approx(2 * 6894.757, rel=0.02)
+    assert (area.min() >= 10e-6, area.max() <= 12e-6) == (True, True)
+    assert np.corrcoef(pressure, area)[0, 1] == pytest.approx(0.78, abs=0.02)  # 0.8 of the normal scores
+
+
+def test_what_varies_in_one_configuration_only_keeps_the_correlation_among_the_rest() -> None:
+    document = study()
+    document["vary"][0]["only"] = ["solenoid"]
+    whole = load_study(document)
+    uncertainty = uncertainty_in(whole, choose_configuration(whole, "proportional"))
+    assert uncertainty.paths == ("valve.area", "actuator.leak.area")
+    columns = uncertainty.random_columns(0, 20_000, 1)
+    found = np.corrcoef(columns["valve.area"], columns["actuator.leak.area"])[0, 1]
+    assert found == pytest.approx(
+        6.0 / np.pi * np.arcsin(-0.5 / 2.0), abs=0.02
+    )  # rank correlation, as both are uniform
+
+
+def test_a_choice_of_configurations_is_not_made_in_silence() -> None:
+    whole = load_study(study())
+    with pytest.raises(StudyError, match="has several configurations; choose one: proportional, solenoid"):
+        choose_configuration(whole, None)
+    with pytest.raises(StudyError, match="no configuration 'solenoids', did you mean 'solenoid'"):
+        choose_configuration(whole, "solenoids")
+
+
+def test_a_grid_has_no_probability() -> None:
+    document = study(correlations=[], sample=None)
+    document["vary"] = [{"path": "valve.area", "kind": "list", "values": ["10 mm^2", "11 mm^2"]}]
+    del document["sample"]
+    with pytest.raises(StudyError, match=r"'valve.area' is varied over a grid or list, which has no probability"):
+        uncertainty_of(load_study(document))
+
+
+def test_a_study_that_is_loaded_takes_no_overrides() -> None:
+    with pytest.raises(StudyError, match="takes no overrides"):
+        study_of(load_study(study()), ["valve.area=11 mm^2"])

@@ -1,0 +1,158 @@
+"""Noise is drawn like everything else that is uncertain, and how much of a spread it makes is known."""
+
+import copy
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import ppafo
+from ppafo.errors import StudyError
+from ppafo.questions.compare.solve import compare
+from ppafo.questions.montecarlo.estimate import StoppingRule, draw_until
+from ppafo.questions.montecarlo.statistic import Mean, Quantile
+from ppafo.questions.sweep.chunks import drawn_values
+from ppafo.studies.distributions import Floats, NormalAround
+from ppafo.studies.draws import Uncertainty, uncertainty_of
+from ppafo.studies.intervals import noise_interval
+from ppafo.studies.loading import load_study
+from ppafo.studies.noise import NOISE, other_noise, with_noise
+from ppafo.studies.outcomes import Outcomes
+from ppafo.studies.study import Drawn
+
+NOISY = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
+DOCUMENT: dict[str, Any] = {
+    "schema_version": 1,
+    "name": "noisy",
+    "configurations": [
+        {"name": "one", "scenario": "torque-task-proportional", "overrides": NOISY},
+        {"name": "other", "scenario": "torque-task-proportional", "overrides": [*NOISY, "sensors.seed=9"]},
+    ],
+    "vary": [{"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"}],
+    "sample": {"method": "random", "runs": 64, "seed": 3},
+    "outputs": {"metrics": ["rms_error"]},
+}
+
+
+def changed(**changes: Any) -> dict[str, Any]:
+    return copy.deepcopy(DOCUMENT) | changes
+
+
+@pytest.mark.parametrize("with_study", [True, False])
+def test_scenarios_that_differ_in_nothing_but_their_seed_are_equal_in_every_draw(with_study: bool) -> None:
+    one, other = (ppafo.load_scenario("torque-task-proportional", [*NOISY, f"sensors.seed={seed}"]) for seed in (1, 9))
+    found = compare({"one": one, "other": other}, changed() if with_study else None, draws=64)
+    error = next(item for item in found.pairs("as written", "other") if item.metric == "rms_error")
+    assert error.equal == 1.0
+    assert error.better is not None
+    assert error.better.value == 0.0
+    outcomes = found.cases[0].outcomes
+    assert outcomes is not None
+    assert np.unique(outcomes.metrics["rms_error"]).size == 64, "every draw has its own noise"
+    drawn = "1 uncertain value and of the sensor noise" if with_study else "64 draws of the sensor noise"
+    assert drawn in found.answer().lead[0]
+
+
+def test_without_noise_nothing_is_drawn_for_it() -> None:
+    quiet = changed()
+    for item in quiet["configurations"]:
+        item["overrides"] = [text for text in item["overrides"] if "noise" not in text]
+    assert NOISE not in load_study(quiet).paths
+    assert NOISE in load_study(changed()).paths
+    assert not compare({"a": ppafo.load_scenario("step-response"), "b": ppafo.load_scenario("step-response")}).draws
+
+
+def test_the_noise_is_independent_of_what_is_correlated_and_leaves_its_correlation() -> None:
+    document = changed()
+    document["vary"].append({"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"})
+    document["correlations"] = [{"between": ["supply.pressure", "valve.area"], "coefficient": 0.8}]
+    columns = uncertainty_of(load_study(document)).random_columns(0, 4000, 1)
+    ranks = np.array([stats.rankdata(columns[path]) for path in ("supply.pressure", "valve.area", NOISE)])
+    found = np.corrcoef(ranks)
+    assert found[0, 1] == pytest.approx(6.0 / np.pi * np.arcsin(0.4), abs=0.02)
+    assert found[:2, 2] == pytest.approx([0.0, 0.0], abs=0.05)
+    assert np.array_equal(columns[NOISE], np.floor(columns[NOISE]))
+
+
+def test_a_seed_varies_as_whole_numbers() -> None:
+    document = changed(configurations=DOCUMENT["configurations"][:1])
+    document["vary"].append({"path": NOISE, "kind": "whole_numbers", "minimum": 3, "maximum": 5})
+    values = drawn_values(load_study(document), np.arange(64))[NOISE]
+    assert set(values) == {3.0, 4.0, 5.0}
+    document["vary"][-1] = {"path": NOISE, "kind": "list", "values": [1, 2]}
+    assert set(drawn_values(load_study(document), np.arange(128))[NOISE]) == {1.0, 2.0}
+
+
+@pytest.mark.parametrize(
+    ("item", "text"),
+    [
+        (
+            {"path": NOISE, "kind": "uniform", "minimum": 1, "maximum": 9},
+            "gives no whole numbers, which a random seed needs",
+        ),
+        ({"path": NOISE, "kind": "list", "values": [1, 2.5]}, "2.5 must be a whole number"),
+        ({"path": NOISE, "kind": "grid", "first": 1, "last": 4, "count": 3}, "2.5 must be a whole number"),
+        ({"path": NOISE, "kind": "whole_numbers", "minimum": 9, "maximum": 3}, "must be less than maximum"),
+        ({"path": "valve.area", "kind": "whole_numbers"}, "is for 'sensors.seed' alone"),
+    ],
+)
+def test_a_seed_that_is_no_whole_number_is_one_line(item: dict[str, Any], text: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        load_study(changed(configurations=DOCUMENT["configurations"][:1], vary=[item]))
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_share_of_noise_is_the_planted_one_and_its_interval_holds() -> None:
+    random, truth, held = np.random.default_rng(5), 0.3, []
+    for _ in range(400):
+        device = random.normal(0.0, math.sqrt(1.0 - truth), 256)
+        first, second = (device + random.normal(0.0, math.sqrt(truth), 256) for _ in range(2))
+        share = noise_interval(first, second, 0.9)
+        assert share is not None
+        held.append(share.low <= truth <= share.high)
+    assert 0.85 <= np.mean(held) <= 0.95
+    assert noise_interval(np.ones(9), np.ones(9), 0.9) is None
+    only = random.normal(size=(2, 500))
+    assert noise_interval(only[0], only[1], 0.95) == pytest.approx(noise_interval(only[1], only[0], 0.95))
+
+
+def test_a_share_of_noise_and_both_ends_are_between_nothing_and_all() -> None:
+    values = np.array([1.0, -1.1, 1.0, -0.9, 1.0])
+    share = noise_interval(values, -values, 0.95)
+    assert share is not None
+    assert 0.0 <= share.low <= share.value <= share.high <= 1.0
+
+
+@pytest.mark.parametrize("statistic", [Mean("N m"), Quantile("N m", 0.5)])
+def test_monte_carlo_says_how_much_is_noise(statistic: Mean | Quantile) -> None:
+    def model(columns: Mapping[str, Floats]) -> Outcomes:
+        noise = stats.norm.ppf((columns[NOISE] + 0.5) / 2.0**32)
+        return Outcomes({"rms_error": columns["x"] + 0.5 * noise}, np.zeros(noise.size, bool), "")
+
+    drawn = (Drawn("x", NormalAround(0.0, 1.0)),)
+    heard = Uncertainty(*with_noise(drawn, None, [ppafo.load_scenario("torque-task-proportional", NOISY)], ["x"]))
+    rule = StoppingRule(0.2, False, first=1024, most=4096)
+    share = draw_until(model, heard, "rms_error", statistic, rule, 1).noise
+    assert share is not None
+    assert share.value == pytest.approx(0.2, abs=0.04)
+    assert (
+        draw_until(
+            lambda columns: model({**columns, NOISE: np.zeros(columns["x"].size)}),
+            Uncertainty(drawn),
+            "rms_error",
+            statistic,
+            rule,
+            1,
+        ).noise
+        is None
+    )
+
+
+def test_another_stream_is_another_seed_for_every_seed() -> None:
+    seeds = np.arange(1000.0)
+    assert np.all(other_noise(seeds) != seeds)
+    assert np.unique(other_noise(seeds)).size == 1000

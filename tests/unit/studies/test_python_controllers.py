@@ -1,0 +1,131 @@
+"""Python objects as controllers where many runs are made: slow, one after the other, and with the same numbers."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.errors import ScenarioError, SimulationError, StudyError
+from ppafo.model.sensors import Measurement
+from ppafo.progress import Progress
+from ppafo.simulation.ensemble import COMPLETED, run_ensemble
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control
+
+TASK = "torque-task-proportional"
+SHORT = ("run.duration=0.2 s", "reference.ramp_time=0.1 s")
+METRIC = ("rms_error",)
+
+
+class Integral:
+    """Proportional and integral action; counts how often it is reset."""
+
+    def __init__(self, gain: float = 0.2) -> None:
+        self.gain, self.sum, self.resets = gain, 0.0, 0
+
+    def reset(self) -> None:
+        self.sum = 0.0
+        self.resets += 1
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+        error = reference - measurement.torque
+        self.sum += 0.001 * error
+        return self.gain * error + 0.5 * self.sum
+
+
+class Proportional(Integral):
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+        return self.gain * (reference - measurement.torque)
+
+
+def test_each_run_of_an_ensemble_gives_what_it_gives_alone_and_begins_afresh() -> None:
+    mine = Integral()
+    base = ppafo.load_scenario(TASK, SHORT).controlled_by(mine)
+    pressures = np.array([3e5, 4e5, 5e5])
+    found = run_ensemble(base, {"supply.pressure": pressures}, METRIC, ("command",), 0.05)
+    assert mine.resets == 3
+    assert (found.status == COMPLETED).all()
+    for run, pressure in enumerate(pressures):
+        scenario = ppafo.load_scenario(TASK, (*SHORT, f"supply.pressure={float(pressure)!r} Pa_a"))
+        alone = ppafo.simulate(scenario.controlled_by(Integral()))
+        assert found.metrics["rms_error"][run] == pytest.approx(alone.metrics["rms_error"].value, rel=1e-11)
+        assert found.traces["command"][:, run] == pytest.approx(alone.recording["command"][::50], rel=1e-12)
+
+
+def test_it_sees_the_same_late_and_noisy_signals_as_alone() -> None:
+    base = ppafo.load_scenario("torque-task-slow-valve", SHORT)
+    assert base.sensors.delay > 0.0
+    assert base.sensors.pressure_noise > 0.0
+    mine = base.controlled_by(Proportional())
+    found = run_ensemble(mine, {"sensors.seed": np.array([1.0, 2.0])}, METRIC).metrics["rms_error"]
+    for seed, error in enumerate(found, 1):
+        alone = ppafo.simulate(replace(mine, sensors=replace(mine.sensors, seed=seed)))
+        assert error == pytest.approx(alone.metrics["rms_error"].value, rel=1e-11)
+    assert found[0] != found[1]
+
+
+def test_it_is_compared_over_an_uncertain_device_with_progress_and_overrides() -> None:
+    base, heard = ppafo.load_scenario(TASK, SHORT), list[Progress]()
+    pair = {"mine": base.controlled_by(Integral(0.1)), "stronger": base.controlled_by(Integral(0.4))}
+    level = ["reference.level=2 N m"]
+    found = ppafo.compare(pair, "torque-task-uncertainty", overrides=level, draws=64, progress=heard.append)
+    assert [item.done for item in heard] == [32, 64, 96, 128]
+    (better,) = [item.better for item in found.pairs("as written", "stronger") if item.metric == "rms_error"]
+    assert better is not None
+    assert better.value == 1.0
+    assert {case.scenario.reference.settings["level"] for case in found.cases} == {2.0}
+    with pytest.raises(StudyError, match=r"gain=1': scenario '.*' is controlled by a Python object"):
+        ppafo.compare(pair, overrides=["controller.proportional_gain=1"])
+
+
+def test_it_is_swept_chunk_by_chunk(tmp_path: Path) -> None:
+    vary = {"path": "supply.pressure", "kind": "uniform", "minimum": "40 psi_g", "maximum": "50 psi_g"}
+    study = ppafo.load_study(
+        {
+            "schema_version": 1,
+            "name": "mine",
+            "configurations": [{"name": "mine", "scenario": TASK, "overrides": list(SHORT)}],
+            "sample": {"method": "random", "runs": 70, "seed": 1},
+            "vary": [vary],
+            "outputs": {"metrics": ["rms_error"]},
+        }
+    )
+    (configuration,) = study.configurations
+    own = replace(configuration, scenario=configuration.scenario.controlled_by(Integral()))
+    heard: list[Progress] = []
+    results = ppafo.sweep(replace(study, configurations=(own,)), tmp_path / "out", progress=heard.append)
+    assert heard[-1].done == 70
+    assert results.document["chunks"] == 2
+    table = results.table()
+    pressure, error = float(table["supply.pressure"][69]), float(table["rms_error"][69])
+    alone = ppafo.load_scenario(TASK, (*SHORT, f"supply.pressure={pressure!r} Pa_a")).controlled_by(Integral())
+    assert error == pytest.approx(ppafo.simulate(alone).metrics["rms_error"].value, rel=1e-9)
+
+
+def test_the_device_around_it_is_tuned_and_gains_that_it_does_not_declare_are_refused_in_a_line() -> None:
+    document = {
+        "schema_version": 1,
+        "name": "trial",
+        "scenario": TASK,
+        "overrides": list(SHORT),
+        "search": [{"path": "supply.pressure", "minimum": "20 psi_g", "maximum": "60 psi_g"}],
+        "objective": [{"metric": "rms_error"}],
+        "effort": {"starts": 1, "generations": 2, "candidates_per_gain": 4},
+    }
+    problem = ppafo.load_tuning(document)
+    tuned = ppafo.tune(replace(problem, scenario=problem.scenario.controlled_by(Integral())))
+    assert tuned.after.objective <= tuned.before.objective
+    gain = {"path": "controller.proportional_gain", "minimum": "0.05 1/(N m)", "maximum": "1 1/(N m)"}
+    problem = ppafo.load_tuning(document | {"search": [gain]})
+    with pytest.raises(StudyError, match="a Python object has no declared settings"):
+        ppafo.tune(replace(problem, scenario=problem.scenario.controlled_by(Integral())))
+
+
+def test_a_command_that_is_no_number_names_the_object_and_a_valve_that_nothing_controls_is_refused() -> None:
+    base = ppafo.load_scenario(TASK, SHORT)
+    columns = {"supply.pressure": np.array([4e5])}
+    with pytest.raises(SimulationError, match=r"Proportional.update returned nan at t = 0 s"):
+        run_ensemble(base.controlled_by(Proportional(float("nan"))), columns, METRIC)
+    with pytest.raises(ScenarioError, match="nothing controls the valve"):
+        run_ensemble(replace(base, control=Control(PYTHON_CONTROLLER, {}, base.control.period)), columns, METRIC)

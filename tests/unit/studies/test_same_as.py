@@ -1,0 +1,110 @@
+"""One pressure for both regulators in sweeps too, and ``same_as`` ties any two paths of a study."""
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.errors import StudyError
+from ppafo.questions.sweep.chunks import drawn_values, varied_columns
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.numbers import with_numbers
+from ppafo.studies.draws import uncertainty_in
+from ppafo.studies.loading import load_study
+
+STUDY: dict[str, Any] = {
+    "schema_version": 1,
+    "name": "tied",
+    "configurations": [{"name": "one", "scenario": "torque-task-proportional"}],
+    "sample": {"method": "random", "runs": 8, "seed": 1},
+    "vary": [
+        {
+            "path": "actuator.dead_volume_1",
+            "kind": "log_normal",
+            "median": "2 cm^3",
+            "factor": 1.5,
+        },
+        {"path": "actuator.dead_volume_2", "same_as": "actuator.dead_volume_1"},
+    ],
+    "outputs": {"metrics": ["rms_error"]},
+}
+
+
+def study(**changes: Any) -> dict[str, Any]:
+    """The study with some of its second table changed."""
+    document = copy.deepcopy(STUDY)
+    document["vary"][1] |= changes
+    return document
+
+
+def test_path_that_follows_another_has_its_values_in_every_run() -> None:
+    loaded = load_study(STUDY)
+    assert loaded.paths == ("actuator.dead_volume_1",)
+    values = varied_columns(loaded, loaded.configurations[0], drawn_values(loaded, np.arange(8)))
+    assert len(set(values["actuator.dead_volume_1"])) == 8
+    assert np.array_equal(values["actuator.dead_volume_2"], values["actuator.dead_volume_1"])
+
+
+def test_path_follows_in_the_draws_of_analyses_too() -> None:
+    loaded = load_study(STUDY)
+    uncertainty = uncertainty_in(loaded, loaded.configurations[0])
+    assert uncertainty.paths == ("actuator.dead_volume_1",)
+    columns = uncertainty.random_columns(0, 5, 1)
+    assert np.array_equal(columns["actuator.dead_volume_2"], columns["actuator.dead_volume_1"])
+
+
+def test_path_follows_only_where_it_is_to() -> None:
+    document = study(only=["one"])
+    document["configurations"].append({"name": "two", "scenario": "torque-task-solenoid"})
+    loaded = load_study(document)
+    values = drawn_values(loaded, np.arange(8))
+    assert "actuator.dead_volume_2" in varied_columns(loaded, loaded.configurations[0], values)
+    assert "actuator.dead_volume_2" not in varied_columns(loaded, loaded.configurations[1], values)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"same_as": "actuator.dead_volume_3"},
+            "does not vary independently here, did you mean 'actuator.dead_volume_1'",
+        ),
+        ({"same_as": "actuator.dead_volume_2"}, "does not vary independently"),
+        ({"same_as": 3}, "same_as"),
+        ({"path": "supply.pressure"}, "is in 'm\\^3', this path in 'Pa_a'"),
+        ({"path": "actuator.dead_volume_1"}, "varied twice"),
+        ({"path": "actuator.dead_volume_4"}, "has no number 'actuator.dead_volume_4'"),
+        ({"median": "2 cm^3"}, "unknown key"),
+        ({"only": ["three"]}, "there is no configuration 'three'"),
+    ],
+)
+def test_path_that_cannot_follow_is_refused_in_one_line(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(StudyError, match=message) as refused:
+        load_study(study(**changes))
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_column_of_the_supply_pressure_is_that_of_both_regulators() -> None:
+    scenario = load_scenario("torque-task-proportional", ["run.duration=0.3 s", "reference.level=-3 N m"])
+    pressures = np.array([4.0e5, 5.0e5])
+    both = {"supply.pressure": pressures, "supply.dorsiflexion_pressure": pressures}
+    apart = {"supply.pressure": pressures, "supply.dorsiflexion_pressure": np.full(2, 4.5e5)}
+    one, two, other = (
+        run_ensemble(scenario, columns, ["gas_supplied"]).metrics["gas_supplied"]
+        for columns in ({"supply.pressure": pressures}, both, apart)
+    )
+    assert np.array_equal(one, two)
+    assert not np.array_equal(one, other)
+
+
+def test_second_pressure_that_is_apart_stays_where_it_is() -> None:
+    scenario = load_scenario("step-response", ["supply.dorsiflexion_pressure=45 psi_g"])
+    moved = with_numbers(scenario, {"supply.pressure": 5.0e5}).device.supply
+    assert (moved.pressure, moved.dorsiflexion_pressure) == (5.0e5, scenario.device.supply.dorsiflexion_pressure)
+
+
+def test_line_of_the_readme_moves_both_chambers() -> None:
+    supply = load_scenario("step-response", ["supply.pressure=70 psi_g"]).device.supply
+    assert supply.dorsiflexion_pressure == supply.pressure > load_scenario("step-response").device.supply.pressure

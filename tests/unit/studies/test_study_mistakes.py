@@ -1,0 +1,244 @@
+"""Study files that cannot be meant as they stand: one line each that names the key and what is allowed."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.errors import StudyError
+from ppafo.studies.declaration import VARIED
+from ppafo.studies.loading import list_studies, load_study
+from ppafo.studies.varying import _DISTRIBUTIONS
+
+AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
+LEAK = AREA | {"path": "actuator.leak.area"}
+CD = {"path": "valve.discharge_coefficient", "kind": "uniform", "minimum": 0.1, "maximum": 0.2}
+
+CONTRADICTIONS = [
+    ({"kind": "uniform", "minimum": "12 mm^2", "maximum": "10 mm^2"}, "minimum = '12 mm^2' must be less than maximum"),
+    ({"kind": "uniform", "minimum": "10 mm^2", "maximum": "10 mm^2"}, "must be less than maximum = '10 mm^2'"),
+    ({"kind": "log_uniform", "minimum": "0 mm^2", "maximum": "10 mm^2"}, "needs both bounds above 0"),
+    (
+        {"kind": "uniform", "minimum": "-1 mm^2", "maximum": "1 mm^2"},
+        "minimum = '-1 mm^2': valve.area must be at least",
+    ),
+    ({"kind": "uniform", "minimum": "1 mm^2", "maximum": "1 m^2"}, "at most 0.01 m^2"),
+    ({"kind": "uniform", "minimum": "1 mm", "maximum": "2 mm^2"}, "a unit like 'm^2' is needed"),
+    (
+        {"kind": "uniform", "minimum": 1.0, "maximum": "2 mm^2"},
+        "a number without a unit; give a text with a unit such as m^2",
+    ),
+    ({"kind": "normal", "mean": "10 mm^2", "standard_deviation": "-1 mm^2"}, "standard_deviation = '-1 mm^2' must be"),
+    ({"kind": "normal", "mean": "10 mm^2", "standard_deviation": "0 mm^2"}, "must be more than 0"),
+    ({"kind": "normal", "mean": "-10 mm^2", "standard_deviation": "1 mm^2"}, "mean = '-10 mm^2'"),
+    ({"kind": "log_normal", "median": "0 mm^2", "factor": 1.1}, "median = '0 mm^2' must be above 0"),
+    ({"kind": "log_normal", "median": "1 mm^2", "factor": 0.9}, "factor = 0.9: must be greater than 1"),
+    ({"kind": "triangular", "minimum": "1 mm^2", "mode": "9 mm^2", "maximum": "3 mm^2"}, "mode = '9 mm^2' must lie"),
+    ({"kind": "choice", "values": ["1 mm^2", "2 mm^2"], "weights": [1.0]}, "weights has 1 numbers, values has 2"),
+    ({"kind": "choice", "values": ["1 mm^2", "2 mm^2"], "weights": [0.0, 0.0]}, "not all of them 0"),
+    ({"kind": "choice", "values": ["1 mm^2", "2 mm^2"], "weights": [2.0, -1.0]}, "must be at least 0"),
+    ({"kind": "grid", "first": "1 mm^2", "last": "1 mm^2", "count": 3}, "a grid needs two different ends"),
+    (
+        {"kind": "grid", "first": "0 mm^2", "last": "1 mm^2", "count": 3, "spacing": "logarithmic"},
+        "needs both ends above 0",
+    ),
+    ({"kind": "grid", "first": "1 mm^2", "last": "2 mm^2", "count": 1}, "count = 1"),
+    ({"kind": "unifrom", "minimum": "1 mm^2", "maximum": "2 mm^2"}, "did you mean 'uniform'?"),
+    ({"kind": "uniform", "minimun": "1 mm^2", "maximum": "2 mm^2"}, "did you mean 'minimum'?"),
+]
+
+
+def refused(document: Any) -> str:
+    """The message of the error, which has one line and names the study."""
+    with pytest.raises(StudyError) as caught:
+        load_study(document)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("study")
+    return message
+
+
+@pytest.mark.parametrize(("table", "expected"), CONTRADICTIONS)
+def test_contradictory_tables_are_refused(varying: Callable[..., Any], table: Any, expected: str) -> None:
+    assert expected in refused(varying({"path": "valve.area", **table}))
+
+
+def test_a_standard_deviation_of_a_pressure_is_a_difference(varying: Callable[..., Any]) -> None:
+    table = {"path": "supply.pressure", "kind": "normal", "mean": "50 psi_g", "standard_deviation": "2 psi_g"}
+    assert "a pressure difference is needed" in refused(varying(table))
+
+
+def test_a_standard_deviation_of_a_temperature_has_no_offset(varying: Callable[..., Any]) -> None:
+    table = {"path": "gas.temperature", "kind": "normal", "mean": "20 degC", "standard_deviation": "2 degC"}
+    assert "a difference of temperatures is given in K" in refused(varying(table))
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("valve.aera", "did you mean 'valve.area'?"),
+        ("suply.pressure", "did you mean 'supply.pressure'?"),
+        ("reference.levl", "did you mean 'reference.level'?"),
+        ("reported.c1", "has no number 'reported.c1'"),
+        ("controller.kind", "has no number 'controller.kind'"),
+    ],
+)
+def test_unknown_paths_are_refused_with_the_nearest(varying: Callable[..., Any], path: str, expected: str) -> None:
+    assert expected in refused(varying(AREA | {"path": path}))
+
+
+def test_a_path_must_exist_in_every_configuration_that_varies_it(varying: Callable[..., Any]) -> None:
+    gain = {"path": "controller.proportional_gain", "kind": "list", "values": ["0.1 1/(N m)"]}
+    document = varying(gain, CD)
+    assert "scenario 'torque-task-solenoid' has no number 'controller.proportional_gain'" in refused(document)
+    document["vary"][0]["only"] = ["proportional"]
+    assert load_study(document).only == {"controller.proportional_gain": ("proportional",)}
+    document["vary"][0]["only"] = ["proportinal"]
+    assert "did you mean 'proportional'?" in refused(document)
+
+
+def test_a_path_is_varied_once(varying: Callable[..., Any]) -> None:
+    assert "'valve.area' is varied twice" in refused(varying(AREA, CD, AREA))
+
+
+def test_a_study_that_asks_for_nothing_is_refused(small: Any) -> None:
+    small["outputs"] = {"metrics": []}
+    assert "[outputs] requests nothing" in refused(small)
+
+
+def test_a_study_that_varies_nothing_is_refused_unless_it_compares(small: Any) -> None:
+    for key in ("vary", "correlations", "sample"):
+        del small[key]
+    assert load_study(small).runs == 2
+    del small["configurations"][1]
+    assert "varies nothing" in refused(small)
+
+
+def test_a_study_without_configurations_is_refused(small: Any) -> None:
+    small["configurations"] = []
+    assert "configurations" in refused(small)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "expected"),
+    [
+        ({"metrics": ["rms_eror"]}, "there is no metric 'rms_eror', did you mean 'rms_error'?"),
+        ({"metrics": ["rms_error", "rms_error"]}, "'rms_error' is named twice"),
+        ({"bands": ["torqe"]}, "there is no channel 'torqe', did you mean 'torque'?"),
+        ({"trajectories": ["presure_1"]}, "did you mean 'pressure_1'?"),
+        ({"bands": ["torque"], "every": "1 s"}, "at most run.duration, 0.2 s"),
+        ({"bands": ["torque"], "every": "0 s"}, "must be more than 0 s"),
+        ({"bands": ["torque"], "every": "1 mm"}, "outputs.every = '1 mm'"),
+        ({"bands": ["torque"], "quantiles": [1.5]}, "quantiles"),
+        ({"metrics": ["rms_error"], "metric": []}, "unknown key 'outputs.metric', did you mean 'metrics'?"),
+    ],
+)
+def test_unknown_outputs_are_refused_with_the_nearest(small: Any, outputs: Any, expected: str) -> None:
+    small["outputs"] = outputs
+    assert expected in refused(small)
+
+
+def test_the_duration_varies_only_where_nothing_is_kept_over_time(small: Any) -> None:
+    small["vary"].append({"path": "run.duration", "kind": "list", "values": ["0.1 s", "0.2 s"]})
+    assert "'run.duration' cannot vary where trajectories or bands are kept" in refused(small)
+    small["outputs"] = {"metrics": ["rms_error"]}
+    assert "'run.duration' is both set and varied" in refused(small)
+    for table in small["configurations"]:
+        table["overrides"] = [text for text in table["overrides"] if not text.startswith("run.duration")]
+    assert load_study(small).runs == 64
+
+
+def test_a_value_below_its_only_limit_is_told_that_limit(varying: Callable[..., Any]) -> None:
+    table = {"path": "actuator.torque_constant", "kind": "list", "values": ["-1 cm^3"]}
+    assert refused(varying(table)).endswith("actuator.torque_constant must be more than 0 m^3")
+
+
+def test_metrics_of_tracking_need_a_reference(varying: Callable[..., Any]) -> None:
+    document = varying(AREA)
+    document["configurations"] = [{"name": "step", "scenario": "step-response"}]
+    assert "'rms_error' needs a reference" in refused(document)
+    document["outputs"] = {"metrics": "all"}
+    assert "rms_error" not in load_study(document).outputs.metrics
+    assert "gas_supplied" in load_study(document).outputs.metrics
+
+
+def test_correlations_that_cannot_hold_at_once_are_refused(varying: Callable[..., Any]) -> None:
+    document = varying(AREA, LEAK, CD)
+    pairs = [("valve.area", "actuator.leak.area", 0.6), ("valve.area", CD["path"], 0.6)]
+    document["correlations"] = [{"between": [one, other], "coefficient": value} for one, other, value in pairs]
+    assert load_study(document).scores is not None
+    document["correlations"].append({"between": ["actuator.leak.area", CD["path"]], "coefficient": -0.9})
+    assert "not positive definite (valve.area with actuator.leak.area: 0.6" in refused(document)
+
+
+@pytest.mark.parametrize(
+    ("between", "coefficient", "expected"),
+    [
+        (["valve.area", "valve.aera"], 0.5, "did you mean 'valve.area'?"),
+        (["valve.area", "valve.area"], 0.5, "must name two different paths"),
+        (["valve.area", "actuator.leak.area"], 1.0, "less than 1"),
+        (["valve.area", "reference.level"], 0.5, "'reference.level' has no distribution"),
+    ],
+)
+def test_single_correlations_are_checked(
+    varying: Callable[..., Any], between: list[str], coefficient: float, expected: str
+) -> None:
+    document = varying(AREA, LEAK, {"path": "reference.level", "kind": "list", "values": ["5 N m"]})
+    document["correlations"] = [{"between": between, "coefficient": coefficient}]
+    assert expected in refused(document)
+
+
+def test_a_correlation_is_given_once(varying: Callable[..., Any]) -> None:
+    document = varying(AREA, LEAK)
+    one = {"between": ["valve.area", "actuator.leak.area"], "coefficient": 0.5}
+    document["correlations"] = [one, one | {"between": ["actuator.leak.area", "valve.area"]}]
+    assert "only once" in refused(document)
+
+
+def test_distributions_need_a_sample_and_a_grid_has_none(varying: Callable[..., Any]) -> None:
+    document = varying(AREA)
+    del document["sample"]
+    assert "'sample' is missing" in refused(document)
+    document = varying({"path": "valve.area", "kind": "list", "values": ["10 mm^2"]})
+    assert "[sample] is given, but nothing has a distribution" in refused(document)
+    del document["sample"]
+    with pytest.raises(StudyError, match=r"has no \[sample\], so the number of runs is that of its grid"):
+        load_study(document, runs=4)
+
+
+def test_configurations_have_names_of_their_own(small: Any) -> None:
+    small["configurations"][1]["name"] = "proportional"
+    assert "there are two configurations named 'proportional'" in refused(small)
+
+
+def test_mistakes_in_a_configuration_name_it(small: Any) -> None:
+    small["configurations"][1]["scenario"] = "torque-task-solenoids"
+    assert "configuration 'solenoid': there is no scenario" in refused(small)
+    small["configurations"][1] |= {"scenario": "torque-task-solenoid", "overrides": ["valve.aera=1 mm^2"]}
+    assert "did you mean 'valve.area'?" in refused(small)
+
+
+def test_files_are_named_in_messages_and_scenarios_are_relative_to_them(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="there is no study 'torque-task-uncertanty', did you mean"):
+        load_study("torque-task-uncertanty")
+    path = tmp_path / "mine.toml"
+    path.write_text("name = 3\n", encoding="utf-8")
+    with pytest.raises(StudyError, match=r"mine\.toml: "):
+        load_study(path)
+    path.write_text("", encoding="utf-8")
+    with pytest.raises(StudyError, match="is empty; 'ppafo schema study' prints what belongs in it"):
+        load_study(path)
+
+
+def test_every_kind_of_the_layout_can_be_built() -> None:
+    kinds = {item.model_fields["kind"].annotation.__args__[0] for item in VARIED}  # type: ignore[union-attr]
+    assert kinds == {"grid", "list", "stated", "same_as", *_DISTRIBUTIONS}
+
+
+@pytest.mark.parametrize("name", list_studies())
+def test_studies_of_the_package_load_under_their_own_name(name: str) -> None:
+    study = load_study(name)
+    assert study.name == name
+    assert study.description
+    assert study.runs > 1000

@@ -1,0 +1,175 @@
+"""Kinds of other packages: found by entry point or by module and object, refused in one line."""
+
+import logging
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+import ppafo
+from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.errors import KindError, ScenarioError
+from ppafo.kinds import Kinds
+from ppafo.metrics import METRICS
+from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.simulation.schema import json_schema
+
+LAW = """
+from dataclasses import replace
+from ppafo.control.controllers import {name}
+KIND = replace({name}.KIND, name={call!r}, summary="Of another package.")
+"""
+Install = Callable[..., None]
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
+    """Installs a package with one module and entry points; forgotten at the end of the test."""
+    known = [(kinds, set(kinds)) for kinds in (CONTROLLERS, PROFILES, METRICS)]
+    modules = set(sys.modules)
+
+    def installed(package: str, text: str, **groups: str) -> None:
+        (tmp_path / f"{package}.py").write_text(text)
+        about = tmp_path / f"{package}-1.0.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+        lines = "".join(f"[ppafo.{group}]\n{name} = {package}:KIND\n" for group, name in groups.items())
+        (about / "entry_points.txt").write_text(lines)
+        monkeypatch.syspath_prepend(tmp_path)
+
+    yield installed
+    for kinds, names in known:
+        for name in set(kinds) - names:
+            del kinds[name]
+    for name in set(sys.modules) - modules:
+        if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
+            del sys.modules[name]
+
+
+def test_a_law_of_another_package_is_found_by_its_name_and_only_then(install: Install) -> None:
+    install("other_laws", LAW.format(name="on_off", call="mine"), controllers="mine")
+    load_scenario("torque-task-proportional")
+    assert "other_laws" not in sys.modules
+    assert load_scenario("torque-task-proportional", ["controller.kind=mine"]).control.kind == "mine"
+    assert "other_laws" in sys.modules
+    assert CONTROLLERS["mine"].summary == "Of another package."
+
+
+def test_the_published_layout_has_the_laws_of_all_packages(install: Install) -> None:
+    install("other_laws", LAW.format(name="on_off", call="mine"), controllers="mine")
+    assert '"mine"' in repr(json_schema()).replace("'", '"')
+
+
+def test_a_broken_package_is_one_line_and_stops_no_other(install: Install, caplog: pytest.LogCaptureFixture) -> None:
+    install("broken_laws", "import nowhere_to_be_found\n", controllers="broken")
+    install("angry_laws", "raise RuntimeError('no\\nno')\n", controllers="angry")
+    install("other_laws", LAW.format(name="on_off", call="mine"), controllers="mine")
+    with caplog.at_level(logging.WARNING):
+        problems = CONTROLLERS.load_all()
+    assert problems == (
+        "controller 'angry' of package 'angry_laws' cannot be loaded: RuntimeError: no no",
+        "controller 'broken' of package 'broken_laws' cannot be loaded: ModuleNotFoundError: No module named "
+        "'nowhere_to_be_found'",
+    )
+    assert [record.getMessage() for record in caplog.records] == [f"ppafo: {line}" for line in problems]
+    assert "mine" in CONTROLLERS
+    document = dict(load_scenario("torque-task-proportional").origin.content)
+    document["controller"] = {"kind": "broken"}
+    with pytest.raises(ScenarioError) as caught:
+        scenario_from_dict(document)
+    assert str(caught.value) == f"scenario 'torque-task-proportional': controller.kind: {problems[1]}"
+
+
+def test_a_name_of_one_of_our_own_is_refused_by_name(install: Install) -> None:
+    ours = CONTROLLERS["pid"]
+    install("clashing_laws", LAW.format(name="on_off", call="pid"), controllers="pid")
+    (problem,) = CONTROLLERS.load_all()
+    assert problem == (
+        "controller 'pid' of package 'clashing_laws' has the name of one of ppafo's own; it needs another name"
+    )
+    assert CONTROLLERS["pid"] is ours
+
+
+def test_two_packages_with_one_name_are_both_named(install: Install) -> None:
+    for package in ("first_laws", "second_laws"):
+        install(package, LAW.format(name="on_off", call="mine"), controllers="mine")
+    with pytest.raises(KindError, match="offered by several packages: package 'first_laws', package 'second_laws'"):
+        CONTROLLERS["mine"]
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("KIND = 1.0\n", "is of type float, not ControllerKind"),
+        (LAW.format(name="on_off", call="another"), "calls itself 'another'"),
+        ("", "cannot be loaded: AttributeError"),
+    ],
+)
+def test_what_is_no_law_of_that_name_is_refused(install: Install, text: str, problem: str) -> None:
+    install("odd_laws", text, controllers="odd")
+    with pytest.raises(KindError, match=problem):
+        CONTROLLERS["odd"]
+
+
+def test_a_law_is_named_by_module_and_object_from_the_working_folder(
+    install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "beside.py").write_text(LAW.format(name="on_off", call="anything"))
+    monkeypatch.chdir(tmp_path)
+    path = list(sys.path)
+    scenario = load_scenario("torque-task-proportional", ["controller.kind=beside:KIND"])
+    assert scenario.control.kind == "beside:KIND"
+    assert sys.path == path
+    for name, problem in (
+        ("nowhere:KIND", "No module named 'nowhere'"),
+        ("beside:LAW", "has no attribute 'LAW'"),
+        ("math:pi", "is of type float"),
+    ):
+        with pytest.raises(KindError, match=problem):
+            load_scenario("torque-task-proportional", [f"controller.kind={name}"])
+
+
+def test_profiles_and_metrics_are_found_too(install: Install) -> None:
+    profile = "from dataclasses import replace\nfrom ppafo.control.profiles import sine\n"
+    install("other_profiles", profile + 'KIND = replace(sine.KIND, name="wave")\n', profiles="wave")
+    metric = "from dataclasses import replace\nfrom ppafo.metrics import METRICS\n"
+    install("other_metrics", metric + 'KIND = replace(METRICS["rms_error"], name="mine")\n', metrics="mine")
+    document = dict(load_scenario("torque-task-proportional").origin.content)
+    document["assumed"] = {}
+    document["reference"] = {"kind": "wave", "level": "1 N m", "amplitude": "1 N m", "frequency": "1 Hz"}
+    assert scenario_from_dict(document).reference.kind == "wave"
+    assert "mine" in METRICS
+    assert "nothing" not in METRICS
+
+
+def test_misspelt_names_are_still_told_with_the_nearest_one(install: Install) -> None:
+    install("other_laws", LAW.format(name="on_off", call="hysteresis"), controllers="hysteresis")
+    with pytest.raises(ppafo.PpafoError, match="did you mean 'hysteresis'"):
+        load_scenario("torque-task-proportional", ["controller.kind=hysteresys"])
+
+
+def test_kinds_are_a_mapping_that_can_be_changed_for_a_while() -> None:
+    kinds: Kinds[object] = Kinds("ppafo.none", "thing", object, ())  # type: ignore[type-var]
+    kinds["a"] = 1.0
+    assert list(kinds) == ["a"]
+    assert kinds["a"] == 1.0
+    del kinds["a"]
+    assert kinds.get("a") is None
+    assert len(kinds) == 0
+
+
+def test_help_and_a_scenario_of_the_package_look_for_no_other_packages() -> None:
+    code = (
+        "import sys, ppafo.cli.main as main\n"
+        "try:\n    main.main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "assert 'importlib.metadata' not in sys.modules and 'ppafo.kinds' not in sys.modules\n"
+        "import importlib.metadata as m\n"
+        "original = m.entry_points\n"
+        "def scan(group):\n    assert not group.startswith('ppafo'), group\n    return original(group=group)\n"
+        "m.entry_points = scan\n"
+        "import ppafo\nppafo.load_scenario('torque-task-proportional')\nppafo.load_walk('proportional')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,69 @@
+"""The progress line: share, rate, time left, failures, and how often it is said."""
+
+import io
+import logging
+
+import pytest
+
+from ppafo.cli.question import progress_line
+from ppafo.progress import Progress, ProgressLine, time_text
+
+
+def test_the_line_has_share_rate_time_left_and_failures() -> None:
+    line = Progress(total=1_000_000, done=300_000, earlier=100_000, failed=12, elapsed=8.0).line()
+    assert line == "300,000 of 1,000,000 runs (30 %), 25,000 runs/s, 28 s left, 12 failed"
+
+
+def test_before_the_first_chunk_there_is_no_rate() -> None:
+    assert Progress("", 0, 10).line() == "0 of 10 runs (0 %)"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"), [(0.4, "0 s"), (59.4, "59 s"), (190.0, "3 min 10 s"), (19_210.0, "5 h 20 min")]
+)
+def test_times_are_told_in_the_units_that_matter(seconds: float, told: str) -> None:
+    assert time_text(seconds) == told
+
+
+class Terminal(io.StringIO):
+    """A stream that somebody watches."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_gets_one_line_that_is_written_over() -> None:
+    stream = Terminal()
+    line = ProgressLine(stream)
+    for done in (1, 2, 3):
+        line(Progress("", done, 3, 0, 0, 1.0))
+    line.close()
+    line.close()
+    assert stream.getvalue().count("\r") == 3
+    assert stream.getvalue().count("\n") == 1
+
+
+def test_a_file_gets_a_line_now_and_then_and_the_last_one() -> None:
+    stream, now = io.StringIO(), [0.0]
+    line = ProgressLine(stream, lambda: now[0])
+    for done in range(1, 31):
+        now[0] += 1.0
+        line(Progress("", done, 30, 0, 0, now[0]))
+    line.close()
+    said = stream.getvalue().splitlines()
+    assert [text.split(" of ")[0] for text in said] == ["ppafo: 1", "ppafo: 11", "ppafo: 21", "ppafo: 30"]
+
+
+def test_what_is_logged_while_a_line_is_open_begins_on_a_line_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    logger = logging.getLogger("ppafo")
+    with progress_line() as report:
+        report(Progress("", 1, 2))
+        logger.warning("compiling")
+        assert terminal.getvalue().endswith("1 of 2 runs (50 %)\n")
+        report(Progress("", 2, 2))
+    assert terminal.getvalue().endswith("2 of 2 runs (100 %)\n")
+    before = terminal.getvalue()
+    logger.warning("later")
+    assert terminal.getvalue() == before

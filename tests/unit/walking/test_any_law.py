@@ -1,0 +1,71 @@
+"""Any torque law walks under its own name: no module, no line of the catalogue."""
+
+from dataclasses import replace
+
+import pytest
+
+from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS, law_that_walks, walking_controllers
+from ppafo.control.walking.phases import MID_STANCE, PUSH_OFF
+from ppafo.errors import ScenarioError
+from ppafo.model.command import VENT
+from ppafo.model.declaration import Quantity
+from ppafo.walking import load_walk, walk
+
+LAWS = sorted(set(CONTROLLERS) - {"constant"})
+NEW = sorted(name for name in LAWS if walking_controllers()[name] not in WALKING_CONTROLLERS.values())
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_every_torque_law_is_named_in_a_walk_file_by_its_own_name(law: str) -> None:
+    configuration = load_walk("proportional", [f"controller.kind={law}"])
+    for item in CONTROLLERS[law].quantities:
+        assert item.name in configuration.settings
+    assert configuration.settings["peak_torque"] == 5.0
+
+
+@pytest.mark.parametrize("name", ["event_pid", "event_feedback_linearisation", "event_on_off_dead_zone"])
+def test_a_law_with_gains_for_walking_has_them_under_both_names(name: str) -> None:
+    old = load_walk("proportional", [f"controller.kind={name}"])
+    new = load_walk("proportional", [f"controller.kind={name.removeprefix('event_')}"])
+    assert new.controller is old.controller
+    assert new.settings == old.settings
+
+
+def test_a_law_without_gains_for_walking_keeps_its_own() -> None:
+    assert NEW == ["damped_proportional", "on_off"]
+    walked = load_walk("proportional", ["controller.kind=damped_proportional"])
+    own = {item.name: item.default for item in CONTROLLERS["damped_proportional"].quantities}
+    assert {name: walked.settings[name] for name in own} == own
+
+
+def test_a_constant_command_does_not_walk_and_the_answer_names_what_does() -> None:
+    with pytest.raises(ScenarioError, match=r"'constant' is not known.*on_off.*pid") as caught:
+        load_walk("proportional", ["controller.kind=constant"])
+    assert "\n" not in str(caught.value)
+
+
+def test_the_law_of_the_paper_switches_solenoid_valves_and_a_pid_does_not() -> None:
+    assert load_walk("solenoid", ["controller.kind=on_off"]).controller.name == "on_off"
+    with pytest.raises(ScenarioError, match="opens its valve by degrees, which a solenoid valve cannot"):
+        load_walk("solenoid", ["controller.kind=pid"])
+
+
+def test_a_law_whose_setting_has_a_name_of_walking_is_refused_by_that_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    law = CONTROLLERS["on_off"]
+    named = replace(law, name="own", quantities=(Quantity("peak_time", "s", "its own", 1.0, 0.0, 2.0),))
+    with pytest.raises(ScenarioError, match="'own' cannot walk: its setting 'peak_time' has the name of one"):
+        law_that_walks(named)
+    monkeypatch.setitem(CONTROLLERS, "own", named)
+    assert "own" not in walking_controllers(), "and the other laws walk as before"
+    assert load_walk("proportional").controller.name == "event_proportional"
+
+
+def test_the_law_of_the_paper_walks_and_follows_the_torque_of_its_phases() -> None:
+    result = walk(load_walk("solenoid", ["controller.kind=on_off"]), 0.1)
+    assert result.status.is_completed
+    assert "safe_state" in result.recording.names
+    phase, command = result.recording["controller_phase"], result.recording["command"]
+    assert set(command[phase == MID_STANCE]) == {VENT}
+    assert set(command[phase == PUSH_OFF]) <= {-1.0, 1.0, VENT}
+    assert result.metrics["push_off_work"].value > 0.5

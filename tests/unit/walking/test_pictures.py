@@ -1,0 +1,120 @@
+"""Pictures of a walk: what they show is what was walked."""
+
+import io
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from ppafo.answers.text import text_of
+from ppafo.questions.walk.answer import comparison_table
+from ppafo.questions.walk.wearers import wearers_answer
+from ppafo.walking import Comparison, compare_walks, load_walk, walk_population
+from ppafo.walking.figures.animation import animation
+from ppafo.walking.figures.legs import drags, frames_figure, legs_of, settled_turns
+from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.figures.phases import strip_figure
+from ppafo.walking.figures.wearers import population_figure
+
+CONFIGURATIONS = ("solenoid", "proportional")
+
+
+@lru_cache(maxsize=4)
+def compared(name: str) -> Comparison:
+    return compare_walks(load_walk(name), 0.15)
+
+
+def texts(figure: Figure) -> list[str]:
+    found = [text.get_text() for text in figure.texts]
+    for axes in figure.axes:
+        found += [text.get_text() for part in (axes, *axes.child_axes) for text in part.texts]
+    return found
+
+
+@pytest.mark.parametrize("name", CONFIGURATIONS)
+def test_a_drop_foot_is_seen_without_the_device_and_lifted_with_it(name: str) -> None:
+    pair = compared(name)
+    turns = settled_turns(pair.with_device, 1, 100)
+    late = np.flatnonzero(turns % 1.0 > 0.7)
+    bare, worn = legs_of(pair.without_device, turns), legs_of(pair.with_device, turns)
+    lowest = [legs.worn.toe[late, 1].min() for legs in (bare, worn)]
+    assert lowest[0] < -0.06, "the toes drag"
+    assert lowest[1] > lowest[0] + 0.05, "and are lifted"
+    assert legs_of(pair.with_device, turns).healthy.toe[late, 1].min() > -0.002
+    assert any(drags(bare, index) for index in late.tolist())
+    dragging = [sum(drags(legs, index) for index in late.tolist()) for legs in (bare, worn)]
+    assert dragging[1] < dragging[0]
+
+
+def test_the_strip_of_frames_marks_toes_that_drag() -> None:
+    figure = frames_figure(compared("solenoid"))
+    marks = [[line.get_marker() for line in axes.lines].count("x") for axes in figure.axes]
+    assert marks[0] >= 1
+    assert marks[0] >= marks[1]
+    assert {"without the device", "with the device", "simulated", "90 %"} <= set(texts(figure))
+
+
+@pytest.mark.parametrize("name", CONFIGURATIONS)
+def test_the_strip_of_phases_names_the_tasks_in_the_order_of_the_stride(name: str) -> None:
+    figure = strip_figure(compared(name).with_device)
+    controller, foot, valve = figure.axes[1:4]
+    shown = sorted((text.get_position()[0], text.get_text()) for text in controller.texts)
+    assert [text for _, text in shown if text[0] in "42"] == ["4 free motion", "2 push-off"]
+    assert shown[-1][1] == "3 swing"
+    assert [text.get_text() for text in sorted(foot.texts, key=lambda item: item.get_position()[0])] == [
+        "heel",
+        "flat",
+        "on the toes",
+        "in the air",
+    ]
+    assert {"vented", "plantarflexion", "dorsiflexion"} <= {text.get_text() for text in valve.texts}
+
+
+def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:
+    pair = compared("solenoid")
+    figure = walk_figure({"with the device": pair.with_device, "without": pair.without_device})
+    angle, torque, _, pressures, toes = figure.axes
+    assert [line.get_label() for line in angle.lines if not str(line.get_label()).startswith("_")] == [
+        "with the device",
+        "without",
+        "healthy gait",
+    ]
+    curve = next(line for line in torque.lines if line.get_label() == "with the device").get_ydata()
+    np.testing.assert_array_equal(curve, pair.with_device.averages["external_torque"].mean)
+    assert len([line for line in pressures.lines if len(np.asarray(line.get_xdata())) > 2]) == 2
+    assert len([line for line in toes.lines if len(np.asarray(line.get_xdata())) > 2]) == 3
+    assert "simulated" in texts(figure)
+    assert len(walk_figure({"off": pair.without_device}).axes[0].lines) < len(angle.lines)
+
+
+def test_the_table_has_a_cell_for_each_walk() -> None:
+    rows = {title: cells for title, *cells in comparison_table(compared("solenoid")).rows}
+    assert rows["Gas per stride (g)"][1:] == ["0.000", None]
+    assert rows["Strides that begin on the toes (%)"] == ["0", "0", "0"]
+    assert float(rows["... of the healthy ankle's positive work (%)"][0]) == pytest.approx(6.0, abs=0.6)
+    assert {len(cells) for cells in rows.values()} == {3}
+
+
+def test_the_animation_has_two_strides_of_frames_at_half_speed() -> None:
+    from PIL import Image
+
+    content = animation(compared("solenoid"))
+    assert 50_000 < len(content) < 3_000_000
+    with Image.open(io.BytesIO(content)) as picture:
+        frames = picture.n_frames  # type: ignore[attr-defined]
+        assert frames * picture.info["duration"] / 1000.0 == pytest.approx(2.0 * 2.0 * 1.0384, rel=0.06)
+        corner = picture.convert("RGB").getpixel((2, 60))
+        assert corner == (255, 255, 255)
+
+
+def test_histograms_hold_every_wearer() -> None:
+    people = walk_population(load_walk("proportional"), 0.1, 60, seed=2)
+    figure = population_figure(people)
+    heights = [patch.get_height() for patch in figure.axes[0].patches]
+    assert sum(heights) == 60
+    lines = text_of(wearers_answer(people)).splitlines()
+    assert lines[0] == "proportional: 60 wearers, 0.1 min each"
+    gas = [float(cell) for cell in next(line for line in lines if line.startswith("Gas")).split()[4:]]
+    assert gas == sorted(gas)
+    assert len(gas) == 5
