@@ -62,7 +62,8 @@ def profiles(draw: random.Random) -> Iterator[Entry]:
     for kind in PROFILES.values():
         points = {f"time_{number:02}": 0.07 * number for number in range(1, 40)} | {"period": 1.7}
         drawn = zip(kind.quantities, settings(kind, draw), strict=True)
-        parameters = kind.parameters(*(points.get(item.name, value or draw.uniform(0.1, 2.0)) for item, value in drawn))
+        numbers = [points.get(item.name, value or draw.uniform(0.1, 2.0)) for item, value in drawn]
+        parameters = rebuild(kind.parameters, numbers)
         yield Entry(kind.name, kind.value, [(parameters, 0.031 * step) for step in range(60)])
 
 
@@ -153,7 +154,9 @@ def written(value: Any, cells: Iterator[int], collector: SourceCollector) -> str
     """Text that makes an argument from the numbers in ``x``."""
     if isinstance(value, tuple):
         inner = ", ".join(written(item, cells, collector) for item in value)
-        return f"{collector.add(type(value))}({inner})" if value else "()"
+        if type(value) is tuple:
+            return f"({inner},)" if value else "()"
+        return f"{collector.add(type(value))}({inner})"
     return f"int(x[{next(cells)}])" if isinstance(value, int) else f"x[{next(cells)}]"
 
 

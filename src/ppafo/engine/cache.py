@@ -330,9 +330,14 @@ def _measured(place: Path) -> CachedProgram:
 
 
 def _remove(place: Path) -> None:
-    """Remove a program, a file or a link; what cannot be removed stays."""
+    """Remove a program, a file or a link; what cannot be removed stays.
+
+    A folder is moved aside first: to another process a program is there and whole, or not there.
+    """
     with contextlib.suppress(OSError):
         if place.is_dir() and not place.is_symlink():
-            shutil.rmtree(place)
+            aside = place.with_name(f".writing-{secrets.token_hex(8)}")
+            place.rename(aside)
+            shutil.rmtree(aside)
         else:
             place.unlink()

@@ -246,5 +246,6 @@ def test_an_interrupt_while_writing_ends_with_130_and_leaves_nothing(tmp_path: P
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert error == "ppafo: interrupted; nothing is half written\n"
+    *_, last = error.splitlines()  # before it, that the model is compiled anew where the cache has no more room for it
+    assert last == "ppafo: interrupted; nothing is half written"
     assert names(tmp_path) == []

@@ -199,6 +199,15 @@ def test_programs_beyond_the_largest_size_are_removed_oldest_first(
     assert not older.exists()
 
 
+def test_a_program_that_is_being_removed_is_not_there_half(compiled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def killed(place: Path) -> None:
+        raise PermissionError(place)
+
+    monkeypatch.setattr("ppafo.engine.cache.shutil.rmtree", killed)
+    clear(compiled.parent)
+    assert all(place.name.startswith(".writing-") for place in compiled.parent.iterdir())
+
+
 def test_clearing_leaves_what_is_not_a_program(compiled: Path) -> None:
     (compiled.parent / "ppafo_results").mkdir()
     (compiled.parent / "notes.txt").write_text("mine")
