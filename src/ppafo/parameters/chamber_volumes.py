@@ -1,9 +1,10 @@
 """What the chambers of the paper's device may be: its two printed facts about them exclude each other.
 
-By virtual work the torque constant and the volume per angle are one number but for losses; printed they differ by a factor
-of 3.5 (docs/decisions/0014). Every figure of gas rests on them, so it is shown for each reading.
+By virtual work the torque constant and the volume per angle are one number but for losses; printed they differ by a
+factor of 3.5 (docs/decisions/0014). Every figure of gas rests on them, so it is shown for each reading.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 from ppafo.parameters.device import Actuator, Device
@@ -12,6 +13,9 @@ from ppafo.parameters.loading import load_device
 PRINTED_VOLUMES, CONSISTENT_VOLUMES = "ppafo2011", "ppafo2011-consistent"
 SHORT_LINES = f"{CONSISTENT_VOLUMES}, short lines"
 """The vane by virtual work, with the dead volumes of the set that has the printed vane."""
+
+_SAME = 1.0e-9
+"""Relative difference of numbers that are the same but for their conversion to SI."""
 
 _FIELDS = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
 
@@ -32,7 +36,7 @@ class ChamberVolumes:
 
     def fits(self, actuator: Actuator) -> bool:
         """Tell whether an actuator has these chambers."""
-        return all(getattr(self, name) == getattr(actuator, name) for name in _FIELDS)
+        return all(math.isclose(getattr(self, name), getattr(actuator, name), rel_tol=_SAME) for name in _FIELDS)
 
 
 def readings() -> tuple[ChamberVolumes, ...]:
@@ -46,9 +50,10 @@ def readings() -> tuple[ChamberVolumes, ...]:
 
 
 def other_readings(actuator: Actuator) -> tuple[ChamberVolumes, ...]:
-    """Return the readings other than that of an actuator; none for one with volumes and a torque constant of its own."""
+    """Return the readings other than that of an actuator; none for one that has other volumes or torque."""
     known = readings()
-    is_of_the_paper = actuator.torque_constant == load_device(PRINTED_VOLUMES).actuator.torque_constant
+    torque_constant = load_device(PRINTED_VOLUMES).actuator.torque_constant
+    is_of_the_paper = math.isclose(actuator.torque_constant, torque_constant, rel_tol=_SAME)
     if not is_of_the_paper or not any(reading.fits(actuator) for reading in known):
         return ()
     return tuple(reading for reading in known if not reading.fits(actuator))

@@ -39,8 +39,12 @@ def check(evidence: Evidence) -> Iterator[Finding]:
         paragraph=(
             f"In the middle of its range chamber 1 has {1e6 * volume:.3g} cm^3, dead volume included, and takes "
             f"{evidence.in_set_unit(path, filled)} of gas from atmosphere to supply; measured is "
-            f"{evidence.in_set_unit(path, used)}, which also covers what leaks across the vane. How the volume is divided into "
-            f"swept and dead volume makes no difference to this."
-            + ("" if agrees else f" Reconciled by {1e6 * _LEAST * used / density:.3g} cm^3 or more, or by a longer task.")
+            f"{evidence.in_set_unit(path, used)}, which also covers what leaks across the vane. How the volume is "
+            f"divided into swept and dead volume makes no difference to this."
+            + (
+                ""
+                if agrees
+                else f" Reconciled by {1e6 * _LEAST * used / density:.3g} cm^3 or more, or by a longer task."
+            )
         ),
     )

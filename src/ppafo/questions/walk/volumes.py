@@ -28,10 +28,11 @@ _HEAD = (
 )
 _EXPLAINED = (
     "The paper's torque constant and volume per angle contradict each other by virtual work, so the walk is repeated, "
-    f"for at most {LONGEST:g} min, with other chambers. The first row with a volume by virtual work has the dead volume "
-    "with which the torque task uses the measured gas, the one with short lines reaches the torque that was published "
-    "of walking at 90 psi gauge; none does both. Work of the gas is the integral of (P1 - P2) dV over a stride, work at "
-    "the shaft that of the actuator torque. The peak torque is that of the mean stride."
+    f"for at most {LONGEST:g} min, with other chambers. Controllers keep what they believe of them. With the volume by "
+    "virtual work and dead volumes that are as large as the torque task's gas wants, the torque that was published of "
+    "walking at 90 psi gauge does not come in time; with short lines it does, and the torque task does not take its "
+    "gas. Work of the gas is the integral of (P1 - P2) dV over a stride, work at the shaft that of the actuator "
+    "torque. The peak torque is that of the mean stride."
 )
 
 

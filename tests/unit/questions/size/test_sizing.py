@@ -9,6 +9,7 @@ import jsonschema
 import numpy as np
 import pytest
 
+from ppafo.answers.text import text_of
 from ppafo.control.profiles.tabulated import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
@@ -237,3 +238,22 @@ def test_a_recording_that_is_no_profile_is_one_line(tmp_path: Path, content: str
     with pytest.raises(PpafoError, match=re.escape(message)) as caught:
         load_sizing(tmp_path / "wrong.toml")
     assert "\n" not in str(caught.value)
+
+
+def test_the_suggestion_is_tried_with_the_other_chambers_of_the_paper(sizing: Sizing) -> None:
+    assert sizing.choice is not None
+    consistent, short = sizing.others
+    assert consistent.gas == pytest.approx(sizing.choice.gas, rel=0.15)
+    assert short.gas < 0.6 * sizing.choice.gas
+    assert short.gas_in_all == pytest.approx(short.gas * 100 * 1.1)
+    assert f"with {short.name}: RMS error" in text_of(sizing.answer())
+
+
+def test_an_actuator_of_its_own_has_no_other_chambers(folder: Path) -> None:
+    path = folder / "own.toml"
+    path.write_text(
+        FILE.replace("smc-crb2bw40-90d", "smc-crb2bw30-90d").replace('rms_error = "0.4 N m"', 'rms_error = "2 N m"')
+    )
+    found = size(path)
+    assert found.choice is not None
+    assert found.others == ()
