@@ -76,8 +76,8 @@ REPORTED = (
     Quantity("torque_efficiency", "", "work at the shaft over the work p dV of the gas"),
     Quantity("walking_torque", "N m", "peak torque of the device while it walks"),
     Quantity("walking_torque_pressure", "Pa_a", "supply pressure of that torque"),
-    Quantity("largest_torque", "N m", "largest torque of the actuator"),
-    Quantity("largest_torque_pressure", "Pa_a", "supply pressure of that torque"),
+    Quantity("rated_torque", "N m", "largest torque of the actuator"),
+    Quantity("rated_torque_pressure", "Pa_a", "supply pressure of that torque"),
 )
 REPORTED_FORMULA = "choked_flow_exponent"
 REPORTED_OF_A_VALVE = (

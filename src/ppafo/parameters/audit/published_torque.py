@@ -26,7 +26,7 @@ def check(evidence: Evidence) -> Iterator[Finding]:
 
     Notes where it does, warnings where not; silent without published torques.
     """
-    for name in ("largest", "walking"):
+    for name in ("rated", "walking"):
         paths = f"reported.{name}_torque", f"reported.{name}_torque_pressure"
         found = evidence.numbers(_TORQUE_CONSTANT, *paths)
         if found is None or min(found) <= 0.0 or found[2] <= evidence.atmosphere():

@@ -165,11 +165,11 @@ def test_the_gas_of_one_filling_is_asked_of_the_whole_chamber() -> None:
 
 def test_published_torques_at_rest_speak_of_the_torque_constant() -> None:
     assert side(findings()["walking-torque"], "torque constant times pressure") == pytest.approx(9.0, rel=0.01)
-    assert side(findings()["largest-torque"], "torque constant times pressure") == pytest.approx(12.0, rel=0.01)
+    assert side(findings()["rated-torque"], "torque constant times pressure") == pytest.approx(12.0, rel=0.01)
     weak = findings("actuator.torque_constant=10 cm^3")
-    assert {weak[name].severity for name in ("walking-torque", "largest-torque")} == {"warning"}
+    assert {weak[name].severity for name in ("walking-torque", "rated-torque")} == {"warning"}
     small = findings("actuator.volume_per_angle=14.5 cm^3/rad")
-    assert {small[name].severity for name in ("walking-torque", "largest-torque")} == {"note"}
+    assert {small[name].severity for name in ("walking-torque", "rated-torque")} == {"note"}
 
 
 def test_a_torque_of_walking_has_to_come_within_a_push_off() -> None:
@@ -192,4 +192,4 @@ def test_choked_filling_takes_the_time_of_the_closed_formula() -> None:
 def test_a_set_without_reports_is_asked_nothing() -> None:
     silent = {path: entry for path, entry in BASE.numbers.items() if not path.startswith("reported.")}
     found = {finding.id for finding in audit(replace(BASE, numbers=silent))}
-    assert not found & {"gas-of-one-filling", "walking-torque", "largest-torque", "walking-torque-in-time-solenoid"}
+    assert not found & {"gas-of-one-filling", "walking-torque", "rated-torque", "walking-torque-in-time-solenoid"}
