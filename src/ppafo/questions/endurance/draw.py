@@ -203,7 +203,8 @@ def _others(document: Mapping[str, Any], actuator: Actuator, file: Path) -> dict
         raise DataError(f"{file}: 'volumes' is not a list of tables; write the walk again")
     found = {}
     for item in listed:
-        if all(item.get(name) == getattr(actuator, name) for name in _VOLUMES):
+        takes_none = "peak_flow" in item and item["peak_flow"] is None
+        if takes_none or all(item.get(name) == getattr(actuator, name) for name in _VOLUMES):
             continue
         gas, time, peak = (_number(item, name, file, 0.0) for name in ("gas_per_stride", "stride_time", "peak_flow"))
         name = str(item.get("chambers", "other chambers"))

@@ -89,6 +89,18 @@ def test_volumes_that_are_no_list_of_numbers_are_refused_in_one_line(folder: Pat
         path.write_text(text, encoding="utf-8")
 
 
+def test_chambers_with_which_no_gas_was_taken_are_left_out(folder: Path) -> None:
+    path = folder / "walk.json"
+    text = path.read_text(encoding="utf-8")
+    document = json.loads(text)
+    document["volumes"][1] |= {"gas_per_stride": 0.0, "peak_flow": None}
+    path.write_text(json.dumps(document), encoding="utf-8")
+    try:
+        assert len(read_walk_gas(folder).others) == 1
+    finally:
+        path.write_text(text, encoding="utf-8")
+
+
 def test_a_folder_of_an_earlier_version_has_no_others(folder: Path, tmp_path: Path) -> None:
     document = json.loads((folder / "walk.json").read_text(encoding="utf-8"))
     del document["volumes"]
