@@ -11,7 +11,7 @@ from ppafo.errors import DataError, UnitError
 from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
 from ppafo.units import parse_quantity, to_si
 
-_MOST_HARMONICS = 40
+_MAXIMUM_HARMONICS = 40
 _SUMMARIES = {
     "shank_angle": "shank angle from the vertical, above 0 while the ankle is in front of the knee",
     "ankle_angle": "ankle angle, 90 deg neutral, growing in plantarflexion",
@@ -72,7 +72,7 @@ def gait_file() -> type[BaseModel]:
 def _curve_table(name: str, unit: str) -> type[BaseModel]:
     units: Any = Literal["deg", "rad"] if unit == "rad" else Literal[unit]
     number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
-    series = Annotated[list[number], Field(min_length=1, max_length=_MOST_HARMONICS)]
+    series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]
     return table(
         "".join(part.capitalize() for part in name.split("_")),
         {

@@ -8,7 +8,7 @@ from ppafo.metrics.metric import Floats, MetricKind, Readings
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 
-TRAVEL_SHARE = 0.01
+TRAVEL_FRACTION = 0.01
 """A move has begun when this share of its travel is done, and has arrived when this share is left."""
 
 _STANDSTILL = 1.0e-6
@@ -24,7 +24,7 @@ def largest_speed(recording: Recording) -> float:
     return float(np.max(np.abs(recording["angular_velocity"])))
 
 
-def _time_of_share(recording: Recording, share: float) -> float | None:
+def _time_of_fraction(recording: Recording, share: float) -> float | None:
     """Return the time [s] at which a share of the way from the first to the last angle is first done, by a line."""
     travelled = recording["angle"] - recording["angle"][0]
     if abs(travelled[-1]) < _STANDSTILL:
@@ -36,12 +36,12 @@ def _time_of_share(recording: Recording, share: float) -> float | None:
 
 def departure_time(recording: Recording) -> float | None:
     """Time [s] at which 1 % of the way from the first to the last angle is done; None without a move."""
-    return _time_of_share(recording, TRAVEL_SHARE)
+    return _time_of_fraction(recording, TRAVEL_FRACTION)
 
 
 def arrival_time(recording: Recording) -> float | None:
     """Time [s] at which 99 % of the way from the first to the last angle is done; None without a move."""
-    return _time_of_share(recording, 1.0 - TRAVEL_SHARE)
+    return _time_of_fraction(recording, 1.0 - TRAVEL_FRACTION)
 
 
 class AngleRange(NamedTuple):
@@ -95,7 +95,7 @@ def read_largest_speed(readings: Readings) -> Floats:
     return speed
 
 
-def _read_time_of_share(readings: Readings, share: float) -> Floats:
+def _read_time_of_fraction(readings: Readings, share: float) -> Floats:
     """As ``_time_of_share``, of traces (samples, runs): the last angle must be known before the first can be judged."""
     travelled = readings.traces["angle"] - readings.traces["angle"][0]
     moves = np.abs(travelled[-1]) >= _STANDSTILL
@@ -109,12 +109,12 @@ def _read_time_of_share(readings: Readings, share: float) -> Floats:
 
 def read_departure_time(readings: Readings) -> Floats:
     """``departure_time`` [s]."""
-    return _read_time_of_share(readings, TRAVEL_SHARE)
+    return _read_time_of_fraction(readings, TRAVEL_FRACTION)
 
 
 def read_arrival_time(readings: Readings) -> Floats:
     """``arrival_time`` [s]."""
-    return _read_time_of_share(readings, 1.0 - TRAVEL_SHARE)
+    return _read_time_of_fraction(readings, 1.0 - TRAVEL_FRACTION)
 
 
 METRICS = (

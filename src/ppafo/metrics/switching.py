@@ -97,7 +97,7 @@ class Swing(NamedTuple):
 UNDECIDED = -0.5
 
 
-def swung(state: Swing, value: float, swing: float) -> Swing:
+def next_swing(state: Swing, value: float, swing: float) -> Swing:
     """The state after one value more."""
     play = min(max(state.play, value - swing), value)
     turns_back = (play - state.play) * state.turns < 0.0
@@ -127,7 +127,7 @@ def start_oscillations(course: Course, sample: Sample) -> Oscillations:
 def update_oscillations(state: Oscillations, course: Course, sample: Sample) -> Oscillations:
     """One sample more; the first one of the hold is the last one of the ramp too."""
     torque = sample.torque
-    swing = swung(state.swing, torque, OSCILLATION_THRESHOLD * course.largest)
+    swing = next_swing(state.swing, torque, OSCILLATION_THRESHOLD * course.largest)
     anew = starts_hold(course, sample)
     begun = Swing(torque if anew else swing.play, UNDECIDED if anew else swing.turns, torque if anew else swing.highest)
     return Oscillations(begun, swing.turns if anew else state.turns_on_ramp)

@@ -19,7 +19,7 @@ from ppafo.model.thermal import (
     temperature_flow_factor,
 )
 from ppafo.model.vane import vane_acceleration
-from ppafo.rig.rows import Exchange, Look, Node, RigPhysics, RigState, Side
+from ppafo.rig.rows import Exchange, Observables, Node, RigPhysics, RigState, Side
 
 BREAKAWAY_DROP = 0.1
 """Share of the fall from static to dynamic friction that happens as soon as the vane moves, so that it does move."""
@@ -40,7 +40,7 @@ def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> Node:
     return Node(pressure, temperature, enthalpy)
 
 
-def passed(rig: RigPhysics, a: Node, b: Node, share: float, orifice: ExactOrifice, takes_back: float) -> Exchange:
+def orifice_exchange(rig: RigPhysics, a: Node, b: Node, share: float, orifice: ExactOrifice, takes_back: float) -> Exchange:
     """What passes a share of an orifice, positive from a to b, with the upstream gas's temperature. Eqs (6) to (8).
 
     ``takes_back`` is 1 where gas may flow back into a, else 0.
@@ -52,9 +52,9 @@ def passed(rig: RigPhysics, a: Node, b: Node, share: float, orifice: ExactOrific
     return Exchange(flow, flow * enthalpy)
 
 
-def leaked(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> Exchange:
+def leak_exchange(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> Exchange:
     """What leaks across the vane, positive from a to b: an orifice, and a laminar gap if there is one."""
-    through_orifice = passed(rig, a, b, 1.0, orifice, 1.0)
+    through_orifice = orifice_exchange(rig, a, b, 1.0, orifice, 1.0)
     laminar = rig.laminar_conductance * (a.pressure * a.pressure - b.pressure * b.pressure)
     enthalpy = a.enthalpy if laminar >= 0.0 else b.enthalpy
     return Exchange(through_orifice.mass + laminar, through_orifice.energy + laminar * enthalpy)
@@ -94,19 +94,19 @@ def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angl
     return node_1, node_2
 
 
-def look(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> Look:
+def observables(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> Observables:
     """What there is to see at an angle [rad]."""
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure)
-    return Look(node_1, node_2, torque, static_limit(plant, rig, node_1.pressure, node_2.pressure))
+    return Observables(node_1, node_2, torque, static_limit(plant, rig, node_1.pressure, node_2.pressure))
 
 
-def followed(seen: float, true: float, rate: float) -> float:
+def sensor_rate(seen: float, true: float, rate: float) -> float:
     """Slope of what a first-order sensor shows, in its unit per second; 0 for a sensor that is not slow."""
     return rate * (true - seen)
 
 
-def drooped(rig: RigPhysics, drop: float, flow: float) -> float:
+def droop_rate(rig: RigPhysics, drop: float, flow: float) -> float:
     """Slope [Pa/s] of the fall of a regulated pressure under a mass flow [kg/s]."""
     return rig.supply_rate * (rig.supply_droop * flow - drop)
 
@@ -124,12 +124,12 @@ def side(
     takes_back: float,
 ) -> Side:
     """All that happens between the valve and one chamber; without a line the port is the chamber itself."""
-    supplied = passed(rig, source, port, rig.ports_open * source_share, valve_orifice, takes_back)
-    vented = passed(rig, port, room, rig.ports_open * vent_share, valve_orifice, 1.0)
+    supplied = orifice_exchange(rig, source, port, rig.ports_open * source_share, valve_orifice, takes_back)
+    vented = orifice_exchange(rig, port, room, rig.ports_open * vent_share, valve_orifice, 1.0)
     mass, energy = supplied.mass - vented.mass, supplied.energy - vented.energy
     if rig.line_volume <= 0.0:
         return Side(supplied.mass, vented.mass, energy, mass, energy, 0.0, 0.0, 0.0)
-    through = passed(rig, port, node, 1.0, line_orifice, 1.0)
+    through = orifice_exchange(rig, port, node, 1.0, line_orifice, 1.0)
     heat = wall_heat(rig, port, rig.line_volume)
     line_energy = energy_rate(energy - through.energy, port.pressure, 0.0, heat)
     return Side(
@@ -196,7 +196,7 @@ def rig_rates(
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     volume_1, volume_2 = chamber_volumes(plant, angle)
     side_1, side_2 = sides(plant, rig, valve_orifice, line_orifice, openings, state, node_1, node_2)
-    leak = leaked(rig, node_1, node_2, leak_orifice)
+    leak = leak_exchange(rig, node_1, node_2, leak_orifice)
     sliding = state.angular_velocity if way != 0.0 else 0.0
     grows = plant.volume_per_angle * (sliding if way != 0.0 else rate)
     heat_1, heat_2 = wall_heat(rig, node_1, volume_1), wall_heat(rig, node_2, volume_2)
@@ -215,12 +215,12 @@ def rig_rates(
         gas * (side_1.supplied_mass + side_2.supplied_mass),
         gas * (side_1.vented_mass + side_2.vented_mass),
         gas * leak.mass,
-        drooped(rig, state.supply_drop_1, side_1.supplied_mass),
-        drooped(rig, state.supply_drop_2, side_2.supplied_mass),
+        droop_rate(rig, state.supply_drop_1, side_1.supplied_mass),
+        droop_rate(rig, state.supply_drop_2, side_2.supplied_mass),
         gas * (side_1.enthalpy_in + side_2.enthalpy_in),
         gas * grows * (node_1.pressure - node_2.pressure),
         gas * (heat_1 + heat_2 + side_1.line_heat + side_2.line_heat),
-        followed(state.seen_angle, angle, rig.angle_follow_rate),
-        followed(state.seen_pressure_1, node_1.pressure, rig.pressure_follow_rate),
-        followed(state.seen_pressure_2, node_2.pressure, rig.pressure_follow_rate),
+        sensor_rate(state.seen_angle, angle, rig.angle_follow_rate),
+        sensor_rate(state.seen_pressure_1, node_1.pressure, rig.pressure_follow_rate),
+        sensor_rate(state.seen_pressure_2, node_2.pressure, rig.pressure_follow_rate),
     )

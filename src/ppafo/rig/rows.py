@@ -92,7 +92,7 @@ class Side(NamedTuple):
     line_heat: float
 
 
-class Look(NamedTuple):
+class Observables(NamedTuple):
     """What a bench could see: both nodes, driving torque [N m] and the static limit of friction [N m] now."""
 
     node_1: Node

@@ -44,7 +44,7 @@ class RigSolution:
     breakaways: list[float] = field(default_factory=list)
 
 
-def played(position: float, command: float, width: float) -> float:
+def spool_position(position: float, command: float, width: float) -> float:
     """Position [-1, 1] of a spool with play of a whole ``width`` [-] behind a command; it reaches full opening."""
     half = 0.5 * width
     inner = position * (1.0 - half)
@@ -52,7 +52,7 @@ def played(position: float, command: float, width: float) -> float:
     return max(-1.0, min(1.0, inner / (1.0 - half)))
 
 
-def seen_signals(given: RigRun, state: Floats, pressures: Floats) -> tuple[float, float, float]:
+def sensor_signals(given: RigRun, state: Floats, pressures: Floats) -> tuple[float, float, float]:
     """Angle [rad] and both pressures [Pa] behind the bandwidth of the sensors, before noise."""
     names = RigState._fields
     slow_angle, slow_pressure = given.physics.angle_follow_rate > 0.0, given.physics.pressure_follow_rate > 0.0

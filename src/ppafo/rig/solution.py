@@ -20,13 +20,13 @@ from ppafo.model.friction import holds_still
 from ppafo.model.sensors import Measurement
 from ppafo.model.vane import actuator_torque
 from ppafo.rig.rows import RigState
-from ppafo.rig.run import RigRun, RigSolution, played, seen_signals
-from ppafo.rig.source import ANGLE, INPUTS, RATE, SEEN, UNKNOWNS, compiled
+from ppafo.rig.run import RigRun, RigSolution, spool_position, sensor_signals
+from ppafo.rig.source import ANGLE, INPUTS, RATE, SEEN, UNKNOWNS, load_rig_program
 
 Floats = NDArray[np.float64]
 
 TOLERANCE = 1.0e-8
-MOST_STEPS = 100_000
+MAXIMUM_STEPS = 100_000
 _TOLERANCES = {
     "angle": 1e-10,
     "angular_velocity": 1e-9,
@@ -56,7 +56,7 @@ def make_solver(slopes: Any, tolerances: Floats, roots: Any) -> Any:
         atol=tolerances,
         eventsfn=roots,
         num_events=0 if roots is None else 2,
-        max_num_steps=MOST_STEPS,
+        max_num_steps=MAXIMUM_STEPS,
     )
 
 
@@ -68,7 +68,7 @@ class _Rig:
         self.run = given.run
         self.plant = given.run.plant
         self.is_free = given.run.program.angle is None
-        functions = compiled()
+        functions = load_rig_program()
         self.fill, self.show = functions.fill, functions.show
         run = given.run
         groups = (
@@ -178,14 +178,14 @@ class _Rig:
         self.decided, self.controller_state = controller.update(
             run.controller, self.controller_state, wanted, self.measurement(), run.period
         )
-        self.spool = played(self.spool, self.decided, self.given.hysteresis)
+        self.spool = spool_position(self.spool, self.decided, self.given.hysteresis)
         self.on_the_way.append((self.time + self.given.command_delay, self.spool))
 
     def measurement(self) -> Measurement:
         """What the sensors read now; the noise is that of the last recorded sample's time."""
         times, sensors = self.given.sample_times, self.given.sensors
         index = max(0, int(np.searchsorted(times, self.time + SAME_TIME, side="right")) - 1)
-        seen = seen_signals(self.given, self.prescribe_angle(self.y, self.time), self.look(self.time, self.y)[:2])
+        seen = sensor_signals(self.given, self.prescribe_angle(self.y, self.time), self.look(self.time, self.y)[:2])
         names = ("angle", "pressure_1", "pressure_2")
         angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, seen, strict=True))
         return Measurement(angle, first, second, actuator_torque(first, second, self.plant.torque_constant))

@@ -14,7 +14,7 @@ from ppafo.engine.reference.source import HEADER, INLINE
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector
 from ppafo.model.plant import Openings, PlantParameters
-from ppafo.rig.dynamics import look, rig_rates
+from ppafo.rig.dynamics import observables, rig_rates
 from ppafo.rig.rows import RigPhysics, RigState
 
 UNKNOWNS = len(RigState._fields)
@@ -45,7 +45,7 @@ class RigProgram(NamedTuple):
     show: Callable[..., None]
 
 
-def compiled() -> RigProgram:
+def load_rig_program() -> RigProgram:
     """Return the compiled right-hand side and view of the rig."""
     module = load_generated("rig", rig_source())
     return RigProgram(module.fill, module.show)
@@ -68,7 +68,7 @@ def rig_source() -> str:
     moved = f"inputs[{ANGLE}], inputs[{RATE}], way"
     fill = [f"rates = {add(rig_rates)}(plant, rig, {orifices}, openings, state, {moved})"]
     fill += [f"slopes[{number}] = rates.{field}" for number, field in enumerate(RigState._fields)]
-    show = [f"now = {add(look)}(plant, rig, state, inputs[{ANGLE}])"]
+    show = [f"now = {add(observables)}(plant, rig, state, inputs[{ANGLE}])"]
     seen = ("node_1.pressure", "node_2.pressure", "torque", "static_limit")
     show += [f"seen[{number}] = now.{path}" for number, path in enumerate(seen)]
     functions = [_function("fill", "slopes", given + fill), _function("show", "seen", given + show)]

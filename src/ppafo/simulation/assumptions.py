@@ -10,7 +10,7 @@ from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.parameter_set import entry_text
 from ppafo.simulation.declaration import quantities, value_at
 from ppafo.simulation.overriding import device_paths, scenario_paths, split_override
-from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.reading import Reading, quantity_text
 from ppafo.simulation.scenario import Assumption
 
 _SECTION = "assumed"
@@ -69,7 +69,7 @@ def _device_value(hardware: Hardware, path: str) -> str | None:
 
 
 def _default(quantity: Quantity) -> str | None:
-    return None if quantity.default is None else written(quantity.default, quantity.unit)
+    return None if quantity.default is None else quantity_text(quantity.default, quantity.unit)
 
 
 def _unknown(reading: Reading, path: str) -> ScenarioError:

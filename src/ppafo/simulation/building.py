@@ -10,7 +10,7 @@ from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.parameter_set import chosen_valve
 from ppafo.simulation.assumptions import Hardware, read_assumptions
-from ppafo.simulation.clock import MOST_STEPS_OF_DELAY, Clock, read_clock
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
     AT_REST,
     INITIAL,
@@ -24,15 +24,15 @@ from ppafo.simulation.declaration import (
 )
 from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.motion import read_motion, read_profile
-from ppafo.simulation.overriding import Changed
-from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.overriding import OverriddenDocument
+from ppafo.simulation.reading import Reading, quantity_text
 from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors
 
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class ScenarioContent:
     """What a scenario is made from.
 
     ``file`` is what messages call it, ``path`` the file itself if there is one, ``folder`` where relative paths begin,
@@ -47,7 +47,7 @@ class Given:
     parameter_set: ParameterSet | None = None
 
 
-def build_scenario(given: Given, changed: Changed) -> Scenario:
+def build_scenario(given: ScenarioContent, changed: OverriddenDocument) -> Scenario:
     """Return the scenario of a document that has the right keys, or refuse the first value that is not usable."""
     document = changed.document
     reading = Reading(given.file, document, changed.paths)
@@ -75,7 +75,7 @@ def build_scenario(given: Given, changed: Changed) -> Scenario:
     )
 
 
-def _hardware(reading: Reading, given: Given, overrides: tuple[str, ...]) -> Hardware:
+def _hardware(reading: Reading, given: ScenarioContent, overrides: tuple[str, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then those of the caller."""
     section = reading.document["device"]
     valve = section.get("valve")
@@ -130,9 +130,9 @@ def _sensors(reading: Reading, clock: Clock) -> Sensors:
     values = reading.section("sensors", SENSORS)
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
-    if values["delay"] / clock.step > MOST_STEPS_OF_DELAY:
-        most = written(MOST_STEPS_OF_DELAY * clock.step, "s")
-        raise reading.refusal("sensors.delay", f"must be at most {most}, {MOST_STEPS_OF_DELAY:.0e} steps")
+    if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
+        most = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
+        raise reading.refusal("sensors.delay", f"must be at most {most}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
     return Sensors(
         delay=values["delay"],
         angle_noise=values["angle_noise"],

@@ -22,7 +22,7 @@ _MOVES = frozenset({MOVED_START, MOVED_MEASUREMENT})
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
+class NumberCheck:
     """A number in SI units and what changed in each repeat by its name; inf where a repeat has no such number.
 
     ``value`` is a metric, or the range of an angle or a pressure whose ``changes`` are the largest over time;
@@ -55,8 +55,8 @@ class Check:
     """
 
     scenario: str
-    metrics: tuple[Changed, ...]
-    courses: tuple[Changed, ...]
+    metrics: tuple[NumberCheck, ...]
+    courses: tuple[NumberCheck, ...]
     parts_at: float | None
     failed: tuple[str, ...]
 
@@ -112,7 +112,7 @@ class Check:
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document, **judged}
 
 
-def _cells(row: Changed, names: list[str], level: Callable[[float, str], tuple[float, str]]) -> list[str]:
+def _cells(row: NumberCheck, names: list[str], level: Callable[[float, str], tuple[float, str]]) -> list[str]:
     value, unit = level(row.value, row.unit)
     changes = [f"{metric_change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names]
     return [row.name, f"{value:.4g} {unit}".rstrip(), *changes, "" if row.is_determined else "not determined"]

@@ -11,7 +11,7 @@ from ppafo.errors import SimulationError
 from ppafo.metrics.metric import Floats
 from ppafo.model.plant import chamber_volumes
 from ppafo.signals import Recording
-from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Changed, Check
+from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, NumberCheck, Check
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.result import Result
 from ppafo.simulation.simulate import results_of
@@ -41,7 +41,7 @@ def check_result(result: Result) -> Check:
         scenario=scenario.name,
         metrics=_metrics(result, found, pressures),
         courses=courses,
-        parts_at=_parting([repeated for _, repeated in found], result, courses),
+        parts_at=_time_of_parting([repeated for _, repeated in found], result, courses),
         failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
     )
 
@@ -119,7 +119,7 @@ def _pressure_range(result: Result) -> float:
     return float(np.ptp(values)) or supply.atmospheric_pressure
 
 
-def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float) -> tuple[Changed, ...]:
+def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float) -> tuple[NumberCheck, ...]:
     names = dict.fromkeys(name for one in (result, *(repeat for _, repeat in repeats)) for name in one.metrics)
     rows = []
     for name in names:
@@ -127,7 +127,7 @@ def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float
         value = _value(result, name)
         changes = _largest((repeat, _difference(_value(repeated, name), value)) for repeat, repeated in repeats)
         scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, kind.unit, pressures))
-        rows.append(Changed(name, kind.unit, value, ALLOWED_CHANGE * scale, changes))
+        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes))
     return tuple(rows)
 
 
@@ -175,27 +175,27 @@ def _metric_range(result: Result, name: str, unit: str, pressures: float) -> flo
     return abs(_value(result, name)) * max(parts[part] / value for part, value in values.items())
 
 
-def _apart(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
+def _largest_differences(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
     """Largest difference of some channels at each sample that both have."""
     count = min(len(one), len(other))
     return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))
 
 
-def _course(name: str, repeats: list[tuple[str, Result]], result: Result, pressures: float) -> Changed:
+def _course(name: str, repeats: list[tuple[str, Result]], result: Result, pressures: float) -> NumberCheck:
     actuator = result.scenario.device.actuator
     is_angle = name == "angle over time"
     span, unit = (actuator.angle_max - actuator.angle_min, "rad") if is_angle else (pressures, "Pa")
     changes = _largest(
-        (repeat, float(np.max(_apart(repeated.recording, result.recording, _COURSES[name]))))
+        (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
         for repeat, repeated in repeats
     )
-    return Changed(name, unit, span, ALLOWED_PARTING * span, changes)
+    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes)
 
 
-def _parting(repeats: list[Result], result: Result, courses: tuple[Changed, ...]) -> float | None:
+def _time_of_parting(repeats: list[Result], result: Result, courses: tuple[NumberCheck, ...]) -> float | None:
     times = [repeat.status.time for repeat in repeats if repeat.status.time is not None]
     for course in courses:
         for repeat in repeats:
-            beyond = _apart(repeat.recording, result.recording, _COURSES[course.name]) > course.allowed
+            beyond = _largest_differences(repeat.recording, result.recording, _COURSES[course.name]) > course.allowed
             times += [float(result.recording.time[np.argmax(beyond)])] if beyond.any() else []
     return min(times, default=None)

@@ -4,7 +4,7 @@ from ppafo.errors import ScenarioError
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import THERMAL, THERMAL_GAS, kind_at, value_at
-from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.reading import Reading, quantity_text
 from ppafo.simulation.scenario import Assumption, Thermal
 from ppafo.simulation.supply_line import LINES, SECTION, entries, line_quantities
 from ppafo.units import format_quantity
@@ -30,7 +30,7 @@ def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
     supply = device.supply
     if supply.dorsiflexion_pressure > supply.pressure:
         first, second = (
-            written(pressure, "Pa_a", supply.atmospheric_pressure)
+            quantity_text(pressure, "Pa_a", supply.atmospheric_pressure)
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
         raise ScenarioError(

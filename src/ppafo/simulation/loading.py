@@ -13,7 +13,7 @@ from ppafo.documents.problems import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet
-from ppafo.simulation.building import Given, build_scenario
+from ppafo.simulation.building import ScenarioContent, build_scenario
 from ppafo.simulation.declaration import find_kinds
 from ppafo.simulation.overriding import apply_overrides
 from ppafo.simulation.scenario import Scenario
@@ -38,13 +38,13 @@ def load_scenario(
     """
     document = _FILE.parse(_FILE.read(name_or_path), label(str(name_or_path)))
     folder, file = Path(name_or_path).parent, str(name_or_path)
-    return _scenario(Given(label(file), file, folder, document, tuple(overrides), parameter_set))
+    return _scenario(ScenarioContent(label(file), file, folder, document, tuple(overrides), parameter_set))
 
 
 def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
     """Return the scenario in the bytes of a TOML file; relative paths in it begin in ``folder``."""
     document = _FILE.parse(content, label(file))
-    return _scenario(Given(label(file), file, folder or Path(), document, tuple(overrides)))
+    return _scenario(ScenarioContent(label(file), file, folder or Path(), document, tuple(overrides)))
 
 
 def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()) -> Scenario:
@@ -57,10 +57,10 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()
     name = content.get("name")
     file = f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
     _FILE.check_depth(content, file)
-    return _scenario(Given(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides)))
+    return _scenario(ScenarioContent(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides)))
 
 
-def _scenario(given: Given) -> Scenario:
+def _scenario(given: ScenarioContent) -> Scenario:
     """Check the keys of the file itself, put the overrides in, and then ask for all that is needed."""
     find_kinds(given.content, given.file)
     if given.overrides:

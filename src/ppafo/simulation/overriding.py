@@ -19,7 +19,7 @@ _OWN_KEYS = {"controller": frozenset({"kind", "rate", "period"})}
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
+class OverriddenDocument:
     """A document with overrides in it: paths that were set, and the overrides that belong to the device."""
 
     document: dict[str, Any]
@@ -27,7 +27,7 @@ class Changed:
     device: tuple[str, ...]
 
 
-def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file: str) -> Changed:
+def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file: str) -> OverriddenDocument:
     """Return a changed copy of a document; ``file`` is what messages call it.
 
     Naming another kind of motion, controller or profile drops the settings that only the old kind has; giving a rate
@@ -46,7 +46,7 @@ def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file:
             raise unknown_value(override, known, f"{file} has")
         _set(changed, path, text, file)
         paths.add(path)
-    return Changed(changed, frozenset(paths), tuple(device))
+    return OverriddenDocument(changed, frozenset(paths), tuple(device))
 
 
 def split_override(override: str) -> tuple[str, str]:

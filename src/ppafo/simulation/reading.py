@@ -71,14 +71,14 @@ class Reading:
         return number
 
 
-def written(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
+def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
     """Return an SI value as a person would write it: angles in degrees, pressures in psi, no rounding dust."""
     unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
     number = from_si(value, unit, si_unit, atmosphere)
     return format_quantity(round(number, 9) if abs(number) > _ROUND else number, unit)
 
 
-def rounded(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
+def short_quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
     """Return an SI value as in ``written`` with six digits, for a message."""
     unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
     return f"{from_si(value, unit, si_unit, atmosphere):.6g} {unit}".rstrip()

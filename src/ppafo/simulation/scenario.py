@@ -44,7 +44,7 @@ class FreeMotion:
 
 
 @dataclass(frozen=True, slots=True)
-class LedMotion:
+class PrescribedMotion:
     """The vane is led along an angle in time [rad]; a held vane is led along the constant profile."""
 
     profile: ProfileChoice
@@ -154,7 +154,7 @@ class Scenario:
     duration: float
     time_step: float
     output_interval: float
-    motion: FreeMotion | LedMotion
+    motion: FreeMotion | PrescribedMotion
     initial_pressure_1: float
     initial_pressure_2: float
     control: Control

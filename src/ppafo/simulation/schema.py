@@ -28,7 +28,7 @@ def number_type(quantity: Quantity, words: tuple[str, ...] = ()) -> Any:
     return Annotated[Any, WithJsonSchema({"anyOf": forms} if len(forms) > 1 else forms[0])]
 
 
-def _described(quantity: Quantity) -> str:
+def _description(quantity: Quantity) -> str:
     default = "" if quantity.default is None else f"; {quantity.default:g} unless given"
     return f"{quantity.summary} [{quantity.unit or '-'}]{default}".lstrip()
 
@@ -39,7 +39,7 @@ def quantity_fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = (
     for item in quantities:
         kind = number_type(item, words)
         required = item.default is None and not words
-        text = _described(item)
+        text = _description(item)
         fields[item.name] = (kind, Field(description=text)) if required else optional(kind, text)
     return fields
 
@@ -49,7 +49,7 @@ def kind_field(kind: str, summary: str) -> dict[str, Any]:
     return {"kind": (Literal[kind], Field(description=summary))}
 
 
-def titled(name: str) -> str:
+def model_name(name: str) -> str:
     """Return a name as that of a model: ``ramp_hold`` as ``RampHold``."""
     return "".join(part.capitalize() for part in re.split(r"\W|_", name))
 
@@ -58,7 +58,7 @@ def _profile(prescribed: Quantity, purpose: str) -> Any:
     return one_of(
         [
             table(
-                f"{titled(name)}{purpose}",
+                f"{model_name(name)}{purpose}",
                 kind_field(name, kind.summary) | quantity_fields(declaration.profile_settings(name, prescribed)),
             )
             for name, kind in PROFILES.items()
@@ -83,11 +83,11 @@ def _motion() -> Any:
 
 
 def _controller() -> Any:
-    sampling = {item.name: optional(number_type(item), _described(item)) for item in declaration.SAMPLING}
+    sampling = {item.name: optional(number_type(item), _description(item)) for item in declaration.SAMPLING}
     return one_of(
         [
             table(
-                f"{titled(name)}Controller",
+                f"{model_name(name)}Controller",
                 kind_field(name, kind.summary) | sampling | quantity_fields(kind.quantities),
             )
             for name, kind in CONTROLLERS.items()
@@ -111,7 +111,7 @@ def gas_model_table() -> Any:
 def supply_line_table() -> Any:
     """Return the section of the regulators and lines that feed the device."""
     fields = {
-        line: optional(table(f"{titled(line)}Line", quantity_fields(supply_line.line_quantities(line))), f"{line} line")
+        line: optional(table(f"{model_name(line)}Line", quantity_fields(supply_line.line_quantities(line))), f"{line} line")
         for line in supply_line.LINES
     }
     return table("SupplyLine", fields)

@@ -20,7 +20,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.result import Result, Status
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
-from ppafo.simulation.scenario import LedMotion, Scenario
+from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.version import __version__
 
 OPEN_LOOP = "constant"
@@ -150,7 +150,7 @@ def _external_torque(
 ) -> Floats:
     """T_ex of equation (1) [N m]: what was prescribed, or what holds a led vane to its path."""
     plant = run.plant
-    if not isinstance(scenario.motion, LedMotion):
+    if not isinstance(scenario.motion, PrescribedMotion):
         return np.full(times.size, plant.external_torque)
     acceleration = profile_values(scenario.motion.profile, times)[2]
     friction = np.array([sliding_friction(float(value), plant.dynamic_torque) for value in rate])

@@ -31,12 +31,12 @@ def compare_walks(configuration: Configuration, minutes: float, progress: Progre
     """Walk some minutes with the device and as long with it switched off; ScenarioError for bad input."""
     return Comparison(
         walk(configuration, minutes, progress=progress),
-        walk(switched_off(configuration), minutes, progress=progress),
+        walk(with_device_off(configuration), minutes, progress=progress),
         healthy_metrics(configuration),
     )
 
 
-def switched_off(configuration: Configuration) -> Configuration:
+def with_device_off(configuration: Configuration) -> Configuration:
     """The same wearer and device with both chambers vented; no gas flows, so it needs no lines."""
     return replace(configuration, name=f"{configuration.name}-off", controller=off.KIND, settings={}, supply_lines=None)
 

@@ -55,7 +55,7 @@ def _series(gait: Gait, name: str) -> Series:
     return Series(curve.mean, *[number for pair in pairs for number in pair])
 
 
-def followed(curve: Curve) -> Curve:
+def truncate(curve: Curve) -> Curve:
     """The curve with the harmonics that the engine follows."""
     return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
 
@@ -68,7 +68,7 @@ def heel_lever(gait: Gait, wearer: Wearer) -> float:
     if gait.ankle_moment is None or gait.vertical_force is None:
         return wearer.heel_lever
     landing = landing_phase(gait)
-    moment, force = followed(gait.ankle_moment).value(landing), followed(gait.vertical_force).value(landing)
+    moment, force = truncate(gait.ankle_moment).value(landing), truncate(gait.vertical_force).value(landing)
     return min(max(-moment / max(force * STANDARD_GRAVITY, 1.0), 0.0), wearer.heel_lever)
 
 
@@ -84,7 +84,7 @@ def landing_phase(gait: Gait) -> float:
 
 def _foot_angles(gait: Gait, phases: Floats) -> Floats:
     """Angles [rad] of the measured foot over the horizontal."""
-    shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
+    shank, ankle = truncate(gait.shank_angle), truncate(gait.ankle_angle)
     return shank.sampled(phases) - ankle.sampled(phases) + 0.5 * math.pi
 
 

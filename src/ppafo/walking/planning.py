@@ -78,7 +78,7 @@ def plan_walk(plan: WalkPlan) -> Run:
         pieces,
         with_leg(bare, leg),
         lambda plant: walk_steps(plan, plant),
-        lambda plant: vented(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
+        lambda plant: vented_state(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
         walk,
     )
 
@@ -159,7 +159,7 @@ def walking_valve(valve: Valve) -> ValveModel:
     return dump.choose(valve.settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(valve.settings)
 
 
-def vented(plant: PlantParameters, angle: float, angular_velocity: float) -> PlantState:
+def vented_state(plant: PlantParameters, angle: float, angular_velocity: float) -> PlantState:
     """State at an angle [rad] with both chambers at the atmosphere."""
     volumes = chamber_volumes(plant, angle)
     mass_1, mass_2 = (chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes)

@@ -12,10 +12,10 @@ import numpy as np
 from ppafo.gait import Gait
 from ppafo.model.gait import GaitTiming
 from ppafo.signals.recording import Floats
-from ppafo.walking.followed_gait import followed
+from ppafo.walking.followed_gait import truncate
 from ppafo.walking.wearer import Wearer
 
-ANKLE_HEIGHT_SHARE = 0.039 / 0.246
+ANKLE_HEIGHT_FRACTION = 0.039 / 0.246
 """Height of the ankle over the sole as a share of the shank's length: both as shares of the stature in figure 4.1 of
 Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
 
@@ -79,8 +79,8 @@ class AnklePath:
 
 def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
     """The path of the ankle in a gait for the segments of a wearer."""
-    height = ANKLE_HEIGHT_SHARE * wearer.shank_length
-    shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
+    height = ANKLE_HEIGHT_FRACTION * wearer.shank_length
+    shank, ankle = truncate(gait.shank_angle), truncate(gait.ankle_angle)
     foot = shank.sampled(_GRID) - ankle.sampled(_GRID) + 0.5 * np.pi - timing.ground_angle
     toes_down = height * np.cos(foot) - wearer.toe_lever * np.sin(foot)
     heel_down = height * np.cos(foot) + wearer.heel_lever * np.sin(foot)

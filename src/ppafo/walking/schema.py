@@ -17,7 +17,7 @@ from ppafo.simulation.schema import (
     number_type,
     quantity_fields,
     supply_line_table,
-    titled,
+    model_name,
 )
 from ppafo.walking import declaration
 from ppafo.walking.wearer import WEARER
@@ -28,7 +28,7 @@ def _controller() -> Any:
     return one_of(
         [
             table(
-                f"{titled(name)}Walking",
+                f"{model_name(name)}Walking",
                 kind_field(name, kind.summary) | sampling | quantity_fields(kind.quantities),
             )
             for name, kind in walking_controllers().items()
@@ -41,8 +41,8 @@ def _fault(sensor: str) -> Any:
     reading = quantity_fields((declaration.READINGS[sensor],))
     return one_of(
         [
-            table(f"{titled(sensor)}Frozen", kind_field("frozen", declaration.FAULT_KINDS["frozen"]) | time),
-            table(f"{titled(sensor)}Stuck", kind_field("stuck", declaration.FAULT_KINDS["stuck"]) | time | reading),
+            table(f"{model_name(sensor)}Frozen", kind_field("frozen", declaration.FAULT_KINDS["frozen"]) | time),
+            table(f"{model_name(sensor)}Stuck", kind_field("stuck", declaration.FAULT_KINDS["stuck"]) | time | reading),
         ]
     )
 

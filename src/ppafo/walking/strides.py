@@ -58,7 +58,7 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
     return {name: np.diff(totals[item.total][starts]) for name, item in PER_STRIDE.items()}
 
 
-def averaged(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Curves]:
+def mean_curves(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Curves]:
     """Mean and deviation over strides of every channel, each stride brought to the same phases; none without strides.
 
     Channels that hold their value between samples, such as the command, have no mean.

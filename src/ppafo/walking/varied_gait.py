@@ -8,7 +8,7 @@ from ppafo.gait import Gait
 from ppafo.gait.gait import KNEE, Curve
 from ppafo.model.gait import GaitTiming
 from ppafo.signals.recording import Floats
-from ppafo.walking.anthropometry import bounded_normal
+from ppafo.walking.anthropometry import draw_bounded_normal
 from ppafo.walking.followed_gait import EVENT_PHASES, HARMONICS, gait_events
 
 SERIES = {
@@ -21,7 +21,7 @@ SERIES = {
 }
 """Curves that vary, by their field of ``GaitSeries``."""
 
-SHARE_OF_LEVEL = 0.5
+LEVEL_FRACTION = 0.5
 """Share of a curve's variance that moves it as a whole; the rest goes to the harmonics by their power. Assumed: a gait
 file has one deviation for a curve."""
 
@@ -64,16 +64,16 @@ class VariedGaits:
     stride_time: Floats
 
 
-def varied_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> VariedGaits:
+def draw_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> VariedGaits:
     """Draw gaits for people of a stature over that of the first (people,); the first walks as ``gait`` says.
 
     A curve that nobody measured stays 0. The way of the knee is as long as people are tall and walked in their stride
     time, so its acceleration goes with stature over stride time squared.
     """
     count = stature.size
-    series = {field: _varied(gait.curves.get(name), count, generator) for field, name in SERIES.items()}
-    time = gait.stride_time + gait.stride_time_deviation * bounded_normal(generator, (count,))
-    share = gait.stance_share + gait.stance_share_deviation * bounded_normal(generator, (count,))
+    series = {field: _draw_series(gait.curves.get(name), count, generator) for field, name in SERIES.items()}
+    time = gait.stride_time + gait.stride_time_deviation * draw_bounded_normal(generator, (count,))
+    share = gait.stance_share + gait.stance_share_deviation * draw_bounded_normal(generator, (count,))
     time[0], share[0] = gait.stride_time, gait.stance_share
     hurry = stature * (gait.stride_time / time) ** 2
     series |= {name: series[name].scaled(hurry) for name in KNEE}
@@ -81,16 +81,16 @@ def varied_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) ->
     return VariedGaits(series, timing, time)
 
 
-def _varied(curve: Curve | None, count: int, generator: np.random.Generator) -> SeriesOfMany:
+def _draw_series(curve: Curve | None, count: int, generator: np.random.Generator) -> SeriesOfMany:
     if curve is None:
         return SeriesOfMany(np.zeros(count), np.zeros((count, HARMONICS)), np.zeros((count, HARMONICS)))
     missing = (0.0,) * HARMONICS
     cosines, sines = (np.array((*values, *missing)[:HARMONICS]) for values in (curve.cosines, curve.sines))
     power = 0.5 * (cosines**2 + sines**2)
     share = power / max(float(power.sum()), 1.0e-30)
-    spread = curve.deviation * np.sqrt((1.0 - SHARE_OF_LEVEL) * share)
-    normal = bounded_normal(generator, (2, count, HARMONICS))
-    level = curve.deviation * np.sqrt(SHARE_OF_LEVEL) * bounded_normal(generator, (count,))
+    spread = curve.deviation * np.sqrt((1.0 - LEVEL_FRACTION) * share)
+    normal = draw_bounded_normal(generator, (2, count, HARMONICS))
+    level = curve.deviation * np.sqrt(LEVEL_FRACTION) * draw_bounded_normal(generator, (count,))
     normal[:, 0], level[0] = 0.0, 0.0
     return SeriesOfMany(curve.mean + level, cosines + spread * normal[0], sines + spread * normal[1])
 

@@ -20,8 +20,8 @@ from ppafo.storage.opensim import write_opensim
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import WalkPlan, plan_walk
-from ppafo.walking.recorded import recorded
-from ppafo.walking.strides import SETTLING, Curves, averaged, per_stride, stride_starts
+from ppafo.walking.recorded import walk_channels
+from ppafo.walking.strides import SETTLING, Curves, mean_curves, per_stride, stride_starts
 from ppafo.walking.walk_metrics import walk_metrics
 
 if TYPE_CHECKING:
@@ -92,8 +92,8 @@ def walk(
     chosen = configuration if isinstance(configuration, Configuration) else load_walk(configuration, overrides, gait)
     if given and (gait is not None or tuple(overrides)):
         raise ScenarioError("overrides and a gait belong to a name or a file: give them to load_walk")
-    run = plan_walk(plan_of(chosen, checked_seconds(chosen, minutes)))
-    outcome = _stepped(batch_of(run), run.step, progress)
+    run = plan_walk(plan_of(chosen, walk_duration(chosen, minutes)))
+    outcome = _run_in_parts(batch_of(run), run.step, progress)
     rows = state_row_numbers(run)
     record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
     failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
@@ -103,12 +103,12 @@ def walk(
         kept = time < status.time
         kept[0] = True
         time, record = time[kept], {name: values[kept] for name, values in record.items()}
-    recording = recorded(chosen, run, time, record)
+    recording = walk_channels(chosen, run, time, record)
     starts = stride_starts(record["walk.strides"])
-    return _gathered(chosen, recording, record, starts, status)
+    return _walk_result(chosen, recording, record, starts, status)
 
 
-def checked_seconds(configuration: Configuration, minutes: float) -> float:
+def walk_duration(configuration: Configuration, minutes: float) -> float:
     """Length of a walk [s], refused where it is too short for whole strides or too long."""
     seconds = 60.0 * minutes
     shortest = SHORTEST_STRIDES * configuration.gait.stride_time
@@ -120,7 +120,7 @@ def checked_seconds(configuration: Configuration, minutes: float) -> float:
     return seconds
 
 
-def _stepped(batch: Batch, step: float, progress: Progress) -> BatchResult:
+def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
     """Run in parts short enough for an interrupt to be seen and for progress to be told."""
     block = LaneBlock(load_program(batch.program), batch.clock, batch.parameters, batch.states)
     count = batch.clock.step_count
@@ -150,7 +150,7 @@ def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
     )
 
 
-def _gathered(
+def _walk_result(
     configuration: Configuration,
     recording: Recording,
     record: Mapping[str, Floats],
@@ -159,7 +159,7 @@ def _gathered(
 ) -> WalkResult:
     strides = per_stride(record, starts)
     settled = starts[SETTLING:]
-    averages = averaged(recording, settled)
+    averages = mean_curves(recording, settled)
     metrics = walk_metrics(configuration, recording, strides, averages, settled)
     return WalkResult(configuration, recording, strides, averages, metrics, status, starts)
 

@@ -11,7 +11,7 @@ from ppafo.rig import record
 from ppafo.rig.hardware import SECOND_VIRIAL
 from ppafo.rig.preset import Preset, load_preset
 from ppafo.rig.rows import RigState
-from ppafo.rig.run import RigRun, RigSolution, played
+from ppafo.rig.run import RigRun, RigSolution, spool_position
 from ppafo.rig.solution import solve_rig
 from ppafo.simulation.simulate import simulate
 
@@ -167,7 +167,7 @@ def test_a_slow_sensor_shows_what_was_one_time_constant_ago_on_a_steady_ramp(per
 def test_play_swallows_small_reversals_and_still_reaches_full_opening(
     position: float, command: float, expected: float
 ) -> None:
-    assert played(position, command, 0.1) == pytest.approx(expected)
+    assert spool_position(position, command, 0.1) == pytest.approx(expected)
 
 
 def test_every_gas_has_a_second_virial_coefficient_of_a_likely_size() -> None:

@@ -12,7 +12,7 @@ from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk
 from ppafo.walking.followed_gait import NEARLY_FLAT, gait_timing
-from ppafo.walking.strides import PHASES, SETTLING, averaged, stride_starts
+from ppafo.walking.strides import PHASES, SETTLING, mean_curves, stride_starts
 
 MINUTES = 0.15
 
@@ -39,7 +39,7 @@ def test_the_mean_stride_is_the_mean_of_strides() -> None:
     time = np.linspace(0.0, 4.0, 4001)
     growing = np.floor(time) + np.sin(2.0 * np.pi * time)
     recording = Recording("strides", time, {"angle": Channel(growing, "rad"), "command": Channel(0.0 * time, "-")})
-    curves = averaged(recording, stride_starts(np.floor(time + 1.0e-9)))
+    curves = mean_curves(recording, stride_starts(np.floor(time + 1.0e-9)))
     assert set(curves) == {"angle"}, "a held channel has no mean"
     middle = np.abs(PHASES - 0.5) < 0.4
     np.testing.assert_allclose(curves["angle"].mean[middle], 2.0 + np.sin(2.0 * np.pi * PHASES[middle]), atol=1e-5)
@@ -48,7 +48,7 @@ def test_the_mean_stride_is_the_mean_of_strides() -> None:
 
 def test_two_strikes_are_needed_for_a_stride() -> None:
     recording = Recording("one", np.arange(3.0), {"angle": Channel(np.zeros(3), "rad")})
-    assert averaged(recording, np.array([1])) == {}
+    assert mean_curves(recording, np.array([1])) == {}
 
 
 def test_channels_of_a_walk_are_known_with_their_units() -> None:

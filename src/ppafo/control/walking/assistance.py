@@ -34,7 +34,7 @@ class Assistance(NamedTuple):
     largest_torque: float
 
 
-class Wish(NamedTuple):
+class TorqueRequest(NamedTuple):
     """Angle one sample ago [rad], 0 before the first, its filtered rate [rad/s], and the torque wanted [N m]."""
 
     angle: float
@@ -42,12 +42,12 @@ class Wish(NamedTuple):
     torque: float
 
 
-class Assisted(NamedTuple):
+class Assessment(NamedTuple):
     """A sample: phase, safety, wish; 1 where the task is that of the sample before; 1 where the device acts."""
 
     phase: PhaseState
     safety: SafetyState
-    wish: Wish
+    wish: TorqueRequest
     goes_on: float
     acts: float
 
@@ -80,14 +80,14 @@ class AssistingState(Protocol):
         """What safety has seen."""
 
     @property
-    def wish(self) -> Wish:
+    def wish(self) -> TorqueRequest:
         """What was wanted."""
 
 
-START = Wish(0.0, 0.0, 0.0)
+START = TorqueRequest(0.0, 0.0, 0.0)
 
 
-def wanted_torque(rules: Assistance, phase: PhaseState, angle: float, rate: float) -> float:
+def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: float) -> float:
     """Torque wanted [N m], above 0 in plantarflexion, at an angle [rad] and its rate [rad/s]; 0 in mid-stance."""
     share = phase.since_strike / phase.stride_time
     hold = rules.hold
@@ -104,31 +104,31 @@ def same_task(before: float, after: float) -> bool:
     return phases.lifts(before) == phases.lifts(after) and (before == phases.PUSH_OFF) == (after == phases.PUSH_OFF)
 
 
-def followed(
+def assess(
     parameters: AssistingParameters, state: AssistingState, measurement: GaitMeasurement, period: float
-) -> Assisted:
+) -> Assessment:
     """Phase, safety and the torque wanted after a sample."""
-    phase = phases.followed_phase(parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period)
-    watch = safety.watched(parameters.safety, state.safety, state.phase, phase, measurement, period)
+    phase = phases.next_phase_state(parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period)
+    watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     last = state.wish
     turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
     rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
-    torque = wanted_torque(parameters.assistance, phase, measurement.angle, rate)
+    torque = requested_torque(parameters.assistance, phase, measurement.angle, rate)
     works = phases.lifts(phase.phase) or phase.phase == phases.PUSH_OFF
-    return Assisted(
+    return Assessment(
         phase,
         watch,
-        Wish(measurement.angle, rate, torque),
+        TorqueRequest(measurement.angle, rate, torque),
         1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
         1.0 if works and watch.vented < 0.5 else 0.0,
     )
 
 
-def torque_seen(measurement: GaitMeasurement) -> Measurement:
+def torque_measurement(measurement: GaitMeasurement) -> Measurement:
     """What a law of the torque task sees of it."""
     return Measurement(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
 
 
-def given(assisted: Assisted, command: float, period: float) -> tuple[float, SafetyState]:
+def valve_command(assisted: Assessment, command: float, period: float) -> tuple[float, SafetyState]:
     """What goes to the valve, the law's command where the device acts and else ``VENT``, and what safety remembers."""
-    return safety.carried_out(assisted.safety, command if assisted.acts > 0.5 else VENT, period)
+    return safety.safe_command(assisted.safety, command if assisted.acts > 0.5 else VENT, period)

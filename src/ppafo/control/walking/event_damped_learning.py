@@ -9,7 +9,7 @@ from ppafo.control.controllers import damped_proportional
 from ppafo.control.controllers.damped_proportional import DampedGains, TorqueSlope, damped_command
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, learnt_table, phases, safety
-from ppafo.control.walking.assistance import Assistance, Wish
+from ppafo.control.walking.assistance import Assistance, TorqueRequest
 from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
 from ppafo.control.walking.learnt_table import LearningRules, LearntTable
 from ppafo.control.walking.phases import PhaseRules, PhaseState
@@ -33,7 +33,7 @@ class EventDampedLearningState(NamedTuple):
 
     phase: PhaseState
     safety: SafetyState
-    wish: Wish
+    wish: TorqueRequest
     law: TorqueSlope
     table: LearntTable
 
@@ -46,10 +46,10 @@ def update(
     period: float,
 ) -> tuple[float, EventDampedLearningState]:
     """Command from -1 to 1, or ``VENT``; the reference is not used."""
-    assisted = assistance.followed(parameters, state, measurement, period)
+    assisted = assistance.assess(parameters, state, measurement, period)
     phase, torque, profile = assisted.phase, measurement.torque, parameters.assistance.push_off
     pushes = phase.phase == phases.PUSH_OFF
-    table = learnt_table.taught(
+    table = learnt_table.learn(
         parameters.learning,
         state.table,
         profile,
@@ -59,10 +59,10 @@ def update(
         period * assisted.acts if pushes else 0.0,
     )
     place = learnt_table.place_in_table(profile, phase.since_strike, phase.stride_time)
-    ahead = learnt_table.learnt(table, place) if pushes else 0.0
+    ahead = learnt_table.command_at(table, place) if pushes else 0.0
     law = TorqueSlope(state.law.torque, state.law.slope * assisted.goes_on, state.law.started * assisted.goes_on)
     command, law = damped_command(parameters.law, law, assisted.wish.torque, torque, ahead, period)
-    command, watch = assistance.given(assisted, command, period)
+    command, watch = assistance.valve_command(assisted, command, period)
     return command, EventDampedLearningState(phase, watch, assisted.wish, law, table)
 
 

@@ -51,7 +51,7 @@ def lifts(phase: float) -> bool:
     return phase < 1.5
 
 
-def switched(rules: PhaseRules, switch: Switch, force: float, period: float) -> Switch:
+def next_switch(rules: PhaseRules, switch: Switch, force: float, period: float) -> Switch:
     """A switch after a sample of a force [N]."""
     wanted = 0.0 if force < rules.unload_threshold else switch.loaded
     wanted = 1.0 if force > rules.load_threshold else wanted
@@ -76,12 +76,12 @@ def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float) ->
     return after_push_off if phase == PUSH_OFF else found
 
 
-def followed_phase(
+def next_phase_state(
     rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, period: float
 ) -> PhaseState:
     """State after a sample of both forces [N]; ``period`` [s]."""
-    heel = switched(rules, state.heel, heel_force, period)
-    toe = switched(rules, state.toe, toe_force, period)
+    heel = next_switch(rules, state.heel, heel_force, period)
+    toe = next_switch(rules, state.toe, toe_force, period)
     since = state.since_strike + period
     known = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
     aged = PhaseState(state.phase, heel, toe, state.in_phase + period, since, known, state.strikes)

@@ -39,7 +39,7 @@ class SafetyRules(NamedTuple):
     vent_time: float
 
 
-class Ordered(NamedTuple):
+class ValveTimes(NamedTuple):
     """How long the valve has now been told to fill chambers 1 and 2, by its opening, and to vent both [s]."""
 
     filling_1: float
@@ -47,7 +47,7 @@ class Ordered(NamedTuple):
     venting: float
 
 
-class Shown(NamedTuple):
+class LastReadings(NamedTuple):
     """Last readings of heel, toe [N] and angle [rad], and how long each has not changed [s]."""
 
     heel_force: float
@@ -58,7 +58,7 @@ class Shown(NamedTuple):
     angle_still: float
 
 
-class Followed(NamedTuple):
+class SlowPressures(NamedTuple):
     """Chamber pressures as readings followed with ``FALL_TIME`` [Pa]: above a reading that falls."""
 
     pressure_1: float
@@ -72,14 +72,14 @@ class SafetyState(NamedTuple):
     """
 
     vented: float
-    shown: Shown
+    shown: LastReadings
     toe_strides: float
     steady: float
-    ordered: Ordered
-    followed: Followed
+    ordered: ValveTimes
+    followed: SlowPressures
 
 
-START = SafetyState(0.0, Shown(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, Ordered(0.0, 0.0, 0.0), Followed(0.0, 0.0))
+START = SafetyState(0.0, LastReadings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, ValveTimes(0.0, 0.0, 0.0), SlowPressures(0.0, 0.0))
 
 STEADY = 0.1
 """A stride that is longer or shorter than the stride time by less than this share of it is a usual one."""
@@ -94,24 +94,24 @@ LEAST_OPENING = 0.1
 """Commands below this may lie within the overlap of a valve: they do not count as opening it."""
 
 
-def still(last: float, reading: float, since: float, period: float) -> float:
+def time_unchanged(last: float, reading: float, since: float, period: float) -> float:
     """How long a reading has been the same to the last bit [s]."""
     return since + period if reading == last else 0.0
 
 
-def next_shown(last: Shown, seen: GaitMeasurement, period: float) -> Shown:
+def next_readings(last: LastReadings, seen: GaitMeasurement, period: float) -> LastReadings:
     """Readings after a sample."""
-    return Shown(
+    return LastReadings(
         seen.heel_force,
         seen.toe_force,
         seen.angle,
-        still(last.heel_force, seen.heel_force, last.heel_still, period),
-        still(last.toe_force, seen.toe_force, last.toe_still, period),
-        still(last.angle, seen.angle, last.angle_still, period),
+        time_unchanged(last.heel_force, seen.heel_force, last.heel_still, period),
+        time_unchanged(last.toe_force, seen.toe_force, last.toe_still, period),
+        time_unchanged(last.angle, seen.angle, last.angle_still, period),
     )
 
 
-def out_of_range(rules: SafetyRules, seen: GaitMeasurement) -> bool:
+def is_out_of_range(rules: SafetyRules, seen: GaitMeasurement) -> bool:
     """True where a reading is none that foot or chamber can give."""
     force = max(seen.heel_force, seen.toe_force) > rules.largest_force
     angle = (seen.angle < rules.lowest_angle) | (seen.angle > rules.highest_angle)
@@ -119,7 +119,7 @@ def out_of_range(rules: SafetyRules, seen: GaitMeasurement) -> bool:
     return force | angle | (low < rules.lowest_pressure) | (high > rules.highest_pressure)
 
 
-def frozen(rules: SafetyRules, shown: Shown, phase: PhaseState) -> bool:
+def is_frozen(rules: SafetyRules, shown: LastReadings, phase: PhaseState) -> bool:
     """True where a reading stays the same while it must change.
 
     An unloaded force sensor shows the same for long, and so does the angle of a foot that is held in the swing.
@@ -141,22 +141,22 @@ def contradicts_gait(
     return endless | skips_toes | lost | (toe_strides > rules.most_toe_strides)
 
 
-def next_followed(last: Followed, seen: GaitMeasurement, period: float) -> Followed:
+def next_slow_pressures(last: SlowPressures, seen: GaitMeasurement, period: float) -> SlowPressures:
     """Slow pressures after a sample."""
     share = period / (period + FALL_TIME)
-    return Followed(
+    return SlowPressures(
         last.pressure_1 + (seen.pressure_1 - last.pressure_1) * share,
         last.pressure_2 + (seen.pressure_2 - last.pressure_2) * share,
     )
 
 
-def remains(rules: SafetyRules, pressure: float, slow: float) -> bool:
+def holds_pressure(rules: SafetyRules, pressure: float, slow: float) -> bool:
     """True where a vented chamber shows a pressure [Pa] that does not fall."""
     return (pressure > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
 
 
 def contradicts_valve(
-    rules: SafetyRules, ordered: Ordered, followed: Followed, phase: PhaseState, seen: GaitMeasurement
+    rules: SafetyRules, ordered: ValveTimes, followed: SlowPressures, phase: PhaseState, seen: GaitMeasurement
 ) -> bool:
     """True where a pressure is not what the valve was told long enough.
 
@@ -166,40 +166,40 @@ def contradicts_valve(
     no_rise_1 = (ordered.filling_1 > rules.fill_time) & (seen.pressure_1 < rules.filled_pressure)
     no_rise_2 = (ordered.filling_2 > rules.fill_time) & (seen.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
-    left = remains(rules, seen.pressure_1, followed.pressure_1) | remains(rules, seen.pressure_2, followed.pressure_2)
+    left = holds_pressure(rules, seen.pressure_1, followed.pressure_1) | holds_pressure(rules, seen.pressure_2, followed.pressure_2)
     return no_rise_1 | no_rise_2 | (stands & (ordered.venting > rules.vent_time) & left)
 
 
-def watched(
+def monitor(
     rules: SafetyRules, state: SafetyState, before: PhaseState, phase: PhaseState, seen: GaitMeasurement, period: float
 ) -> SafetyState:
     """State after a sample; ``before`` and ``phase`` are the phases before and after it."""
-    shown = next_shown(state.shown, seen, period)
+    shown = next_readings(state.shown, seen, period)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = phase.phase == MID_STANCE
     toe_strides = (state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
     steady = (1.0 if usual else 0.0) if enters else state.steady
-    wrong = out_of_range(rules, seen) | frozen(rules, shown, phase)
+    wrong = is_out_of_range(rules, seen) | is_frozen(rules, shown, phase)
     wrong = wrong | contradicts_gait(rules, before, phase, toe_strides, steady)
-    followed = next_followed(state.followed, seen, period)
+    followed = next_slow_pressures(state.followed, seen, period)
     fails = wrong | contradicts_valve(rules, state.ordered, followed, phase, seen)
     return SafetyState(1.0 if fails else state.vented, shown, toe_strides, steady, state.ordered, followed)
 
 
-def fed(since: float, opening: float, period: float) -> float:
+def feed_time(since: float, opening: float, period: float) -> float:
     """How long a chamber has now been fed [s], by the opening towards it; 0 where the valve is shut or empties it."""
     return since + opening * period if opening > LEAST_OPENING else 0.0
 
 
-def carried_out(state: SafetyState, command: float, period: float) -> tuple[float, SafetyState]:
+def safe_command(state: SafetyState, command: float, period: float) -> tuple[float, SafetyState]:
     """The command that goes to the valve, ``VENT`` once vented, and the state that remembers it."""
     given = VENT if state.vented > 0.5 else command
     vents = given > VENTS_ABOVE
     opening = 0.0 if vents else max(-1.0, min(1.0, given))
-    ordered = Ordered(
-        fed(state.ordered.filling_1, opening, period),
-        fed(state.ordered.filling_2, -opening, period),
+    ordered = ValveTimes(
+        feed_time(state.ordered.filling_1, opening, period),
+        feed_time(state.ordered.filling_2, -opening, period),
         state.ordered.venting + period if vents else 0.0,
     )
     return given, SafetyState(state.vented, state.shown, state.toe_strides, state.steady, ordered, state.followed)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, phases, safety
-from ppafo.control.walking.assistance import Assistance, Wish
+from ppafo.control.walking.assistance import Assistance, TorqueRequest
 from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyRules, SafetyState
@@ -35,7 +35,7 @@ class LawState(NamedTuple):
 
     phase: PhaseState
     safety: SafetyState
-    wish: Wish
+    wish: TorqueRequest
     law: Any
 
 
@@ -67,16 +67,16 @@ def update(
     parameters: Any, state: LawState, reference: float, measurement: GaitMeasurement, period: float
 ) -> tuple[float, LawState]:
     """Command from -1 to 1, or ``VENT``; the reference is not used."""
-    assisted = assistance.followed(parameters, state, measurement, period)
+    assisted = assistance.assess(parameters, state, measurement, period)
     wanted = assisted.wish.torque
     law = law_restart(state.law, wanted, assisted.goes_on)
-    seen = assistance.torque_seen(measurement)
+    seen = assistance.torque_measurement(measurement)
     command, law = law_update(parameters.law, law, wanted, seen, period)
-    command, watch = assistance.given(assisted, command, period)
+    command, watch = assistance.valve_command(assisted, command, period)
     return command, LawState(phase=assisted.phase, safety=watch, wish=assisted.wish, law=law)
 
 
-def bound(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Callable[..., Any]:
+def bind(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Callable[..., Any]:
     """Return the function of a frame with other pieces in the place of some names of this module.
 
     It is the same code: only what those names stand for differs, so that the engine compiles it as any other function.
@@ -116,7 +116,7 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
     title = "".join(part.capitalize() for part in name.split("_"))
     parameters = row_with_law(f"{title}Parameters", LawParameters, law.parameters)
     state = row_with_law(f"{title}State", LawState, type(law.initial))
-    anew = bound(restart, f"restart_{name}", {"LAW_START": law.initial}) if len(law.initial) else keep
+    anew = bind(restart, f"restart_{name}", {"LAW_START": law.initial}) if len(law.initial) else keep
     pieces = {"law_update": law.update, "law_restart": law.restart or anew, "LawState": state}
     return replace(
         law,
@@ -126,6 +126,6 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
         quantities=(*with_defaults(law.quantities, dict(gains)), *ASSISTING_QUANTITIES),
         parameters=parameters,
         initial=state(phase=phases.START, safety=safety.START, wish=assistance.START, law=law.initial),
-        update=bound(update, f"update_{name}", pieces),
+        update=bind(update, f"update_{name}", pieces),
         restart=None,
     )

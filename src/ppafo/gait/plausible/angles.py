@@ -3,7 +3,7 @@
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.plausible.checked import Checked, Given
+from ppafo.gait.plausible.checked import MeanStride, SignSource
 
 SHANK_RANGE = (25.0, 120.0)
 ANKLE_RANGE = (5.0, 80.0)
@@ -14,7 +14,7 @@ _LEAST_SHANK_TRAVEL = 8.0
 _LARGEST_FOOT_ANGLE = 35.0
 
 
-def check_shank(walk: Checked) -> None:
+def check_shank(walk: MeanStride) -> None:
     """Refuse a shank that no leg has."""
     phi = np.degrees(walk.curves["shank_angle"])
     place = f"{walk.file['shank_angle']}: shank_angle"
@@ -38,7 +38,7 @@ def check_shank(walk: Checked) -> None:
         )
 
 
-def check_ankle(walk: Checked) -> None:
+def check_ankle(walk: MeanStride) -> None:
     """Refuse an ankle that no leg has, or not with this shank."""
     theta, phi = (np.degrees(walk.curves[name]) for name in ("ankle_angle", "shank_angle"))
     place = f"{walk.file['ankle_angle']}: ankle_angle"
@@ -65,7 +65,7 @@ def check_ankle(walk: Checked) -> None:
         )
 
 
-_NEUTRAL: dict[Given, str] = {
+_NEUTRAL: dict[SignSource, str] = {
     "map": "give ankle_angle.neutral in the gait map: the reading of the file when the foot is "
     "perpendicular to the shank",
     "columns": "write it as 90 deg when the foot is perpendicular to the shank, or give a gait map with "
@@ -74,7 +74,7 @@ _NEUTRAL: dict[Given, str] = {
 }
 
 
-def _other_foot(walk: Checked) -> str:
+def _other_foot(walk: MeanStride) -> str:
     if walk.given == "gait_file" or "vertical_force" not in walk.curves:
         return ""
     return ", or the force is of the other foot: choose the other side, or the column of this foot"

@@ -6,26 +6,26 @@ from typing import Literal
 
 from ppafo.signals.recording import Floats
 
-Given = Literal["map", "columns", "gait_file"]
+SignSource = Literal["map", "columns", "gait_file"]
 """What says how the numbers count: a gait map, the columns of the file by convention, or a gait file."""
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
+class MeanStride:
     """What is looked at: mean curves (101 samples, SI units, package signs) by name, stance share and stride time."""
 
     file: Mapping[str, str]
     curves: Mapping[str, Floats]
     stance_share: float
     stride_time: float
-    given: Given
+    given: SignSource
 
     def other_sign(self, key: str, turned: str = "the other sign") -> str:
         """Return how to turn a curve around, by its key in a gait map."""
         return other_sign(self.given, key, turned)
 
 
-def other_sign(given: Given, key: str, turned: str = "the other sign") -> str:
+def other_sign(given: SignSource, key: str, turned: str = "the other sign") -> str:
     """Return how to turn a curve around: by its key in a gait map, or in the file."""
     return {
         "map": f"change {key} in the gait map",

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.plausible.checked import Checked, Given, other_sign
+from ppafo.gait.plausible.checked import MeanStride, SignSource, other_sign
 from ppafo.signals.recording import Floats
 
 MOMENT_PEAK = (0.05, 3.5)
@@ -20,7 +20,7 @@ _FOOT_ALONE = 0.05
 """N m/kg that a swinging foot may need, however weak the push-off."""
 
 
-def check_force_scale(file: str, force: Floats, given: Given) -> None:
+def check_force_scale(file: str, force: Floats, given: SignSource) -> None:
     """Refuse a vertical force [body weights] in which no heel strike can be found, by its unit or its sign."""
     lowest, highest = (float(value) for value in np.percentile(force, (2.0, 98.0)))
     low, high = FORCE_PEAK
@@ -36,7 +36,7 @@ def check_force_scale(file: str, force: Floats, given: Given) -> None:
         )
 
 
-def check_moment(walk: Checked) -> None:
+def check_moment(walk: MeanStride) -> None:
     """Refuse an ankle moment, where there is one, that no leg has."""
     if "ankle_moment" not in walk.curves:
         return
@@ -56,7 +56,7 @@ def check_moment(walk: Checked) -> None:
     _check_moment_time(walk)
 
 
-def _check_moment_time(walk: Checked) -> None:
+def _check_moment_time(walk: MeanStride) -> None:
     """Refuse a moment that works while the foot is off the ground."""
     moment, share = walk.curves["ankle_moment"], walk.stance_share
     phase = np.linspace(0.0, 1.0, moment.size)
@@ -73,14 +73,14 @@ def _check_moment_time(walk: Checked) -> None:
     )
 
 
-_OTHER_TIME: dict[Given, str] = {
+_OTHER_TIME: dict[SignSource, str] = {
     "map": "it is of the other foot or on another clock: choose the other side, or the column of this foot",
     "columns": "it is of the other foot or on another clock: choose the other side, or the column of this foot",
     "gait_file": "write the moment of this foot, counted from its heel strike",
 }
 
 
-def check_force(walk: Checked) -> None:
+def check_force(walk: MeanStride) -> None:
     """Refuse a vertical force, where there is one, that no walk has."""
     if "vertical_force" not in walk.curves:
         return

@@ -8,7 +8,7 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.fourier import HARMONICS, fit_curve
 from ppafo.gait.gait import KNEE
-from ppafo.gait.plausible.checked import Checked, Given
+from ppafo.gait.plausible.checked import MeanStride, SignSource
 from ppafo.signals.recording import Floats
 
 FOOT_FLAT = slice(15, 43)
@@ -22,7 +22,7 @@ _FITS = 0.6
 _CLEARLY = 0.7
 """A mistake is named where without it less than this share of the misfit is left."""
 
-Shares = tuple[float, float]
+Factors = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,8 @@ class _Mistake:
 
     words: str
     remedy: str
-    forward: Shares
-    up: Shares
+    forward: Factors
+    up: Factors
 
 
 _G = STANDARD_GRAVITY
@@ -72,14 +72,14 @@ _MISTAKES = (
 )
 """The first that fits is named. A sign alone is recognised in the swing."""
 
-_WHERE: dict[Given, str] = {
+_WHERE: dict[SignSource, str] = {
     "map": "in the gait map or the file",
     "columns": "in the file",
     "gait_file": "in every number of their tables",
 }
 
 
-def check_turning(walk: Checked) -> None:
+def check_turning(walk: MeanStride) -> None:
     """Refuse a knee that turns about the standing ankle only once a mistake is taken back; the message names it."""
     if any(name not in walk.curves for name in KNEE):
         return

@@ -15,7 +15,7 @@ _LONGEST_SHOWN = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class CurveColumns:
     """The table of a curve, its columns with their signs, and the key that states their unit in a gait map."""
 
     unit_key: str
@@ -61,7 +61,7 @@ def check_finite(values: Floats, place: str, time: Floats) -> None:
         )
 
 
-def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool) -> Found | None:
+def find_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool) -> CurveColumns | None:
     """Return the one table that has every column of a curve; None where it may be missing and no table has one."""
     bare = [name.removeprefix("-") for name in names]
     holders = [table for table in tables if all(name in table.columns for name in bare)]
@@ -70,7 +70,7 @@ def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable
         raise DataError(f"{curve}: both {files} have the column {bare[0]!r}; give one of them, or name another column")
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
-        return Found(f"{curve}.unit", holders[0], _detect_knee(holders[0], tuple(zip(signs, bare, strict=True))))
+        return CurveColumns(f"{curve}.unit", holders[0], _detect_knee(holders[0], tuple(zip(signs, bare, strict=True))))
     if optional and not any(name in table.columns for name in bare for table in tables):
         return None
     known = [name for table in tables for name in table.columns]

@@ -9,7 +9,7 @@ import numpy as np
 from ppafo.errors import DataError
 from ppafo.gait.fourier import HARMONICS, FitError, fit_curve
 from ppafo.gait.gait import REQUIRED, Curve, Gait, Origin
-from ppafo.gait.plausible.checked import Checked, Given
+from ppafo.gait.plausible.checked import MeanStride, SignSource
 from ppafo.gait.plausible.loads import check_force_scale, force_remarks
 from ppafo.gait.plausible.stride import check_plausible
 from ppafo.gait.recorded.events import Stride, strides_from_force, strides_from_shank
@@ -21,7 +21,7 @@ from ppafo.gait.recorded.settings import ImportSettings, check_settings
 from ppafo.gait.recorded.signal import Signal, low_pass
 from ppafo.gait.recorded.strides import CurveStatistics, mean_curve, strides_within, without_outliers
 from ppafo.gait.recorded.table import CSV, MotionTable, read_table
-from ppafo.gait.recorded.walk import Person, recorded_walk
+from ppafo.gait.recorded.walk import Person, walk_signals
 
 LARGEST_STRIDE_CHANGE = 0.25
 """Share of the median stride time; a stride that differs by more has a missed event in it, or is no steady walking."""
@@ -51,13 +51,13 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     file, column and row, and what to do.
     """
     check_settings(settings)
-    given: Given = "columns" if settings.columns is None else "map"
+    given: SignSource = "columns" if settings.columns is None else "map"
     tables = [read_table(path) for path in files]
     if not tables:
         raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
     columns = settings.columns or _convention(tables, settings.side)
     person = Person(settings.body_mass, settings.stature)
-    walk = recorded_walk(tables, columns, person, is_default=settings.columns is None)
+    walk = walk_signals(tables, columns, person, is_default=settings.columns is None)
     events = "vertical_force" if "vertical_force" in walk else "shank_angle"
     found = _strides(walk, events, given)
     smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
@@ -71,7 +71,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     check_scatter(curves, errors, walk)
-    check_plausible(Checked({name: signal.file for name, signal in walk.items()}, means, share, time, given))
+    check_plausible(MeanStride({name: signal.file for name, signal in walk.items()}, means, share, time, given))
     check_way(walk, given)
     gait = _gait(settings, tables, strides, {name: curve for name, (curve, _) in fitted.items()}, events)
     remarks = (*_remarks(curves, strides, left_out), *knee_remarks(columns.knee, walk, settings.stature))
@@ -92,7 +92,7 @@ def _convention(tables: Sequence[MotionTable], side: Side) -> GaitMap:
     return CONVENTIONS[forms[0]](side)
 
 
-def _strides(walk: Mapping[str, Signal], events: str, given: Given) -> list[Stride]:
+def _strides(walk: Mapping[str, Signal], events: str, given: SignSource) -> list[Stride]:
     if events != "vertical_force":
         return strides_from_shank(walk[events])
     check_force_scale(walk[events].file, walk[events].values, given)

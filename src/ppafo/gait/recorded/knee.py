@@ -7,15 +7,15 @@ import numpy as np
 
 from ppafo.errors import DataError, UnitError
 from ppafo.gait.fourier import HARMONICS, fit_curve
-from ppafo.gait.plausible.checked import Given, other_sign
-from ppafo.gait.recorded.columns import Found, found_columns
+from ppafo.gait.plausible.checked import SignSource, other_sign
+from ppafo.gait.recorded.columns import CurveColumns, find_columns
 from ppafo.gait.recorded.mapping import KneeMap
 from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity
 
-THIGH_SHARE = 0.245
+THIGH_FRACTION = 0.245
 """Hip to knee as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
 ed. 2009."""
 
@@ -37,7 +37,7 @@ def knee_signals(
             return {}
         raise DataError("knee.thigh needs a length: give knee.thigh_length in the gait map, or the stature")
     thigh = mapped.thigh or ()
-    found = found_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, optional=is_default)
+    found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, optional=is_default)
     if found is None:
         return {}
     ends = len(mapped.forward), len(mapped.forward) + len(mapped.up)
@@ -67,7 +67,7 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
         return [f"{what}knee.thigh_length"] if mapped.thigh is not None else []
     remarks = []
     if mapped.thigh is not None and mapped.thigh_length is None:
-        remarks.append(f"thigh of {_thigh_length(mapped, stature):.3f} m: {THIGH_SHARE:g} of the stature (Winter 2009)")
+        remarks.append(f"thigh of {_thigh_length(mapped, stature):.3f} m: {THIGH_FRACTION:g} of the stature (Winter 2009)")
     if walk["knee_forward"].is_position:
         remarks.append(
             f"acceleration of the knee from a series of {HARMONICS['knee_forward']} harmonics of its position"
@@ -75,7 +75,7 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
     return remarks
 
 
-def check_way(walk: Mapping[str, Signal], given: Given) -> None:
+def check_way(walk: Mapping[str, Signal], given: SignSource) -> None:
     """Refuse a knee that is carried backwards; on a treadmill it stays about where it is."""
     knee = walk.get("knee_forward")
     if knee is None or not knee.is_position:
@@ -114,13 +114,13 @@ def _check_hip_moves(mapped: KneeMap, file: str, forward: Floats, up: Floats) ->
             )
 
 
-def _part(found: Found, chosen: slice) -> Found:
+def _part(found: CurveColumns, chosen: slice) -> CurveColumns:
     return replace(found, terms=found.terms[chosen])
 
 
 def _thigh_length(mapped: KneeMap, stature: float | None) -> float:
     if mapped.thigh_length is None:
-        return THIGH_SHARE * (stature or 0.0)
+        return THIGH_FRACTION * (stature or 0.0)
     place, (low, high) = f"knee.thigh_length = {mapped.thigh_length!r}", _LENGTHS
     try:
         length = parse_quantity(mapped.thigh_length, "m")

@@ -14,7 +14,7 @@ from ppafo.parameters.declaration import SECTIONS
 from ppafo.rig.hardware import line_orifice, real_device, rig_physics, rig_plant
 from ppafo.rig.request import Outcome, Request
 from ppafo.rig.rows import RigPhysics, RigState
-from ppafo.rig.run import RigRun, RigSolution, seen_signals
+from ppafo.rig.run import RigRun, RigSolution, sensor_signals
 from ppafo.rig.sensors import Floats, sensor
 from ppafo.rig.solution import solve_rig
 from ppafo.signals.channels import CHANNELS
@@ -133,7 +133,7 @@ def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState
 
 def _outcome(name: str, scenario: Scenario, given: RigRun, names: tuple[str, ...]) -> Outcome:
     solution = solve_rig(given)
-    values = measured(scenario, given, solution)
+    values = sensor_readings(scenario, given, solution)
     channels = {item: Channel(values[item], CHANNELS[item].unit) for item in names}
     recording = Recording(name, given.sample_times, channels, kind="synthetic")
     offsets = {item: given.sensors[item].offset for item in names if item in given.sensors}
@@ -147,9 +147,9 @@ def _outcome(name: str, scenario: Scenario, given: RigRun, names: tuple[str, ...
     return Outcome(recording, given.device, offsets, settings)
 
 
-def measured(scenario: Scenario, given: RigRun, solution: RigSolution) -> dict[str, Floats]:
+def sensor_readings(scenario: Scenario, given: RigRun, solution: RigSolution) -> dict[str, Floats]:
     """Return what the sensors show at every sample; the torque is computed from the measured pressures."""
-    seen = [seen_signals(given, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
+    seen = [sensor_signals(given, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
     true = dict(zip(("angle", "pressure_1", "pressure_2"), np.array(seen).T, strict=True))
     for name, drop in _SUPPLIES.items():
         regulated = getattr(given.run.plant, name)

@@ -12,7 +12,7 @@ from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import MetricKind
-from ppafo.simulation.ensemble.columns import checked_columns
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, samples_of
 from ppafo.simulation.scenario import Scenario
@@ -68,7 +68,7 @@ def run_ensemble(
     interval = every or base.output_interval
     if not interval > 0.0:
         raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
-    checked = checked_columns(base, columns)
+    checked = check_columns(base, columns)
     plan = plan_ensemble(checked)
     times = _times(plan, interval if bands else 0.0)
     request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.control.custom)

@@ -46,7 +46,7 @@ class Columns:
         return replace(self, values={path: column[kept] for path, column in self.values.items()})
 
 
-def checked_columns(base: Scenario, columns: Mapping[str, Any]) -> Columns:
+def check_columns(base: Scenario, columns: Mapping[str, Any]) -> Columns:
     """Return the columns with the chosen valve as ``valve``; ScenarioError for what no single run is to blame for."""
     if base.control.kind == PYTHON_CONTROLLER and base.control.custom is None:
         raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
@@ -99,7 +99,7 @@ def _check_together(base: Scenario, values: Mapping[str, Floats]) -> None:
             )
 
 
-def varied(columns: Columns, clock: Clock) -> Scenario:
+def varied_scenario(columns: Columns, clock: Clock) -> Scenario:
     """Return the scenario that stands for all runs; numbers of ``clock`` may be arrays too.
 
     A pressure at the start that was given as a word follows the pressure that the word names.

@@ -52,11 +52,11 @@ class Outcome:
         """Return the programs that batches need, with their meters."""
         first = {batch.program: batch for batch in batches}
         alone = [Batch(item.program, item.clock, item.parameters[:, :1], item.states[:, :1]) for item in first.values()]
-        return [_asked(batch, self.request).batch.program for batch in alone] if len(alone) > 1 else []
+        return [_meter_batch(batch, self.request).batch.program for batch in alone] if len(alone) > 1 else []
 
     def run(self, plain: Batch, members: Members, threads: int | None) -> None:
         """Run a batch whose runs have these places in the ensemble."""
-        asked = _asked(plain, self.request)
+        asked = _meter_batch(plain, self.request)
         batch = asked.batch
         states = np.empty_like(batch.states)
         looked_back = {name: np.full(members.size, np.nan) for name, kind in asked.metrics.items() if kind.traced}
@@ -95,7 +95,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class _MeteredBatch:
     """What is asked of one batch: the batch with its meters, the metrics it can have, the interval of its samples."""
 
     batch: Batch
@@ -143,7 +143,7 @@ def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, F
     return totals
 
 
-def _asked(plain: Batch, request: Request) -> _Asked:
+def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     program = plain.program
     there = {
         name: kind for name, kind in request.metrics.items() if program.has_reference or REFERENCE not in kind.channels
@@ -156,7 +156,7 @@ def _asked(plain: Batch, request: Request) -> _Asked:
     traced = sorted({*looked_back, *request.bands})
     trace_every = 0 if not traced else 1 if looked_back else stride
     batch = metered(plain, [meter for _, meter in meters], traced, trace_every)
-    return _Asked(batch, there, interval, samples_of(plain), stride if looked_back else 1)
+    return _MeteredBatch(batch, there, interval, samples_of(plain), stride if looked_back else 1)
 
 
 def intervals(batch: Batch) -> Floats:
@@ -181,7 +181,7 @@ def _stride(interval: Floats, request: Request) -> int:
     return stride
 
 
-def _read(asked: _Asked, name: str, readings: Readings) -> Floats:
+def _read(asked: _MeteredBatch, name: str, readings: Readings) -> Floats:
     """The values of a metric; runs that failed may have any."""
     with np.errstate(all="ignore"):
         return np.asarray(asked.metrics[name].read(readings))

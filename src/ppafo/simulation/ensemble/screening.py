@@ -11,7 +11,7 @@ from ppafo.engine.run import Members
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.clock import Clock
-from ppafo.simulation.ensemble.columns import Columns, TimeTexts, clock_of, clock_with, time_texts, varied
+from ppafo.simulation.ensemble.columns import Columns, TimeTexts, clock_of, clock_with, time_texts, varied_scenario
 from ppafo.simulation.ensemble.rules import RULES, Rule
 from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.plan import Problem
@@ -36,7 +36,7 @@ class Screen:
         """The scenario that stands for the runs that are still in."""
         if self.clock is None:
             raise ScenarioError("the times of an ensemble are not read yet")
-        return varied(self.columns, self.clock)
+        return varied_scenario(self.columns, self.clock)
 
     def at(self, places: Members) -> "Screen":
         """The screen of some of these runs, which writes its reasons to the same place."""
@@ -57,7 +57,7 @@ class Screen:
         self.clock = None if self.clock is None else _clock_of(self.clock, ~bad)
 
 
-def screened(columns: Columns) -> Screen:
+def screen_columns(columns: Columns) -> Screen:
     """The runs whose values are in range and fit together."""
     screen = Screen(columns)
     for path in columns.values:

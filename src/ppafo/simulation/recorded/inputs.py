@@ -72,12 +72,12 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
 
     A run that follows the angle is one of ``led_along``.
     """
-    command = held_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
+    command = last_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
     path = _path(inputs, device, run) if inputs.has(ANGLE) else {}
-    return StepInputs(command, {**followed_parameters(inputs, device, run), **path})
+    return StepInputs(command, {**recorded_parameters(inputs, device, run), **path})
 
 
-def led_along(run: Run, angle: float) -> Run:
+def with_prescribed_angle(run: Run, angle: float) -> Run:
     """Return the run with the vane led along a recorded angle, which is ``angle`` [rad] at the start."""
     return replace(run, program=led_by_recording(run.program), path=(0.0, angle, 0.0), needs_parts=True)
 
@@ -104,7 +104,7 @@ def between_stops(angles: Floats, device: Device, file: str) -> Floats:
     return np.clip(angles, lowest, highest)
 
 
-def followed_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
+def recorded_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
     """Return the parameters that follow a recording, for every step; each keeps its mean over a millisecond."""
     followed: dict[str, Floats] = {}
     if inputs.has(SUPPLY):
@@ -116,7 +116,7 @@ def followed_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dic
     return followed
 
 
-def held_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:
+def last_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:
     """Return the last value of a channel at each step; a change falls on the nearest step."""
     own_times = inputs.recording.time - inputs.start
     index = np.searchsorted(own_times, step_times(run) + 0.5 * run.step, side="right") - 1

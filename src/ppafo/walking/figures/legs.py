@@ -52,7 +52,7 @@ def legs_of(result: WalkResult, turns: Floats) -> Legs:
     return Legs(turns, path.posture(turns, shank, angle), path.posture(turns, shank, healthy))
 
 
-def settled_turns(result: WalkResult, strides: int, per_stride: int) -> Floats:
+def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
     """Return running phases of some strides near the end of a walk, an equal number in each."""
     last = int(result.recording.time[-1] / result.configuration.gait.stride_time + 1.0e-6)
     count = min(strides, max(1, last - 1))
@@ -135,7 +135,7 @@ def frames_figure(comparison: Comparison) -> "Figure":
 
 
 def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
-    turns = settled_turns(result, 1, _FRAMES)
+    turns = last_phases(result, 1, _FRAMES)
     legs = legs_of(result, turns)
     draw_ground(axes, 0.0, _SLOT * turns.size)
     for index in range(turns.size):

@@ -12,7 +12,7 @@ from ppafo.answers.style import CHAMBER_1, CHAMBER_2, GREY, house_style, mark_ki
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.command import VENTS_ABOVE
 from ppafo.signals.recording import Floats
-from ppafo.walking.figures.legs import GHOST, draw_ground, leg_artists, legs_of, settled_turns
+from ppafo.walking.figures.legs import GHOST, draw_ground, leg_artists, legs_of, last_phases
 from ppafo.walking.figures.mean_stride import WITH
 from ppafo.walking.strides import PHASES, SETTLING, times_of_phases
 from ppafo.walking.walk import WalkResult
@@ -137,7 +137,7 @@ def _name_blocks(axes: "Axes", state: State, share: Floats, middle: Floats) -> N
 
 def _legs(axes: "Axes", result: WalkResult) -> None:
     """Stick figures over the strip, each over its instant, in an axes of metres that shares the percent below."""
-    turns = settled_turns(result, 1, _FRAMES) + 0.5 / _FRAMES
+    turns = last_phases(result, 1, _FRAMES) + 0.5 / _FRAMES
     legs = legs_of(result, turns)
     panel_width = _SIZE[0] - _MARGINS.left - _MARGINS.right
     panel_height = axes.get_position().height * _SIZE[1]

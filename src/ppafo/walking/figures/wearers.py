@@ -30,7 +30,7 @@ _DRAWN_QUANTILES = (0.05, 0.5, 0.95)
 _HISTOGRAMS = ("gas", "push_off_work", "slap_rate", "toe_clearance")
 _PAIRS = (("stride_time", "gas"), ("body_mass", "push_off_work"))
 _BINS = 40
-_MOST_POINTS = 2000
+_MAXIMUM_POINTS = 2000
 
 
 def population_figure(population: Population) -> "Figure":
@@ -70,7 +70,7 @@ def _scatter(axes: "Axes", population: Population, trait: str, outcome: str) -> 
     (across, across_quantity, _), (up, up_quantity, _) = SHOWN[trait], SHOWN[outcome]
     x = shown_values(population.traits[trait], across_quantity)
     y = shown_values(population.outcomes[outcome], up_quantity)
-    thin = slice(None, None, max(1, x.size // _MOST_POINTS))
+    thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
     axes.plot(x[thin], y[thin], ".", color=BLUE, markersize=2.5, alpha=0.35, markeredgewidth=0.0)
     axes.plot(x[0], y[0], "o", color=VERMILION, markersize=6)
     axes.set_ylabel(titled(up, up_quantity), fontsize=9)
