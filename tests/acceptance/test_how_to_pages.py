@@ -126,7 +126,7 @@ def test_the_check_of_the_scenario_page_finds_what_the_page_shows(
     names, shown_names = ([line.split("  ")[0] for line in table] for table in tables)
     assert names == shown_names
     assert {"rms_error", "angle over time"} <= set(names)
-    cause = "a measurement moved by 1e-07 of its range, which nobody could measure"
+    cause = "a measurement moved by 1e-07 of its range, far less than anybody can measure"
     assert cause in " ".join(shown.split())
     assert cause in printed
 

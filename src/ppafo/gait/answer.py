@@ -17,7 +17,7 @@ _CAPTION = "The curves over the stride: mean, standard deviation between strides
 
 def gait_answer(gait: Gait, imported: ImportedGait | None = None) -> Answer:
     """Return what ``ppafo gait`` says of a gait; the gait file is among its files."""
-    head = ("curve", "lowest", "highest", "unit", "between strides", "series within (RMS)")
+    head = ("curve", "lowest", "highest", "unit", "between strides", "series error (RMS)")
     rows = tuple(_row(gait, name, imported) for name in gait.curves)
     return Answer(
         name="gait",
@@ -56,7 +56,7 @@ def _plus_minus(deviation: float) -> str:
 def _row(gait: Gait, name: str, imported: ImportedGait | None) -> tuple[str | None, ...]:
     quantity = quantity_of_unit(CURVES[name])
     curve = gait.curves[name]
-    values = shown_values(curve.sampled(phases()), quantity)
+    values = shown_values(curve.values_at(phases()), quantity)
     left = 0.0 if imported is None else shown(imported.fit_errors[name].root_mean_square, quantity)
     return (
         name,
@@ -89,7 +89,7 @@ def _data(gait: Gait, imported: ImportedGait | None) -> dict[str, Any]:
                 "unit": CURVES[name],
                 "harmonics": curve.harmonics,
                 "deviation": curve.deviation,
-                "series": curve.sampled(phases()).tolist(),
+                "series": curve.values_at(phases()).tolist(),
             }
             for name, curve in gait.curves.items()
         },

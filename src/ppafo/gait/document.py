@@ -89,7 +89,10 @@ def _curve_table(name: str, unit: str) -> type[BaseModel]:
 
 
 def gait_of(document: dict[str, Any], file: str) -> Gait:
-    """Return the gait in the document of a gait file; ``file`` is what messages call it."""
+    """Return the gait in the document of a gait file; ``file`` is what messages call it.
+
+    DataError where it is not a gait.
+    """
     try:
         gait_file().model_validate(document)
     except ValidationError as error:

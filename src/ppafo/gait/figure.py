@@ -33,7 +33,7 @@ _PANELS: dict[str, _CurvePanel] = {
     "ankle_angle": _CurvePanel("Ankle angle (deg, 90 neutral, growing in plantarflexion)", _DEGREES, 90.0),
     "ankle_moment": _CurvePanel("Ankle moment (N m/kg, above 0: plantarflexion)", 1.0, 0.0),
     "vertical_force": _CurvePanel("Vertical ground reaction (body weights)", 1.0, 0.0),
-    "centre_of_pressure": _CurvePanel("Centre of pressure (cm forward of the ankle)", 100.0, 0.0),
+    "centre_of_pressure": _CurvePanel("Centre of pressure (cm in front of the ankle)", 100.0, 0.0),
     "knee_forward": _CurvePanel("Acceleration of the knee forward (m/s$^2$)", 1.0, 0.0),
     "knee_up": _CurvePanel("Acceleration of the knee upwards (m/s$^2$, without gravity)", 1.0, 0.0),
 }
@@ -68,7 +68,7 @@ def _draw(axes: "Axes", gait: Gait, name: str, imported: ImportedGait | None) ->
     axes.axvspan(0.0, 100.0 * gait.stance_share, color=_STANCE, zorder=0, linewidth=0.0)
     axes.axhline(shown.level, color=GREY, linewidth=0.8)
     axes.axvline(100.0 * gait.stance_share, color=ORANGE, linewidth=1.0)
-    series = shown.factor * curve.sampled(phases())
+    series = shown.factor * curve.values_at(phases())
     if imported is None:
         mean, band = series, np.full(series.size, shown.factor * curve.deviation)
         label = "standard deviation, mean over the stride"

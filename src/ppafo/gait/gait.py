@@ -67,7 +67,7 @@ class Curve:
 
     def value(self, phase: float) -> float:
         """Return the value at a phase [strides]."""
-        return float(self.sampled(phase))
+        return float(self.values_at(phase))
 
     def rate(self, phase: float, stride_time: float) -> float:
         """Return the first derivative by time at a phase [strides], for a stride of this time [s]."""
@@ -85,14 +85,14 @@ class Curve:
         cosines, sines = angular * np.array(self.sines), -angular * np.array(self.cosines)
         return Curve(0.0, tuple(cosines.tolist()), tuple(sines.tolist()))
 
-    def scaled(self, factor: float) -> "Curve":
-        """Return the curve times a factor, the deviation between strides with it."""
+    def scale(self, factor: float) -> "Curve":
+        """Return the curve times a factor [-], with its deviation between strides."""
         cosines, sines = (tuple(factor * value for value in values) for values in (self.cosines, self.sines))
         return replace(
             self, mean=factor * self.mean, cosines=cosines, sines=sines, deviation=abs(factor) * self.deviation
         )
 
-    def sampled(self, phases: "ArrayLike") -> "Floats":
+    def values_at(self, phases: "ArrayLike") -> "Floats":
         """Return the values at many phases [strides]."""
         import numpy as np
 
@@ -105,7 +105,7 @@ class Curve:
 class Gait:
     """One stride of one wearer, as curves over the phase; those that nobody recorded are None.
 
-    ``body_mass`` [kg], ``stride_time`` [s], ``stance_share`` (share of the stride until toe-off), ``walking_speed``
+    ``body_mass`` [kg], ``stride_time`` [s], ``stance_share`` (fraction of the stride until toe-off), ``walking_speed``
     [m/s], None where nobody recorded it. The two deviations are between strides, 0 where not known. ``recorded_speed``
     is the speed at which the curves were recorded, where it is another than ``walking_speed``.
     """

@@ -27,7 +27,10 @@ class Hardware:
 def read_assumptions(
     before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[str]
 ) -> tuple[Assumption, ...]:
-    """Return every assumption that still has a value; one that an override replaced says what it was ``before``."""
+    """Return every assumption that still has a value; one that an override replaced says what it was ``before``.
+
+    ScenarioError for a path that has no value.
+    """
     replaced = frozenset(split_override(text)[0] for text in overrides)
     notes: Mapping[str, str] = reading.document.get(_SECTION, {})
     assumptions = []

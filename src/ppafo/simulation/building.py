@@ -32,8 +32,8 @@ _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
 
 @dataclass(frozen=True, slots=True)
-class ScenarioContent:
-    """What a scenario is made from.
+class ScenarioRequest:
+    """A scenario that is to be built.
 
     ``file`` is what messages call it, ``path`` the file itself if there is one, ``folder`` where relative paths begin,
     ``content`` the document as it was given. ``parameter_set`` takes the place of the set that the document names.
@@ -47,14 +47,17 @@ class ScenarioContent:
     parameter_set: ParameterSet | None = None
 
 
-def build_scenario(given: ScenarioContent, changed: OverriddenDocument) -> Scenario:
-    """Return the scenario of a document that has the right keys, or refuse the first value that is not usable."""
+def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
+    """Return the scenario of a document that has the right keys.
+
+    ScenarioError or ParameterError for the first value that cannot be used.
+    """
     document = changed.document
-    reading = Reading(given.file, document, changed.paths)
-    hardware = _hardware(reading, given, changed.device)
+    reading = Reading(request.file, document, changed.paths)
+    hardware = _hardware(reading, request, changed.device)
     device = _device(reading, hardware)
     clock = read_clock(reading)
-    before = Reading(given.file, given.content)
+    before = Reading(request.file, request.content)
     return Scenario(
         name=document["name"],
         description=document.get("description", ""),
@@ -68,19 +71,19 @@ def build_scenario(given: ScenarioContent, changed: OverriddenDocument) -> Scena
         control=_control(reading, clock.period),
         reference=read_profile(reading, "reference", TORQUE_LEVEL) if "reference" in document else _NOTHING_TO_FOLLOW,
         sensors=_sensors(reading, clock),
-        assumptions=(*read_assumptions(before, reading, hardware, given.overrides), *assumed_lines(reading)),
-        origin=Origin(given.path, document["device"]["set"], hardware.valve, given.overrides, given.content),
+        assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
+        origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         thermal=read_thermal(reading),
         supply_lines=read_supply_lines(reading, device),
     )
 
 
-def _hardware(reading: Reading, given: ScenarioContent, overrides: tuple[str, ...]) -> Hardware:
+def _hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then those of the caller."""
     section = reading.document["device"]
     valve = section.get("valve")
     try:
-        parameter_set = given.parameter_set or load_parameter_set(set_name(section["set"], given.folder))
+        parameter_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
         name = chosen_valve(parameter_set, valve)
         parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
     except ParameterError as error:
@@ -131,8 +134,8 @@ def _sensors(reading: Reading, clock: Clock) -> Sensors:
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
     if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
-        most = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
-        raise reading.refusal("sensors.delay", f"must be at most {most}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
+        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
+        raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
     return Sensors(
         delay=values["delay"],
         angle_noise=values["angle_noise"],

@@ -11,7 +11,7 @@ from ppafo.errors import SimulationError
 from ppafo.metrics.metric import Floats
 from ppafo.model.plant import chamber_volumes
 from ppafo.signals import Recording
-from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, NumberCheck, Check
+from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.result import Result
 from ppafo.simulation.simulate import results_of
@@ -19,7 +19,7 @@ from ppafo.simulation.simulate import results_of
 DRAWS = 4
 """Draws of what moves the measurements of sensors without noise."""
 ALLOWED_PARTING = 1.0e-2
-"""Largest difference of two runs over time that counts as none, as a share of the range."""
+"""Largest difference of two runs over time that counts as none, as a fraction of the range."""
 
 
 _COURSES = {"angle over time": ("angle",), "pressures over time": ("pressure_1", "pressure_2")}
@@ -29,7 +29,7 @@ def check_result(result: Result) -> Check:
     """Return what a completed run determines; SimulationError for one that diverged, or that is never the same."""
     scenario = result.scenario
     if not result.status.is_completed:
-        raise SimulationError(f"{scenario.name}: the run diverged, so that there is nothing to check")
+        raise SimulationError(f"{scenario.name}: the run diverged, so there is nothing to check")
     run = plan_run(scenario)
     _check_repeatable(result, run)
     pressures = _pressure_range(result)
@@ -47,14 +47,14 @@ def check_result(result: Result) -> Check:
 
 
 def _check_repeatable(result: Result, run: Run) -> None:
-    """Refuse a Python controller that gives another run each time: every change would be its own."""
+    """Refuse a Python controller that gives a different run each time: every change would be its own."""
     controller = result.scenario.control.custom
     if controller is None:
         return
     again = results_of(result.scenario, [run])[0].recording
     if not all(np.array_equal(again[name], result.recording[name]) for name in again.names):
         raise SimulationError(
-            f"{result.scenario.name}: {type(controller).__name__} gives another run each time, so that nothing can be "
+            f"{result.scenario.name}: {type(controller).__name__} gives a different run each time, so nothing can be "
             f"checked; its reset() must forget everything, and its random numbers need a fixed seed"
         )
 
@@ -80,8 +80,8 @@ def _start_moved(run: Run, move: float) -> Run:
     plant, start = run.plant, run.initial
     angle = start.angle
     if run.program.angle is None:
-        wanted = angle + move * (plant.angle_max - plant.angle_min)
-        angle = min(max(wanted, plant.angle_min), plant.angle_max)
+        shifted = angle + move * (plant.angle_max - plant.angle_min)
+        angle = min(max(shifted, plant.angle_min), plant.angle_max)
     before, after = chamber_volumes(plant, start.angle), chamber_volumes(plant, angle)
     mass_1, mass_2 = (
         mass * now / then * (1.0 + move)

@@ -28,9 +28,10 @@ class Clock:
 
 
 def read_clock(reading: Reading) -> Clock:
-    """Return the times of a run; the step is the longest one, up to what is given, that divides the sample period.
+    """Return the times of a run [s]; the step is the largest one, up to what is given, that divides the sample period.
 
-    Without an output interval every step is recorded, or about every one where they do not divide the duration.
+    Without an output interval every step is recorded, or nearly every one where they do not divide the duration.
+    ScenarioError where the times contradict each other or make too many steps.
     """
     duration = reading.number(_DURATION_PATH, _DURATION)
     period = _read_period(reading)
@@ -47,8 +48,8 @@ def _check_size(reading: Reading, clock: Clock) -> None:
     if duration / used > MAXIMUM_STEPS:
         raise reading.refusal(
             _DURATION_PATH,
-            f"with a step of {quantity_text(used, 's')} the run has {duration / used:.3g} steps, at most {MAXIMUM_STEPS:.0e} "
-            f"are allowed: shorten the run or take a larger {_STEP_PATH}",
+            f"with a step of {quantity_text(used, 's')} the run has {duration / used:.3g} steps, at most "
+            f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or take a larger {_STEP_PATH}",
         )
     if duration / output > MAXIMUM_OUTPUTS:
         raise reading.refusal(

@@ -1,4 +1,4 @@
-"""What a scenario file and a walk file say of the gas alike: its energy balance, and the lines that feed the device."""
+"""Sections that scenario and walk files have in common: energy balance of the gas, and the lines of the supply."""
 
 from ppafo.errors import ScenarioError
 from ppafo.model.regulator import SupplyLines
@@ -34,7 +34,7 @@ def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
         raise ScenarioError(
-            f"{reading.file}: [{SECTION}]: its second regulator hangs behind the first, so "
+            f"{reading.file}: [{SECTION}]: its second regulator is fed by the first, so "
             f"supply.dorsiflexion_pressure, {second}, cannot be above supply.pressure, {first}"
         )
     first_line, second_line = (reading.section(f"{SECTION}.{line}", line_quantities(line)) for line in LINES)
@@ -50,7 +50,7 @@ def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
 
 
 def assumed_lines(reading: Reading) -> tuple[Assumption, ...]:
-    """Return the values of the lines that the file leaves to the package, with the reason for each."""
+    """Return the values of the lines that the file leaves to their defaults, with the reason for each."""
     if value_at(reading.document, SECTION) is None:
         return ()
     return tuple(

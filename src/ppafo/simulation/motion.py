@@ -17,9 +17,12 @@ _ANGLE_PATH = "motion.angle"
 
 
 def read_motion(reading: Reading, device: Device, duration: float, step: float) -> FreeMotion | PrescribedMotion:
-    """Return the motion of the vane, which stays between the stops at every time that it prescribes."""
+    """Return the motion of the vane; every angle [rad] that it prescribes lies between the stops of the device.
+
+    ScenarioError where one does not. ``duration`` and ``step`` are in seconds.
+    """
     kind = kind_at(reading.document, "motion")
-    if kind == "led":
+    if kind == "prescribed":
         profile = read_profile(reading, "motion.profile", ANGLE_LEVEL)
         problem = profile_problem(device.name, _stops(device), profile, duration, step)
         if problem:
@@ -46,8 +49,8 @@ def profile_problem(
     for time, angle in _angles(profile, duration, step):
         if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
             return (
-                f"[motion.profile] leaves the stops of {device}, {_range_text(stops)}: it is at {quantity_text(angle, 'rad')} at "
-                f"{time:.6g} s"
+                f"[motion.profile] leaves the stops of {device}, {_range_text(stops)}: it is at "
+                f"{quantity_text(angle, 'rad')} at {time:.6g} s"
             )
     return ""
 

@@ -83,7 +83,7 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     """Return a document that names the kinds of the scenario and nothing else; a constant command has no reference."""
     motion: dict[str, Any] = {"kind": "free"}
     if isinstance(scenario.motion, PrescribedMotion):
-        motion = {"kind": "led", "profile": {"kind": scenario.motion.profile.kind}}
+        motion = {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
     controller = {"kind": scenario.control.kind}
     gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
     gas |= {} if scenario.supply_lines is None else {SECTION: {}}

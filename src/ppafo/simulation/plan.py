@@ -35,7 +35,10 @@ Problem = tuple[Any, Callable[[int], str]]
 
 
 def plan_run(scenario: Scenario) -> Run:
-    """The run of a scenario; with a Python controller it records every step, because that controller needs the past."""
+    """The run of a scenario; with a Python controller it records every step, because that controller needs the past.
+
+    ScenarioError where it takes too many steps.
+    """
     run, problems = plan_runs(scenario)
     for is_bad, line in problems:
         if is_bad:
@@ -174,7 +177,7 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
 
 
 def valve_parameters(valve: ValveModel, settings: Mapping[str, float]) -> Any:
-    """Parameters of a valve; settings may be arrays (runs,)."""
+    """Parameters of a valve from its settings in SI units, which may be arrays (runs,)."""
 
     def prepare(*values: float) -> Any:
         return valve.prepare(dict(zip(settings, values, strict=True)))
@@ -186,8 +189,8 @@ def _too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem
     def line(run: int) -> str:
         duration, length, count = (at(number, run) for number in (scenario.duration, step, step_count))
         return (
-            f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MAXIMUM_STEPS:.0e} are "
-            "allowed: shorten the run or take a larger run.step"
+            f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MAXIMUM_STEPS:.0e} "
+            "are allowed: shorten the run or take a larger run.step"
         )
 
     return step_count > MAXIMUM_STEPS, line
@@ -297,7 +300,7 @@ def angle_range(scenario: Scenario, plant: PlantParameters) -> tuple[float, floa
 
 
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
-    """Lowest and highest value of a profile."""
+    """Lowest and highest value of a profile, N m or rad as its levels; arrays (runs,) where its settings are."""
     kind = PROFILES[choice.kind]
     numbers = [choice.settings[item.name] for item in kind.quantities]
     lowest, highest = over_runs(lambda *values: kind.bounds(rebuilt(kind.parameters, values)), *numbers)

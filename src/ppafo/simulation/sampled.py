@@ -29,8 +29,8 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     for sample in range(math.ceil(clock.step_count / clock.steps_per_sample)):
         first_step = sample * clock.steps_per_sample
         time = first_step * step
-        wanted = program.reference.value(reference, time)[0]
-        command = controller.update(time, wanted, see(sample))
+        requested = program.reference.value(reference, time)[0]
+        command = controller.update(time, requested, see(sample))
         block.states[command_row] = _clip_command(command, controller, time)
         block.advance(min(clock.steps_per_sample, clock.step_count - first_step))
     return block.result()

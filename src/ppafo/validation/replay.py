@@ -22,9 +22,9 @@ from ppafo.simulation.recorded.inputs import (
     SUPPLY,
     RecordedInputs,
     between_stops,
-    with_prescribed_angle,
     sample_period,
     step_inputs,
+    with_prescribed_angle,
 )
 from ppafo.simulation.recorded.scenario import held_vane, replay_scenario, with_highest_supply
 from ppafo.simulation.recorded.start import Start, samples_at_rest

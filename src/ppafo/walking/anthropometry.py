@@ -1,8 +1,8 @@
-"""How wearers differ: a person scaled in mass and length, and how much people do.
+"""How wearers differ: a person scaled in mass and length, and the variation between people.
 
-A segment keeps its share of the body mass, its share of the body's length, and where its mass lies in it (as in
+A segment keeps its fraction of the body mass, its fraction of the body's length, and where its mass lies in it (as in
 table 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009). So masses go with body mass,
-lengths with stature, and inertias with mass times length squared; the shares are those of the wearer that is scaled.
+lengths with stature, and inertias with mass times length squared; the fractions are those of the wearer that is scaled.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class Build:
 
 
 def draw_builds(count: int, generator: np.random.Generator) -> Build:
-    """Draw people; the first has the mass and stature of the wearer that is scaled."""
+    """Draw the build of ``count`` people; the first is the wearer that is scaled."""
     normal = draw_bounded_normal(generator, (2, count))
     stature = normal[0]
     mass = CORRELATION * normal[0] + np.sqrt(1.0 - CORRELATION**2) * normal[1]
@@ -48,12 +48,12 @@ def draw_builds(count: int, generator: np.random.Generator) -> Build:
 
 
 def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Draw from the normal distribution, held within ``MOST_DEVIATIONS``."""
+    """Standard normal draws [-] of this shape, those beyond ``MAXIMUM_DEVIATIONS`` set to that limit."""
     return np.clip(generator.standard_normal(shape), -MAXIMUM_DEVIATIONS, MAXIMUM_DEVIATIONS)
 
 
 def segment_values(wearer: Wearer, build: Build) -> dict[str, Floats]:
-    """Values of the leg (people,) by the field of ``LegParameters``, in SI units."""
+    """Values of the leg (people,) by field of ``LegParameters``, in SI units."""
     found = {name: getattr(wearer, name) * build.stature for name in _LENGTHS}
     found |= {name: getattr(wearer, name) * build.mass for name in _MASSES}
     found |= {name: getattr(wearer, name) * build.mass * build.stature**2 for name in _INERTIAS}

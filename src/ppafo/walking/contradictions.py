@@ -27,7 +27,7 @@ def _is_given(reading: Reading, path: str) -> bool:
 
 
 def _of_default(reading: Reading, path: str, reason: str) -> ScenarioError:
-    return ScenarioError(f"{reading.file}: {path}, which is not given and has its default: {reason}")
+    return ScenarioError(f"{reading.file}: {path}, which is not given and takes its default: {reason}")
 
 
 def _contradictions(configuration: Configuration) -> Iterator[tuple[str, str]]:
@@ -60,7 +60,7 @@ def _valve(configuration: Configuration) -> Iterator[tuple[str, str]]:
     if valve != "proportional" and not configuration.controller.only_switches:
         fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
         remedy = f"take device.valve 'proportional', or controller.kind {fitting}"
-        yield "controller.kind", f"opens its valve by degrees, which a {valve} valve cannot: {remedy}"
+        yield "controller.kind", f"opens its valve gradually, which a {valve} valve cannot: {remedy}"
 
 
 def _thresholds(configuration: Configuration) -> Iterator[tuple[str, str]]:
@@ -72,16 +72,19 @@ def _thresholds(configuration: Configuration) -> Iterator[tuple[str, str]]:
             f"must be below controller.load_threshold, which is {short_quantity_text(load, _NEWTON)}",
         )
     if settings["largest_force"] <= load:
-        yield "controller.largest_force", f"must be above controller.load_threshold, which is {short_quantity_text(load, _NEWTON)}"
+        yield (
+            "controller.largest_force",
+            f"must be above controller.load_threshold, which is {short_quantity_text(load, _NEWTON)}",
+        )
 
 
 def _times(configuration: Configuration) -> Iterator[tuple[str, str]]:
     settings, stride = configuration.settings, configuration.gait.stride_time
     if not 0.5 * stride < settings["first_stride_time"] < 2.0 * stride:
-        wanted = short_quantity_text(round(stride, 4), _SECOND)
+        stride_text = short_quantity_text(round(stride, 4), _SECOND)
         yield (
             "controller.first_stride_time",
-            f"must be between half and twice the stride of the gait, which is {wanted}",
+            f"must be between half and twice the stride of the gait, which is {stride_text}",
         )
     if settings["flat_from"] >= settings["flat_to"]:
         yield "controller.flat_from", f"must be below controller.flat_to, which is {settings['flat_to']:g}"
@@ -92,18 +95,21 @@ def _times(configuration: Configuration) -> Iterator[tuple[str, str]]:
             yield f"controller.{name}", f"must be longer than the dead time of the valve, which is {dead}"
     if settings["frozen_time"] <= 2.0 * configuration.period:
         sample = short_quantity_text(configuration.period, _SECOND)
-        yield "controller.frozen_time", f"must be longer than two samples of the controller, one is {sample}"
+        yield "controller.frozen_time", f"must be longer than two sample periods of the controller, {sample} each"
 
 
 def _angles(configuration: Configuration) -> Iterator[tuple[str, str]]:
     settings, actuator = configuration.settings, configuration.device.actuator
     low, high = settings["lowest_angle"], settings["highest_angle"]
     if low >= high:
-        yield "controller.lowest_angle", f"must be below controller.highest_angle, which is {short_quantity_text(high, _RADIAN)}"
+        yield (
+            "controller.lowest_angle",
+            f"must be below controller.highest_angle, which is {short_quantity_text(high, _RADIAN)}",
+        )
     low, high = max(low, actuator.angle_min), min(high, actuator.angle_max)
     if not low < settings["swing_angle"] < high:
         reach = f"{short_quantity_text(low, _RADIAN)} to {short_quantity_text(high, _RADIAN)}"
-        yield "controller.swing_angle", f"lies outside of what sensor and device reach, {reach}"
+        yield "controller.swing_angle", f"lies outside the range of sensor and device, {reach}"
 
 
 def _gait(configuration: Configuration) -> Iterator[tuple[str, str]]:
@@ -129,7 +135,7 @@ def _pressures(configuration: Configuration) -> Iterator[tuple[str, str]]:
     compressed = highest * COMPRESSION
     if settings["highest_pressure"] <= compressed:
         limit = short_quantity_text(compressed, _PASCAL)
-        yield "controller.highest_pressure", f"a moving foot compresses a chamber to above it; must be above {limit}"
+        yield "controller.highest_pressure", f"must be above {limit}: a moving foot compresses the gas in a chamber"
 
 
 def _push_off(settings: Mapping[str, float]) -> Iterator[tuple[str, str]]:

@@ -55,7 +55,7 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` replaces the
-    gait of the file.
+    gait of the file. ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)

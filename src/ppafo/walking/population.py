@@ -15,7 +15,7 @@ from ppafo.walking.configuration import Configuration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.varied_gait import draw_gaits
-from ppafo.walking.walk import REMEDY, Progress, walk_duration, plan_of, silent
+from ppafo.walking.walk import REMEDY, Progress, plan_of, silent, walk_duration
 from ppafo.walking.wearers_rows import batch_of_many
 
 MAXIMUM_WEARERS = 1_000_000
@@ -38,14 +38,14 @@ OUTCOMES: dict[str, Number] = {
     "slap_rate": Number(
         "rad/s", "rate of the toes as they come down after the heel, below 0; 0 where they always came first"
     ),
-    "toe_clearance": Number("m", "lowest toes in mid-swing against the wearer's healthy gait"),
-    "toe_landing": Number("-", "share of the strides in which the toes met the ground before the heel"),
+    "toe_clearance": Number("m", "lowest toe height in mid-swing, relative to the wearer's healthy gait"),
+    "toe_landing": Number("-", "fraction of the strides in which the toes met the ground before the heel"),
 }
 TRAITS: dict[str, Number] = {
     "body_mass": Number("kg", "mass of the body"),
     "shank_length": Number("m", "knee to ankle"),
     "stride_time": Number("s", "from one heel strike to the next"),
-    "stance_share": Number("-", "share of the stride until toe-off"),
+    "stance_share": Number("-", "fraction of the stride until toe-off"),
 }
 
 
@@ -84,12 +84,12 @@ class Population:
 def walk_population(
     configuration: Configuration, minutes: float, wearers: int, seed: int = 1, progress: Progress = silent
 ) -> Population:
-    """Let many wearers walk; the first is that of the configuration. ScenarioError for bad input.
+    """Let many wearers walk for ``minutes`` [min]; the first is that of the configuration.
 
-    ``progress`` is told how many of how many wearers have walked.
+    ``progress`` gets the number of wearers that have walked and the number of all. ScenarioError for bad input.
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
-        raise ScenarioError(f"{wearers} wearers cannot walk; choose 1 to {MAXIMUM_WEARERS}")
+        raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
     run = plan_walk(plan_of(configuration, walk_duration(configuration, minutes)))
     generator = np.random.default_rng(seed)
     build = draw_builds(wearers, generator)

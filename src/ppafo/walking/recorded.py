@@ -19,12 +19,12 @@ PHASE_ROW = "controller_state.phase.phase"
 SAFE_ROW = "controller_state.safety.vented"
 """Where event-based controllers keep the phase that they see, and whether they have vented for good."""
 
-REQUEST_ROW = "controller_state.wish.torque"
+REQUEST_ROW = "controller_state.request.torque"
 """Where those that follow a torque keep the one they want."""
 
 
-def walk_channels(configuration: Configuration, run: Run, time: Floats, record: Mapping[str, Floats]) -> Recording:
-    """The recording of a walk from its rows (samples,) by path, at these times [s]."""
+def recording_of_walk(configuration: Configuration, run: Run, time: Floats, record: Mapping[str, Floats]) -> Recording:
+    """The recording of a walk [SI] from its rows (samples,) by path, at these times [s]."""
     assert run.walk is not None, "a walk has a leg"
     angle, rate = record["state.angle"], record["state.angular_velocity"]
     pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])

@@ -34,7 +34,7 @@ PER_STRIDE: dict[str, Quantity] = {
         "rate of the toes as they come down after the heel, below 0; 0 where they came first",
         "walk.slap_rates",
     ),
-    "toe_clearance": Quantity("m", "lowest toes in mid-swing against the healthy gait", "walk.clearances"),
+    "toe_clearance": Quantity("m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances"),
     "toe_landing": Quantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
 }
 
@@ -59,7 +59,7 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
 
 
 def mean_curves(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Curves]:
-    """Mean and deviation over strides of every channel, each stride brought to the same phases; none without strides.
+    """Mean and deviation of every channel over strides brought to the same phases, in its SI unit; {} without strides.
 
     Channels that hold their value between samples, such as the command, have no mean.
     """

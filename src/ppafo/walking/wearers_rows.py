@@ -22,7 +22,7 @@ THRESHOLD_VARIATION = 0.15
 """Standard deviation of thresholds over their values: how a fitter sets them, and how a sensor sits. Assumed."""
 
 START_VARIATION = 0.03
-"""Standard deviation of the share of the stride at which the push-off begins. Assumed."""
+"""Standard deviation of the fraction of the stride at which the push-off begins. Assumed."""
 
 
 def batch_of_many(

@@ -180,7 +180,8 @@ def test_a_failing_sensor_is_told_with_the_time_of_the_safe_state(
     told = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("safe state"))
     assert 3.3 <= float(told.split()[-2]) < 3.4
     assert (
-        "Safe state: when the controller vented both chambers for good" in (tmp_path / "walk/report.html").read_text()
+        "Safe state: time at which the controller vented both chambers permanently"
+        in (tmp_path / "walk/report.html").read_text()
     )
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())
     assert 3.3 <= document["metrics"]["safe_state_time"]["value"] < 3.4

@@ -24,7 +24,7 @@ def test_every_curve_has_a_panel_with_its_events() -> None:
     assert len(figure.axes) == len(gait.curves) == 6
     top = figure.axes[0]
     assert {text.get_text() for text in top.texts} == {"heel strike", "toe-off"}
-    assert np.degrees(gait.shank_angle.sampled([0.25]))[0] == pytest.approx(top.lines[-1].get_ydata()[25])
+    assert np.degrees(gait.shank_angle.values_at([0.25]))[0] == pytest.approx(top.lines[-1].get_ydata()[25])
     assert [text.get_text() for text in figure.texts] == ["falisse2019-subject1: 62 kg, 1.33 m/s, stride 1.04 s"]
 
 

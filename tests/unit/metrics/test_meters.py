@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ppafo.metrics.catalog import METRICS, evaluate
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import Readings
-from ppafo.metrics.switching import UNDECIDED, Swing, count_of, reversals, next_swing
+from ppafo.metrics.switching import UNDECIDED, Swing, count_of, next_swing, reversals
 from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import SAME_LEVEL, Course, MeterKind, Sample, followed
 

@@ -12,7 +12,7 @@ from ppafo.answers.shown_metrics import metric_change
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement
-from ppafo.simulation.check import HALF_ERROR, MOVED_MEASUREMENT, MOVED_START, NumberCheck, Check
+from ppafo.simulation.check import HALF_ERROR, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.result import Status
 from ppafo.simulation.scenario import Scenario
@@ -106,7 +106,7 @@ def test_what_only_the_error_changes_is_told_from_what_nobody_could_measure() ->
     assert inexact.changed_by == {HALF_ERROR}
     sentence = Check("loop", (moved, inexact, firm), (), None, ()).sentence
     assert sentence.startswith("Not determined by this run: switchings: a start moved by 1e-07 of its range")
-    assert "Nor: rms_error: half the error gives other values. Take a smaller run.step" in sentence
+    assert "Nor: rms_error: half the error changes them. Take a smaller run.step" in sentence
     assert "peak_error" not in sentence
     assert Check("loop", (firm,), (), None, ()).is_determined
     diverged = Check("loop", (firm,), (), 0.1, (MOVED_START,))
@@ -159,7 +159,7 @@ def test_a_decision_by_a_hair_of_a_reading_is_found_where_the_start_does_not_mat
 def test_a_controller_that_gives_another_run_each_time_is_refused(torque_task: Callable[[str], Scenario]) -> None:
     scenario = dataclasses.replace(torque_task("proportional"), duration=0.05)
     result = simulate(scenario.controlled_by(Unforgetting(0.0)))
-    with pytest.raises(SimulationError, match=r"Unforgetting gives another run each time.* reset\(\) must forget"):
+    with pytest.raises(SimulationError, match=r"Unforgetting gives a different run each time.* reset\(\) must forget"):
         result.check()
 
 

@@ -193,7 +193,7 @@ def test_a_scenario_is_shown_in_a_few_lines() -> None:
 
 def test_the_motion_of_a_scenario_is_shown_in_words() -> None:
     assert "free, from 20 deg" in repr(load_scenario("step-response"))
-    assert "led along the profile sine" in repr(load_scenario("torque-task-moving-ankle"))
+    assert "prescribed, along the profile sine" in repr(load_scenario("torque-task-moving-ankle"))
 
 
 def test_an_assumption_carries_the_value_it_is_about() -> None:

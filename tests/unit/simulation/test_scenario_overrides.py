@@ -59,7 +59,7 @@ def test_another_kind_of_motion_keeps_what_both_have() -> None:
 
 
 def test_a_profile_can_be_built_from_nothing() -> None:
-    overrides = ["motion.kind=led", "motion.profile.kind=sine", "motion.profile.level=75 deg"]
+    overrides = ["motion.kind=prescribed", "motion.profile.kind=sine", "motion.profile.level=75 deg"]
     motion = load_scenario(TASK, [*overrides, "motion.profile.amplitude=5 deg"]).motion
     assert isinstance(motion, PrescribedMotion)
     assert motion.profile.settings["amplitude"] == math.radians(5.0)

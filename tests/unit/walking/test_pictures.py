@@ -12,7 +12,7 @@ from ppafo.questions.walk.answer import comparison_table
 from ppafo.questions.walk.wearers import wearers_answer
 from ppafo.walking import Comparison, compare_walks, load_walk, walk_population
 from ppafo.walking.figures.animation import animation
-from ppafo.walking.figures.legs import drags, frames_figure, legs_of, last_phases
+from ppafo.walking.figures.legs import drags, frames_figure, last_phases, legs_of
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.phases import strip_figure
 from ppafo.walking.figures.wearers import population_figure

@@ -20,7 +20,7 @@ from ppafo.walking.anthropometry import (
     draw_builds,
     segment_values,
 )
-from ppafo.walking.followed_gait import gait_timing
+from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.varied_gait import SERIES, SeriesOfMany, draw_gaits
 from ppafo.walking.walk import plan_of

@@ -11,7 +11,7 @@ import pytest
 from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk
-from ppafo.walking.followed_gait import NEARLY_FLAT, gait_timing
+from ppafo.walking.gait_series import NEARLY_FLAT, gait_timing
 from ppafo.walking.strides import PHASES, SETTLING, mean_curves, stride_starts
 
 MINUTES = 0.15
@@ -80,7 +80,7 @@ def test_the_healthy_foot_is_judged_where_it_lands() -> None:
     gait = load_walk("solenoid").gait
     shank, ankle = gait.shank_angle, gait.ankle_angle
     phases = np.linspace(0.0, 0.15, 15001)
-    foot = shank.sampled(phases) - ankle.sampled(phases) + 0.5 * np.pi - gait_timing(gait).ground_angle
+    foot = shank.values_at(phases) - ankle.values_at(phases) + 0.5 * np.pi - gait_timing(gait).ground_angle
     landing = int(np.argmax(foot < NEARLY_FLAT))
     assert 0.05 < phases[landing] < 0.12
     rate = (foot[landing + 5] - foot[landing - 5]) / (phases[landing + 5] - phases[landing - 5]) / gait.stride_time

@@ -20,7 +20,7 @@ class ConstantState(NamedTuple):
 def update(
     parameters: ConstantParameters, state: ConstantState, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, ConstantState]:
-    """Command: the one that was set."""
+    """Command from -1 to 1: the setting."""
     return parameters.command, state
 
 

@@ -40,7 +40,7 @@ class Segment(NamedTuple):
 
 
 def next_segment(segment: Segment, place: float, time: float, value: float) -> Segment:
-    """The segment, or the next one, to the knot at ``time``, where the place [s] is not before its end."""
+    """The segment, or the next one, to the knot at ``time`` [s], where ``place`` [s] has passed its end."""
     passed = place >= segment.end
     return Segment(
         segment.end if passed else segment.start,
@@ -80,7 +80,7 @@ def used_knots(profile: Tabulated) -> list[tuple[float, float]]:
 
 
 def bounds(profile: Tabulated) -> tuple[float, float]:
-    """The lowest and the highest value of the knots that are used, with the level."""
+    """The lowest and the highest value [N m or rad] of the knots that are used, with the level."""
     values = [value for _, value in used_knots(profile)]
     return profile.level + min(values), profile.level + max(values)
 

@@ -42,8 +42,10 @@ def update(
     measurement: GaitMeasurement,
     period: float,
 ) -> tuple[float, EventOnOffState]:
-    """Command: 1 plantarflexion, -1 dorsiflexion, ``VENT`` free; the reference is not used."""
-    phase = phases.next_phase_state(parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period)
+    """Command [-]: 1 plantarflexion, -1 dorsiflexion, ``VENT`` for free motion; the reference is not used."""
+    phase = phases.next_phase_state(
+        parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period
+    )
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     above = measurement.angle > parameters.swing_angle + parameters.band
     below = measurement.angle < parameters.swing_angle - parameters.band
@@ -66,7 +68,7 @@ KIND = ControllerKind(
         Quantity(
             "band", "rad", "the foot is lifted above the angle plus this, let go below it less this", 0.145, 0.0, 0.5
         ),
-        Quantity("push_off_end", "1", "share of the stride time at which the push-off is over", 0.565, 0.1, 1.0),
+        Quantity("push_off_end", "1", "fraction of the stride time at which the push-off is over", 0.565, 0.1, 1.0),
         *PHASE_QUANTITIES,
         *SAFETY_QUANTITIES,
     ),

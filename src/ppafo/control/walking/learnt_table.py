@@ -18,7 +18,7 @@ KNOTS = 16
 
 
 class LearningRules(NamedTuple):
-    """Gain [1/(N m)], share of a knot that a stride forgets [-], lead [s]."""
+    """Gain [1/(N m)], fraction of a knot that a stride forgets [-], lead [s]."""
 
     learning_gain: float
     forgetting: float
@@ -35,7 +35,7 @@ EMPTY = LearntTable(knots=(0.0,) * KNOTS)
 
 
 def near(place: float, knot: float) -> float:
-    """Weight of a knot at a place, both counted in knots: 1 at the knot, 0 from its neighbours on."""
+    """Weight [-] of a knot at a place, both counted in knots: 1 at the knot, falling to 0 at its neighbours."""
     return max(0.0, 1.0 - abs(place - knot))
 
 
@@ -62,7 +62,7 @@ def command_at(table: LearntTable, place: float) -> float:
 
 
 def next_knot(knot: float, weight: float, step: float, forgetting: float) -> float:
-    """Command of a knot after a sample of some weight: forgotten a little, moved by a step, from -1 to 1."""
+    """Command [-] of a knot after a sample of some weight: forgotten a little, moved by a step, within -1 to 1."""
     return max(-1.0, min(1.0, knot + weight * (step - forgetting * knot)))
 
 
@@ -81,7 +81,7 @@ def learn(
     error: float,
     duration: float,
 ) -> LearntTable:
-    """The table after a sample with a torque error [N m] that stood for some time [s], 0 where nothing is learnt.
+    """The table after a sample with a torque error [N m] that lasted ``duration`` [s], 0 where nothing is learnt.
 
     While a stride passes over a knot, the weights of its samples add up to 1.
     """
@@ -91,7 +91,10 @@ def learn(
 
 
 def next_table(table: LearntTable, place: float, weight: float, step: float, forgetting: float) -> LearntTable:
-    """The table with the two knots at a place moved in part: each by its share of the sample's ``weight``."""
+    """The table after a sample at a place, counted in knots.
+
+    The two knots beside the place move, each by its part of the sample's ``weight`` [-] and of ``step`` [-].
+    """
     return LearntTable(
         knots=(
             next_knot(table.knots[0], near(place, 0.0) * weight, step, forgetting),

@@ -10,12 +10,12 @@ ANKLE_RANGE = (5.0, 80.0)
 ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
 """Percent of the stride in which the foot stands: the ankle then turns as the shank does."""
-_LEAST_SHANK_TRAVEL = 8.0
+_MINIMUM_SHANK_TRAVEL = 8.0
 _LARGEST_FOOT_ANGLE = 35.0
 
 
 def check_shank(walk: MeanStride) -> None:
-    """Refuse a shank that no leg has."""
+    """Raise DataError for a shank angle that no leg has."""
     phi = np.degrees(walk.curves["shank_angle"])
     place = f"{walk.file['shank_angle']}: shank_angle"
     travel = float(np.ptp(phi))
@@ -39,7 +39,7 @@ def check_shank(walk: MeanStride) -> None:
 
 
 def check_ankle(walk: MeanStride) -> None:
-    """Refuse an ankle that no leg has, or not with this shank."""
+    """Raise DataError for an ankle angle that no leg has, or not with this shank."""
     theta, phi = (np.degrees(walk.curves[name]) for name in ("ankle_angle", "shank_angle"))
     place = f"{walk.file['ankle_angle']}: ankle_angle"
     travel = float(np.ptp(theta))
@@ -50,7 +50,7 @@ def check_ankle(walk: MeanStride) -> None:
             f"{_unit_hint(travel, low, high)}"
         )
     stand, lean = theta[MIDSTANCE], phi[MIDSTANCE]
-    slope = float(np.polyfit(lean, stand, 1)[0]) if np.ptp(lean) > _LEAST_SHANK_TRAVEL else 1.0
+    slope = float(np.polyfit(lean, stand, 1)[0]) if np.ptp(lean) > _MINIMUM_SHANK_TRAVEL else 1.0
     if slope < 0.0:
         raise DataError(
             f"{place} goes into plantarflexion while the shank rotates forward over the standing foot "
@@ -61,7 +61,7 @@ def check_ankle(walk: MeanStride) -> None:
     if abs(foot) > _LARGEST_FOOT_ANGLE or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
         raise DataError(
             f"{place} would tilt the standing foot by {foot:.0f} deg, plausible is within {_LARGEST_FOOT_ANGLE:g} deg "
-            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.given]}"
+            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.signs_from]}"
         )
 
 
@@ -75,7 +75,7 @@ _NEUTRAL: dict[SignSource, str] = {
 
 
 def _other_foot(walk: MeanStride) -> str:
-    if walk.given == "gait_file" or "vertical_force" not in walk.curves:
+    if walk.signs_from == "gait_file" or "vertical_force" not in walk.curves:
         return ""
     return ", or the force is of the other foot: choose the other side, or the column of this foot"
 

@@ -15,7 +15,7 @@ _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.
 
 
 def check_knee(walk: MeanStride) -> None:
-    """Refuse accelerations of the knee, where there are some, that no leg has."""
+    """Raise DataError for knee accelerations, where there are some, that no leg has."""
     there = [name for name in KNEE if name in walk.curves]
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)

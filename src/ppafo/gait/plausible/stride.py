@@ -16,14 +16,14 @@ STRIDE_TIME = (0.5, 3.0)
 
 
 def check_gait(gait: Gait, file: str) -> None:
-    """Refuse a gait file whose stride cannot be true, as ``check_plausible`` does."""
+    """Raise DataError for a gait file whose stride is not plausible, as ``check_plausible`` does."""
     percent = np.linspace(0.0, 1.0, 101)
-    curves = {name: curve.sampled(percent) for name, curve in gait.curves.items()}
+    curves = {name: curve.values_at(percent) for name, curve in gait.curves.items()}
     check_plausible(MeanStride(dict.fromkeys(curves, file), curves, gait.stance_share, gait.stride_time, "gait_file"))
 
 
 def check_plausible(walk: MeanStride) -> None:
-    """Refuse a mean stride that cannot be true; the message names file, curve, number, limits and remedy."""
+    """Raise DataError for a mean stride that is not plausible; names file, curve, number, limits and remedy."""
     for check in _CHECKS:
         check(walk)
 
@@ -44,7 +44,7 @@ def _times(walk: MeanStride) -> None:
 
 
 def _stance_hint(walk: MeanStride) -> str:
-    if walk.given == "gait_file":
+    if walk.signs_from == "gait_file":
         return "give stride.stance_share from heel strike to toe-off"
     if "vertical_force" in walk.curves:
         return "is the force of this foot, its sign and unit right?"

@@ -1,4 +1,4 @@
-"""The way or the acceleration of the knee in the sagittal plane, from recorded columns."""
+"""The position or the acceleration of the knee in the sagittal plane, from recorded columns."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,7 +16,7 @@ from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity
 
 THIGH_FRACTION = 0.245
-"""Hip to knee as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
+"""Hip to knee as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
 ed. 2009."""
 
 _LENGTHS = (0.2, 0.7)
@@ -29,8 +29,8 @@ def knee_signals(
 ) -> dict[str, Signal]:
     """Return ``knee_forward`` and ``knee_up``, each a position [m] or an acceleration [m/s^2].
 
-    With a thigh they are the way of the hip and that of the knee about it: in the plane, with the hip where the
-    columns of the map say it is.
+    With a thigh they are the way of the hip and that of the knee about it: in the plane, with the hip where the columns
+    of the map say it is. DataError where a column, unit or length is missing or does not fit.
     """
     if mapped.thigh is not None and mapped.thigh_length is None and stature is None:
         if is_default:
@@ -59,7 +59,10 @@ def knee_signals(
 
 
 def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: float | None) -> list[str]:
-    """Return where the acceleration of the knee comes from, or why there is none."""
+    """Return where the acceleration of the knee comes from, or why there is none; ``stature`` [m].
+
+    DataError for a length of the thigh that is not plausible.
+    """
     if mapped is None:
         return []
     if "knee_forward" not in walk:
@@ -67,7 +70,9 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
         return [f"{what}knee.thigh_length"] if mapped.thigh is not None else []
     remarks = []
     if mapped.thigh is not None and mapped.thigh_length is None:
-        remarks.append(f"thigh of {_thigh_length(mapped, stature):.3f} m: {THIGH_FRACTION:g} of the stature (Winter 2009)")
+        remarks.append(
+            f"thigh of {_thigh_length(mapped, stature):.3f} m: {THIGH_FRACTION:g} of the stature (Winter 2009)"
+        )
     if walk["knee_forward"].is_position:
         remarks.append(
             f"acceleration of the knee from a series of {HARMONICS['knee_forward']} harmonics of its position"
@@ -75,8 +80,8 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
     return remarks
 
 
-def check_way(walk: Mapping[str, Signal], given: SignSource) -> None:
-    """Refuse a knee that is carried backwards; on a treadmill it stays about where it is."""
+def check_way(walk: Mapping[str, Signal], signs_from: SignSource) -> None:
+    """Raise DataError for a knee that moves backwards; on a treadmill it stays about where it is."""
     knee = walk.get("knee_forward")
     if knee is None or not knee.is_position:
         return
@@ -85,7 +90,7 @@ def check_way(walk: Mapping[str, Signal], given: SignSource) -> None:
         raise DataError(
             f"{knee.file}: the knee goes back by {-speed:.2g} m/s: knee.forward points against the "
             "direction of walking; "
-            f"{other_sign(given, 'the sign of knee.forward')}"
+            f"{other_sign(signs_from, 'the sign of knee.forward')}"
         )
 
 
@@ -101,7 +106,7 @@ def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Flo
     """
     phase = np.linspace(0.0, 1.0, position.size)
     curve, _ = fit_curve(position - (position[-1] - position[0]) * phase, harmonics)
-    return curve.derivative(stride_time).derivative(stride_time).sampled(phase)
+    return curve.derivative(stride_time).derivative(stride_time).values_at(phase)
 
 
 def _check_hip_moves(mapped: KneeMap, file: str, forward: Floats, up: Floats) -> None:

@@ -1,4 +1,4 @@
-"""What recorded files do not say and an import has to know."""
+"""What an import has to know and recorded files do not say."""
 
 import math
 import re
@@ -30,7 +30,7 @@ class ImportSettings:
 
 
 def check_settings(settings: ImportSettings) -> None:
-    """Refuse settings that make no sense."""
+    """Raise DataError for settings that are not plausible."""
     if not 1.0 <= settings.body_mass <= 500.0:
         raise DataError(f"a body mass of {settings.body_mass:g} kg is not plausible; give it in kg, such as '62 kg'")
     if settings.walking_speed is not None and not 0.05 <= settings.walking_speed <= 4.0:

@@ -30,7 +30,10 @@ class MotionTable:
 
 
 def read_table(path: str | Path) -> MotionTable:
-    """Return the table in a ``.mot``, ``.sto``, ``.csv`` or ``.c3d`` file; its clock runs without a gap."""
+    """Return the table in a ``.mot``, ``.sto``, ``.csv`` or ``.c3d`` file; its clock runs without a gap.
+
+    DataError for any other file, or for one with a gap in its time.
+    """
     suffix = Path(path).suffix.lower()
     if suffix in (".mot", ".sto"):
         table = _of_opensim(str(path), read_opensim(path))

@@ -28,7 +28,7 @@ _RIGHT_ANGLE = 0.5 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """Body mass [kg], which turns moments and forces into shares of it, and stature [m], which gives a thigh length."""
+    """Body mass [kg], by which moments and forces are divided, and stature [m], which gives the length of the thigh."""
 
     body_mass: float
     stature: float | None = None
@@ -40,7 +40,7 @@ def walk_signals(
     """Return the signals that a map finds in tables.
 
     With a convention of the package (``is_default``) only both angles have to be there; what a map of the user names
-    has to be there.
+    has to be there. DataError where one is missing.
     """
     walk = {}
     for name, read in _READERS.items():
@@ -97,8 +97,8 @@ def _ankle(found: CurveColumns, mapped: AngleMap, _body_mass: float) -> Signal:
 
 def _moment(found: CurveColumns, mapped: MomentMap, body_mass: float) -> Signal:
     values, unit = found.in_unit(mapped.unit, ("N m/kg", "N m"))
-    share = values / body_mass if unit == "N m" else values
-    return Signal(found.table.file, found.table.time, share if mapped.positive == "plantarflexion" else -share)
+    fraction = values / body_mass if unit == "N m" else values
+    return Signal(found.table.file, found.table.time, fraction if mapped.positive == "plantarflexion" else -fraction)
 
 
 def _force(found: CurveColumns, mapped: ForceMap, body_mass: float) -> Signal:

@@ -36,7 +36,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, LONGEST_STEP, between_stops
-from ppafo.simulation.recorded.scenario import with_fixed_volume, held_vane, replay_scenario
+from ppafo.simulation.recorded.scenario import held_vane, replay_scenario, with_fixed_volume
 from ppafo.simulation.recorded.start import Start, samples_at_rest
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import read_csv

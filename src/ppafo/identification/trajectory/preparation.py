@@ -16,7 +16,7 @@ from ppafo.engine.run import Run
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.experiment import Experiment, scenario_of, with_numbers
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.inputs import ANGLE, RecordedInputs, with_prescribed_angle, step_inputs
+from ppafo.simulation.recorded.inputs import ANGLE, RecordedInputs, step_inputs, with_prescribed_angle
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,7 @@ from ppafo.identification.trajectory.problem import Range
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import exact_orifice, plant_behind_lines, initial_lines, initial_state, thermal_parameters
+from ppafo.simulation.plan import exact_orifice, initial_lines, initial_state, plant_behind_lines, thermal_parameters
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import FreeMotion
 

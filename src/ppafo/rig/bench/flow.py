@@ -25,7 +25,7 @@ COMMAND_STEPS = 100
 READING_INTERVAL = 2.0
 REPETITIONS = 2
 SMALL_METER = 0.1
-"""Range of the flow meter for the leak as a share [-] of that of the other."""
+"""Range of the flow meter for the leak as a fraction [-] of that of the other."""
 
 
 def record_open_valve(request: Request) -> Outcome:
@@ -77,7 +77,7 @@ def record_valve_map(request: Request) -> Outcome:
 
 
 def record_steady_leak(request: Request) -> Outcome:
-    """Return the mass flow [kg/s] that keeps up the pressure in chamber 1 while chamber 2 is open to the atmosphere."""
+    """Return the mass flow [kg/s] that maintains the pressure in chamber 1 while chamber 2 is open to the atmosphere."""
     device, physics = _bench(request)
     ambient = device.supply.atmospheric_pressure
     levels = np.array(LEAK_GAUGE * REPETITIONS) + ambient
@@ -96,11 +96,11 @@ def _bench(request: Request) -> tuple[Device, RigPhysics]:
     return device, rig_physics(device, request.preset)
 
 
-def _flow(physics: RigPhysics, upstream: float, downstream: float, share: float, orifice: ExactOrifice) -> float:
+def _flow(physics: RigPhysics, upstream: float, downstream: float, fraction: float, orifice: ExactOrifice) -> float:
     """Mass flow [kg/s] of gas at the supply's temperature."""
     a = ambient_node(physics, float(upstream), physics.supply_temperature)
     return orifice_exchange(
-        physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), share, orifice, 1.0
+        physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), fraction, orifice, 1.0
     ).mass
 
 

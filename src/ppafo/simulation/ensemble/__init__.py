@@ -1,4 +1,4 @@
-"""Many variants of one scenario, with metrics worked out inside the lanes and no trajectory stored."""
+"""Many variants of one scenario, with metrics computed inside the lanes and no trajectory stored."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ COMPLETED, DIVERGED, REFUSED = 0, 1, 2
 
 @dataclass(frozen=True, slots=True)
 class EnsembleResult:
-    """What came of the runs of an ensemble, in the order of the columns.
+    """Results of the runs of an ensemble, in the order of the columns.
 
     ``status`` (runs,) is COMPLETED, DIVERGED or REFUSED; ``failure_time`` (runs,) [s] is nan where a run did not
     diverge; ``reasons`` has one line for each run, by its index, that diverged or was refused. ``metrics`` maps a name

@@ -127,7 +127,7 @@ TimeTexts = Mapping[str, Mapping[str, Any]]
 
 
 def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock:
-    """Return the clock of a run with other times, read as overrides of the scenario ``name`` are.
+    """Return the clock [s] of a run with other times, which are read as overrides of the scenario ``name`` are.
 
     ScenarioError if they do not fit together.
     """

@@ -1,4 +1,4 @@
-"""What the numbers of a run must not be together: the rules of a single scenario, over columns."""
+"""Which numbers of a run contradict each other: the rules of a single scenario, over columns."""
 
 from collections.abc import Callable
 from typing import Any
@@ -32,7 +32,7 @@ def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
 
 
 def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
-    """A vane that begins, is held or is led beyond the stops."""
+    """A vane that begins, is held or is to move beyond the stops."""
     actuator, motion = scenario.device.actuator, scenario.motion
     profile = ProfileChoice("constant", {"level": motion.angle}) if isinstance(motion, FreeMotion) else motion.profile
     lowest, highest = profile_bounds(profile)
@@ -42,8 +42,8 @@ def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
         level = profile.settings["level"]
 
         def angle_line(run: int) -> str:
-            stops = f"{quantity_text(at(actuator.angle_min, run), 'rad')} to {quantity_text(at(actuator.angle_max, run), 'rad')}"
-            return f"{HELD_ANGLE} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {stops}"
+            low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
+            return f"{HELD_ANGLE} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
 
         return ((outside, angle_line),)
     # The bounds hold for all time; a run that may leave them is looked at in time.
@@ -62,12 +62,12 @@ def _stop_violation(scenario: Scenario, profile: ProfileChoice, run: int) -> str
 
 
 def _too_late(scenario: Scenario) -> tuple[Problem, ...]:
-    """Sensors that are slower than the run, or than can be remembered."""
+    """Sensors whose delay is longer than the run, or than can be stored."""
     delay, step = scenario.sensors.delay, scenario.time_step
 
     def long_line(run: int) -> str:
-        most = quantity_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
-        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {most}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
+        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
+        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
 
     return (
         (

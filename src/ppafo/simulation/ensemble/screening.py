@@ -1,4 +1,4 @@
-"""Which runs of an ensemble cannot be: the checks of a single scenario, over columns."""
+"""Which runs of an ensemble are impossible: the checks of a single scenario, over columns."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, final
@@ -33,7 +33,7 @@ class Screen:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that stands for the runs that are still in."""
+        """The scenario that stands for the runs that are still in. ScenarioError before the times are read."""
         if self.clock is None:
             raise ScenarioError("the times of an ensemble are not read yet")
         return varied_scenario(self.columns, self.clock)

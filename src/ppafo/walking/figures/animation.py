@@ -10,7 +10,7 @@ from ppafo.answers.style import BLACK, CHAMBER_1, CHAMBER_2, GREY, house_style
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.command import VENTS_ABOVE
 from ppafo.walking.comparison import Comparison
-from ppafo.walking.figures.legs import DRAGS, GHOST, Legs, drags, draw_ground, leg_artists, legs_of, last_phases
+from ppafo.walking.figures.legs import DRAGS, GHOST, Legs, drags, draw_ground, last_phases, leg_artists, legs_of
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.walk import WalkResult
 

@@ -41,9 +41,9 @@ _DEGREES = float(np.degrees(1.0))
 _PANELS = (
     _Panel("Ankle angle (deg, 90 neutral, growing in plantarflexion)", ("angle",), _DEGREES, 90.0),
     _Panel("Torque on the wearer, $T_{ex}$ (N m)", ("external_torque",), 1.0, 0.0),
-    _Panel("Torque of the actuator (N m)", ("torque",), 1.0, 0.0),
-    _Panel("Chambers (psi, gauge; full: plantarflexion, dashed: dorsiflexion)", ("pressure_1", "pressure_2")),
-    _Panel("Toes over the ground (cm; they drag more than 1 cm below 0)", ("toe_height",), 100.0, 0.0),
+    _Panel("Actuator torque (N m)", ("torque",), 1.0, 0.0),
+    _Panel("Chamber pressures (psi gauge; solid: plantarflexion, dashed: dorsiflexion)", ("pressure_1", "pressure_2")),
+    _Panel("Toe height above ground (cm; the toes drag below -1)", ("toe_height",), 100.0, 0.0),
 )
 
 
@@ -86,8 +86,8 @@ def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
 
 
 def _background(axes: "Axes", result: Strides, panel: _Panel) -> None:
-    share = 100.0 * result.configuration.gait.stance_share
-    axes.axvspan(0.0, share, color=STANCE, zorder=0, linewidth=0.0)
+    fraction = 100.0 * result.configuration.gait.stance_share
+    axes.axvspan(0.0, fraction, color=STANCE, zorder=0, linewidth=0.0)
     if panel.level is not None:
         axes.axhline(panel.level, color=GREY, linewidth=0.8)
     axes.set_title(panel.title)
@@ -111,7 +111,7 @@ def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) 
 def _healthy(angle: "Axes", toes: "Axes", result: Strides) -> None:
     gait = result.configuration.gait
     look: dict[str, Any] = {"color": HEALTHY, "linewidth": 1.2, "linestyle": (0, (1, 1.2)), "label": "healthy gait"}
-    curve = _DEGREES * gait.ankle_angle.sampled(PHASES)
+    curve = _DEGREES * gait.ankle_angle.values_at(PHASES)
     angle.plot(_PERCENT, curve, **look)
     band = _DEGREES * gait.ankle_angle.deviation
     angle.fill_between(_PERCENT, curve - band, curve + band, color=GREY, alpha=0.15, linewidth=0.0)

@@ -74,11 +74,11 @@ def test_the_rate_of_the_angle_is_filtered_and_has_no_kick_at_the_start() -> Non
     kind = WALKING_CONTROLLERS["event_pid"]
     parameters, state = default_parameters("event_pid"), kind.initial
     first = assistance.assess(parameters, state, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
-    assert first.wish.rate == 0.0
+    assert first.request.rate == 0.0
     _, state = kind.update(parameters, state, 0.0, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
     second = assistance.assess(parameters, state, seen(1.601, 0.0, 0.0, 0.0), PERIOD)
     filter_time = parameters.assistance.hold.rate_filter
-    assert second.wish.rate == pytest.approx(0.001 / (PERIOD + filter_time))
+    assert second.request.rate == pytest.approx(0.001 / (PERIOD + filter_time))
 
 
 def one_stride() -> list[GaitMeasurement]:
@@ -115,7 +115,7 @@ def test_a_law_forgets_where_another_task_begins(name: str) -> None:
         command, state = kind.update(parameters, before, 0.0, measurement, PERIOD)
         if not assistance.same_task(before.phase.phase, state.phase.phase):
             changes += 1
-            fresh = kind.initial._replace(phase=before.phase, safety=before.safety, wish=before.wish)
+            fresh = kind.initial._replace(phase=before.phase, safety=before.safety, request=before.request)
             assert command == kind.update(parameters, fresh, 0.0, measurement, PERIOD)[0]
     assert changes == 3
 

@@ -9,9 +9,9 @@ from ppafo.control.walking.learnt_table import (
     LearningRules,
     LearntTable,
     command_at,
+    learn,
     next_table,
     place_in_table,
-    learn,
 )
 from ppafo.control.walking.torque_profile import TorqueProfile
 

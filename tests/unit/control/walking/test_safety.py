@@ -7,7 +7,7 @@ import pytest
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.declaration import SAFETY_QUANTITIES
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
-from ppafo.control.walking.safety import SlowPressures, ValveTimes, SafetyRules, SafetyState
+from ppafo.control.walking.safety import SafetyRules, SafetyState, SlowPressures, ValveTimes
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 
