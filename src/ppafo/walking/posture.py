@@ -16,8 +16,8 @@ from ppafo.walking.gait_series import truncate
 from ppafo.walking.wearer import Wearer
 
 ANKLE_HEIGHT_FRACTION = 0.039 / 0.246
-"""Height of the ankle over the sole as a fraction of the shank's length, from their fractions of the stature in figure 4.1
-of Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
+"""Height of the ankle over the sole as a fraction of the shank's length: both as fractions of the stature in figure
+4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
 
 MID_SWING_CLEARANCE = 0.015
 """Healthy toes over the ground in mid-swing [m]; 1 to 2 cm (Winter 1992, Phys Ther 72:45)."""

@@ -77,7 +77,7 @@ def record_valve_map(request: Request) -> Outcome:
 
 
 def record_steady_leak(request: Request) -> Outcome:
-    """Return the mass flow [kg/s] that maintains the pressure in chamber 1 while chamber 2 is open to the atmosphere."""
+    """Return the mass flow [kg/s] that maintains the pressure in chamber 1, with chamber 2 open to the atmosphere."""
     device, physics = _bench(request)
     ambient = device.supply.atmospheric_pressure
     levels = np.array(LEAK_GAUGE * REPETITIONS) + ambient

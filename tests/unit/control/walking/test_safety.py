@@ -73,8 +73,8 @@ def test_a_loaded_force_that_stays_the_same_is_frozen_and_an_unloaded_one_is_not
 @pytest.mark.parametrize(("name", "is_sign"), [(SWING, False), (LANDING, True), (MID_STANCE, True), (PUSH_OFF, True)])
 def test_an_angle_that_stays_the_same_is_a_sign_but_in_the_swing(name: float, is_sign: bool) -> None:
     now = phase(name, 0.5, heel=0.0, toe=0.0)
-    shown = safety.START.shown._replace(angle=GOOD.angle, angle_still=0.25)
-    assert vents(now=now, state=safety.START._replace(shown=shown)) is is_sign
+    shown = safety.START.readings._replace(angle=GOOD.angle, angle_unchanged=0.25)
+    assert vents(now=now, state=safety.START._replace(readings=shown)) is is_sign
 
 
 @pytest.mark.parametrize(("heel", "toe"), [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
@@ -162,7 +162,7 @@ def stood(state: SafetyState, sample: int, **pressures: float) -> SafetyState:
 
 
 def test_a_pressure_that_freezes_while_the_chamber_vents_is_found_soon() -> None:
-    state = after_commands(VENT, 0.252)._replace(followed=SlowPressures(2.2e5, GOOD.pressure_2))
+    state = after_commands(VENT, 0.252)._replace(slow_pressures=SlowPressures(2.2e5, GOOD.pressure_2))
     for sample in range(100):
         state = stood(state, sample, pressure_1=2.0e5 - 500.0 * sample)
     assert state.vented < 0.5
@@ -188,10 +188,10 @@ def test_once_vented_it_stays_so() -> None:
         state = safety.monitor(RULES, state, phases.START, phases.START, GOOD, PERIOD)
         given, state = safety.safe_command(state, command, PERIOD)
         assert given == VENT
-    assert state.ordered == ValveTimes(0.0, 0.0, pytest.approx(3.0 * PERIOD))
+    assert state.valve_times == ValveTimes(0.0, 0.0, pytest.approx(3.0 * PERIOD))
 
 
 def test_a_change_of_direction_begins_to_fill_anew() -> None:
     state = after_commands(1.0, 0.04)
     _, state = safety.safe_command(state, -1.0, PERIOD)
-    assert state.ordered == ValveTimes(0.0, pytest.approx(PERIOD), 0.0)
+    assert state.valve_times == ValveTimes(0.0, pytest.approx(PERIOD), 0.0)
