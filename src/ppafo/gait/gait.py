@@ -10,6 +10,7 @@
 With a flat foot theta is 90 deg plus phi. The phase counts strides from one heel strike of the foot to its next.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -37,6 +38,11 @@ REQUIRED = ("shank_angle", "ankle_angle")
 
 KNEE = ("knee_forward", "knee_up")
 """Curves that are accelerations: they go with the square of the cadence."""
+
+
+def clinical_angle(angle: "Floats") -> "Floats":
+    """Return an ankle angle theta [rad] as people read it [rad]: 0 at neutral, dorsiflexion positive."""
+    return 0.5 * math.pi - angle
 
 
 def plain_unit(unit: str) -> str:

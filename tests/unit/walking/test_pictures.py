@@ -80,6 +80,8 @@ def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:
         "without",
         "healthy gait",
     ]
+    flexion = next(line for line in angle.lines if line.get_label() == "with the device").get_ydata()
+    np.testing.assert_allclose(flexion, 90.0 - np.degrees(pair.with_device.averages["angle"].mean))
     curve = next(line for line in torque.lines if line.get_label() == "with the device").get_ydata()
     np.testing.assert_array_equal(curve, pair.with_device.averages["external_torque"].mean)
     assert len([line for line in pressures.lines if len(np.asarray(line.get_xdata())) > 2]) == 2
