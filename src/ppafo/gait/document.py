@@ -53,7 +53,10 @@ def gait_file() -> type[BaseModel]:
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=100)),
         "title": (str, Field("", description="one line: who walks, and how")),
-        "origin": (Literal["measured", "synthetic"], Field(description="synthetic: made by a model, nobody walked so")),
+        "origin": (
+            Literal["measured", "synthetic"],
+            Field(description="synthetic: made by a model, not recorded from a person"),
+        ),
         "source": (Annotated[str, Field(min_length=1)], Field(description="where the numbers come from")),
         "notes": (str, Field("", description="further remarks")),
         "subject": (table("Subject", subject), Field(description="the wearer")),

@@ -109,10 +109,10 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """One stride of one wearer, as curves over the phase; those that nobody recorded are None.
+    """One stride of one wearer, as curves over the phase; those that were not recorded are None.
 
     ``body_mass`` [kg], ``stride_time`` [s], ``stance_share`` (fraction of the stride until toe-off), ``walking_speed``
-    [m/s], None where nobody recorded it. The two deviations are between strides, 0 where not known. ``recorded_speed``
+    [m/s], None where it was not recorded. The two deviations are between strides, 0 where not known. ``recorded_speed``
     is the speed at which the curves were recorded, where it is another than ``walking_speed``.
     """
 

@@ -16,7 +16,7 @@ def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:
     DataError for a number that is not plausible.
     """
     if not 1 <= strides <= _MAXIMUM_STRIDES:
-        raise DataError(f"{strides} strides cannot be recorded; choose 1 to {_MAXIMUM_STRIDES}")
+        raise DataError(f"the number of strides must be from 1 to {_MAXIMUM_STRIDES}, not {strides}")
     per_stride = max(10, round(rate * gait.stride_time))
     phase = np.arange(strides * per_stride + 1) / per_stride
     one = np.arange(per_stride) / per_stride

@@ -24,7 +24,7 @@ _HEAD = ("schema_version", "name", "title", "notes")
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """A preset: values in SI by dotted path, and why each is what it is."""
+    """A preset: values in SI by dotted path, and the reason for each."""
 
     name: str
     title: str

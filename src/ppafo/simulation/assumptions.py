@@ -1,4 +1,4 @@
-"""The values of a scenario that no source gives, each with what it is and why."""
+"""The assumed values of a scenario, which no source gives, each with its reason."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

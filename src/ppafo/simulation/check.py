@@ -1,6 +1,6 @@
 """Whether a run determines what it says: it runs again with less error, and with start and measurements moved a little.
 
-A loop with coarse sensors or repeated impacts may amplify a difference that nobody could measure into other results.
+A loop with coarse sensors or repeated impacts may amplify a difference that is too small to measure into other results.
 Then its metrics are those of one run among many, and a check says so.
 """
 

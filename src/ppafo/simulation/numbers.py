@@ -1,6 +1,6 @@
 """Numbers of a scenario and its device by dotted path: declared and replaced, in SI units.
 
-A number may be an array (runs,), one value for each run of an ensemble; the scenario then stands for all of them.
+A number may be an array (runs,), one value for each run of an ensemble; the scenario then represents all of them.
 """
 
 from collections.abc import Mapping

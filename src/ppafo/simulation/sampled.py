@@ -67,7 +67,7 @@ def _clip_command(command: object, controller: PythonController, time: float) ->
 
 
 def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measurement]:
-    """What the controller sees at a sample: the present, or what late sensors looked at."""
+    """What the controller measures at a sample: the present state, or an earlier one where sensors are late."""
     program, per_sample = batch.program, batch.clock.steps_per_sample
     rows = row_numbers(program.state_rows())
     plant, sensors = _group(batch, "plant"), _group(batch, "sensors")

@@ -1,4 +1,4 @@
-"""What is to be run: one device in one experiment, as frozen values in SI units.
+"""What is run: one device in one experiment, as frozen values in SI units.
 
 ``load_scenario`` makes one from a file; in Python, ``dataclasses.replace`` changes a value and ``controlled_by`` puts
 an object of your own in charge of the valve.

@@ -121,7 +121,7 @@ def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, F
 def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
     """Return what a run records of its gas beside pressures, in SI with the unit, from rows (samples,) by path.
 
-    Line pressures and what came through the bottle's regulator where there are lines; true masses, temperatures and
+    Line pressures and the gas through the bottle's regulator where there are lines; true masses, temperatures and
     energies where the gas has an energy balance.
     """
     found: dict[str, tuple[Floats, str]] = {}

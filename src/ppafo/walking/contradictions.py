@@ -1,4 +1,4 @@
-"""Settings of a walk that contradict each other: refused before anything runs, in one line that names both."""
+"""Settings of a walk that contradict each other: refused before the run, in one line that names both."""
 
 from collections.abc import Iterator, Mapping
 

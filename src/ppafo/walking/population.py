@@ -26,7 +26,7 @@ STEPS_AT_ONCE = 1.0e8
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """What is known of every wearer: unit and meaning."""
+    """A quantity of every wearer: unit and meaning."""
 
     unit: str
     summary: str
@@ -51,10 +51,10 @@ TRAITS: dict[str, Number] = {
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Population:
-    """Wearers and what came of their walks, each an array (wearers,) by name, in SI units.
+    """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
 
     ``diverged`` counts the wearers whose walk left what is possible; they are not in ``outcomes`` nor in ``traits``.
-    ``vented`` counts those whose controller stopped trusting its sensors and vented both chambers for good.
+    ``vented`` counts those whose controller stopped trusting its sensors and vented both chambers permanently.
     """
 
     configuration: Configuration

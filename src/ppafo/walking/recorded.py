@@ -17,7 +17,7 @@ from ppafo.walking.posture import ankle_path
 
 PHASE_ROW = "controller_state.phase.phase"
 SAFE_ROW = "controller_state.safety.vented"
-"""Where event-based controllers keep the phase that they see, and whether they have vented for good."""
+"""Where event-based controllers keep the phase that they see, and whether they have vented permanently."""
 
 REQUEST_ROW = "controller_state.request.torque"
 """Where those that follow a torque keep the one they want."""

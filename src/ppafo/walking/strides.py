@@ -19,7 +19,7 @@ SETTLING = 2
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What is known of every stride: unit, meaning, and the running total in the record that it is the gain of."""
+    """A quantity of every stride: unit, meaning, and the running total in the record whose gain it is."""
 
     unit: str
     summary: str

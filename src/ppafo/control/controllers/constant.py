@@ -14,7 +14,7 @@ class ConstantParameters(NamedTuple):
 
 
 class ConstantState(NamedTuple):
-    """The law remembers nothing."""
+    """The law has no state."""
 
 
 def update(

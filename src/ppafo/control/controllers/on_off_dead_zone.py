@@ -16,7 +16,7 @@ class OnOffDeadZoneParameters(NamedTuple):
 
 
 class OnOffDeadZoneState(NamedTuple):
-    """Which way the valve is open: 1, 0 or -1."""
+    """Direction in which the valve is open: 1, 0 or -1."""
 
     direction: float
 

@@ -1,4 +1,4 @@
-"""When a controller of walking stops trusting its sensors and vents both chambers for good.
+"""When a controller of walking stops trusting its sensors and vents both chambers permanently.
 
 Four signs: readings that no foot and no chamber gives (out of range), readings that contradict each other or the gait
 (a stance or a swing without end, a foot that stands flat on one sensor), readings that contradict the valve (a chamber

@@ -26,7 +26,7 @@ def check_constant(
 ) -> None:
     """Raise DataError for a column that keeps one value for more than 0.1 s within the strides; a load may in swing.
 
-    Motions are looked at in strides that are left out too: what held everything made them longer. A column that never
+    Motions are checked in strides that are left out too: a drop-out made those longer. A column that never
     moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its smallest step is none either.
     """
     by_file = {table.file: table for table in tables}

@@ -38,7 +38,7 @@ def check_settings(settings: ImportSettings) -> None:
     if settings.stature is not None and not 0.5 <= settings.stature <= 2.5:
         raise DataError(f"a stature of {settings.stature:g} m is not plausible; give it in m, such as '1.75 m'")
     if settings.low_pass is not None and not (math.isfinite(settings.low_pass) and settings.low_pass >= 1.0):
-        raise DataError(f"a low pass at {settings.low_pass:g} Hz removes the walking itself; 6 Hz is usual")
+        raise DataError(f"a low pass at {settings.low_pass:g} Hz would remove the gait itself; 6 Hz is usual")
     if re.fullmatch(NAME, settings.name) is None:
         raise DataError(f"name {settings.name!r} must consist of lower-case letters, digits, '-' and '_'")
     if settings.least_strides < 1:

@@ -75,7 +75,7 @@ def _of_csv(path: str | Path) -> MotionTable:
 
 def _check_gaps(table: MotionTable) -> None:
     if table.time.size < 3:
-        raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs at least tens of them")
+        raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
     steps = np.diff(table.time)
     median = float(np.median(steps))
     index = int(np.argmax(steps))

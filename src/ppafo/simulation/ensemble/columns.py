@@ -1,4 +1,4 @@
-"""The columns of an ensemble: what may vary, checked as a whole, and the scenario that stands for all runs."""
+"""The columns of an ensemble: what may vary, checked as a whole, and the scenario that represents all runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -71,7 +71,7 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
     if path in declared:
         return
     if path in _TEXTS:
-        raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; make an ensemble for each")
+        raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; run an ensemble for each value")
     if base.control.kind == PYTHON_CONTROLLER and path.startswith("controller."):
         raise ScenarioError(
             f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
@@ -100,7 +100,7 @@ def _check_together(base: Scenario, values: Mapping[str, Floats]) -> None:
 
 
 def varied_scenario(columns: Columns, clock: Clock) -> Scenario:
-    """Return the scenario that stands for all runs; numbers of ``clock`` may be arrays too.
+    """Return the scenario that represents all runs; numbers of ``clock`` may be arrays too.
 
     A pressure at the start that was given as a word follows the pressure that the word names.
     """

@@ -16,7 +16,7 @@ from ppafo.simulation.reading import quantity_text
 from ppafo.simulation.scenario import FreeMotion, ProfileChoice, Scenario
 
 Rule = Callable[[Scenario], tuple[Problem, ...]]
-"""What may be wrong with a scenario that stands for many runs."""
+"""What may be wrong with a scenario that represents many runs."""
 
 
 def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
@@ -46,7 +46,7 @@ def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
             return f"{HELD_ANGLE} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
 
         return ((outside, angle_line),)
-    # The bounds hold for all time; a run that may leave them is looked at in time.
+    # The bounds hold for all time; a run that may leave them is checked at its own times.
     found = {int(run): _stop_violation(scenario, profile, int(run)) for run in np.flatnonzero(outside)}
     for run, problem in found.items():
         outside[run] = bool(problem)

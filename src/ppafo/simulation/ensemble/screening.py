@@ -23,7 +23,7 @@ _SEED = "sensors.seed"
 
 @final
 class Screen:
-    """The runs that are still in: their places in the ensemble, their columns and clocks; and why others are not."""
+    """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not."""
 
     def __init__(self, columns: Columns) -> None:
         self.columns = columns
@@ -33,7 +33,7 @@ class Screen:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that stands for the runs that are still in. ScenarioError before the times are read."""
+        """The scenario that represents the runs that are left. ScenarioError before the times are read."""
         if self.clock is None:
             raise ScenarioError("the times of an ensemble are not read yet")
         return varied_scenario(self.columns, self.clock)
@@ -46,7 +46,7 @@ class Screen:
         return part
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
-        """Drop runs, by a mask over those still in or a truth for all; ``line(place)`` says why."""
+        """Drop runs, by a mask over those left or one truth value for all; ``line(place)`` says why."""
         bad = np.broadcast_to(np.asarray(is_bad, dtype=bool), self.members.shape)
         if not bad.any():
             return
@@ -126,7 +126,7 @@ def _clock_of(clock: Clock, kept: Any) -> Clock:
 
 
 def _keep(screen: Screen, rule: Rule) -> None:
-    """Drop the runs that break a rule; after each problem that some have, the others are looked at anew."""
+    """Drop the runs that break a rule; after each problem that some have, the others are checked again."""
     while screen.members.size:
         found = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
         if not found:

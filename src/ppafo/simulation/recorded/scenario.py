@@ -62,7 +62,7 @@ def replay_scenario(
 
 
 def replay_control(recording: Recording) -> Control:
-    """Return the control of a run whose command comes from a recording: nobody's, on the clock of the samples."""
+    """Return the control of a run whose command comes from a recording: no controller, the period of the samples."""
     return Control(PYTHON_CONTROLLER, {}, sample_period(recording.time))
 
 
