@@ -150,8 +150,8 @@ class _Rig:
 
     def torque_and_limit(self, t: float, y: Floats) -> tuple[float, float]:
         """Driving torque and static limit of friction [N m]."""
-        seen = self.observe(t, y)
-        return float(seen[2]), float(seen[3])
+        signals = self.observe(t, y)
+        return float(signals[2]), float(signals[3])
 
     def rest_mode(self) -> float:
         """Way in which a vane at rest sets off, 0 where it is held."""
@@ -188,11 +188,11 @@ class _Rig:
         """What the sensors read now; the noise is that of the last recorded sample's time."""
         times, sensors = self.rig_run.sample_times, self.rig_run.sensors
         index = max(0, int(np.searchsorted(times, self.time + SAME_TIME, side="right")) - 1)
-        seen = sensor_signals(
+        signals = sensor_signals(
             self.rig_run, self.prescribe_angle(self.y, self.time), self.observe(self.time, self.y)[:2]
         )
         names = ("angle", "pressure_1", "pressure_2")
-        angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, seen, strict=True))
+        angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, signals, strict=True))
         return Measurement(angle, first, second, actuator_torque(first, second, self.plant.torque_constant))
 
     def advance_to(self, end: float) -> None:

@@ -88,9 +88,9 @@ def walk(
     A walk that diverges is a result with that status, up to the time of failure. ScenarioError or ParameterError for
     bad input. ``progress`` gets the minutes done and the minutes in all, part by part.
     """
-    given = isinstance(configuration, Configuration)
+    is_loaded = isinstance(configuration, Configuration)
     chosen = configuration if isinstance(configuration, Configuration) else load_walk(configuration, overrides, gait)
-    if given and (gait is not None or tuple(overrides)):
+    if is_loaded and (gait is not None or tuple(overrides)):
         raise ScenarioError("overrides and a gait go with a name or a file; a Configuration takes them in load_walk")
     run = plan_walk(plan_of(chosen, walk_duration(chosen, minutes)))
     outcome = _run_in_parts(batch_of(run), run.step, progress)

@@ -70,8 +70,8 @@ def update(
     assessment = assistance.assess(parameters, state, measurement, period)
     requested = assessment.request.torque
     law = law_restart(state.law, requested, assessment.continues)
-    seen = assistance.torque_measurement(measurement)
-    command, law = law_update(parameters.law, law, requested, seen, period)
+    sample = assistance.torque_measurement(measurement)
+    command, law = law_update(parameters.law, law, requested, sample, period)
     command, watch = assistance.valve_command(assessment, command, period)
     return command, LawState(phase=assessment.phase, safety=watch, request=assessment.request, law=law)
 

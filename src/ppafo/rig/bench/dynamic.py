@@ -149,16 +149,16 @@ def _outcome(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str,
 
 def sensor_readings(scenario: Scenario, bench_run: RigRun, solution: RigSolution) -> dict[str, Floats]:
     """Return what the sensors read at every sample [SI]; the torque is computed from the measured pressures."""
-    seen = [sensor_signals(bench_run, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
-    true = dict(zip(("angle", "pressure_1", "pressure_2"), np.array(seen).T, strict=True))
+    signals = [sensor_signals(bench_run, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
+    true = dict(zip(("angle", "pressure_1", "pressure_2"), np.array(signals).T, strict=True))
     for name, drop in _SUPPLIES.items():
         regulated = getattr(bench_run.run.plant, name)
         true[name] = regulated - solution.states[:, RigState._fields.index(drop)]
-    shown = {name: bench_run.sensors[name].readings(values) for name, values in true.items()}
-    shown["command"] = solution.commands
-    shown["torque"] = bench_run.run.plant.torque_constant * (shown["pressure_1"] - shown["pressure_2"])
-    shown["reference"] = profile_values(scenario.reference, bench_run.sample_times)[0]
-    return shown
+    readings = {name: bench_run.sensors[name].readings(values) for name, values in true.items()}
+    readings["command"] = solution.commands
+    readings["torque"] = bench_run.run.plant.torque_constant * (readings["pressure_1"] - readings["pressure_2"])
+    readings["reference"] = profile_values(scenario.reference, bench_run.sample_times)[0]
+    return readings
 
 
 def device_overrides(request: Request) -> tuple[str, ...]:
