@@ -62,6 +62,8 @@ class Wearer:
             ankle_damping=self.ankle_damping,
             residual_share=self.residual_share,
             heel_lever=self.heel_lever,
+            flat_heel_lever=self.heel_lever,
+            heel_roll_angle=1.0,
             toe_lever=self.toe_lever,
             gravity=STANDARD_GRAVITY,
         )

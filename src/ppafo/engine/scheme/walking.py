@@ -64,7 +64,7 @@ def begin_walk(
     step: float,
 ) -> WalkStep:
     """Where one step [s] leads the foot, by its own dynamics and by the ground."""
-    torque = leg_torque(leg, share, walk.contact, walk.now, state.angle, walk.foot)
+    torque = leg_torque(leg, share, walk.contact, walk.now, timing.ground_angle, state.angle, walk.foot)
     free = begin_free(plant, state, torque, step)
     offset = walk.offset / (1.0 + step / ground.FADING_TIME)
     prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle)
@@ -124,7 +124,7 @@ def end_walk(
     predicted = bounded(plant, begun.free.free_angle)
     # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
     foot = foot_direction(now.shank, predicted if free else begun.led.angle)
-    torque = leg_torque(leg, share, walk.contact, now, predicted, foot)
+    torque = leg_torque(leg, share, walk.contact, now, timing.ground_angle, predicted, foot)
     moved = end_free(plant, state, begun.free, torque, step)
     after = with_motion(
         state,
