@@ -85,9 +85,9 @@ def run(parsed: argparse.Namespace) -> int:
     text, document = coverage_text(lines, parsed.from_prior), coverage_document(lines, parsed.from_prior)
     if parsed.out is not None:
         load_drawing()
-        from ppafo.answers.style import rendered
+        from ppafo.answers.style import render_figure
 
-        figures = rendered(ranks_figure(lines), ("png", "svg"))
+        figures = render_figure(ranks_figure(lines), ("png", "svg"))
         contents = {f"{FIGURE}.{ending}": content for ending, content in figures.items()}
         contents |= {"coverage.txt": f"{text}\n".encode(), "coverage.json": f"{json_text(document)}\n".encode()}
         write_files(parsed, contents | _files_to_keep(parsed.out))

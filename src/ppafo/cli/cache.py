@@ -46,9 +46,9 @@ def _warm(why_not: str) -> None:
 
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
-    from ppafo.engine.cache import LONGEST_UNUSED, MOST_BYTES, cached_programs
+    from ppafo.engine.cache import LONGEST_UNUSED, MOST_BYTES, list_programs
 
-    programs = [] if folder is None else cached_programs(folder)
+    programs = [] if folder is None else list_programs(folder)
     now = time.time()
     return {
         "folder": None if folder is None else str(folder),

@@ -120,10 +120,10 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
 
 def _write(path: Path, kind: _NewFile, text: str) -> None:
     """Write the file; where it does not load, such as one with a path relative to another folder, it is not left."""
-    from ppafo.questions.question import loaded
+    from ppafo.questions.question import load_name
     from ppafo.storage.files import write_file
 
-    load = loaded(kind.load)
+    load = load_name(kind.load)
     write_file(path, text.encode())
     is_good = False
     try:

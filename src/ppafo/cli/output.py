@@ -47,7 +47,7 @@ def check_output(parsed: argparse.Namespace) -> None:
     if parsed.out is not None:
         from ppafo.storage.owned_folder import check_owned_folder, marked_folder
 
-        with named_option():
+        with blame_out_option():
             check_owned_folder(parsed.out, marked_folder(_command(parsed)))
 
 
@@ -58,7 +58,7 @@ def check_new_file(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def named_option() -> Iterator[None]:
+def blame_out_option() -> Iterator[None]:
     """Begin what is said of a folder with the option that named it."""
     try:
         yield
@@ -138,7 +138,7 @@ def write_files(parsed: argparse.Namespace, contents: Mapping[str, bytes]) -> No
     """Make the folder of ``--out`` hold exactly these files, and the mark by which it is known: all of them or none."""
     from ppafo.storage.owned_folder import write_marked_folder
 
-    with named_option():
+    with blame_out_option():
         write_marked_folder(parsed.out, contents, _command(parsed))
 
 

@@ -28,12 +28,12 @@ def load_drawing() -> None:
         return
     import matplotlib.artist
 
-    with _replaced(matplotlib.artist, "kwdoc", lambda _artist: ""):
+    with _replace_temporarily(matplotlib.artist, "kwdoc", lambda _artist: ""):
         import matplotlib.figure
 
 
 @contextmanager
-def _replaced(module: ModuleType, name: str, stand_in: object) -> Iterator[None]:
+def _replace_temporarily(module: ModuleType, name: str, stand_in: object) -> Iterator[None]:
     original = getattr(module, name)
     setattr(module, name, stand_in)
     try:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, named_option, print_result
+from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, blame_out_option, print_result
 from ppafo.cli.quick_imports import load_compiler
 from ppafo.errors import ParameterError
 
@@ -71,7 +71,7 @@ def _record(parsed: argparse.Namespace) -> int:
 
     find_experiment(parsed.experiment)
     seed = _whole_number(parsed.seed)
-    with named_option():
+    with blame_out_option():
         check_rig_folder(parsed.out, parsed.experiment)
     made = record(parsed.experiment, parsed.preset, seed, parsed.device, parsed.overrides, parsed.valve)
     files = write_rig_recording(parsed.out, made)

@@ -30,7 +30,7 @@ def table(name: str, fields: dict[str, Any]) -> type[BaseModel]:
 
 def optional(annotation: Any, description: str) -> Any:
     """Return the field of a value that a file may leave out."""
-    return annotation, Field(default_factory=_left_out, description=description)
+    return annotation, Field(default_factory=_no_value, description=description)
 
 
 def one_of(models: list[Any]) -> Any:
@@ -48,10 +48,10 @@ def read_model(kind: TomlKind, model: type[Model], name_or_path: str | Path) -> 
         raise kind.error(f"{file}: {first_problem(error.errors(include_url=False), model)}") from error
 
 
-def published_schema(model: type[BaseModel], title: str) -> dict[str, Any]:
+def make_schema(model: type[BaseModel], title: str) -> dict[str, Any]:
     """Return the JSON Schema of a file with this layout."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema(), "title": title}
 
 
-def _left_out() -> None:
+def _no_value() -> None:
     """Stand in for a value that a file may leave out; keeps 'null' out of the published schema."""

@@ -42,7 +42,7 @@ def mistake(said: str, source: str) -> ProgramError:
     # The first is the innermost; several are the ways through one function, in an order that changes.
     number = min(numbers, default=0)
     text = lines[number - 1].strip() if 0 < number <= len(lines) else ""
-    found = place_in(lines, number) or _called(lines, text)
+    found = place_in(lines, number) or _find_called(lines, text)
     if found is None:
         return ProgramError(f"the model cannot be compiled: {_problem(Report(said, source, text, text))}")
     written = linecache.getline(found.file, found.line).strip()
@@ -66,7 +66,7 @@ def place_in(lines: list[str], number: int) -> Place | None:
     return None
 
 
-def _called(lines: list[str], text: str) -> Place | None:
+def _find_called(lines: list[str], text: str) -> Place | None:
     """Where the last function of a file that is called in a line of the loop was defined."""
     for name in reversed(re.findall(r"\w+", text)):
         for number, line in enumerate(lines, 1):
@@ -86,7 +86,7 @@ def _line_of(report: str, place: Place) -> int:
 
 
 def _problem(report: Report) -> str:
-    tellers: tuple[Callable[[Report], str], ...] = (_attribute, _returns, _operator, _arguments, _unpacked)
+    tellers: tuple[Callable[[Report], str], ...] = (_attribute, _returns, _operator, _arguments, _unpack)
     for teller in tellers:
         problem = teller(report)
         if problem:
@@ -145,7 +145,7 @@ def _arguments(report: Report) -> str:
     return f"{name}({found[1]}): {engine}{found[2].rstrip('.')}"
 
 
-def _unpacked(report: Report) -> str:
+def _unpack(report: Report) -> str:
     found = re.search(
         r"failed to unpack (.+)|Tuple '.*' length (?:mismatch|does not match)|wrong tuple length", report.said
     )

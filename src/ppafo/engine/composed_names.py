@@ -144,14 +144,14 @@ class Composer(ast.NodeTransformer):
         """What is written for a value from outside."""
         # ``inf`` and ``nan`` of math are written by name, as they are in most sources.
         if isinstance(node, ast.Attribute) and self.value_of(node.value) is math:
-            return self.written("math", node.attr, node)
+            return self.global_name("math", node.attr, node)
         own = str(getattr(value, "__name__", ""))
         if isinstance(value, types.BuiltinFunctionType) and getattr(math, own, None) is value:
-            return self.written("math", own, node)
+            return self.global_name("math", own, node)
         if own in COMPILED_BUILTINS and getattr(builtins, own) is value:
-            return self.written("", own, node)
+            return self.global_name("", own, node)
         if isinstance(value, types.FunctionType) or is_row(value):
-            return self.written("", self.add(value), node)
+            return self.global_name("", self.add(value), node)
         name = ast.unparse(node)
         if getattr(value, "__module__", "") == "numpy" or own.startswith("numpy"):
             raise self.refuse(
@@ -159,7 +159,7 @@ class Composer(ast.NodeTransformer):
             )
         return self.literal(value, node, f"'{name}'")
 
-    def written(self, module: str, name: str, node: ast.expr) -> ast.expr:
+    def global_name(self, module: str, name: str, node: ast.expr) -> ast.expr:
         """A name of the generated module, which no local name may hide."""
         first = module or name
         if first in self.local:

@@ -4,7 +4,7 @@ Samples are the ones that a recording would have.
 """
 
 from ppafo.engine.lane_course import course_lines, follow_lines
-from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
+from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.model.plant import chamber_pressures_in_one_division
 from ppafo.model.vane import actuator_torque
 from ppafo.signals.meter import Sample
@@ -35,9 +35,9 @@ def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
     lines = [*sample_lines(rows, moment), *follow_lines(rows)]
     return [
         "if next_record == 0:",
-        *indented([*course_lines(rows), *over_lanes([*lines, *begin])]),
+        *indent([*course_lines(rows), *over_lanes([*lines, *begin])]),
         "else:",
-        *indented(over_lanes([*lines, *update])),
+        *indent(over_lanes([*lines, *update])),
     ]
 
 
@@ -65,5 +65,5 @@ def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
     keep = [f"trace[next_record // trace_every, {row}, lane] = {TRACED[name]}" for row, name in enumerate(traced)]
     return [
         "if next_record % trace_every == 0:",
-        *indented(over_lanes([*sample_lines(rows, moment), *keep])),
+        *indent(over_lanes([*sample_lines(rows, moment), *keep])),
     ]

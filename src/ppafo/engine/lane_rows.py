@@ -80,7 +80,7 @@ def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
     return {path: first + number for number, path in enumerate(paths)}
 
 
-def indented(lines: list[str], levels: int = 1) -> list[str]:
+def indent(lines: list[str], levels: int = 1) -> list[str]:
     """The lines, some levels further in."""
     return ["    " * levels + line for line in lines]
 
@@ -96,4 +96,4 @@ def over_lanes(lines: list[str]) -> list[str]:
         if load is None or load["group"] in asked or words.count(load["group"]) > 1:
             kept.append(line)
             asked.update(words)
-    return ["for lane in range(width):", *indented(kept[::-1])]
+    return ["for lane in range(width):", *indent(kept[::-1])]

@@ -12,7 +12,7 @@ from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.signals.meter import MeterKind
 
 
-def metered(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (), trace_every: int = 0) -> Batch:
+def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (), trace_every: int = 0) -> Batch:
     """The batch with meters at every sample that it would record, and traces of channels every so many samples."""
     program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
     clock, interval = batch.clock, batch.clock.record_every

@@ -137,14 +137,16 @@ class _Flow:
             self.read(given, bound)
         ends_here = isinstance(statement, ast.Return | ast.Break | ast.Continue)
         targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
-        stored = set() if given is None else {name for item in targets if item is not None for name in _stored(item)}
+        stored = (
+            set() if given is None else {name for item in targets if item is not None for name in _assigned_names(item)}
+        )
         return None if ends_here else bound | stored
 
     def after_loop(self, statement: ast.For | ast.While, bound: set[str]) -> set[str] | None:
         """Names that have a value after a loop, which may be gone through not once."""
         if isinstance(statement, ast.For):
             self.read(statement.iter, bound)
-            self.end_of(statement.body, bound | _stored(statement.target))
+            self.end_of(statement.body, bound | _assigned_names(statement.target))
             return self.end_of(statement.orelse, bound)
         self.read(statement.test, bound)
         self.end_of(statement.body, bound)
@@ -164,5 +166,5 @@ class _Flow:
         return refusal(self.file, where, f"'{name}' may have no value here; give it one before, on every way")
 
 
-def _stored(target: ast.AST) -> set[str]:
+def _assigned_names(target: ast.AST) -> set[str]:
     return {item.id for item in ast.walk(target) if isinstance(item, ast.Name)}

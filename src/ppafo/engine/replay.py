@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.control.kind import ProfileKind
 from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lanes import Batch, BatchResult, Floats, LaneBlock, joined, load_program
+from ppafo.engine.lanes import Batch, BatchResult, Floats, LaneBlock, join_results, load_program
 from ppafo.engine.program import Program
 from ppafo.engine.rows import row_numbers
 
@@ -59,7 +59,7 @@ class StepInputs:
     parameters: Mapping[str, Floats]
 
 
-def led_by_recording(program: Program) -> Program:
+def prescribe_recorded_angle(program: Program) -> Program:
     """The program with the vane led along a recorded angle, by the parameters ``path.start``, ``.level``, ``.rate``."""
     return replace(program, angle=RECORDED_ANGLE)
 
@@ -69,7 +69,7 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     runs = batch.states.shape[1]
     lanes = lanes_of(batch.program)
     blocks = [slice(first, min(first + lanes, runs)) for first in range(0, runs, lanes)]
-    return joined([_replay_block(batch, inputs, block) for block in blocks])
+    return join_results([_replay_block(batch, inputs, block) for block in blocks])
 
 
 def _replay_block(batch: Batch, inputs: StepInputs, runs: slice) -> BatchResult:

@@ -125,9 +125,9 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
-    masses = begun_masses(run.initial) if program.is_thermal else NoParameters()
+    masses = initial_masses(run.initial) if program.is_thermal else NoParameters()
     result = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
-    further = [*walk_states, *line_states, settled_sensors(run)]
+    further = [*walk_states, *line_states, initial_sensors(run)]
     states = table(
         [result, Pace(run.step), run.initial, masses, program.valve.initial(), controller_state, *further], runs
     )
@@ -168,7 +168,7 @@ def _program_and_clock(program: Program, counts: Floats) -> tuple[Program, Clock
     return own, Clock(int(step_count), int(steps_per_sample), every, int(signal_delay), int(command_delay))
 
 
-def begun_masses(initial: PlantState) -> ThermalState:
+def initial_masses(initial: PlantState) -> ThermalState:
     """True masses of gas at the reference temperature, and no energy yet."""
     return ThermalState(
         mass_1=initial.mass_1,
@@ -180,7 +180,7 @@ def begun_masses(initial: PlantState) -> ThermalState:
     )
 
 
-def settled_sensors(run: Run) -> SensorState | NoParameters:
+def initial_sensors(run: Run) -> SensorState | NoParameters:
     """Slow sensors that show what is true at the start of a run; nothing where there are none."""
     if not run.program.slow_sensors:
         return NoParameters()

@@ -100,7 +100,7 @@ class SourceCollector:
             )
 
     def _function_text(self, function: Any, name: str) -> str:
-        tree = parsed(function)
+        tree = parse_definition(function)
         file = function.__code__.co_filename
         made = Made(function, function.__code__, function.__defaults__, dict(function.__kwdefaults__ or {}))
         if any(known.function is function for known in self.functions):
@@ -154,7 +154,7 @@ def place_of(item: Any) -> str:
     return f"module {item.__module__}" if code is None else place(code.co_filename, code.co_firstlineno)
 
 
-def parsed(function: FunctionType) -> ast.FunctionDef:
+def parse_definition(function: FunctionType) -> ast.FunctionDef:
     """The definition of a plain function with the lines of its file; refused where it is not what Python runs."""
     code = function.__code__
     file, name = code.co_filename, function.__qualname__

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
-from ppafo.documents.models import NAME, optional, published_schema, table
+from ppafo.documents.models import NAME, make_schema, optional, table
 from ppafo.documents.problems import first_problem
 from ppafo.errors import DataError, UnitError
 from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
@@ -157,4 +157,4 @@ def _curve(given: dict[str, Any], name: str, file: str) -> Curve:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a gait file."""
-    return published_schema(gait_file(), "ppafo gait")
+    return make_schema(gait_file(), "ppafo gait")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
-from ppafo.documents.models import NAME, one_of, published_schema
+from ppafo.documents.models import NAME, make_schema, one_of
 from ppafo.documents.problems import first_problem
 from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
@@ -206,4 +206,4 @@ def _column_maps(problem: ProblemFile) -> list[tuple[str, str]]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a problem file."""
-    return published_schema(ProblemFile, "ppafo identification problem")
+    return make_schema(ProblemFile, "ppafo identification problem")

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ppafo.model.sensors import SensorParameters, measure, quantised, standard_noise, unit_noise
+from ppafo.model.sensors import SensorParameters, measure, quantise, standard_noise, unit_noise
 
 
 class GaitMeasurement(NamedTuple):
@@ -65,7 +65,7 @@ class GaitSeen(NamedTuple):
 NOTHING_SEEN = GaitSeen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def followed(shown: float, true: float, follow_rate: float, step: float) -> float:
+def lagged_reading(shown: float, true: float, follow_rate: float, step: float) -> float:
     """What a first-order sensor shows after a step [s]; ``follow_rate`` [1/s] is the inverse of its time constant."""
     share = follow_rate * step
     return shown + (true - shown) * share / (1.0 + share)
@@ -80,15 +80,15 @@ def faulty(fault: Fault, reading: float, last: float, time: float) -> float:
 def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, channel: int) -> float:
     """A force [N] with noise and steps, never below 0."""
     noisy = force + sensors.force_noise * standard_noise(seed, sample, channel)
-    return max(quantised(noisy, sensors.force_quantum), 0.0)
+    return max(quantise(noisy, sensors.force_quantum), 0.0)
 
 
-def shown_before(last: float, reading: float, sample: int) -> float:
+def previous_reading(last: float, reading: float, sample: int) -> float:
     """What a sensor showed before; before the first sample it showed the same, as one that has settled."""
     return last if sample > 0 else reading
 
 
-def kept(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
+def hold_if_lost(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
     """A reading, or the last one where the sample is lost."""
     return last if unit_noise(seed, sample, channel) < lost_share else reading
 
@@ -117,16 +117,16 @@ def measure_gait(
     seen = measure(sensors, smooth_angle, smooth_1, smooth_2, torque_constant, sample)
     heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
     toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
-    was_angle = shown_before(last.angle, seen.angle, sample)
-    was_1 = shown_before(last.pressure_1, seen.pressure_1, sample)
-    was_2 = shown_before(last.pressure_2, seen.pressure_2, sample)
-    was_heel = shown_before(last.heel_force, heel, sample)
-    was_toe = shown_before(last.toe_force, toe, sample)
-    kept_angle = kept(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
-    kept_1 = kept(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
-    kept_2 = kept(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
-    kept_heel = kept(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
-    kept_toe = kept(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
+    was_angle = previous_reading(last.angle, seen.angle, sample)
+    was_1 = previous_reading(last.pressure_1, seen.pressure_1, sample)
+    was_2 = previous_reading(last.pressure_2, seen.pressure_2, sample)
+    was_heel = previous_reading(last.heel_force, heel, sample)
+    was_toe = previous_reading(last.toe_force, toe, sample)
+    kept_angle = hold_if_lost(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
+    kept_1 = hold_if_lost(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
+    kept_2 = hold_if_lost(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
+    kept_heel = hold_if_lost(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
+    kept_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
     shown_angle = faulty(gait_sensors.angle_fault, kept_angle, was_angle, time)
     shown_1 = faulty(gait_sensors.pressure_1_fault, kept_1, was_1, time)
     shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, was_2, time)

@@ -100,10 +100,10 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
 
 def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve) -> float:
     """Mass flow from a to b [kg/s], positive from a to b, antisymmetric under exchange. Eqs (6), (7)."""
-    return checked_flow(pressure_a, pressure_b, conductance, 1.0, curve)
+    return check_valve_flow(pressure_a, pressure_b, conductance, 1.0, curve)
 
 
-def checked_flow(
+def check_valve_flow(
     pressure_a: float, pressure_b: float, conductance: float, takes_back: float, curve: FlowCurve
 ) -> float:
     """As ``orifice_flow`` [kg/s], with nothing back into a where ``takes_back`` is 0, not 1. Equations (6) to (8)."""
@@ -117,13 +117,13 @@ def orifice_flow_slopes(
     pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve
 ) -> tuple[float, float, float]:
     """Mass flow from a to b [kg/s] and its derivatives with respect to both pressures [kg/(s Pa)]. Eqs (6), (7)."""
-    return checked_flow_slopes(pressure_a, pressure_b, conductance, 1.0, curve)
+    return check_valve_flow_slopes(pressure_a, pressure_b, conductance, 1.0, curve)
 
 
-def checked_flow_slopes(
+def check_valve_flow_slopes(
     pressure_a: float, pressure_b: float, conductance: float, takes_back: float, curve: FlowCurve
 ) -> tuple[float, float, float]:
-    """As ``checked_flow``, with its derivatives with respect to both pressures [kg/(s Pa)]."""
+    """As ``check_valve_flow``, with its derivatives with respect to both pressures [kg/(s Pa)]."""
     forward = pressure_a >= pressure_b
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream

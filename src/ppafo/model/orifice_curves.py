@@ -38,14 +38,14 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
 @lru_cache(maxsize=4096)
 def _isentropic_coefficients(heat_capacity_ratio: float) -> tuple[float, ...]:
     gaps = _gaps(critical_pressure_ratio(heat_capacity_ratio))
-    return _fitted(gaps, np.array([isentropic_flow_function(1.0 - gap, heat_capacity_ratio) for gap in gaps]))
+    return _fit_curve(gaps, np.array([isentropic_flow_function(1.0 - gap, heat_capacity_ratio) for gap in gaps]))
 
 
 @lru_cache(maxsize=1)
 def _iso6358_coefficients() -> tuple[float, ...]:
     """Coefficients for a critical ratio of 0."""
     gaps = _gaps(0.0)
-    return _fitted(gaps, np.array([iso6358_flow_function(1.0 - gap, 0.0) for gap in gaps]))
+    return _fit_curve(gaps, np.array([iso6358_flow_function(1.0 - gap, 0.0) for gap in gaps]))
 
 
 def area_conductance(
@@ -72,7 +72,7 @@ def _gaps(critical_ratio: float) -> "np.ndarray[tuple[int], np.dtype[np.float64]
     return np.asarray(0.5 * (1.0 - critical_ratio) * (1.0 - np.cos(angles)))
 
 
-def _fitted(
+def _fit_curve(
     gaps: "np.ndarray[tuple[int], np.dtype[np.float64]]", exact: "np.ndarray[tuple[int], np.dtype[np.float64]]"
 ) -> tuple[float, ...]:
     """Coefficients of a polynomial times a root, by relative least squares."""

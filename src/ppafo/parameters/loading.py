@@ -95,7 +95,7 @@ def _leaves(node: object, path: str) -> Iterator[tuple[str, object]]:
 def _check(parameter_set: ParameterSet) -> None:
     """Refuse units that do not exist and names of valves that the set does not have."""
     chosen_valve(parameter_set, None)
-    declared = parameter_set.declared()
+    declared = parameter_set.declarations()
     for path, entry in parameter_set.numbers.items():
         if path not in declared:
             valve = path.split(".")[2]

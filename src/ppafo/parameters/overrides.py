@@ -41,7 +41,7 @@ class _Order:
         inside = self.typed.removeprefix(_CHOSEN)
         return f"valves.{self.chosen}.{inside}" if self.typed.startswith(_CHOSEN) else self.typed
 
-    def named(self, path: str) -> str:
+    def typed_path(self, path: str) -> str:
         """Return a path of the set in the way in which this override was typed."""
         own = f"valves.{self.chosen}."
         return _CHOSEN + path.removeprefix(own) if self.typed.startswith(_CHOSEN) and path.startswith(own) else path
@@ -89,9 +89,9 @@ def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
 
 
 def _with_number(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
-    declared, path = parameter_set.declared(), order.path
+    declared, path = parameter_set.declarations(), order.path
     if path not in declared:
-        allowed = [order.named(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
+        allowed = [order.typed_path(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
         hint = nearest_name(order.typed, allowed) or f"; for example {', '.join(_neighbours(order.typed, allowed))}"
         raise order.refusal(f"{parameter_set.file} has no value '{order.typed}'{hint}")
     try:

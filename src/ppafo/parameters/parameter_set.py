@@ -46,7 +46,7 @@ class ParameterSet:
         """Return every value of the set by path, as it was given: texts, then flags, then numbers."""
         return {**self.texts, **self.flags, **self.numbers}
 
-    def declared(self) -> Mapping[str, Quantity]:
+    def declarations(self) -> Mapping[str, Quantity]:
         """Return the declaration of every number that this set may hold, by path."""
         return quantities(self.valve_kinds)
 
@@ -69,13 +69,13 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
     if not entry.unit.endswith("_a"):
         unit = entry.unit
         raise ParameterError(f"{parameter_set.file}: {ATMOSPHERE_PATH} = {entry.value:g} {unit}: give it as absolute")
-    return entry_in_si(entry, parameter_set.declared()[ATMOSPHERE_PATH], STANDARD_ATMOSPHERE)
+    return entry_in_si(entry, parameter_set.declarations()[ATMOSPHERE_PATH], STANDARD_ATMOSPHERE)
 
 
 def has_one_pressure(parameter_set: ParameterSet) -> bool:
     """Tell whether both regulators are set to one pressure, so that a change of the first is one of both."""
     entries = [parameter_set.numbers.get(path) for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)]
-    declared, atmosphere = parameter_set.declared(), atmospheric_pressure(parameter_set)
+    declared, atmosphere = parameter_set.declarations(), atmospheric_pressure(parameter_set)
     try:
         first, second = (
             entry_in_si(entry, declared[PRESSURE_PATH], atmosphere) for entry in entries if entry is not None
@@ -115,7 +115,7 @@ def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
     if entry is None:
         return None
     try:
-        return entry_in_si(entry, parameter_set.declared()[path], atmospheric_pressure(parameter_set))
+        return entry_in_si(entry, parameter_set.declarations()[path], atmospheric_pressure(parameter_set))
     except UnitError:
         return base_value(entry.value, entry.unit)
 

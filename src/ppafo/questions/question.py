@@ -74,11 +74,11 @@ class Question:
 
     def solver(self) -> Callable[..., Solved]:
         """Load and return the function that solves the question."""
-        found: Callable[..., Solved] = loaded(self.solve)
+        found: Callable[..., Solved] = load_name(self.solve)
         return found
 
 
-def loaded(place: str) -> Any:
+def load_name(place: str) -> Any:
     """Return what ``module:name`` stands for."""
     module, _, name = place.partition(":")
     return getattr(importlib.import_module(module), name)

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ppafo.documents.models import published_schema, table
+from ppafo.documents.models import make_schema, table
 from ppafo.model.declaration import Quantity
 from ppafo.rig.declaration import SECTIONS
 
@@ -37,4 +37,4 @@ def json_schema() -> dict[str, Any]:
         "notes": (str, Field(description="what is on, what is off, and where the values come from")),
     }
     fields |= {name: (_section(name, members), Field()) for name, members in SECTIONS.items()}
-    return published_schema(table("RigPreset", fields), "ppafo rig preset")
+    return make_schema(table("RigPreset", fields), "ppafo rig preset")

@@ -49,7 +49,7 @@ def is_away(reference: float, last: float, tolerance: float) -> bool:
     return abs(reference - last) > tolerance
 
 
-def followed(course: Course, sample: Sample) -> Course:
+def advance_course(course: Course, sample: Sample) -> Course:
     """The course with one sample more, of a monotone reference: away from its last value first, then at rest."""
     away = is_away(sample.reference, course.last, course.tolerance)
     return Course(course.last, course.largest, course.tolerance, sample.number + 1.0 if away else course.hold_start)

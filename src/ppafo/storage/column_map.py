@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ppafo.documents.models import published_schema
+from ppafo.documents.models import make_schema
 from ppafo.documents.problems import first_problem
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, nearest_name
@@ -93,4 +93,4 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a file of column maps."""
-    return published_schema(ColumnMaps, "ppafo column maps")
+    return make_schema(ColumnMaps, "ppafo column maps")

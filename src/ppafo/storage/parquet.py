@@ -93,7 +93,7 @@ def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:
     return {name: table.column(name).to_numpy() for name in table.column_names}
 
 
-def coded_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":
+def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":
     """Return a column of texts from their numbers in a list."""
     import pyarrow as pa
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ppafo.documents.models import NAME, published_schema
+from ppafo.documents.models import NAME, make_schema
 
 MOST_RUNS = 2**32
 MOST_RUNS_OF_CHUNK = 1_000_000
@@ -253,4 +253,4 @@ class StudyFile(BaseModel):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a study file."""
-    return published_schema(StudyFile, "ppafo study")
+    return make_schema(StudyFile, "ppafo study")

@@ -12,7 +12,7 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import begin_moving_gas, end_moving_gas
-from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, fed_plant
+from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, plant_at_line_pressures
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
 from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
@@ -61,9 +61,9 @@ def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     """Both chambers filled at once from full lines, the vane held."""
     state, gas = vented(plant, ANGLE, 0.0), full_lines(plant, lines)
     for _ in range(round(DURATION / step)):
-        ports = open_ports(fed_plant(plant, lines, gas))
+        ports = open_ports(plant_at_line_pressures(plant, lines, gas))
         begun = begin_fed_gas(plant, lines, gas, state, ANGLE, *ports, step, single_port_flow_slopes)
-        ports = open_ports(fed_plant(plant, lines, begun.lines.after))
+        ports = open_ports(plant_at_line_pressures(plant, lines, begun.lines.after))
         change = end_moving_gas(plant, begun.chambers, *ports, step, single_port_flow)
         gas = end_lines(plant, lines, gas, begun, change, ports[1], step, single_port_flow)
         state = with_gas(state, change)

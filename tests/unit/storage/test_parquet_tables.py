@@ -10,7 +10,7 @@ from ppafo.errors import DataError
 from ppafo.storage.parquet import (
     TableColumn,
     as_numpy,
-    coded_texts,
+    encode_texts,
     lists_of,
     parquet_bytes,
     read_parquet,
@@ -25,7 +25,7 @@ def content() -> bytes:
     columns = {
         "run": TableColumn(np.arange(500), "-", "number"),
         "torque": TableColumn(random.normal(size=500), "N m", "a torque"),
-        "status": TableColumn(coded_texts(np.arange(500) % 2, ("good", "bad")), "-", "how it ended"),
+        "status": TableColumn(encode_texts(np.arange(500) % 2, ("good", "bad")), "-", "how it ended"),
         "reason": TableColumn(texts_of_some({3: "why"}, 500), "-", "why"),
         "trace": TableColumn(lists_of(random.normal(size=(500, 4)).astype(np.float32)), "N m", "over time"),
     }

@@ -38,7 +38,7 @@ class GasRates(NamedTuple):
     leaked: float
 
 
-class Passed(NamedTuple):
+class Transport(NamedTuple):
     """Mass and energy that pass [kg/s], the energy as a content of ``PlantState``."""
 
     mass: float
@@ -94,16 +94,16 @@ def gas_rates(
     return GasRates(source_1 - vent_1 - leak, source_2 - vent_2 + leak, source_1 + source_2, vent_1 + vent_2, abs(leak))
 
 
-def passed(
+def transport(
     thermal: ThermalParameters, pressure_a: float, pressure_b: float, warmth_a: float, warmth_b: float, flow: float
-) -> Passed:
+) -> Transport:
     """What a flow [kg/s] that holds at the reference temperature carries, with the temperature of its upstream side.
 
     Warmths are T/T_0 [-] on both sides; flow from a to b. Equation (6).
     """
     warmth = warmth_a if pressure_a >= pressure_b else warmth_b
     mass = flow / math.sqrt(warmth)
-    return Passed(mass, thermal.heat_capacity_ratio * warmth * mass)
+    return Transport(mass, thermal.heat_capacity_ratio * warmth * mass)
 
 
 def thermal_gas_rates(
@@ -129,11 +129,11 @@ def thermal_gas_rates(
     outlet_1 = exact_flow(pressure_1, room, openings.vent_1, valve_orifice)
     outlet_2 = exact_flow(pressure_2, room, openings.vent_2, valve_orifice)
     across = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
-    source_1 = passed(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
-    source_2 = passed(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)
-    vent_1 = passed(thermal, pressure_1, room, warmth_1, 1.0, outlet_1)
-    vent_2 = passed(thermal, pressure_2, room, warmth_2, 1.0, outlet_2)
-    leak = passed(thermal, pressure_1, pressure_2, warmth_1, warmth_2, across)
+    source_1 = transport(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
+    source_2 = transport(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)
+    vent_1 = transport(thermal, pressure_1, room, warmth_1, 1.0, outlet_1)
+    vent_2 = transport(thermal, pressure_2, room, warmth_2, 1.0, outlet_2)
+    leak = transport(thermal, pressure_1, pressure_2, warmth_1, warmth_2, across)
     compression = (thermal.heat_capacity_ratio - 1.0) * plant.volume_per_angle * angular_velocity
     wall_1 = thermal.wall_exchange * volume_1 * (1.0 - warmth_1)
     wall_2 = thermal.wall_exchange * volume_2 * (1.0 - warmth_2)

@@ -20,7 +20,7 @@ from ppafo.engine.reference.source import (
     unknowns_before_valve,
 )
 from ppafo.engine.rows import numbers, rebuild
-from ppafo.engine.run import Run, settled_sensors
+from ppafo.engine.run import Run, initial_sensors
 from ppafo.errors import SimulationError
 from ppafo.model.plant import chamber_pressures
 
@@ -75,7 +75,7 @@ class _Solution:
         self.fill = load_right_hand_side(run)
         self.parameters = right_hand_side_parameters(run)
         masses = [run.initial.mass_1, run.initial.mass_2] if run.program.is_thermal else []
-        shown = numbers(settled_sensors(run))[:3]
+        shown = numbers(initial_sensors(run))[:3]
         self.y = np.array([*numbers(run.initial), *masses, *shown, *numbers(run.program.valve.initial())])
         self.valve_from = unknowns_before_valve(run.program)
         self.command = 0.0
@@ -214,11 +214,11 @@ class _Solution:
         while self.records < times.size and times[self.records] < end - 2 * SAME_TIME:
             moment = times[self.records]
             state = self.y if solution is None else solution.y[np.argmin(np.abs(solution.t - moment))]
-            self.result.states[self.records] = self.led(state[:PLANT_UNKNOWNS], moment)
+            self.result.states[self.records] = self.with_prescribed_angle(state[:PLANT_UNKNOWNS], moment)
             self.result.commands[self.records] = self.control.decided
             self.records += 1
 
-    def led(self, state: Floats, time: float) -> Floats:
+    def with_prescribed_angle(self, state: Floats, time: float) -> Floats:
         """The state with the prescribed angle put in, where there is one."""
         if self.run.program.angle is None:
             return state

@@ -65,7 +65,7 @@ def direction_of(value: float) -> float:
     return (1.0 if value > 0.0 else 0.0) - (1.0 if value < 0.0 else 0.0)
 
 
-def bounded(plant: PlantParameters, angle: float) -> float:
+def clamp_angle(plant: PlantParameters, angle: float) -> float:
     """``angle`` [rad], not beyond the stops."""
     return max(plant.angle_min, min(plant.angle_max, angle))
 
@@ -116,7 +116,7 @@ def depart(
     angle = departure.angle + (travel if goes and travel * way > 0.0 else 0.0)
     rate = next_rate if goes and not turned else 0.0
     hits = angle < plant.angle_min or angle > plant.angle_max
-    return bounded(plant, angle), (0.0 if hits else rate)
+    return clamp_angle(plant, angle), (0.0 if hits else rate)
 
 
 def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tuple[FreePart, float]:
@@ -138,7 +138,7 @@ def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tup
     meets_stop = way != 0.0 and gets_there and impact <= longest
     length = impact if meets_stop else longest
     stop = plant.angle_max if way > 0.0 else plant.angle_min
-    free_angle = bounded(plant, state.angle + length * (velocity + 0.5 * length * acceleration))
+    free_angle = clamp_angle(plant, state.angle + length * (velocity + 0.5 * length * acceleration))
     next_angle = stop if meets_stop else free_angle
     return FreePart(way, acceleration, torque, next_angle, 1.0 if meets_stop else 0.0), length
 
@@ -158,7 +158,7 @@ def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length:
     fall = velocity - full_velocity
     turns = way != 0.0 and not slides
     share = velocity / (fall if fall != 0.0 else 1.0) if turns else 0.0
-    turning_angle = bounded(plant, state.angle + 0.5 * share * length * velocity)
+    turning_angle = clamp_angle(plant, state.angle + 0.5 * share * length * velocity)
     left_torque = begun.torque + share * (next_torque - begun.torque)
     left_angle, left_velocity = depart(plant, Departure(share, turning_angle, 0.0), left_torque, next_torque, length)
     rebound = rebound_velocity(plant, full_velocity, next_torque)
@@ -202,10 +202,10 @@ def first_event(
     reverses = way != 0.0 and full_velocity * way <= 0.0
     reversal = velocity / (fall if reverses else 1.0)
     stop = plant.angle_max if velocity > 0.0 else plant.angle_min
-    hits = way != 0.0 and free_angle != bounded(plant, free_angle)
+    hits = way != 0.0 and free_angle != clamp_angle(plant, free_angle)
     impact = min(time_to_stop(abs(stop - state.angle), abs(velocity), acceleration * way) / step, 1.0)
     hits_first = hits and not (reverses and reversal < impact)
-    turning_angle = bounded(plant, state.angle + 0.5 * reversal * step * velocity)
+    turning_angle = clamp_angle(plant, state.angle + 0.5 * reversal * step * velocity)
     share = impact if hits_first else (reversal if reverses else 0.0)
     angle = stop if hits_first else (turning_angle if reverses else state.angle)
     rebound = -plant.restitution * (velocity - impact * fall)
@@ -237,7 +237,7 @@ def end_free(
     velocity = state.angular_velocity
     way = direction_of(velocity)
     moving = way != 0.0
-    predicted = bounded(plant, begun.free_angle)
+    predicted = clamp_angle(plant, begun.free_angle)
     next_1, next_2 = chamber_pressures(plant, predicted, state.mass_1, state.mass_2)
     next_torque = driving_torque(plant, predicted, next_1, next_2) + added_torque
     sliding_torque = next_torque - way * plant.dynamic_torque

@@ -37,7 +37,7 @@ def until_jump(
     return jump if jump < remaining - SAME_INSTANT else remaining
 
 
-def paced(pace: Pace, remaining: float) -> float:
+def part_length(pace: Pace, remaining: float) -> float:
     """Length [s] of a part: what the error allows, in equal parts where two of them reach the end."""
     halves = 0.5 * remaining if remaining < 2.0 * pace.length else pace.length
     return remaining if remaining <= pace.length else halves

@@ -299,10 +299,10 @@ def opening_error(plant: PlantParameters, begun: StillGas, shift: float, next_an
 
 def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:
     """Pressure [Pa] against which an error is seen: of the supplies or of the chamber, over the atmosphere."""
-    return max(supplied_range(plant), abs(pressure - plant.atmospheric_pressure))
+    return max(supply_range(plant), abs(pressure - plant.atmospheric_pressure))
 
 
-def supplied_range(plant: PlantParameters) -> float:
+def supply_range(plant: PlantParameters) -> float:
     """Pressure [Pa] of the higher supply over the atmosphere, not less than a share of the latter."""
     supplied = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
     return max(supplied, LEAST_PRESSURE * plant.atmospheric_pressure)

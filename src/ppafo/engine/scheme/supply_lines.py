@@ -20,7 +20,7 @@ from ppafo.engine.scheme.pneumatics import (
     linearise,
     pressure_that_matters,
 )
-from ppafo.engine.scheme.thermal_flows import ThermalFlows, carried
+from ppafo.engine.scheme.thermal_flows import ThermalFlows, transport
 from ppafo.engine.scheme.thermal_gas import ThermalGas, begin_thermal_stage, thermal_pressures
 from ppafo.model.plant import (
     PlantParameters,
@@ -43,7 +43,7 @@ class FedGas(NamedTuple):
     lines: LineStep
 
 
-def fed_plant(plant: PlantParameters, lines: SupplyLines, state: LineState) -> PlantParameters:
+def plant_at_line_pressures(plant: PlantParameters, lines: SupplyLines, state: LineState) -> PlantParameters:
     """The plant with the pressures of its lines in place of those that the regulators are set to."""
     pressure_1, pressure_2 = line_pressures(lines, plant.gas_product, state)
     return PlantParameters(
@@ -182,7 +182,7 @@ def with_line(flow: PortFlowSlopes, share: float) -> PortFlowSlopes:
 
 def mass_from_source(thermal: ThermalParameters, flow: float, state: PlantState, masses: ThermalState) -> float:
     """True mass flow [kg/s] out of line 2 from the flow at the reference temperature, below 0 for warm gas back in."""
-    return flow * carried(thermal, flow, 1.0, math.sqrt(state.mass_2 / masses.mass_2)).mass
+    return flow * transport(thermal, flow, 1.0, math.sqrt(state.mass_2 / masses.mass_2)).mass
 
 
 def begin_fed_thermal_gas(

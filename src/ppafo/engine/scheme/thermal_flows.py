@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
 from ppafo.model.ports import PortFlow
-from ppafo.model.thermal import carried_energy, carried_mass
+from ppafo.model.thermal import enthalpy_flow_ratio, mass_flow_ratio
 
 
 class ThermalFlows(NamedTuple):
@@ -49,17 +49,17 @@ class FlowSlopes(NamedTuple):
     source_content_by_2: float
 
 
-class Carried(NamedTuple):
+class Transport(NamedTuple):
     """Mass [kg/s] and content [kg/s] that a flow carries, each over the flow at the reference temperature [-]."""
 
     mass: float
     content: float
 
 
-def carried(thermal: ThermalParameters, flow: float, root_from: float, root_to: float) -> Carried:
+def transport(thermal: ThermalParameters, flow: float, root_from: float, root_to: float) -> Transport:
     """What a flow carries, by the sign of its direction; roots of ``T / T_0`` on both sides [-]."""
     root = root_from if flow >= 0.0 else root_to
-    return Carried(carried_mass(root), carried_energy(root, thermal.heat_capacity_ratio))
+    return Transport(mass_flow_ratio(root), enthalpy_flow_ratio(root, thermal.heat_capacity_ratio))
 
 
 def wall_rate(thermal: ThermalParameters, volume: float, content: float, mass: float) -> float:
@@ -83,11 +83,11 @@ def thermal_flows(
     root_2 = math.sqrt(state.mass_2 / masses.mass_2)
     vent_1 = in_1.total - in_1.from_source
     vent_2 = in_2.total - in_2.from_source
-    source_1_carries = carried(thermal, in_1.from_source, 1.0, root_1)
-    source_2_carries = carried(thermal, in_2.from_source, 1.0, root_2)
-    vent_1_carries = carried(thermal, vent_1, 1.0, root_1)
-    vent_2_carries = carried(thermal, vent_2, 1.0, root_2)
-    leak_carries = carried(thermal, leak, root_1, root_2)
+    source_1_carries = transport(thermal, in_1.from_source, 1.0, root_1)
+    source_2_carries = transport(thermal, in_2.from_source, 1.0, root_2)
+    vent_1_carries = transport(thermal, vent_1, 1.0, root_1)
+    vent_2_carries = transport(thermal, vent_2, 1.0, root_2)
+    leak_carries = transport(thermal, leak, root_1, root_2)
     supplied_1 = in_1.from_source * source_1_carries.mass
     supplied_2 = in_2.from_source * source_2_carries.mass
     leaked = leak * leak_carries.mass
@@ -123,11 +123,11 @@ def flow_slopes(
     leak: Any,
 ) -> FlowSlopes:
     """How all flows answer to both contents; weights are gamma h times pressure over content [Pa s/kg]."""
-    leak_carries = carried(thermal, leak[0], root_1, root_2)
-    source_1 = carried(thermal, in_1.from_source, 1.0, root_1)
-    source_2 = carried(thermal, in_2.from_source, 1.0, root_2)
-    vent_1 = carried(thermal, in_1.total - in_1.from_source, 1.0, root_1)
-    vent_2 = carried(thermal, in_2.total - in_2.from_source, 1.0, root_2)
+    leak_carries = transport(thermal, leak[0], root_1, root_2)
+    source_1 = transport(thermal, in_1.from_source, 1.0, root_1)
+    source_2 = transport(thermal, in_2.from_source, 1.0, root_2)
+    vent_1 = transport(thermal, in_1.total - in_1.from_source, 1.0, root_1)
+    vent_2 = transport(thermal, in_2.total - in_2.from_source, 1.0, root_2)
     vent_slope_1 = in_1.total_slope - in_1.source_slope
     vent_slope_2 = in_2.total_slope - in_2.source_slope
     by_1 = leak[1] * weight_1
@@ -150,7 +150,7 @@ def flow_slopes(
     )
 
 
-def answered(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
+def flow_response(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
     """Gamma h times the change of all flows but heat [kg/s] while both contents change at two rates [kg/s]."""
     return ThermalFlows(
         slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2,
@@ -166,7 +166,7 @@ def answered(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalF
     )
 
 
-def combined(one: ThermalFlows, factor_one: float, other: ThermalFlows, factor_other: float) -> ThermalFlows:
+def combine_flows(one: ThermalFlows, factor_one: float, other: ThermalFlows, factor_other: float) -> ThermalFlows:
     """Two sets of rates, each times a factor, added."""
     return ThermalFlows(
         factor_one * one.content_1 + factor_other * other.content_1,

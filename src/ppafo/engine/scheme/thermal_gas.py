@@ -14,8 +14,8 @@ from ppafo.engine.scheme.pneumatics import ALLOWED_OF_PRESSURE, GAMMA, SHORTEST,
 from ppafo.engine.scheme.thermal_flows import (
     FlowSlopes,
     ThermalFlows,
-    answered,
-    combined,
+    combine_flows,
+    flow_response,
     flow_slopes,
     thermal_flows,
 )
@@ -29,7 +29,7 @@ from ppafo.model.plant import (
     chamber_volumes,
 )
 from ppafo.model.ports import PortFlow, admitted_flow
-from ppafo.model.thermal import carried_energy
+from ppafo.model.thermal import enthalpy_flow_ratio
 
 
 class ThermalMatrix(NamedTuple):
@@ -109,7 +109,7 @@ def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFl
     right_2 = right.content_2 + matrix.wall_2 * right.mass_2
     content_1 = (matrix.d * right_1 - matrix.b * right_2) * matrix.scale
     content_2 = (matrix.a * right_2 - matrix.c * right_1) * matrix.scale
-    by_contents = answered(matrix.slopes, content_1, content_2)
+    by_contents = flow_response(matrix.slopes, content_1, content_2)
     mass_1 = right.mass_1 + by_contents.mass_1
     mass_2 = right.mass_2 + by_contents.mass_2
     warmed_1 = matrix.wall_1 * mass_1 - matrix.cooling_1 * content_1
@@ -188,9 +188,9 @@ def begin_thermal_stage(
     slopes = flow_slopes(thermal, root_1, root_2, weight * per_content_1, weight * per_content_2, in_1, in_2, leak)
     matrix = thermal_matrix(thermal, state, masses, volume_1, volume_2, growth, weight, slopes)
     # A growing volume lowers the pressure as a loss of content at this rate would.
-    drift = answered(slopes, -state.mass_1 * growth / volume_1, state.mass_2 * growth / volume_2)
-    first = solve_thermal_stage(matrix, combined(flows, 1.0, drift, 1.0))
-    change = combined(first, step, first, 0.0)
+    drift = flow_response(slopes, -state.mass_1 * growth / volume_1, state.mass_2 * growth / volume_2)
+    first = solve_thermal_stage(matrix, combine_flows(flows, 1.0, drift, 1.0))
+    change = combine_flows(first, step, first, 0.0)
     end, end_masses = with_thermal_gas(state, masses, change)
     return ThermalGas(matrix, first, drift, end, end_masses, at_begin.next_1, at_begin.next_2, growth)
 
@@ -212,7 +212,7 @@ def second_thermal_stage(
     flows = thermal_flows(
         thermal, begun.end, begun.end_masses, begun.volume_1, begun.volume_2, begun.growth, in_1, in_2, leak
     )
-    right = combined(combined(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
+    right = combine_flows(combine_flows(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
     return solve_thermal_stage(begun.matrix, right)
 
 
@@ -220,12 +220,12 @@ def thermal_change(
     plant: PlantParameters, thermal: ThermalParameters, begun: ThermalGas, second: ThermalFlows, step: float
 ) -> ThermalFlows:
     """Changes [kg] in one step [s] from both stages; supplies that take no gas back are as in ``moving_change``."""
-    change = combined(begun.first, 1.5 * step, second, 0.5 * step)
+    change = combine_flows(begun.first, 1.5 * step, second, 0.5 * step)
     supplied = admitted_flow(change.supplied, plant.relieving)
     kept = supplied - change.supplied
     to_1 = kept if begun.matrix.slopes.supplied_by_1 < begun.matrix.slopes.supplied_by_2 else 0.0
     to_2 = kept - to_1
-    carries = carried_energy(1.0, thermal.heat_capacity_ratio)
+    carries = enthalpy_flow_ratio(1.0, thermal.heat_capacity_ratio)
     return ThermalFlows(
         change.content_1 + to_1 * carries,
         change.content_2 + to_2 * carries,
@@ -241,7 +241,7 @@ def thermal_change(
 
 def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlows, step: float) -> float:
     """Estimated error of both pressures at the end of a step [s] over what is allowed [-], as ``gas_error``."""
-    added = solve_thermal_stage(begun.matrix, combined(begun.first, 1.0, second, 1.0))
+    added = solve_thermal_stage(begun.matrix, combine_flows(begun.first, 1.0, second, 1.0))
     return 0.5 * over_allowed(plant, begun, added.content_1, added.content_2, step)
 
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from ppafo.engine.scheme.ankle_torque import DeviceShare, Direction, foot_direction, leg_torque, plate_torque
-from ppafo.engine.scheme.motion import FreeStep, begin_free, bounded, end_free, with_motion
+from ppafo.engine.scheme.motion import FreeStep, begin_free, clamp_angle, end_free, with_motion
 from ppafo.model import contact as ground
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import (
@@ -69,7 +69,7 @@ def begin_walk(
     offset = walk.offset / (1.0 + step / ground.FADING_TIME)
     prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle)
     led = ground.Ankle(
-        bounded(plant, prescribed.angle + offset),
+        clamp_angle(plant, prescribed.angle + offset),
         prescribed.rate - offset / ground.FADING_TIME,
         prescribed.acceleration + offset / (ground.FADING_TIME * ground.FADING_TIME),
     )
@@ -78,7 +78,7 @@ def begin_walk(
 
 def next_angle(plant: PlantParameters, walk: WalkState, begun: WalkStep) -> float:
     """Angle [rad] to which the volumes run."""
-    return bounded(plant, begun.free.free_angle) if ground.is_free(walk.contact) else begun.led.angle
+    return clamp_angle(plant, begun.free.free_angle) if ground.is_free(walk.contact) else begun.led.angle
 
 
 def external_torque(
@@ -121,7 +121,7 @@ def end_walk(
 ) -> tuple[PlantState, WalkState]:
     """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin; ``now`` is then."""
     free = ground.is_free(walk.contact)
-    predicted = bounded(plant, begun.free.free_angle)
+    predicted = clamp_angle(plant, begun.free.free_angle)
     # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
     foot = foot_direction(now.shank, predicted if free else begun.led.angle)
     torque = leg_torque(leg, share, walk.contact, now, predicted, foot)
@@ -137,10 +137,10 @@ def end_walk(
     landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset)
     height = leg.toe_lever * (foot.sine - now.sine_healthy_foot)
     turned = after.angle - state.angle
-    return after, counted(timing, walk, after, now, foot, landed, given, height, follow_rate, turned, step)
+    return after, advance_walk(timing, walk, after, now, foot, landed, given, height, follow_rate, turned, step)
 
 
-def counted(
+def advance_walk(
     timing: GaitTiming,
     walk: WalkState,
     state: PlantState,

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from ppafo.documents.models import published_schema
+from ppafo.documents.models import make_schema
 from ppafo.documents.problems import first_problem
 from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
@@ -190,4 +190,4 @@ def load_map(path: str | Path) -> GaitMap:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a gait map."""
-    return published_schema(GaitMap, "ppafo gait map")
+    return make_schema(GaitMap, "ppafo gait map")

@@ -241,8 +241,8 @@ def leak_or_relaxation(
         rate = relaxation.rate / (1.0 + decays[0].chambers.volume_ratio)
         text = f"undecided: a linear leak of {rate:.3g} 1/s and a sensor offset of {plateau:.4g} Pa in the difference "
         return Check(name, False, f"{text}give the same curve; a decay from another pressure distinguishes them"), None
-    offset = _shared_plateau(decays, confidence, lambda shared, _top: shared)
-    share = _shared_plateau(decays, confidence, lambda shared, top: shared * top)
+    offset = _fit_shared_plateau(decays, confidence, lambda shared, _top: shared)
+    share = _fit_shared_plateau(decays, confidence, lambda shared, top: shared * top)
     freedom = max(1, int(count) - 1 - 2 * len(decays))
     own = relaxation.rms**2 * count / freedom
     scale, longest = _scales(decays)
@@ -268,7 +268,7 @@ def _scales(decays: tuple[Decay, ...]) -> tuple[float, float]:
     return max(float(decay.difference.max()) for decay in decays), max(float(decay.time[-1]) for decay in decays)
 
 
-def _shared_plateau(
+def _fit_shared_plateau(
     decays: tuple[Decay, ...], confidence: float, plateau_of: Callable[[float, float], float]
 ) -> CurveFit:
     """Return the exponentials whose plateaus follow from one number and their starts; values: rate, number, starts."""

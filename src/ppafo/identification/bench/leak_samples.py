@@ -133,10 +133,10 @@ def _volume_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
     rise = float(np.mean(closed.second[-EDGE:]) - np.mean(closed.second[:EDGE]))
     if abs(rise) <= STANDS_STILL * abs(change):
         return 0.0
-    return given_ratio(closed, settings) or max(rise / change, 0.0)
+    return volume_ratio(closed, settings) or max(rise / change, 0.0)
 
 
-def given_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
+def volume_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
     """Return the volume of the fuller chamber over that of the other; 0 where one of them is not known."""
     if settings.volume_1 is None or settings.volume_2 is None:
         return 0.0

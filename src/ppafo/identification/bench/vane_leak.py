@@ -36,7 +36,7 @@ from ppafo.identification.bench.leak_samples import (
     closed_chambers,
     decay_in,
     falling_decays,
-    given_ratio,
+    volume_ratio,
 )
 from ppafo.identification.bench.leak_steady import CHANNELS as STEADY
 from ppafo.identification.bench.leak_steady import steady_leak
@@ -136,7 +136,7 @@ def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], setti
     best, orifice = best_law(fitted), fitted[0]
     drop = max(float(np.ptp(decay.difference)) for decay in decays)
     judged = judge(fitted, best, noise, drop, "Pa")
-    checks = [*law_checks(fitted, best, judged, "Pa"), *_kept_check(decays)]
+    checks = [*law_checks(fitted, best, judged, "Pa"), *_conservation_check(decays)]
     # Only what is reported needs the intervals of a law that may miss, which take long.
     told_laws = {
         law.name: fit_law(law, decays, count, settings.confidence)
@@ -160,7 +160,7 @@ def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], setti
         tuple(checks),
         _panels(decays, orifice, best),
         kind_of(sources),
-        () if _kept_check(decays) else ("the pressure in chamber 2 is constant, so it is treated as a room",),
+        () if _conservation_check(decays) else ("the pressure in chamber 2 is constant, so it is treated as a room",),
     )
 
 
@@ -185,7 +185,7 @@ def _tight_leak(
     scale = max(float(np.mean(item.difference)) for item in closed)
     shape = settings.opening.law().shape
     falls = [
-        (1.0 + given_ratio(item, settings)) * float(shape(*(np.array([np.mean(p)]) for p in item[1:3]))[0]) / scale
+        (1.0 + volume_ratio(item, settings)) * float(shape(*(np.array([np.mean(p)]) for p in item[1:3]))[0]) / scale
         for item in closed
     ]
 
@@ -265,7 +265,7 @@ def _numbers(settings: VaneLeakSettings, emptying: set[int], orifice: FittedLaw,
     return settings.opening.numbers(conductance, half, text, orifice.widened)
 
 
-def _kept_check(decays: tuple[Decay, ...]) -> tuple[Check, ...]:
+def _conservation_check(decays: tuple[Decay, ...]) -> tuple[Check, ...]:
     """Return whether what one chamber loses the other gains; nothing to ask where the other is a room."""
     if all(decay.chambers.volume_ratio == 0.0 for decay in decays):
         return ()

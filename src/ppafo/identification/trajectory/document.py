@@ -206,7 +206,7 @@ def experiment_without_scenario(item: ExperimentSection, source: Source, setting
     first = float(recording.time[0]) if item.start is None else quantity_of(f"{said}: start", item.start, "s")
     used = recording.between(first, float(recording.time[-1]))
     device = build_device(apply_overrides(setting.parameter_set, item.overrides, setting.valve), setting.valve)
-    device, fixed = _fixed(item, device, said)
+    device, fixed = _fix_vane(item, device, said)
     inputs = _inputs(item, recording, said)
     start = _start_of(used, device, fixed, said)
     motion = held_at(start.angle) if fixed else None
@@ -225,7 +225,7 @@ def compared_channels(item: ExperimentSection) -> tuple[str, ...]:
     return FITTED_CHANNELS[1:] if is_led else FITTED_CHANNELS
 
 
-def _fixed(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:
+def _fix_vane(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:
     """Return the device and what of its state is known where the vane is held, or where there is none."""
     if (item.held is not None or item.volume is not None) and ANGLE in (item.inputs or ()):
         raise IdentificationError(f"{said}: the vane is held or absent, but inputs has '{ANGLE}': omit one of them")

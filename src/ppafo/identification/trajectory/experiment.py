@@ -202,7 +202,7 @@ def _orifice_form(orifice: object) -> tuple[Quantity, ...]:
     return AREA_FORM if isinstance(orifice, Orifice) else SONIC_FORM
 
 
-def broken_order(device: Device) -> str:
+def broken_rule(device: Device) -> str:
     """Return which rule of a device a set of numbers breaks, as a parameter set would say it; empty for none."""
     if device.friction.dynamic_torque > device.friction.static_torque:
         return "friction.dynamic_torque came out above friction.static_torque"

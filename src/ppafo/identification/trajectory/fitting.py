@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ppafo.identification.trajectory.experiment import Experiment, broken_order, with_numbers
+from ppafo.identification.trajectory.experiment import Experiment, broken_rule, with_numbers
 from ppafo.identification.trajectory.information import correlation
 from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment, prepare, with_half_steps
 from ppafo.identification.trajectory.problem import Range, TrajectoryProblem, ranges_of, reach_of
@@ -184,7 +184,7 @@ def _remarks(
         f"the search stopped after {problem.search.most_evaluations} evaluations before it converged: "
         f"start closer to the solution, or allow more evaluations"
     )
-    broken = broken_order(device)
+    broken = broken_rule(device)
     misfit = (
         f"the model does not explain the recordings: {evidence.misfit}; what it determines holds for this model only"
     )

@@ -9,7 +9,7 @@ from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.result import count_of
 from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.trajectory.document import candidates_of, trajectory_problem
-from ppafo.identification.trajectory.experiment import broken_order, full_path
+from ppafo.identification.trajectory.experiment import broken_rule, full_path
 from ppafo.identification.trajectory.fitting import fit, noise_in, residuals_of
 from ppafo.identification.trajectory.follow_up import Expected, Profile, expected_information, profile
 from ppafo.identification.trajectory.information import correlation, covariance, directions_for, precision
@@ -185,7 +185,7 @@ def _checks(found: TrajectoryFit) -> tuple[Check, ...]:
     worst = max(found.channels, key=lambda channel: channel.share)
     left, good = f"{100.0 * worst.share:.2g} %", f"{100.0 * ACCEPTABLE_SHARE:g} %"
     told = f"RMS at most {left} of the range in {worst.channel} of {worst.experiment}; {good} is good"
-    broken = next((text for text in (broken_order(item.device) for item in found.scenarios) if text), "")
+    broken = next((text for text in (broken_rule(item.device) for item in found.scenarios) if text), "")
     settled = found.optimum.has_converged
     wrong = found.misfit
     return (

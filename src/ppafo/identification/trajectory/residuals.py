@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Batch, BatchResult, run_batch
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
-from ppafo.engine.scheme.pneumatics import supplied_range
+from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.experiment import TIME_OFFSET, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment
@@ -67,7 +67,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
     bare = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     plant = fed_plant(bare, scenario.supply_lines)
     # The engine allows a share of the supply pressure. Where that pressure is fitted, the error in pascals must stay.
-    allowed = supplied_range(base.plant) / supplied_range(plant)
+    allowed = supply_range(base.plant) / supply_range(plant)
     return replace(
         base,
         plant=plant,

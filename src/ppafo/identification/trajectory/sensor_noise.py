@@ -202,13 +202,13 @@ def _outside(numbers: Floats, longest: float) -> float:
 def _tails(noise: SensorNoise, segments: Sequence[Floats]) -> tuple[float, float]:
     """Return the best degrees of freedom of the innovations, and the log likelihood gained over normal ones."""
     errors = np.concatenate([errors_of(noise.shape, one) for one in segments]) / noise.levels[0]
-    likelihoods, _ = _scaled_t(errors)
+    likelihoods, _ = _fit_scaled_t(errors)
     best = int(np.argmax(likelihoods))
     normal = -0.5 * len(errors) * (math.log(2.0 * math.pi * float(np.mean(errors * errors))) + 1.0)
     return float(FREEDOMS[best]), float(likelihoods[best] - normal)
 
 
-def _scaled_t(errors: Floats) -> tuple[Floats, Floats]:
+def _fit_scaled_t(errors: Floats) -> tuple[Floats, Floats]:
     """Return log likelihood and best scale for each of the degrees of freedom that are tried."""
     squares = np.square(errors)[:, None]
     variances = np.full(len(FREEDOMS), float(np.median(squares)) / 0.45 + _LEAST)
@@ -234,7 +234,7 @@ def _heavy_of_order(segments: list[Floats], order: int) -> SensorNoise:
     reflections, _ = reflections_of(segments, order)
     shape = from_reflections(reflections)
     for _ in range(_REWEIGHED):
-        likelihoods, levels = _scaled_t(np.concatenate([errors_of(shape, one) for one in segments]))
+        likelihoods, levels = _fit_scaled_t(np.concatenate([errors_of(shape, one) for one in segments]))
         best = int(np.argmax(likelihoods))
         if order == 0:
             break

@@ -83,10 +83,10 @@ def _refine_frequency(white: Sequence[Floats], frequency: float, reach: float) -
     """Return the frequency near one at which sinusoids explain most."""
     from scipy.optimize import minimize_scalar
 
-    def left(place: float) -> float:
+    def power_left(place: float) -> float:
         return sum(float(np.sum(np.square(without_hum(one, (place,))))) for one in white)
 
-    found = minimize_scalar(left, bounds=(frequency - reach, frequency + reach), method="bounded")
+    found = minimize_scalar(power_left, bounds=(frequency - reach, frequency + reach), method="bounded")
     return float(found.x)
 
 

@@ -28,7 +28,7 @@ def spool_command(command: float) -> float:
     return 0.0 if command > VENTS_ABOVE else command
 
 
-def vented(openings: Openings, command: float) -> Openings:
+def vent_chambers(openings: Openings, command: float) -> Openings:
     """Openings with both chambers vented where the command says so."""
     vents = command > VENTS_ABOVE
     return Openings(
@@ -70,7 +70,7 @@ def connect_ideal(plant: PlantParameters, shown: DumpedOpening) -> tuple[SingleP
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
     """Openings at an instant."""
-    return vented(proportional.instant_ideal(valve, state, spool_command(command)), command)
+    return vent_chambers(proportional.instant_ideal(valve, state, spool_command(command)), command)
 
 
 def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
@@ -83,12 +83,12 @@ def advance_moving(
 ) -> tuple[Openings, SpoolState]:
     """Mean openings during the step and the spool at its end."""
     openings, after = proportional.advance_moving(valve, state, spool_command(command), time, step)
-    return vented(openings, command), after
+    return vent_chambers(openings, command), after
 
 
 def instant_moving(valve: MovingProportional, state: SpoolState, command: float) -> Openings:
     """Openings at an instant."""
-    return vented(proportional.instant_moving(valve, state, spool_command(command)), command)
+    return vent_chambers(proportional.instant_moving(valve, state, spool_command(command)), command)
 
 
 def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -> SpoolState:

@@ -83,7 +83,7 @@ def advance_ideal(
     return opening, NoValveState(opening)
 
 
-def slewed(asked: float, target: float, slew_limit: float, step: float) -> tuple[float, float]:
+def slew_opening(asked: float, target: float, slew_limit: float, step: float) -> tuple[float, float]:
     """Opening asked for after a step [s], and its rate [1/s], on the way to a target at the slew limit [1/s]."""
     distance = target - asked
     way = (1.0 if distance > 0.0 else 0.0) - (1.0 if distance < 0.0 else 0.0)
@@ -107,7 +107,7 @@ def advance_moving(
     """Mean openings during the step and the spool at its end; what is asked for changes its rate at the begin only."""
     settled = settle_moving(valve, state, command, time)
     target = opening_of_command(command, valve.dead_band)
-    asked, slew = slewed(settled.asked, target, valve.slew_limit, step)
+    asked, slew = slew_opening(settled.asked, target, valve.slew_limit, step)
     asked_mean = 0.5 * (settled.asked + asked)
     has_spool = valve.frequency > 0.0
     angular = 2.0 * math.pi * valve.frequency
@@ -247,12 +247,12 @@ def prepare_moving(settings: Mapping[str, float]) -> MovingProportional:
     )
 
 
-def closed_at_rest() -> SpoolState:
+def spool_at_rest() -> SpoolState:
     """A spool at rest in the middle."""
     return SpoolState(0.0, 0.0, 0.0)
 
 
-def closed() -> NoValveState:
+def closed_valve() -> NoValveState:
     """An ideal valve that is closed."""
     return NoValveState(0.0)
 
@@ -266,7 +266,7 @@ IDEAL = ValveModel(
     parameters=IdealProportional,
     state=NoValveState,
     prepare=prepare_ideal,
-    initial=closed,
+    initial=closed_valve,
     advance=advance_ideal,
     connect=single_ports,
     port_flow=single_port_flow,
@@ -284,7 +284,7 @@ MOVING = ValveModel(
     parameters=MovingProportional,
     state=SpoolState,
     prepare=prepare_moving,
-    initial=closed_at_rest,
+    initial=spool_at_rest,
     advance=advance_moving,
     connect=blended_ports,
     port_flow=blended_port_flow,

@@ -55,7 +55,7 @@ class PairState(NamedTuple):
     coil_b: Coil
 
 
-def energised(command: float) -> tuple[float, float]:
+def coil_commands(command: float) -> tuple[float, float]:
     """What a command asks of valves A and B: 1 energised, 0 not. Equation (14)'s two voltages."""
     return (1.0 if command > 0.0 and command < VENTS_ABOVE else 0.0), (1.0 if command < 0.0 else 0.0)
 
@@ -64,7 +64,7 @@ def advance_ideal(
     valve: IdealSolenoid, state: PairPositions, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairPositions]:
     """Positions during the step of a pair that follows its command at once."""
-    position_a, position_b = energised(command)
+    position_a, position_b = coil_commands(command)
     positions = PairPositions(position_a, position_b)
     return positions, positions
 
@@ -87,17 +87,17 @@ def accept_time(coil: Coil, switching_interval: float, time: float) -> float:
     return max(time, coil.accepted_time + switching_interval)
 
 
-def moved(coil: Coil, time: float) -> float:
+def flow_position(coil: Coil, time: float) -> float:
     """Position [-] of the flow at ``time`` [s] of a coil that was told nothing new."""
     return coil.target if coil.change_time <= time + SAME_INSTANT else coil.position
 
 
-def told(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> Coil:
+def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> Coil:
     """A coil at ``time`` [s] with an order standing: the flow moves if it is due, then the order is taken if it may be.
 
     A change that is still waiting when the coil is told otherwise is lost.
     """
-    position = moved(coil, time)
+    position = flow_position(coil, time)
     accepts = wanted != coil.target and accept_time(coil, valve.switching_interval, time) <= time + SAME_INSTANT
     delay = valve.opening_delay if wanted > 0.5 else valve.closing_delay
     at_once = accepts and delay <= SAME_INSTANT
@@ -118,13 +118,15 @@ def next_coil_event(valve: TimedSolenoid, coil: Coil, wanted: float, time: float
 
 def settle_timed(valve: TimedSolenoid, state: PairState, command: float, time: float) -> PairState:
     """Both coils after the changes and orders that are due at ``time`` [s]."""
-    wanted_a, wanted_b = energised(command)
-    return PairState(told(valve, state.coil_a, wanted_a, time), told(valve, state.coil_b, wanted_b, time))
+    wanted_a, wanted_b = coil_commands(command)
+    return PairState(
+        command_coil(valve, state.coil_a, wanted_a, time), command_coil(valve, state.coil_b, wanted_b, time)
+    )
 
 
 def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, time: float) -> float:
     """Time [s] at which a coil next takes a waiting order or its flow changes; huge for never."""
-    wanted_a, wanted_b = energised(command)
+    wanted_a, wanted_b = coil_commands(command)
     event_a = next_coil_event(valve, state.coil_a, wanted_a, time)
     return min(event_a, next_coil_event(valve, state.coil_b, wanted_b, time))
 
@@ -139,7 +141,7 @@ def advance_timed(
 
 def instant_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> Openings:
     """Openings at an instant of a pair that follows its command at once."""
-    position_a, position_b = energised(command)
+    position_a, position_b = coil_commands(command)
     return Openings(position_a, 1.0 - position_a, position_b, 1.0 - position_b)
 
 
@@ -155,7 +157,7 @@ def never_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time
 
 def settle_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time: float) -> PairPositions:
     """The positions that the command asks for."""
-    return PairPositions(*energised(command))
+    return PairPositions(*coil_commands(command))
 
 
 def instant_timed(valve: TimedSolenoid, state: PairState, command: float) -> Openings:

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import display_difference, display_unit
 from ppafo.answers.shown_metrics import metric_column, metric_quantity
-from ppafo.answers.shown_units import shown_change, shown_unit
 from ppafo.questions.compare.figure import change_figure, has_changes, has_errors, pareto_figure
 from ppafo.questions.compare.paired import Paired, pareto_front
 from ppafo.questions.compare.solve import COMPARED, Case, Comparison
@@ -174,12 +174,12 @@ def _others(comparison: Comparison) -> list[str]:
 
 def _paired_row(item: Paired, baseline: float, other: float) -> list[str]:
     quantity = metric_quantity(item.metric)
-    difference = [shown_change(value, quantity) for value in _ends(item.difference)]
+    difference = [display_difference(value, quantity) for value in _ends(item.difference)]
     nominal = _percent((other - baseline) / abs(baseline)) if baseline else ""
     spread = f"{_percent(item.change)} ({_percent(item.change_low)} to {_percent(item.change_high)})"
     better = "" if item.better is None else "equal in all" if item.equal == 1.0 else _probability(item.better)
     shown = f"{difference[0]:+.3g} [{difference[1]:+.3g}, {difference[2]:+.3g}]"
-    return [item.metric, shown_unit(quantity), nominal, "" if math.isnan(item.change) else spread, shown, better]
+    return [item.metric, display_unit(quantity), nominal, "" if math.isnan(item.change) else spread, shown, better]
 
 
 def _ends(interval: Interval) -> Sequence[float]:

@@ -163,7 +163,7 @@ def compare(
         for task, texts in wanted.items()
         for item in chosen
     ]
-    metrics = compared_metrics([place.scenario for place in placed])
+    metrics = common_metrics([place.scenario for place in placed])
     drawing = _drawing(known, placed, draws, seed, check_fraction(maximum_failed, "maximum_failed"))
     outcomes = (
         _outcomes(placed, metrics, drawing, threads, progress) if drawing is not None else [_UNDRAWN] * len(placed)
@@ -195,7 +195,7 @@ def _tasks(tasks: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str
     return {name: tuple(texts) for name, texts in pairs}
 
 
-def compared_metrics(scenarios: list[Scenario]) -> tuple[str, ...]:
+def common_metrics(scenarios: list[Scenario]) -> tuple[str, ...]:
     """Return those metrics of the table that all scenarios can have: without a reference there is no error."""
     has_reference = all(scenario.control.kind != OPEN_LOOP for scenario in scenarios)
     return tuple(name for name in COMPARED if has_reference or "reference" not in METRICS[name].channels)

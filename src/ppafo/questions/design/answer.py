@@ -5,7 +5,7 @@ import io
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import quantity_of_unit
+from ppafo.answers.display_units import quantity_of_unit
 from ppafo.questions.design.figure import design_figure
 from ppafo.questions.design.search import PATIENCE
 from ppafo.questions.design.solve import SHOWN_OBJECTIVES, Design, DesignPoint

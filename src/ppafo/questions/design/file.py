@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, STRICT, Text, Texts, published_schema, read_model
+from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics.catalog import METRICS
@@ -115,7 +115,7 @@ def read_design_file(name_or_path: str | Path) -> tuple[DesignFile, str]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a design file."""
-    return published_schema(DesignFile, "ppafo design")
+    return make_schema(DesignFile, "ppafo design")
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError
 
-from ppafo.documents.models import NAME, optional, published_schema, table
+from ppafo.documents.models import NAME, make_schema, optional, table
 from ppafo.documents.problems import first_problem
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
@@ -93,7 +93,7 @@ def bottle_file() -> type[BaseModel]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a file of a bottle."""
-    return published_schema(bottle_file(), "ppafo bottle")
+    return make_schema(bottle_file(), "ppafo bottle")
 
 
 @dataclass(frozen=True, slots=True)

@@ -109,7 +109,7 @@ def find(
     search.run(np.linspace(low, high, grid))
     if not np.isfinite(search.metrics).any():
         raise StudyError(
-            f"scenario '{base.name}': no run from {path.shown(low)} to {path.shown(high)} has a "
+            f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
             f"'{condition.metric}'{search.reason and '; the first: '}{search.reason}"
         )
     value, beyond = search.ends(highest)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import shown
+from ppafo.answers.display_units import display_value
 from ppafo.questions.league.draws import UNCERTAINTIES
 from ppafo.questions.league.figure import league_figure
 from ppafo.questions.league.presentation import Presentation
@@ -65,7 +65,7 @@ def league_remarks(league: League) -> list[str]:
     remarks += [shown_as.bound_sentence(valve, bounded) for valve, bounded in league.bounds.items()]
     remarks += [f"no lower bound: {league.without_bound}"] if league.without_bound else []
     if league.draws:
-        spread = ", ".join(f"{item.name} {shown(item.share, 'fraction'):.0f} %" for item in UNCERTAINTIES)
+        spread = ", ".join(f"{item.name} {display_value(item.share, 'fraction'):.0f} %" for item in UNCERTAINTIES)
         remarks.append(shown_as.draws_remark.format(draws=f"{league.draws:,}", spread=spread))
     remarks += _noise_remarks(league)
     for standing in league.standings:

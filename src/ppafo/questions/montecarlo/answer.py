@@ -3,8 +3,8 @@
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import change_text, display_unit, display_value
 from ppafo.answers.shown_metrics import metric_quantity
-from ppafo.answers.shown_units import change_text, shown, shown_unit
 from ppafo.questions.montecarlo.estimate import Look, MonteCarlo
 from ppafo.questions.montecarlo.figure import monte_carlo_figure
 from ppafo.simulation.document import plain
@@ -36,7 +36,7 @@ def verdict(estimate: MonteCarlo) -> str:
     numbers = [_level(estimate, value) for value in (interval.value, interval.low, interval.high)]
     is_narrow = rule.is_narrow(interval)
     ending = "" if is_narrow else f"; the target width was not reached with the maximum of {rule.most:,} draws"
-    what = "" if estimate.statistic.unit == "-" else f" {shown_unit(metric_quantity(estimate.metric))}"
+    what = "" if estimate.statistic.unit == "-" else f" {display_unit(metric_quantity(estimate.metric))}"
     return (
         f"{estimate.statistic.label} of {estimate.metric}: {numbers[0]} [{numbers[1]}, {numbers[2]}]{what} "
         f"after {estimate.last.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
@@ -101,7 +101,7 @@ def _row(estimate: MonteCarlo, look: Look) -> list[str]:
 
 def _level(estimate: MonteCarlo, value: float) -> str:
     quantity = "" if estimate.statistic.unit == "-" else metric_quantity(estimate.metric)
-    return f"{shown(value, quantity):.5g}"
+    return f"{display_value(value, quantity):.5g}"
 
 
 def _difference(estimate: MonteCarlo, value: float) -> str:

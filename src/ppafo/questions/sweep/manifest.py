@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, ValidationError
 
 from ppafo.documents.json_text import json_text
-from ppafo.documents.problems import first_problem, shown
+from ppafo.documents.problems import first_problem, quote
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.questions.sweep.bands import Bins
@@ -63,7 +63,7 @@ def read_manifest(place: Place) -> dict[str, Any]:
         raise DataError(f"{place.address}: {MANIFEST} is not a manifest of study results")
     if document.get("schema_version") != SCHEMA_VERSION:
         raise DataError(
-            f"{place.address}: has schema_version {shown(document.get('schema_version'))}, "
+            f"{place.address}: has schema_version {quote(document.get('schema_version'))}, "
             f"this version of ppafo reads {SCHEMA_VERSION}"
         )
     try:
@@ -145,4 +145,4 @@ def _differences(path: str, before: Any, now: Any) -> Iterator[str]:
             label = new.get("path", new.get("name", number)) if isinstance(new, dict) else number
             yield from _differences(f"{path}[{label}]", old, new)
     elif before != now:
-        yield f"{path.removeprefix('study.')} was {shown(before)} and is now {shown(now)}"
+        yield f"{path.removeprefix('study.')} was {quote(before)} and is now {quote(now)}"

@@ -4,8 +4,8 @@ import math
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.answers.shown_metrics import metric_quantity
-from ppafo.answers.shown_units import shown, titled
 from ppafo.questions.tune.figure import search_figure, task_figure
 from ppafo.questions.tune.problem import Constraint
 from ppafo.questions.tune.search import agreement, keeps
@@ -185,7 +185,7 @@ def _data(tuning: Tuning) -> dict[str, Any]:
 def _metric_row(tuning: Tuning, name: str) -> tuple[str, ...]:
     sides = (tuning.before, tuning.after)
     limits = ", ".join(_limit(item) for item in tuning.problem.constraints if item.metric == name)
-    first = [titled(name, metric_quantity(name)), *(_number(name, side.values.get(name)) for side in sides)]
+    first = [title_with_unit(name, metric_quantity(name)), *(_number(name, side.values.get(name)) for side in sides)]
     if tuning.problem.spread is None:
         return (*first, limits)
     nominal = [side.result.metrics.get(name) for side in sides]
@@ -194,7 +194,7 @@ def _metric_row(tuning: Tuning, name: str) -> tuple[str, ...]:
 
 
 def _number(name: str, value: float | None) -> str:
-    return "" if value is None or math.isnan(value) else f"{shown(value, metric_quantity(name)):.4g}"
+    return "" if value is None or math.isnan(value) else f"{display_value(value, metric_quantity(name)):.4g}"
 
 
 def _limit(item: Constraint) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ppafo.documents.models import NAME, published_schema
+from ppafo.documents.models import NAME, make_schema
 from ppafo.documents.problems import first_problem
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice
@@ -113,7 +113,7 @@ class TuningFile(BaseModel):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a tuning file."""
-    return published_schema(TuningFile, "ppafo tuning")
+    return make_schema(TuningFile, "ppafo tuning")
 
 
 TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "questions" / "tune" / "library", StudyError)

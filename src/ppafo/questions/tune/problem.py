@@ -147,8 +147,8 @@ class Problem:
         values = {
             item.path: float(item.value(np.asarray(share))) for item, share in zip(self.searched, shares, strict=True)
         }
-        return {item.path: item.place.level(item.place.shown(values[item.path])) for item in self.searched}
+        return {item.path: item.place.level(item.place.quote(values[item.path])) for item in self.searched}
 
     def lines(self, gains: Gains) -> list[str]:
         """Return gains as overrides, ``PATH=VALUE``."""
-        return [f"{item.path}={item.place.shown(gains[item.path])}" for item in self.searched]
+        return [f"{item.path}={item.place.quote(gains[item.path])}" for item in self.searched]

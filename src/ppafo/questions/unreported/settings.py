@@ -40,7 +40,7 @@ class Setting:
     choices: tuple[float, ...] = ()
     words: tuple[str, ...] = ()
 
-    def drawn(self, shares: Floats) -> Floats:
+    def values_at(self, shares: Floats) -> Floats:
         """Values for fractions from 0 to 1, evenly spread."""
         if self.choices:
             places = np.minimum((shares * len(self.choices)).astype(np.intp), len(self.choices) - 1)
@@ -95,7 +95,7 @@ def spread(count: int, seed: int) -> Floats:
 
 def values_of(points: Floats) -> Draws:
     """Settings of completions that are points in the unit cube."""
-    return {setting.name: setting.drawn(points[:, column]) for column, setting in enumerate(SETTINGS)}
+    return {setting.name: setting.values_at(points[:, column]) for column, setting in enumerate(SETTINGS)}
 
 
 def in_si(values: Floats, unit: str) -> Floats:

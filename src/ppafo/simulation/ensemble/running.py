@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
-from ppafo.engine.metering import group_of, metered, meters_of
+from ppafo.engine.metering import add_meters, group_of, meters_of
 from ppafo.engine.program import Program
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
@@ -155,7 +155,7 @@ def _asked(plain: Batch, request: Request) -> _Asked:
     stride = _stride(interval, request) if request.bands else 1
     traced = sorted({*looked_back, *request.bands})
     trace_every = 0 if not traced else 1 if looked_back else stride
-    batch = metered(plain, [meter for _, meter in meters], traced, trace_every)
+    batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every)
     return _Asked(batch, there, interval, samples_of(plain), stride if looked_back else 1)
 
 

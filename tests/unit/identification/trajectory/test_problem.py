@@ -102,7 +102,7 @@ def test_samples_on_the_grid_are_taken_from_the_record_as_they_are(experiment: E
 
 
 def test_samples_off_the_grid_lie_between_two_records(experiment: Experiment) -> None:
-    recording = experiment.recording.resampled(np.linspace(0.0, 0.35, 223))
+    recording = experiment.recording.resample(np.linspace(0.0, 0.35, 223))
     prepared = prepare(dataclasses.replace(experiment, recording=recording), {})
     assert prepared.share.any()
     at = (prepared.place + prepared.share) * prepared.run.step * prepared.run.record_every
