@@ -1,7 +1,7 @@
-"""Catalogues of kinds: those of this package, and those that other packages offer, found when they are asked for.
+"""Catalogues of kinds: those of this package, and those that other packages offer, found when they are requested.
 
 Another package offers a kind as an entry point of the catalogue's group; a module that is no package is named with its
-object, ``my_module:KIND``. Nothing is looked for before a name is asked for that is not here.
+object, ``my_module:KIND``. Nothing is looked for before a name is requested that is not here.
 """
 
 import importlib

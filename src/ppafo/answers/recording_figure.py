@@ -39,7 +39,7 @@ _PANEL, _GAP, _TOP, _BOTTOM, _REMARK_LINE = 1.15, 0.42, 0.75, 0.55, 0.17
 
 _REMARK_WIDTH = 100
 _HEADROOM = 0.06
-_MOST_TICKS = 5
+_MAXIMUM_TICKS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,4 +181,4 @@ def _set_limits(axes: "Axes", panel: Panel) -> None:
     missing = max(0.0, panel.smallest_span - span)
     air = _HEADROOM * (span + missing) + 0.5 * missing
     axes.set_ylim(min(shown) - air, max(shown) + air)
-    axes.locator_params(axis="y", nbins=_MOST_TICKS)
+    axes.locator_params(axis="y", nbins=_MAXIMUM_TICKS)

@@ -67,7 +67,7 @@ def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Do what was asked for."""
+    """Run the action that was given."""
     actions = {"list": _list, "show": _show, "import": _import, "record": _record, "export": _export}
     return actions[parsed.action](parsed)
 

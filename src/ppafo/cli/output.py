@@ -72,7 +72,7 @@ def _command(parsed: argparse.Namespace) -> str:
 
 
 def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.Namespace) -> None:
-    """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where asked, and print one of them."""
+    """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where requested, and print one of them."""
     if parsed.out is not None:
         contents = {f"{name}.txt": text, f"{name}.json": json_text(document)}
         write_files(parsed, {file: f"{content}\n".encode() for file, content in contents.items()})
@@ -80,7 +80,7 @@ def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.
 
 
 def deliver_answer(answer: "Answer", parsed: argparse.Namespace, filled: str | None = None) -> int:
-    """Write an answer where asked, print it as text or JSON, and return the exit code.
+    """Write an answer where requested, print it as text or JSON, and return the exit code.
 
     ``filled`` is a folder that has the files already.
     """

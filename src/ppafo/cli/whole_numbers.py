@@ -4,7 +4,7 @@ import math
 
 from ppafo.cli.arguments import UsageError
 
-_MOST_DIGITS = 40
+_MAXIMUM_DIGITS = 40
 """A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
 
 
@@ -13,8 +13,8 @@ def whole_number(text: str | None, option: str) -> int | None:
     if text is None:
         return None
     digits = text.replace("_", "").replace(",", "")
-    if not digits.isascii() or not digits.isdecimal() or len(digits) > _MOST_DIGITS:
-        raise UsageError(f"{option} {text}: must be a whole number, 0 or more, of at most {_MOST_DIGITS} digits")
+    if not digits.isascii() or not digits.isdecimal() or len(digits) > _MAXIMUM_DIGITS:
+        raise UsageError(f"{option} {text}: must be a whole number, 0 or more, of at most {_MAXIMUM_DIGITS} digits")
     return int(digits)
 
 

@@ -34,7 +34,7 @@ def optional(annotation: Any, description: str) -> Any:
 
 
 def one_of(models: list[Any]) -> Any:
-    """Return the union of tables that are told apart by their ``kind``."""
+    """Return the union of tables that are distinguished by their ``kind``."""
     return Annotated[Union[tuple(models)], Field(discriminator="kind")]  # noqa: UP007
 
 

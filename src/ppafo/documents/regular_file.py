@@ -3,7 +3,7 @@
 import stat
 from pathlib import Path
 
-MOST_BYTES_TYPED = 1_000_000
+MAXIMUM_BYTES_TYPED = 1_000_000
 """More than this is no scenario and no parameter set that a person wrote."""
 
 

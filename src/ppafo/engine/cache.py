@@ -35,9 +35,9 @@ logger = logging.getLogger("ppafo")
 
 CACHE_VARIABLE = "PPAFO_CACHE_DIR"
 LONGEST_UNUSED = 90.0 * 86400.0
-"""Seconds after which a program that no start has asked for is removed."""
+"""Seconds after which a program that no run has used is removed."""
 
-MOST_BYTES = 500_000_000
+MAXIMUM_BYTES = 500_000_000
 """Size of all programs above which those that were not used for longest are removed."""
 
 _PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
@@ -162,11 +162,11 @@ def clear(folder: Path) -> int:
 
 
 def evict(folder: Path) -> None:
-    """Remove programs unused for ``LONGEST_UNUSED``, those beyond ``MOST_BYTES``, and what a killed process left."""
+    """Remove programs unused for ``LONGEST_UNUSED``, those beyond ``MAXIMUM_BYTES``, and what a killed process left."""
     now, total = time.time(), 0
     for program in list_programs(folder):
         total += program.size
-        if now - program.used > LONGEST_UNUSED or total > MOST_BYTES:
+        if now - program.used > LONGEST_UNUSED or total > MAXIMUM_BYTES:
             _remove(program.place)
     for place in _entries_named(folder, _ASIDE):
         if now - _measure_program(place).used > _LONGEST_ASIDE:

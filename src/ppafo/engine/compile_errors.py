@@ -91,10 +91,12 @@ def _problem(report: Report) -> str:
         problem = teller(report)
         if problem:
             return problem
-    told = [line.strip() for line in report.said.splitlines() if line.strip()]
-    told = [line for line in told if not line.startswith(("Failed in nopython", "During:", "File ", "- Resolution"))]
+    lines = [line.strip() for line in report.said.splitlines() if line.strip()]
+    lines = [
+        line for line in lines_said if not line.startswith(("Failed in nopython", "During:", "File ", "- Resolution"))
+    ]
     where = f"'{report.written}' is not compiled: " if report.written else ""
-    return where + one_line(told[0] if told else "no reason given")[:_LONGEST]
+    return where + one_line(lines[0] if lines_said else "no reason given")[:_LONGEST]
 
 
 def _attribute(report: Report) -> str:

@@ -18,7 +18,7 @@ SECONDS_FILE = "seconds.txt"
 """The file of a kept program that says how long it took to compile [s]."""
 _SECONDS_PER_BYTE = 2.5e-4
 """Of source text; what a common computer takes, until this one has compiled something."""
-_MOST_ASKED = 20
+_MAXIMUM_ASKED = 20
 
 _place = (1, 1)
 """Which model is compiled, and of how many; whoever compiles holds the lock of the cache."""
@@ -65,6 +65,6 @@ def estimate_seconds(source: str, kept: Iterable[Path]) -> float:
         with contextlib.suppress(OSError, ValueError, StopIteration):
             seconds = float((folder / SECONDS_FILE).read_text(encoding="ascii"))
             rates.append(seconds / next(folder.glob("*.py")).stat().st_size)
-        if len(rates) == _MOST_ASKED:
+        if len(rates) == _MAXIMUM_ASKED:
             break
     return len(source) * (statistics.median(rates) if rates else _SECONDS_PER_BYTE)

@@ -104,7 +104,7 @@ def signals_before_start(rows: LaneRows) -> list[str]:
 def sense_end(rows: LaneRows, flag: str = "") -> list[str]:
     """What slow sensors show at the end of a step or part, and what late ones look at in it.
 
-    A signal that is late by a share of a step is looked at that share before the end of the step, at ``look_at`` [s].
+    A signal that is late by a fraction of a step is looked at by that much before its end, at ``look_at`` [s].
     """
     program = rows.program
     if not (program.slow_sensors or program.late_signals) or program.walks:

@@ -1,4 +1,4 @@
-"""What the meters of the lanes are told of the reference: looked at once before the first sample, then followed."""
+"""What the meters of the lanes know of the reference: looked at once before the first sample, then followed."""
 
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.signals.meter import SAME_LEVEL, advance_course, is_away

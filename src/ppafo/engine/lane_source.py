@@ -26,7 +26,7 @@ SIGNATURE = (
 )
 COMPILED = f'@njit({SIGNATURE}, cache=True, nogil=True, fastmath=FAST, error_model="numpy")'
 SAME_MOMENT = 1.0e-9
-"""Shares of a step that are taken to be one instant."""
+"""Fractions of a step that are taken to be one instant."""
 ARGUMENTS = (
     "states, parameters, signal_history, command_history, record, trace, "
     "first_step, step_count, steps_in_all, steps_per_sample, interval, last_record, next_record, trace_every, "

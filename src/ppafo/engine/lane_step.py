@@ -13,7 +13,7 @@ from ppafo.model.gait import gait_at
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
-MOST_PARTS = 100_000
+MAXIMUM_PARTS = 100_000
 
 
 def plant_loop(rows: LaneRows) -> list[str]:
@@ -48,7 +48,7 @@ def step_in_parts(rows: LaneRows) -> list[str]:
     inside = [*part_opening(rows), f"length = {rows.length}"]
     return [
         *places,
-        f"for part in range({MOST_PARTS}):",
+        f"for part in range({MAXIMUM_PARTS}):",
         *indent(over_lanes([*part_opening(rows), *measure(rows)])),
         *indent(over_phases(inside, phases(rows))),
         "    longest = 0.0",
@@ -62,7 +62,7 @@ def step_in_parts(rows: LaneRows) -> list[str]:
 
 
 def give_up(rows: LaneRows) -> list[str]:
-    """Lines that end a run whose step is not done after ``MOST_PARTS``: it failed where it is, and hurries on."""
+    """Lines that end a run whose step is not done after ``MAXIMUM_PARTS``: it failed where it is, and hurries on."""
     failure, cause = rows.cells["result.failure_time"], rows.cells["result.too_many_parts"]
     return [
         rows.load("timing"),
@@ -170,7 +170,7 @@ def lead(rows: LaneRows) -> list[str]:
     return [
         rows.load("path"),
         f"next_angle, next_rate, _ = {add(program.angle.value)}(path, time + length)",
-        f"begun = {add(motion.LedStep)}(next_angle, next_rate)",
+        f"begun = {add(motion.PrescribedStep)}(next_angle, next_rate)",
     ]
 
 
@@ -250,7 +250,7 @@ def finish(rows: LaneRows) -> list[str]:
         rows.load("next_valve"),
         *([rows.load("next_lines")] if program.has_lines else []),
         "error = max(error, gas_error) / timing.tolerance",
-        f"error = error if {positive(rows)} else {parts.MOST_ERROR!r}",
+        f"error = error if {positive(rows)} else {parts.MAXIMUM_ERROR!r}",
         f"refused = {add(parts.is_refused)}(error, length) and not result.failure_time <= time",
         f"next_length = {add(parts.next_pace)}(pace, error, length, refused, timing.step).length",
         f"active = {rows.remaining} > 0.0",

@@ -1,4 +1,4 @@
-"""The part of Python that the engine compiles, and the line in which a user is told about anything else."""
+"""The part of Python that the engine compiles, and the line that tells a user of anything else."""
 
 import ast
 from collections.abc import Iterable, Iterator

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lane_step import MOST_PARTS
+from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 NEVER_FAILED = 1.0e300
 TOO_MANY_PARTS = (
-    f"a step was cut into {MOST_PARTS:,} parts and was still not done: try a smaller run.step, and look at the delays "
+    f"a step was cut into {MAXIMUM_PARTS:,} parts and was still not done: try a smaller run.step, and check the delays "
     "of the valve, the inertia and the volumes (ppafo audit)"
 )
 """Remedy for a run that ``LaneResult.too_many_parts`` ended."""

@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from ppafo.documents.models import NAME, make_schema, one_of
 from ppafo.documents.problems import first_problem
-from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name, reason
 from ppafo.identification.trajectory.section import STRICT, Text, TrajectorySection
@@ -157,7 +157,7 @@ class ProblemFile(BaseModel):
 def load_problem(path: str | Path) -> ProblemFile:
     """Return the problem in a TOML file; paths in it begin in its folder."""
     try:
-        content = read_regular_file(Path(path), MOST_BYTES_TYPED)
+        content = read_regular_file(Path(path), MAXIMUM_BYTES_TYPED)
     except (OSError, ValueError) as error:
         raise IdentificationError(f"{label(str(path))}: cannot be read: {reason(error)}") from error
     return parse_problem(content, label(str(path)))

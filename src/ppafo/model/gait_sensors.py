@@ -25,7 +25,7 @@ class Fault(NamedTuple):
 
 
 class GaitSensors(NamedTuple):
-    """How sensors follow, noise and step of the forces [N], shares of samples that are lost, and faults.
+    """How sensors follow, noise and step of the forces [N], fractions of samples that are lost, and faults.
 
     ``follow_rate`` [1/s] is that of the force sensors; ``angle_memory`` and ``pressure_memory`` are what is left of a
     first-order sensor's last value after one sample, 0 for one that follows at once.
@@ -67,8 +67,8 @@ NOTHING_SEEN = GaitSeen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 def lagged_reading(shown: float, true: float, follow_rate: float, step: float) -> float:
     """What a first-order sensor shows after a step [s]; ``follow_rate`` [1/s] is the inverse of its time constant."""
-    share = follow_rate * step
-    return shown + (true - shown) * share / (1.0 + share)
+    fraction = follow_rate * step
+    return shown + (true - shown) * fraction / (1.0 + fraction)
 
 
 def faulty(fault: Fault, reading: float, last: float, time: float) -> float:

@@ -82,7 +82,7 @@ class ThermalState(NamedTuple):
 
 
 class Openings(NamedTuple):
-    """Share of the valve's full area that joins each chamber to the source and to the atmosphere, each 0 to 1."""
+    """Fraction of the valve's full area that joins each chamber to the source and to the atmosphere, each 0 to 1."""
 
     source_1: float
     vent_1: float

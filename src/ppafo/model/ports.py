@@ -21,7 +21,7 @@ class SinglePort(NamedTuple):
 
     conductance: float
     node_pressure: float
-    source_share: float
+    source_fraction: float
     takes_back: float
 
 
@@ -62,13 +62,13 @@ def admitted_flow(flow: float, takes_back: float) -> float:
 def single_port_flow(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlow:
     """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through one open path. Equations (6) to (8)."""
     flow = check_valve_flow(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
-    return PortFlow(flow, flow * port.source_share)
+    return PortFlow(flow, flow * port.source_fraction)
 
 
 def single_port_flow_slopes(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlowSlopes:
     """As ``single_port_flow``, with derivatives."""
     flow, _, slope = check_valve_flow_slopes(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
-    return PortFlowSlopes(flow, slope, flow * port.source_share, slope * port.source_share)
+    return PortFlowSlopes(flow, slope, flow * port.source_fraction, slope * port.source_fraction)
 
 
 def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlow:

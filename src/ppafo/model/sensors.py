@@ -6,7 +6,7 @@ and on any number of threads.
 
 from typing import NamedTuple
 
-from ppafo.model.turns import DOUBLINGS, SMALLEST_SHARE, TERMS
+from ppafo.model.turns import DOUBLINGS, SMALLEST_FRACTION, TERMS
 
 MASK = 0xFFFFFFFF
 ARRIVAL = 40.0
@@ -51,9 +51,9 @@ class SensorState(NamedTuple):
 
 
 def decay_factors(rate: float, step: float) -> tuple[float, float]:
-    """exp(-rate step) and its mean over the step [-], by series at a small share of it, doubled up to the whole."""
+    """exp(-rate step) and its mean over the step [-], by series at a small fraction of it, doubled up to the whole."""
     whole = rate * step
-    small = -min(whole, ARRIVAL) * SMALLEST_SHARE
+    small = -min(whole, ARRIVAL) * SMALLEST_FRACTION
     term, kept, mean = 1.0, 1.0, 1.0
     for order in range(1, TERMS):
         term *= small / order

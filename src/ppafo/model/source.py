@@ -21,7 +21,7 @@ from ppafo.model.gas import choked_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
 
 _NARROW_ENOUGH = 1e-9
-_MOST_HALVINGS = 60
+_MAXIMUM_HALVINGS = 60
 
 
 class BottleWall(NamedTuple):
@@ -123,7 +123,7 @@ def _between_nodes(table: FluidTable, mass: float, volume: float, energy: float,
     low, high = bracket
     miss_low = content_energy(table, mass, volume, low) - energy
     miss_high = content_energy(table, mass, volume, high) - energy
-    for _ in range(_MOST_HALVINGS):
+    for _ in range(_MAXIMUM_HALVINGS):
         middle = (low * miss_high - high * miss_low) / (miss_high - miss_low)
         miss = content_energy(table, mass, volume, middle) - energy
         if abs(miss) <= _NARROW_ENOUGH * abs(miss_high - miss_low) or high - low <= _NARROW_ENOUGH:

@@ -3,8 +3,8 @@
 TURN = 6.283185307179586
 
 DOUBLINGS = 12
-"""A function of a whole step is summed at a share of it, and doubled so often up to the whole."""
-SMALLEST_SHARE = 0.5**DOUBLINGS
+"""A function of a whole step is summed at a fraction of it, and doubled so often up to the whole."""
+SMALLEST_FRACTION = 0.5**DOUBLINGS
 TERMS = 9
 """Terms of such a series, with the one of order 0."""
 

@@ -19,7 +19,7 @@ QUESTIONS: dict[str, str] = {
     "design": "find the parts and settings that no others beat in error, gas and mass",
     "size": "torque profile and hours of use in, smallest valve, pressure and bottle out",
     "parts": "list real parts with the origin of every figure",
-    "tune": "search gains for a goal under constraints, robust where asked",
+    "tune": "search gains for a goal under constraints, robust where requested",
     "league": "rank every controller on a task, with the best that is possible",
 }
 """Name of the command to what it does, in the order of the help."""

@@ -84,7 +84,7 @@ def load_name(place: str) -> Any:
     return getattr(importlib.import_module(module), name)
 
 
-_MOST_DIGITS = 40
+_MAXIMUM_DIGITS = 40
 """A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
 
 
@@ -100,10 +100,10 @@ def counting_number(text: str) -> int:
 
 def _number_from(text: str, least: int) -> int:
     digits = text.replace("_", "").replace(",", "")
-    is_usable = digits.isascii() and digits.isdecimal() and len(digits) <= _MOST_DIGITS
+    is_usable = digits.isascii() and digits.isdecimal() and len(digits) <= _MAXIMUM_DIGITS
     if not is_usable or int(digits) < least:
         raise argparse.ArgumentTypeError(
-            f"{text}: must be a whole number, {least} or more, of at most {_MOST_DIGITS} digits"
+            f"{text}: must be a whole number, {least} or more, of at most {_MAXIMUM_DIGITS} digits"
         )
     return int(digits)
 

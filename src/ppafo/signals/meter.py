@@ -41,7 +41,7 @@ class Course(NamedTuple):
 
 
 SAME_LEVEL = 1.0e-9
-"""Share of the largest reference up to which two values of it are the same level."""
+"""Fraction of the largest reference up to which two values of it are the same level."""
 
 
 def is_away(reference: float, last: float, tolerance: float) -> bool:

@@ -14,7 +14,7 @@ from ppafo.documents.json_text import json_document, json_text
 from ppafo.errors import DataError, one_line, reason
 from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_bytes, replace_folder
 
-_MOST_BYTES_WRITTEN = 16_000_000
+_MAXIMUM_BYTES_WRITTEN = 16_000_000
 """No document of ours comes near; one repeats what a scenario file of at most 1 MB says, but not sixteen times."""
 _NAMED = 3
 
@@ -126,7 +126,7 @@ def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: Folder
 def read_json(path: Path) -> Any:
     """Return what a JSON file of ours holds, as plain data."""
     try:
-        return json_document(read_bytes(path, _MOST_BYTES_WRITTEN))
+        return json_document(read_bytes(path, _MAXIMUM_BYTES_WRITTEN))
     except ValueError as error:
         raise DataError(f"{path}: is not JSON: {one_line(error)}") from error
 

@@ -16,7 +16,7 @@ from ppafo.errors import DataError, reason
 from ppafo.storage.files import LEFT_ASIDE, write_file
 
 _ADDRESS_MARK = "://"
-_MOST_BYTES_OF_DOCUMENT = 100_000_000
+_MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
 
 
 class Place(Protocol):
@@ -55,9 +55,9 @@ class Place(Protocol):
 def read_document(place: Place, name: str) -> Any:
     """Return what a JSON file of ours holds, as plain data; OSError or ValueError where that is not possible."""
     with place.open(name) as file:
-        content = file.read(_MOST_BYTES_OF_DOCUMENT + 1)
-    if len(content) > _MOST_BYTES_OF_DOCUMENT:
-        raise ValueError(f"{name} is larger than {_MOST_BYTES_OF_DOCUMENT / 1e6:g} MB")
+        content = file.read(_MAXIMUM_BYTES_OF_DOCUMENT + 1)
+    if len(content) > _MAXIMUM_BYTES_OF_DOCUMENT:
+        raise ValueError(f"{name} is larger than {_MAXIMUM_BYTES_OF_DOCUMENT / 1e6:g} MB")
     return json_document(content)
 
 

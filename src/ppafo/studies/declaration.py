@@ -10,10 +10,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ppafo.documents.models import NAME, make_schema
 
-MOST_RUNS = 2**32
-MOST_RUNS_OF_CHUNK = 1_000_000
+MAXIMUM_RUNS = 2**32
+MAXIMUM_RUNS_OF_CHUNK = 1_000_000
 LARGEST_SEED = 2**32 - 1
-MOST_GRID_VALUES = 1_000_000
+MAXIMUM_GRID_VALUES = 1_000_000
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 _STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -44,7 +44,7 @@ class Grid(BaseModel):
     kind: Literal["grid"]
     first: _Value
     last: _Value
-    count: Annotated[int, Field(ge=2, le=MOST_GRID_VALUES, description="number of values")]
+    count: Annotated[int, Field(ge=2, le=MAXIMUM_GRID_VALUES, description="number of values")]
     spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
     only: _Only = ()
 
@@ -184,7 +184,7 @@ class Sample(BaseModel):
     model_config = _STRICT
 
     method: Literal["random", "latin_hypercube", "sobol"]
-    runs: Annotated[int, Field(ge=1, le=MOST_RUNS, description="number of draws; each is run in every configuration")]
+    runs: Annotated[int, Field(ge=1, le=MAXIMUM_RUNS, description="draws; each is run in every configuration")]
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 1
 
 
@@ -244,7 +244,9 @@ class StudyFile(BaseModel):
     runs_of_chunk: Annotated[
         int | None,
         Field(
-            ge=1, le=MOST_RUNS_OF_CHUNK, description="runs computed and written together; default: chosen automatically"
+            ge=1,
+            le=MAXIMUM_RUNS_OF_CHUNK,
+            description="runs computed and written together; default: chosen automatically",
         ),
     ] = None
     sample: Annotated[Sample | None, Field(description="required if there are distributions")] = None

@@ -15,7 +15,7 @@ from ppafo.studies.noise import NOISE, other_noise, with_noise
 from ppafo.studies.sampling import correlate, uniform_numbers
 from ppafo.studies.study import Configuration, Drawn, Sample, Study, with_followers
 
-MOST_DRAWS = 2**26
+MAXIMUM_DRAWS = 2**26
 REPLICATES = 16
 """Independent scrambles of the Sobol sequence among which draws are dealt out in turn."""
 
@@ -40,8 +40,8 @@ class Uncertainty:
 
     def columns(self, uniform: Floats) -> Columns:
         """Return values [SI] (draws,) by path for uniform numbers in (0, 1), shape (draws, paths)."""
-        shares = uniform if self.scores is None else correlate(uniform, self.scores)
-        values = {item.path: item.distribution.values(shares[:, row]) for row, item in enumerate(self.drawn)}
+        fractions = uniform if self.scores is None else correlate(uniform, self.scores)
+        values = {item.path: item.distribution.values(fractions[:, row]) for row, item in enumerate(self.drawn)}
         return with_followers(values, self.same)
 
     def random_columns(self, first: int, count: int, seed: int) -> Columns:

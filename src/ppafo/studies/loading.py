@@ -17,7 +17,7 @@ from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.noise import with_noise
 from ppafo.studies.outputs import valid_outputs
-from ppafo.studies.sampling import MOST_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix
+from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix
 from ppafo.studies.study import Axis, Configuration, Drawn, Sample, Study
 from ppafo.studies.varying import VariedPath, axis_or_distribution, stated_normal, varied_path
 
@@ -261,6 +261,6 @@ def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn], source: _Source)
         return Sample(None, 1, 0)
     if parsed.sample is None:
         raise source.refusal("'sample' is missing: distributions need [sample] with method and runs")
-    if parsed.sample.method == "sobol" and len(drawn) > MOST_SOBOL_DIMENSIONS:
-        raise source.refusal(f"sample.method = 'sobol' allows at most {MOST_SOBOL_DIMENSIONS} distributions")
+    if parsed.sample.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
+        raise source.refusal(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")
     return Sample(parsed.sample.method, parsed.sample.runs, parsed.sample.seed)

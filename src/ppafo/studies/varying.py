@@ -189,8 +189,8 @@ def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
         )
     if min(weights) < 0.0 or math.fsum(weights) <= 0.0:
         raise UnitError(f"weights = {list(weights)} must be at least 0, and not all of them 0")
-    shares = np.cumsum(weights) / np.sum(weights)
-    return OneOf(values, tuple(shares.tolist()))
+    fractions = np.cumsum(weights) / np.sum(weights)
+    return OneOf(values, tuple(fractions.tolist()))
 
 
 def _whole_numbers(item: declared.WholeNumbers, place: VariedPath) -> Distribution:

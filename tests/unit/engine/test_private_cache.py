@@ -193,7 +193,7 @@ def test_programs_beyond_the_largest_size_are_removed_oldest_first(
     (older / "large").write_bytes(bytes(1000))
     used = compiled.stat().st_mtime
     os.utime(older, (used - 60.0, used - 60.0))
-    monkeypatch.setattr(cache, "MOST_BYTES", list_programs(compiled.parent)[0].size + 500)
+    monkeypatch.setattr(cache, "MAXIMUM_BYTES", list_programs(compiled.parent)[0].size + 500)
     evict(compiled.parent)
     assert compiled.is_dir()
     assert not older.exists()

@@ -248,7 +248,7 @@ def test_a_step_that_is_not_done_in_the_most_parts_ends_the_run_with_time_and_re
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A coil that switches inside a step, after 10.3 ms, cuts it in two; here one part is the most."""
-    monkeypatch.setattr(lane_step, "MOST_PARTS", 1)
+    monkeypatch.setattr(lane_step, "MAXIMUM_PARTS", 1)
     write_source.cache_clear()
     try:
         result = simulate("torque-task-solenoid", ["run.duration=0.1 s", "valve.opening_delay=10.3 ms"])

@@ -174,10 +174,10 @@ def test_a_bad_threshold_is_refused(text: str, words: str) -> None:
 
 def test_thresholds_are_shares_or_errors_and_the_last_one_wins() -> None:
     thresholds = parse_thresholds(["5%", "angle=2.2 deg", "pressure_1=20%", "pressure_1=7 percent"])
-    assert thresholds.limit("torque").share_of(123.0) == 0.05
-    assert thresholds.limit("pressure_1").share_of(1e5) == pytest.approx(0.07)
-    assert thresholds.limit("angle").share_of(np.radians(110.0)) == pytest.approx(0.02)
-    assert parse_thresholds().limit("angle").share_of(1.0) == 0.10
+    assert thresholds.limit("torque").fraction_of(123.0) == 0.05
+    assert thresholds.limit("pressure_1").fraction_of(1e5) == pytest.approx(0.07)
+    assert thresholds.limit("angle").fraction_of(np.radians(110.0)) == pytest.approx(0.02)
+    assert parse_thresholds().limit("angle").fraction_of(1.0) == 0.10
 
 
 @pytest.mark.parametrize("text", ["pressure_3=0 psi_g", "angle=3 psi_g", "pressure_1=3 psi", "pressure_1"])

@@ -43,7 +43,7 @@ def late(recording: Recording, delay: float) -> Recording:
 
 
 def shares(agreement: Any) -> dict[str, float]:
-    return {channel.channel: channel.share for channel in agreement.channels}
+    return {channel.channel: channel.fraction for channel in agreement.channels}
 
 
 def test_a_simulated_recording_agrees_with_its_own_set_to_rounding(step: Step, agree: Agree) -> None:
@@ -77,7 +77,7 @@ def test_a_shift_in_time_is_found_and_taken_out(delay: float, step: Step, agree:
     agreement = agree(late(recording, delay), device)
     assert agreement.delay.value == pytest.approx(delay, abs=5e-5)
     angle = agreement.channels[0]
-    assert angle.share < 1e-4
+    assert angle.fraction < 1e-4
     assert angle.rms_unaligned > 100 * angle.rms
 
 

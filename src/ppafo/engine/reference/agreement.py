@@ -15,7 +15,7 @@ IMPACT_WINDOW = 5.0e-3
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Largest and root-mean-square differences as shares of the angle range and of the supply's gauge pressure [-].
+    """Largest and root-mean-square differences as fractions of the angle range and of the supply's gauge pressure [-].
 
     Where the supply is at the pressure of the atmosphere, that pressure stands for the gauge pressure. Instants within
     5 ms of an impact on a stop are left out. ``supplied`` is relative, ``impacts`` in seconds.

@@ -67,11 +67,11 @@ def exact_flow_function(ratio: float, orifice: ExactOrifice) -> float:
     return value * min((1.0 - ratio) / (1.0 - orifice.linear_ratio), 1.0)
 
 
-def exact_flow(pressure_a: float, pressure_b: float, share: float, orifice: ExactOrifice) -> float:
-    """Mass flow from a to b [kg/s] through a share of an orifice, positive from a to b. Equations (6), (7)."""
+def exact_flow(pressure_a: float, pressure_b: float, fraction: float, orifice: ExactOrifice) -> float:
+    """Mass flow from a to b [kg/s] through a fraction of an orifice, positive from a to b. Equations (6), (7)."""
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
-    flow = share * orifice.conductance * upstream * exact_flow_function(ratio, orifice)
+    flow = fraction * orifice.conductance * upstream * exact_flow_function(ratio, orifice)
     return flow if pressure_a >= pressure_b else -flow
 
 

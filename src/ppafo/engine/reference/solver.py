@@ -30,7 +30,7 @@ MASS_TOLERANCE = 1e-15
 TOLERANCES = (1e-11, 1e-10, *(MASS_TOLERANCE,) * 5)
 VALVE_TOLERANCE = 1e-11
 SIGNAL_TOLERANCES = (1e-10, 1e-4, 1e-4)
-MOST_STEPS = 200_000
+MAXIMUM_STEPS = 200_000
 
 
 @dataclass(slots=True)
@@ -116,7 +116,7 @@ class _Solution:
             atol=np.array(TOLERANCES + (MASS_TOLERANCE,) * gas_count + shown + (VALVE_TOLERANCE,) * valve_count),
             eventsfn=roots if free else None,
             num_events=2 if free else 0,
-            max_num_steps=MOST_STEPS,
+            max_num_steps=MAXIMUM_STEPS,
         )
 
     def roots(self, y: Floats) -> vane_mode.Roots:

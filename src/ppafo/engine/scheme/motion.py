@@ -1,4 +1,4 @@
-"""One step of the vane, free between its stops or led along a prescribed angle, with the gas in the chambers.
+"""One step of the vane, free between its stops or with a prescribed angle, with the gas in the chambers.
 
 Order of a free step: the angle is predicted with the present acceleration; the gas runs with volumes that lead to the
 predicted angle; the angular velocity follows from the trapezoidal rule with the new pressures. What ends or starts
@@ -17,16 +17,16 @@ ALLOWED_OF_ANGLE = 2.0e-6
 """Error of one part over the range of the angle; with it a run keeps to 2e-4 of the range."""
 ALLOWED_BY_GAS = 3.0e-6
 """Error of one part over the angle in which the smaller chamber would close."""
-MISSED_SHARE = 0.2
-"""Share of the way between where the gas took the vane to be and where an event left it that counts as an error."""
+MISSED_FRACTION = 0.2
+"""Fraction of the way between where the gas took the vane to be and where an event left it that counts as an error."""
 LOWEST_REBOUND = 1.0e-7
 """Height over the range of the angle below which a rebound is none."""
 
 
 class Departure(NamedTuple):
-    """Second part of a step: where it begins (share of the step), angle [rad], angular velocity [rad/s]."""
+    """Second part of a step: where it begins (fraction of the step), angle [rad], angular velocity [rad/s]."""
 
-    share: float
+    fraction: float
     angle: float
     angular_velocity: float
 
@@ -53,8 +53,8 @@ class FreePart(NamedTuple):
     meets_stop: float
 
 
-class LedStep(NamedTuple):
-    """Where a led step leads [rad], [rad/s]."""
+class PrescribedStep(NamedTuple):
+    """Angle [rad] and angular velocity [rad/s] at the end of a prescribed step."""
 
     next_angle: float
     next_rate: float
@@ -105,7 +105,7 @@ def depart(
     start_torque = torque + waits * change
     way = direction_of(departure.angular_velocity) if moving else way
     sliding = way * plant.dynamic_torque
-    duration = step * (1.0 - departure.share) * (1.0 - waits)
+    duration = step * (1.0 - departure.fraction) * (1.0 - waits)
     velocity = departure.angular_velocity
     first = (start_torque - sliding - plant.viscous_damping * velocity) / plant.inertia
     last = (next_torque - sliding) / plant.inertia
@@ -157,10 +157,10 @@ def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length:
 
     fall = velocity - full_velocity
     turns = way != 0.0 and not slides
-    share = velocity / (fall if fall != 0.0 else 1.0) if turns else 0.0
-    turning_angle = clamp_angle(plant, state.angle + 0.5 * share * length * velocity)
-    left_torque = begun.torque + share * (next_torque - begun.torque)
-    left_angle, left_velocity = depart(plant, Departure(share, turning_angle, 0.0), left_torque, next_torque, length)
+    fraction = velocity / (fall if fall != 0.0 else 1.0) if turns else 0.0
+    turning_angle = clamp_angle(plant, state.angle + 0.5 * fraction * length * velocity)
+    left_torque = begun.torque + fraction * (next_torque - begun.torque)
+    left_angle, left_velocity = depart(plant, Departure(fraction, turning_angle, 0.0), left_torque, next_torque, length)
     rebound = rebound_velocity(plant, full_velocity, next_torque)
     slid_velocity = rebound if begun.meets_stop > 0.5 else full_velocity
     angle = begun.next_angle if slides else left_angle
@@ -168,7 +168,7 @@ def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length:
 
     last = (sliding_torque - plant.viscous_damping * full_velocity) / plant.inertia
     bent = abs(last - begun.acceleration) * length * length / 6.0 if way != 0.0 else 0.0
-    missed = MISSED_SHARE * abs(angle - begun.next_angle)
+    missed = MISSED_FRACTION * abs(angle - begun.next_angle)
     # Where a chamber is small, a little of the angle is much of the pressure.
     volume_1, volume_2 = chamber_volumes(plant, begun.next_angle)
     allowed_by_gas = ALLOWED_BY_GAS * min(volume_1, volume_2) / plant.volume_per_angle
@@ -206,10 +206,10 @@ def first_event(
     impact = min(time_to_stop(abs(stop - state.angle), abs(velocity), acceleration * way) / step, 1.0)
     hits_first = hits and not (reverses and reversal < impact)
     turning_angle = clamp_angle(plant, state.angle + 0.5 * reversal * step * velocity)
-    share = impact if hits_first else (reversal if reverses else 0.0)
+    fraction = impact if hits_first else (reversal if reverses else 0.0)
     angle = stop if hits_first else (turning_angle if reverses else state.angle)
     rebound = -plant.restitution * (velocity - impact * fall)
-    return Departure(share, angle, rebound if hits_first else 0.0)
+    return Departure(fraction, angle, rebound if hits_first else 0.0)
 
 
 def begin_free(plant: PlantParameters, state: PlantState, added_torque: float, step: float) -> FreeStep:
@@ -244,7 +244,7 @@ def end_free(
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
 
     departure = first_event(plant, state, begun.free_angle, begun.acceleration, full_velocity, step)
-    departure_torque = begun.torque + departure.share * (next_torque - begun.torque)
+    departure_torque = begun.torque + departure.fraction * (next_torque - begun.torque)
     left_angle, left_velocity = depart(plant, departure, departure_torque, next_torque, step)
     slides_through = moving and full_velocity * way > 0.0 and begun.free_angle == predicted
     next_angle = predicted if slides_through else left_angle

@@ -18,8 +18,8 @@ GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
 ALLOWED_OF_PRESSURE = 2.5e-5
 """Error of one step over the pressure that matters; with it a run keeps to 1e-3 of the pressure range."""
-LEAST_PRESSURE = 0.02
-"""The least pressure that matters, as a share of the atmosphere's."""
+MINIMUM_PRESSURE = 0.02
+"""The least pressure that matters, as a fraction of the atmosphere's."""
 
 
 class GasChange(NamedTuple):
@@ -303,6 +303,6 @@ def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:
 
 
 def supply_range(plant: PlantParameters) -> float:
-    """Pressure [Pa] of the higher supply over the atmosphere, not less than a share of the latter."""
+    """Pressure [Pa] of the higher supply over the atmosphere, not less than a fraction of the latter."""
     supplied = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
-    return max(supplied, LEAST_PRESSURE * plant.atmospheric_pressure)
+    return max(supplied, MINIMUM_PRESSURE * plant.atmospheric_pressure)

@@ -169,9 +169,9 @@ class FedThermalGas(NamedTuple):
     lines: LineStep
 
 
-def with_line(flow: PortFlowSlopes, share: float) -> PortFlowSlopes:
-    """The flow of a port whose line loses what its chamber gains; ``share`` as in ``with_lines``."""
-    more = flow.source_slope * share
+def with_line(flow: PortFlowSlopes, fraction: float) -> PortFlowSlopes:
+    """The flow of a port whose line loses what its chamber gains; ``fraction`` as in ``with_lines``."""
+    more = flow.source_slope * fraction
     return PortFlowSlopes(
         total=flow.total,
         total_slope=flow.total_slope + more,

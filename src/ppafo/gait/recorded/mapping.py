@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from ppafo.documents.models import make_schema
 from ppafo.documents.problems import first_problem
-from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, reason
 
@@ -180,7 +180,7 @@ def load_map(path: str | Path) -> GaitMap:
     """Return the map in a TOML file."""
     file = label(str(path))
     try:
-        content = read_regular_file(Path(path), MOST_BYTES_TYPED)
+        content = read_regular_file(Path(path), MAXIMUM_BYTES_TYPED)
         return GaitMap.model_validate(_FILE.parse(content, file))
     except ValidationError as error:
         raise DataError(f"{file}: {first_problem(error.errors(include_url=False), GaitMap)}") from error

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Indices = NDArray[np.intp]
 
 _FEWEST_BLOCKS = 8
-_MOST_BLOCKS = 64
+_MAXIMUM_BLOCKS = 64
 """More would find what follows from sample to sample, for which there is an interval of its own."""
 
 _FEWEST_IN_A_BLOCK = 2
@@ -106,7 +106,7 @@ def _block_counts(size: int, parameters: int) -> list[int]:
     """Return the numbers of blocks to try: from few to as many as leave two readings in each, and a limit."""
     counts: list[int] = []
     count = max(_FEWEST_BLOCKS, 2 * parameters)
-    while count * _FEWEST_IN_A_BLOCK <= size and (not counts or count <= _MOST_BLOCKS):
+    while count * _FEWEST_IN_A_BLOCK <= size and (not counts or count <= _MAXIMUM_BLOCKS):
         counts.append(count)
         count *= 2
     return counts
@@ -137,7 +137,7 @@ def _exceeds_uneven_noise(parts: list[Floats], chance: float) -> bool:
 CLEARLY_WORSE = 10.0
 """Difference in Akaike's criterion from which one law is refused in favour of another."""
 
-_MOST_CORRELATION = 0.999
+_MAXIMUM_CORRELATION = 0.999
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,7 +254,7 @@ def effective_samples(residuals: Floats) -> float:
     if residuals.size < 3 or total == 0.0:
         return float(residuals.size)
     likeness = float(residuals[1:] @ residuals[:-1]) / total
-    likeness = min(max(likeness, 0.0), _MOST_CORRELATION)
+    likeness = min(max(likeness, 0.0), _MAXIMUM_CORRELATION)
     return max(3.0, residuals.size * (1.0 - likeness) / (1.0 + likeness))
 
 

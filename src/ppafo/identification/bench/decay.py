@@ -62,10 +62,10 @@ VELOCITY = "angular_velocity"
 
 MINIMUM_SAMPLES = 20
 FEWEST_SMOOTHED = 5
-_SMOOTHED_SHARE = 0.04
+_SMOOTHED_FRACTION = 0.04
 _VELOCITY_MAY_DIFFER = 0.1
 _SMALLEST_NOISE = 1.0e-6
-_LEAST_OVER_NOISE = 20.0
+_MINIMUM_OVER_NOISE = 20.0
 
 
 class Decay(NamedTuple):
@@ -116,7 +116,7 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
 def _check_course(source: Source, part: Recording) -> None:
     """Refuse a recording in which nothing moves by more than its noise."""
     swept, noise = float(np.ptp(part[ANGLE])), noise_of(part[ANGLE])
-    if swept < _LEAST_OVER_NOISE * noise:
+    if swept < _MINIMUM_OVER_NOISE * noise:
         raise IdentificationError(
             f"{source.name}: {PROCEDURE}: nothing moves: the angle changes by {swept:.3g} rad with a noise of "
             f"{noise:.3g} rad; push the vane"
@@ -165,4 +165,4 @@ def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
 
 def smoothing_width(count: int) -> int:
     """Return an odd number of samples to smooth over."""
-    return max(FEWEST_SMOOTHED, int(_SMOOTHED_SHARE * count)) | 1
+    return max(FEWEST_SMOOTHED, int(_SMOOTHED_FRACTION * count)) | 1

@@ -15,7 +15,7 @@ _NO_SENSORS = ("command", "direction", "repetition")
 _COARSE = 0.02
 _SHARE_THAT_IS_CLIPPED = 0.05
 _FEWEST_CLIPPED = 4
-_SHARE_THAT_MOVES = 0.02
+_FRACTION_THAT_MOVES = 0.02
 _LARGEST_NUMBER = 1.0e12
 _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 
@@ -45,15 +45,15 @@ def check_moves(source: Source, procedure: str, name: str) -> None:
 
 
 def check_not_clipped(
-    source: Source, procedure: str, name: str, driver: str, driving: Floats, share: float = _SHARE_THAT_MOVES
+    source: Source, procedure: str, name: str, driver: str, driving: Floats, fraction: float = _FRACTION_THAT_MOVES
 ) -> None:
     """Refuse a channel that stays exactly at its largest value while what drives it moves: a saturated sensor.
 
-    ``driving`` are the values of that, ``driver`` its name; ``share`` of its largest value is how far it must move [-].
+    ``driving`` are the values of that, ``driver`` its name; it must move by ``fraction`` [-] of its largest value.
     """
     values = source.recording[name]
     longest, _ = plateaus(values)
-    moves = float(np.ptp(driving[longest.first : longest.last + 1])) > share * float(np.abs(driving).max())
+    moves = float(np.ptp(driving[longest.first : longest.last + 1])) > fraction * float(np.abs(driving).max())
     if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
         raise IdentificationError(
             f"{source.name}: {procedure}: channel '{name}' stays at {values.max():g} {source.recording.unit(name)} for "

@@ -64,7 +64,7 @@ def steady_leak(
     laws = [item.law for item in fitted]
     best, noise = best_law(laws), _noise(readings)
     judged = judge(laws, best, noise, float(np.ptp(readings.flow)), "kg/s")
-    evidence = Evidence(traces(sources), confidence, opening.gas.share_of_flow(calibration))
+    evidence = Evidence(traces(sources), confidence, opening.gas.flow_uncertainty(calibration))
     checks = law_checks(laws, best, judged, "kg/s")
     return BenchResult(
         PROCEDURE,

@@ -31,7 +31,7 @@ MINIMUM_SAMPLES = 12
 _MINIMUM_RANGE = 0.5
 _SEEN_BEYOND = 0.02
 _SMALL_COMMAND = 0.2
-_GOOD_SHARE = 0.05
+_GOOD_FRACTION = 0.05
 _DEAD_BAND, _GAIN, _FULL, _HYSTERESIS = range(4)
 
 
@@ -83,7 +83,7 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     measured = _read_map(sources, settings.gas)
     fitted = _fit(measured, settings.confidence)
     fit, scale = fitted
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow(settings.calibration))
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty(settings.calibration))
     estimates = _estimates(evidence, measured, fitted, settings.path)
     checks = (*_checks(measured, fit), _meter_check(sources))
     remarks = (*_one_way_remark(measured), *pauses(sources))
@@ -218,14 +218,14 @@ def _saturation(fit: CurveFit) -> Number:
 
 def _checks(measured: _Map, fit: CurveFit) -> tuple[Check, ...]:
     fits = Check(
-        "residuals", fit.rms <= _GOOD_SHARE, f"the map misses the opening by {fit.rms:.2%} of the full one (rms)"
+        "residuals", fit.rms <= _GOOD_FRACTION, f"the map misses the opening by {fit.rms:.2%} of the full one (rms)"
     )
     listed = [fits]
     if not _one_way_remark(measured):
         sides = [float(np.mean(fit.residuals[sign * measured.command > 0.1])) * sign for sign in (1.0, -1.0)]
         apart = abs(sides[0] - sides[1])
         text = f"the two directions differ by {apart:.2%} of the full opening"
-        listed.append(Check("both ways alike", apart <= _GOOD_SHARE, text))
+        listed.append(Check("both ways alike", apart <= _GOOD_FRACTION, text))
     both_ways, one_way = "rising and falling commands were recorded", "the command went one way: hysteresis is unknown"
     text = both_ways if measured.is_two_way else one_way
     return (*listed, Check("hysteresis seen", measured.is_two_way, text))

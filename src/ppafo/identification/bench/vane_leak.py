@@ -138,18 +138,18 @@ def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], setti
     judged = judge(fitted, best, noise, drop, "Pa")
     checks = [*law_checks(fitted, best, judged, "Pa"), *_conservation_check(decays)]
     # Only what is reported needs the intervals of a law that may miss, which take long.
-    told_laws = {
+    reported = {
         law.name: fit_law(law, decays, count, settings.confidence)
         for law in laws
         if law.name in _reported_laws(best, judged)
     }
-    orifice, best = told_laws.get(orifice.name, orifice), told_laws.get(best.name, best)
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow())
+    orifice, best = reported.get(orifice.name, orifice), reported.get(best.name, best)
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty())
     numbers = _numbers(settings, {decay.emptying for decay in decays}, orifice, f"{judged.reason}.")
     estimates = [*opening_estimates(evidence, settings.opening, numbers, judged)]
     if best is relaxation:
-        told, leak = leak_or_relaxation(decays, relaxation, count, settings.confidence)
-        checks.append(told)
+        check, leak = leak_or_relaxation(decays, relaxation, count, settings.confidence)
+        checks.append(check)
         estimates += [evidence.without_calibration(number) for number in _course(relaxation, leak)]
     elif best.name != orifice.name:
         estimates.append(evidence.without_calibration(replace(_rate(best), condition=condition_of(best, checks[1]))))
@@ -204,14 +204,14 @@ def _tight_leak(
     text = (
         f"No leak is visible in {longest:.4g} s; with {settings.confidence:.0%} confidence it is below the upper end."
     )
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow())
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty())
     estimates = tuple(
         replace(evidence.estimate(number, number.half_width * (1.0 + evidence.calibration), "upper bound"), low=0.0)
         for number in _numbers(settings, {item.fuller for item in closed}, most, text)
     )
     rises = slope + half < 0.0
-    told = "the pressure difference rises" if rises else "the pressure difference does not rise either"
-    check = Check("nothing flows in", not rises, f"{told}: {-slope * falls[0] * scale:+.3g} Pa/s at first sight")
+    check = "the pressure difference rises" if rises else "the pressure difference does not rise either"
+    check = Check("nothing flows in", not rises, f"{check}: {-slope * falls[0] * scale:+.3g} Pa/s at first sight")
     summary = (
         f"{count_of(len(closed), 'recording')} of closed chambers; no leak is visible, so there is only an upper bound"
     )

@@ -196,7 +196,7 @@ def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
 
 
 def experiment_without_scenario(item: ExperimentSection, source: Source, setting: Setting) -> Experiment:
-    """Return the experiment of a recording on the device of the set; it begins at the first sample unless told."""
+    """Return the experiment of a recording on the device of the set; it begins at the first sample unless stated otherwise."""
     said = f"{setting.file}: experiment '{item.label}'"
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")
@@ -221,8 +221,8 @@ def compared_channels(item: ExperimentSection) -> tuple[str, ...]:
         return item.channels
     if item.volume is not None:
         return ("pressure_1",)
-    is_led = item.held is not None or ANGLE in (item.inputs or ())
-    return FITTED_CHANNELS[1:] if is_led else FITTED_CHANNELS
+    is_prescribed = item.held is not None or ANGLE in (item.inputs or ())
+    return FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
 
 
 def _fix_vane(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:

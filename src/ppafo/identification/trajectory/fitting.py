@@ -181,7 +181,7 @@ def _remarks(
     device: Device,
 ) -> tuple[str, ...]:
     stopped = (
-        f"the search stopped after {problem.search.most_evaluations} evaluations before it converged: "
+        f"the search stopped after {problem.search.maximum_evaluations} evaluations before it converged: "
         f"start closer to the solution, or allow more evaluations"
     )
     broken = broken_rule(device)

@@ -18,8 +18,8 @@ SMALLEST_STEP, LARGEST_STEP = 1.0e-6, 5.0e-2
 STEP_IN_ERRORS = 1.0
 """Step of a difference in standard errors, and its limits in coordinates."""
 
-SMALLEST_SHARE = 1.0e-12
-"""Eigenvalues of the scaled information below this share of the largest are noise of the differences."""
+SMALLEST_FRACTION = 1.0e-12
+"""Eigenvalues of the scaled information below this fraction of the largest are noise of the differences."""
 
 FIXED = 1.0e-9
 """Share below which an eigenvalue fixes nothing, so that a solution does not move along its direction."""
@@ -75,7 +75,7 @@ def directions_for(information: Floats, is_fixed: Mask) -> Floats:
     free = np.flatnonzero(~is_fixed)
     part = information[np.ix_(free, free)]
     scale, values, vectors = principal_axes(part)
-    errors = 1.0 / np.sqrt(np.maximum(values, SMALLEST_SHARE * values[-1])) if free.size else values
+    errors = 1.0 / np.sqrt(np.maximum(values, SMALLEST_FRACTION * values[-1])) if free.size else values
     found = STEP_IN_ERRORS * errors * vectors / scale[:, None]
     size = np.max(np.abs(found), axis=0, initial=0.0)
     directions[np.ix_(free, free)] = found * (np.clip(size, SMALLEST_STEP, LARGEST_STEP) / size)
@@ -85,7 +85,7 @@ def directions_for(information: Floats, is_fixed: Mask) -> Floats:
 def covariance(information: Floats) -> Floats:
     """Return the inverse of an information matrix; a direction without information gets a huge variance, not none."""
     scale, values, vectors = principal_axes(information)
-    kept = np.maximum(values, SMALLEST_SHARE * values[-1])
+    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
     return np.asarray((vectors / kept) @ vectors.T / np.outer(scale, scale))
 
 
@@ -137,12 +137,12 @@ class Mixture:
         spread = np.sqrt(self.covariances[:, index, index])
         return np.asarray(ndtr((at[:, None] - self.means[:, index]) / spread).mean(axis=1))
 
-    def quantile(self, index: int, share: float, low: float = -math.inf, high: float = math.inf) -> float:
+    def quantile(self, index: int, fraction: float, low: float = -math.inf, high: float = math.inf) -> float:
         """Return the place below which a coordinate lies with a probability, given that it lies between two bounds."""
         from scipy.optimize import brentq
 
         first, last = self.below(index, np.array([low, high]))
-        wanted = first + share * (last - first)
+        wanted = first + fraction * (last - first)
         error = 12.0 * math.sqrt(float(self.covariance[index, index]))
         ends = max(low, float(self.mean[index]) - error), min(high, float(self.mean[index]) + error)
         if not ends[0] < ends[1] or last - first < LEAST:
@@ -159,7 +159,7 @@ class Mixture:
 def inverse_with_root(precision: Floats) -> tuple[Floats, Floats]:
     """Return the inverse of a precision and a root of it; a direction that nothing fixes gets a huge variance."""
     scale, values, vectors = principal_axes(precision)
-    kept = np.maximum(values, SMALLEST_SHARE * values[-1])
+    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
     root = vectors / np.sqrt(kept) / scale[:, None]
     return root @ root.T, root
 
@@ -168,5 +168,5 @@ def solution(precision: Floats, product: Floats) -> Floats:
     """Return the solution of a linear system that does not move along directions that nothing fixes."""
     scale, values, vectors = principal_axes(precision)
     is_fixed = values > FIXED * values[-1]
-    shares = np.where(is_fixed, 1.0 / np.where(is_fixed, values, 1.0), 0.0)
-    return np.asarray((vectors * shares) @ (vectors.T @ (product / scale)) / scale)
+    inverses = np.where(is_fixed, 1.0 / np.where(is_fixed, values, 1.0), 0.0)
+    return np.asarray((vectors * inverses) @ (vectors.T @ (product / scale)) / scale)

@@ -14,7 +14,7 @@ import numpy as np
 from ppafo.identification.trajectory.information import (
     FIXED,
     LEAST,
-    SMALLEST_SHARE,
+    SMALLEST_FRACTION,
     Mixture,
     inverse_with_root,
     principal_axes,
@@ -266,7 +266,7 @@ def _without_columns(model: LinearModel, products: Floats) -> float:
     precision = products[:-1, :-1] + model.precision
     pull = products[:-1, -1] + model.pull
     scale, values, vectors = principal_axes(precision)
-    kept = np.maximum(values, SMALLEST_SHARE * values[-1])
+    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
     along = vectors.T @ (pull / scale)
     size = float(np.sum(np.where(values > FIXED * values[-1], along * along / kept, 0.0)))
     return 0.5 * (size - float(products[-1, -1]) - float(np.sum(np.log(kept)))) - float(np.sum(np.log(scale)))

@@ -205,7 +205,7 @@ class Search:
     loss: Loss = "linear"
     other_starts: int = 0
     seed: int = 1
-    most_evaluations: int = 60
+    maximum_evaluations: int = 60
     confidence: float = 0.95
     identified: float = 0.2
     weak: float = 1.0

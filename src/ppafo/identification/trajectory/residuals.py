@@ -66,7 +66,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
         )
     bare = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     plant = fed_plant(bare, scenario.supply_lines)
-    # The engine allows a share of the supply pressure. Where that pressure is fitted, the error in pascals must stay.
+    # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
     allowed = supply_range(base.plant) / supply_range(plant)
     return replace(
         base,
@@ -128,12 +128,12 @@ def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -
     """Return a state at the times of the samples, by straight lines between records; each run with its offset [s]."""
     if offsets.any():
         return _at_moved_samples(values, prepared, offsets)
-    place, share = prepared.place, prepared.share
+    place, fraction = prepared.place, prepared.fraction
     here = values[place]
-    if not share.any():
+    if not fraction.any():
         return here
     following = values[np.minimum(place + 1, len(values) - 1)]
-    return np.asarray(here + share[:, None] * (following - here))
+    return np.asarray(here + fraction[:, None] * (following - here))
 
 
 def _at_moved_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
@@ -148,7 +148,7 @@ def _at_moved_samples(values: Floats, prepared: PreparedExperiment, offsets: Flo
 Mask = NDArray[np.bool_]
 
 FIRST_STEP = 1.0e-3
-"""Step of a difference before standard errors are known: the share of a number by which it is moved."""
+"""Step of a difference before standard errors are known: the fraction of a number by which it is moved."""
 
 _TOUCH = 1.0e-9
 

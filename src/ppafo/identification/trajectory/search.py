@@ -17,13 +17,13 @@ DRAWS_PER_START = 8
 STAGES = 3
 PASSES = 2
 AT_BOUND = 1.0e-4
-"""Share of a number, or of the way between its bounds if that is less, within which it counts as being at one."""
+"""Fraction of a number, or of the way between its bounds if that is less, within which it counts as being at one."""
 
 _TOLERANCES = (1.0e-4, 3.0e-8)
 """Of the first stage, which only comes near, and of the others."""
 
 _SETTLED = 0.05
-"""A further stage that moves no coordinate by more than this share of its standard error is the last."""
+"""A further stage that moves no coordinate by more than this fraction of its standard error is the last."""
 _WIDEST_DRAW = 1.5
 _NOTABLE = 1.0e-3
 _EXPLAINED = 1.5**2
@@ -126,7 +126,7 @@ def descend(
         xtol=tolerance,
         ftol=tolerance,
         gtol=tolerance,
-        max_nfev=search.most_evaluations,
+        max_nfev=search.maximum_evaluations,
     )
     return Descent(done.x, float(done.cost), int(done.nfev), done.status > 0)
 

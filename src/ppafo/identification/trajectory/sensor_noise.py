@@ -23,7 +23,7 @@ from ppafo.identification.trajectory.whitening import (
 FREEDOMS = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0])
 """Degrees of freedom of a t distribution that are tried; more cannot be distinguished from a normal one."""
 
-MOST_ORDER = 30
+MAXIMUM_ORDER = 30
 _HEAVY_ORDERS = (0, 1, 2, 3, 5, 8, 12, 20)
 _SAMPLES_FOR_EACH = 8
 _HEAVY = 4.0
@@ -64,8 +64,8 @@ class SensorNoise:
         if isinstance(self.shape, Drift):
             size, memory = math.sqrt(self.shape.stationary), -interval / math.log(self.shape.memory)
             return f"white and a drift of {size:.2g} times its size over {memory:.2g} s{tails}{unequal}"
-        told = "white" if self.shape.order == 0 else f"autoregression of {self.shape.order}"
-        return f"{told}{tails}{unequal}"
+        description = "white" if self.shape.order == 0 else f"autoregression of {self.shape.order}"
+        return f"{description}{tails}{unequal}"
 
 
 def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNoise:
@@ -164,7 +164,7 @@ def _relative_levels(segments: Sequence[Floats]) -> Floats:
 def _autoregression(segments: list[Floats]) -> SensorNoise:
     """Return the autoregression with normal innovations whose order has the least criterion."""
     count, shortest = sum(len(one) for one in segments), min(len(one) for one in segments)
-    most = max(0, min(MOST_ORDER, count // _SAMPLES_FOR_EACH, shortest - 2))
+    most = max(0, min(MAXIMUM_ORDER, count // _SAMPLES_FOR_EACH, shortest - 2))
     reflections, left = reflections_of(segments, most)
     scores = [_criterion(-0.5 * count * math.log(left[order]), order + 1, count) for order in range(most + 1)]
     shape = from_reflections(reflections[: int(np.argmin(scores))])

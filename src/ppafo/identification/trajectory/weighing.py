@@ -18,7 +18,7 @@ from ppafo.identification.trajectory.search import Optimum, is_at_bound
 from ppafo.identification.trajectory.sensor_noise import SensorNoise, errors_of, sample_weights, sensor_noise
 from ppafo.identification.trajectory.whitening import from_reflections, reflections_of
 
-MOST_LINES = 3
+MAXIMUM_LINES = 3
 CHANCE = 1.0e-4
 """Chance at which noise alone would be taken for hum, for each sensor."""
 
@@ -33,7 +33,7 @@ def hum_of(segments: Sequence[Floats]) -> tuple[float, ...]:
     found: list[float] = []
     if min(len(one) for one in segments) < _FEWEST_SAMPLES:
         return ()
-    for _ in range(MOST_LINES):
+    for _ in range(MAXIMUM_LINES):
         left = [without_hum(one, tuple(found)) for one in segments]
         line = _strongest_line(left)
         if line is None:
@@ -90,12 +90,12 @@ def _refine_frequency(white: Sequence[Floats], frequency: float, reach: float) -
     return float(found.x)
 
 
-MOST_ROUNDS = 8
+MAXIMUM_ROUNDS = 8
 ESTIMATED_ROUNDS = 2
 """Rounds after which the noise stays as it is, so that the others can settle."""
 
 SETTLED = 0.03
-"""Share of a standard error below which a step is the last."""
+"""Fraction of a standard error below which a step is the last."""
 
 ROUGH = 0.5
 """The same where no step lowers the cost, although the slopes say so."""
@@ -172,13 +172,13 @@ def weigh(found: Optimum, given: Sequence[frozenset[str]]) -> WhitenedFit:
     fixed = is_at_bound(point, residuals.ranges)
     near = residuals.around(point, directions_for(found.information, fixed))
     sensors = _sensors(residuals.experiments, given)
-    for number in range(1, MOST_ROUNDS + 1):
+    for number in range(1, MAXIMUM_ROUNDS + 1):
         sensors = tuple(_estimate_noise(one, near.of_data, number <= ESTIMATED_ROUNDS) for one in sensors)
         model = _linear_model(near, sensors)
         step, information = _step(near, model, sensors)
         errors = np.sqrt(np.diag(inverse_with_root(information)[0]))
         has_settled = bool(np.all(np.abs(step) <= SETTLED * errors))
-        if has_settled or number == MOST_ROUNDS:
+        if has_settled or number == MAXIMUM_ROUNDS:
             break
         directions = directions_for(information, is_at_bound(near.point + step, residuals.ranges))
         further = _damp_step(near, step, directions, Whitening(sensors))

@@ -24,7 +24,7 @@ class DumpedOpening(NamedTuple):
 
 
 def spool_command(command: float) -> float:
-    """What the proportional valve is told: nothing while both chambers vent."""
+    """Command of the proportional valve: none while both chambers vent."""
     return 0.0 if command > VENTS_ABOVE else command
 
 
@@ -56,13 +56,13 @@ def connect_ideal(plant: PlantParameters, shown: DumpedOpening) -> tuple[SingleP
         SinglePort(
             full if vents else port_1.conductance,
             room if vents else port_1.node_pressure,
-            0.0 if vents else port_1.source_share,
+            0.0 if vents else port_1.source_fraction,
             1.0 if vents else port_1.takes_back,
         ),
         SinglePort(
             full if vents else port_2.conductance,
             room if vents else port_2.node_pressure,
-            0.0 if vents else port_2.source_share,
+            0.0 if vents else port_2.source_fraction,
             1.0 if vents else port_2.takes_back,
         ),
     )
@@ -97,12 +97,12 @@ def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -
 
 
 def next_moving_event(valve: MovingProportional, state: SpoolState, command: float, time: float) -> float:
-    """Time [s] at which what is asked for arrives at the command."""
+    """Time [s] at which the requested opening arrives at the command."""
     return proportional.next_moving_event(valve, state, spool_command(command), time)
 
 
 def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
-    """The state with what is asked for at its target, where it has arrived."""
+    """The state with the requested opening at its target, where it has arrived."""
     return proportional.settle_moving(valve, state, spool_command(command), time)
 
 

@@ -2,7 +2,7 @@
 
 A command above 0 energises valve A (chamber 1), below 0 valve B (chamber 2), 0 neither: both chambers vent and the
 foot moves freely. A coil accepts a change at most once in every switching interval; the change reaches the flow after
-the opening or closing delay, and is lost if the coil is told otherwise before that.
+the opening or closing delay, and is lost if the coil is commanded otherwise before that.
 """
 
 import math
@@ -40,7 +40,7 @@ class TimedSolenoid(NamedTuple):
 
 
 class Coil(NamedTuple):
-    """Where the flow is (0 or 1), where the coil was told to go, when it was told and when the flow follows [s]."""
+    """Where the flow is (0 or 1), where the coil was commanded to go, when, and when the flow follows [s]."""
 
     position: float
     target: float
@@ -88,14 +88,14 @@ def accept_time(coil: Coil, switching_interval: float, time: float) -> float:
 
 
 def flow_position(coil: Coil, time: float) -> float:
-    """Position [-] of the flow at ``time`` [s] of a coil that was told nothing new."""
+    """Position [-] of the flow at ``time`` [s] of a coil that has no new command."""
     return coil.target if coil.change_time <= time + SAME_INSTANT else coil.position
 
 
 def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> Coil:
     """A coil at ``time`` [s] with an order standing: the flow moves if it is due, then the order is taken if it may be.
 
-    A change that is still waiting when the coil is told otherwise is lost.
+    A change that is still waiting when the coil is commanded otherwise is lost.
     """
     position = flow_position(coil, time)
     accepts = wanted != coil.target and accept_time(coil, valve.switching_interval, time) <= time + SAME_INSTANT

@@ -152,7 +152,7 @@ def _data(design: Design) -> dict[str, Any]:
             "failures": [{"reason": reason, "task": task} for reason, task in design.failures.items()],
             "seed": problem.search.seed,
             "settled": design.settled,
-            "hypervolume": [{"designs": count, "share": share} for count, share in design.growth],
+            "hypervolume": [{"designs": count, "share": fraction} for count, fraction in design.growth],
         },
         "doubtful": doubts_data(design.doubtful),
         "versions": {"ppafo": __version__},

@@ -26,7 +26,7 @@ _PANELS = (
     ("B", "Error against mass", 0, 2),
     ("C", "Gas per task against mass", 1, 2),
 )
-_MOST_TICKS_OF_ONE_DECADE = 1.5
+_MAXIMUM_TICKS_OF_ONE_DECADE = 1.5
 """Decades above which a logarithmic axis has ticks at powers of ten only."""
 
 
@@ -98,7 +98,7 @@ def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> 
     if not (values.min() > 0.0 and values.max() > _LOGARITHMIC_FROM * values.min()):
         return
     set_scale("log")
-    is_long = np.log10(values.max() / values.min()) > _MOST_TICKS_OF_ONE_DECADE
+    is_long = np.log10(values.max() / values.min()) > _MAXIMUM_TICKS_OF_ONE_DECADE
     axis.set_major_locator(LogLocator(subs=(1.0,) if is_long else (1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
@@ -106,8 +106,8 @@ def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> 
 
 def _growth(axes: "Axes", design: Design) -> None:
     designs = [count for count, _ in design.growth]
-    shares = [share for _, share in design.growth]
-    axes.plot(designs, shares, color=BLUE, marker="o", markersize=3)
+    fractions = [fraction for _, fraction in design.growth]
+    axes.plot(designs, fractions, color=BLUE, marker="o", markersize=3)
     axes.set_title("$\\bf{D}$   Hypervolume of the front", pad=8)
     axes.set_xlabel("Designs tried")
     axes.set_ylabel("Fraction of the box of the first designs")

@@ -24,7 +24,7 @@ from ppafo.walking.strides import SETTLING
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
 
-_MOST_FALLEN = 0.1
+_MAXIMUM_FALLEN = 0.1
 """Fraction of the gas used that may flow back: it waits in the line before the valve, and the next step takes it."""
 
 WALK_FILE = "walk.json"
@@ -89,7 +89,7 @@ def draw_of_recording(recording: Recording, step_time: float | None) -> Draw:
     if recording.duration <= 0.0 or gain <= 0.0:
         raise DataError(f"{recording.label}: no gas was taken from the supply, so a bottle would never be empty")
     fallen = -float(np.minimum(np.diff(supplied), 0.0).sum())
-    if fallen > _MOST_FALLEN * gain:
+    if fallen > _MAXIMUM_FALLEN * gain:
         raise DataError(
             f"{recording.label}: supplied_mass falls by {fallen * GRAMS_PER_KILOGRAM:.3g} g in total while it "
             f"gains {gain * GRAMS_PER_KILOGRAM:.3g} g; it must be cumulative from the start of the recording to "

@@ -38,7 +38,7 @@ def load_fluid(name: str) -> Fluid:
     table = FluidTable(
         gas_constant=content["gas_constant"],
         temperatures=tuple(content["temperatures"]),
-        shares=tuple(content["shares"]),
+        fractions=tuple(content["shares"]),
         densest=tuple(content["densest"]),
         liquid_densities=tuple(content.get("liquid_densities", ())),
         liquid_energies=tuple(content.get("liquid_energies", ())),

@@ -32,7 +32,7 @@ def bound_sentence(valve: str, bounded: Bounded[LowerBound]) -> str:
     )
     if not bounded.played:
         return f"{text}; for a valve that switches infinitely fast, so no run can confirm it"
-    error, gas = (quantity_text(share, "fraction", ".2g") for share in disagreement(bounded))
+    error, gas = (quantity_text(fraction, "fraction", ".2g") for fraction in disagreement(bounded))
     return f"{text}; in the simulation the error agrees within {error}, the gas within {gas}"
 
 

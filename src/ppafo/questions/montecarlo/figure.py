@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _SIZE = (8.4, 3.5)
 _MARGINS = Margins(left=0.85, right=0.2, top=0.55, bottom=0.55, row_gap=0.0, column_gap=0.95)
-_MOST_BINS = 80
+_MAXIMUM_BINS = 80
 
 
 def monte_carlo_figure(estimate: MonteCarlo) -> "Figure":
@@ -47,7 +47,7 @@ def _draw_trace(axes: "Axes", estimate: MonteCarlo) -> None:
 
 def _draw_values(axes: "Axes", estimate: MonteCarlo) -> None:
     values = display_values(estimate.values, metric_quantity(estimate.metric))
-    axes.hist(values, bins=min(_MOST_BINS, max(10, int(np.sqrt(values.size)))), color=BLUE, alpha=0.55)
+    axes.hist(values, bins=min(_MAXIMUM_BINS, max(10, int(np.sqrt(values.size)))), color=BLUE, alpha=0.55)
     threshold = getattr(estimate.statistic, "threshold", None)
     if estimate.statistic.unit != "-" or threshold is None:
         axes.axvline(

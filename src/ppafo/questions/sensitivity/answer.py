@@ -52,7 +52,7 @@ def lead(found: Sensitivity) -> list[str]:
     return [
         f"{found.name}: {method.name}, {settings.samples:,} {method.sizes_label}, {found.runs:,} runs of "
         f"{len(found.paths)} uncertain values; bands with {100.0 * settings.confidence:g} % confidence",
-        f"{found.failures:,} runs failed; up to {100.0 * settings.most_failed:g} % are allowed, and every "
+        f"{found.failures:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
         f"{method.block_label} with a failed run is left out",
     ]
 

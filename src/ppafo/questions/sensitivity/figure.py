@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _WIDTH, _RIGHT_PANEL = 9.6, 1.0
 _LETTER, _LINE = 0.083, 0.27
-_MOST_LINES = 5
+_MAXIMUM_LINES = 5
 _TITLES = {
     "total": "total",
     "first": "first order",
@@ -55,7 +55,7 @@ def _draw_indices(axes: "Axes", found: Sensitivity, metric: OfMetric) -> None:
             values, places + shift, xerr=reach, fmt="o", color=colour, markersize=5, elinewidth=1.4, label=_TITLES[name]
         )
     axes.set_yticks(places, [found.paths[row] for row in order])
-    for label, colour in zip(reversed(axes.get_yticklabels()), COLOURS[:_MOST_LINES], strict=False):
+    for label, colour in zip(reversed(axes.get_yticklabels()), COLOURS[:_MAXIMUM_LINES], strict=False):
         label.set_color(colour)
     axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
     axes.set_xlabel(_unit(found, metric))
@@ -65,7 +65,7 @@ def _draw_indices(axes: "Axes", found: Sensitivity, metric: OfMetric) -> None:
 
 def _draw_settling(axes: "Axes", found: Sensitivity, metric: OfMetric) -> None:
     name = found.method.shown[0]
-    order = np.argsort(-metric.indices.values[name])[:_MOST_LINES]
+    order = np.argsort(-metric.indices.values[name])[:_MAXIMUM_LINES]
     sizes = [each.blocks for each in metric.settling]
     for colour, row in zip(COLOURS, order, strict=False):
         values = _in_display_unit(found, metric, np.array([each.indices.values[name][row] for each in metric.settling]))

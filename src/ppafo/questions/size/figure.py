@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _SIZE = (9.0, 6.6)
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9")
-_MOST_OF_LIMIT = 4.0
+_MAXIMUM_OF_LIMIT = 4.0
 
 
 def sizing_figure(sizing: Sizing) -> "Figure":
@@ -57,7 +57,7 @@ def _errors(axes: "Axes", sizing: Sizing) -> None:
         )
         _mark(axes, item, item.error, colour)
     axes.axhline(limit, color=BLACK, linewidth=1.0, linestyle="--")
-    axes.set_ylim(0.0, _MOST_OF_LIMIT * limit)
+    axes.set_ylim(0.0, _MAXIMUM_OF_LIMIT * limit)
     axes.set_title("$\\bf{B}$   RMS error (N m), limit dashed", pad=8)
     axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
     axes.legend(loc="upper right", fontsize=8)

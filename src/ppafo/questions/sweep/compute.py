@@ -62,7 +62,7 @@ def folders(study: Study) -> tuple[str, ...]:
     """Return the folders in which every chunk has a table."""
     outputs = study.outputs
     kept = [(TRAJECTORIES_FOLDER, outputs.trajectories), (COUNTS_FOLDER, outputs.bands)]
-    return (*(folder for folder, asked in kept if asked), RUNS_FOLDER)
+    return (*(folder for folder, is_requested in kept if is_requested), RUNS_FOLDER)
 
 
 def compute_chunk(task: Task, number: int) -> tuple[Finished, Files]:

@@ -23,10 +23,10 @@ COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
 MOST_METRICS, MOST_CONFIGURATIONS = 9, len(COLOURS)
 _COLUMNS, _PANEL = 3, (3.5, 2.7)
 _HISTOGRAM_BINS = 60
-_MOST_POINTS = 3000
+_MAXIMUM_POINTS = 3000
 _MEDIAN = 0.5
 _OPACITIES = (0.18, 0.32, 0.45)
-MOST_DRAWN = 4_000_000
+MAXIMUM_DRAWN = 4_000_000
 """Runs from which a figure is drawn, spread evenly over all; the numbers beside it are from all of them."""
 
 _GRIDDED = ("grid", "list")
@@ -76,7 +76,7 @@ def _draw_metrics(places: "list[Axes]", panels: list[tuple[str, str]], results: 
 
 def _draw_histogram(axes: "Axes", results: StudyResults, metric: str) -> None:
     """Draw how often each value came, for every configuration."""
-    parts = {name: _metric_values(metric, values) for name, values in results.thin(metric, MOST_DRAWN).items()}
+    parts = {name: _metric_values(metric, values) for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
     parts = {name: values[np.isfinite(values)] for name, values in parts.items()}
     axes.set_xlabel(metric_title(metric))
     axes.set_yticks([])
@@ -101,10 +101,10 @@ def _edges(parts: list[Floats]) -> Floats:
 
 def _draw_over(axes: "Axes", results: StudyResults, path: str, metric: str) -> None:
     """Draw a metric over the one path that varies."""
-    across, values = results.thin(path, MOST_DRAWN), results.thin(metric, MOST_DRAWN)
+    across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
     for name, colour in zip(results.configurations, COLOURS, strict=False):
         order = np.argsort(across[name], kind="stable")
-        order = order[:: max(1, order.size // _MOST_POINTS)]
+        order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
         shown = _path_for_display(results, path, across[name][order])[1]
         axes.plot(shown, _metric_values(metric, values[name])[order], ".-", color=colour, label=name)
     axes.set_xlabel(_path_for_display(results, path, np.zeros(1))[0])
@@ -130,9 +130,9 @@ def _is_map(results: StudyResults) -> bool:
 def _draw_map(axes: "Axes", results: StudyResults, name: str, metric: str) -> None:
     """Draw the mean of a metric over the two paths, for one configuration; white where no run completed."""
     across, upward = _grid_paths(results)
-    columns, column = np.unique(results.thin(across, MOST_DRAWN)[name], return_inverse=True)
-    rows, row = np.unique(results.thin(upward, MOST_DRAWN)[name], return_inverse=True)
-    values = _metric_values(metric, results.thin(metric, MOST_DRAWN)[name])
+    columns, column = np.unique(results.thin(across, MAXIMUM_DRAWN)[name], return_inverse=True)
+    rows, row = np.unique(results.thin(upward, MAXIMUM_DRAWN)[name], return_inverse=True)
+    values = _metric_values(metric, results.thin(metric, MAXIMUM_DRAWN)[name])
     mean = _means(values, row * columns.size + column, rows.size * columns.size).reshape(rows.size, columns.size)
     (x_label, x), (y_label, y) = _path_for_display(results, across, columns), _path_for_display(results, upward, rows)
     mesh = axes.pcolormesh(x, y, mean, shading="nearest", rasterized=True, cmap="cividis")

@@ -32,12 +32,12 @@ BinsOf = Mapping[str, Mapping[str, Bins]]
 def manifest(study: Study, bins: BinsOf) -> dict[str, Any]:
     """Return the document: study, base scenarios in SI units, runs, columns with units; no time and no machine."""
     scenarios = {item.name: _without_origin(item.scenario) for item in study.configurations}
-    asked = {"ppafo": __version__, "study": _plain(study.document), "scenarios": scenarios}
+    requested = {"ppafo": __version__, "study": _plain(study.document), "scenarios": scenarios}
     return {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
-        **asked,
-        "sha256": hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest(),
+        **requested,
+        "sha256": hashlib.sha256(json.dumps(requested, sort_keys=True).encode()).hexdigest(),
         "runs": study.runs,
         "runs_of_configuration": study.runs_of_configuration,
         "chunks": chunk_count(study),
@@ -102,15 +102,15 @@ def stored_bins(document: Mapping[str, Any]) -> BinsOf:
     }
 
 
-def check_same_study(place: Place, stored: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
+def check_same_study(place: Place, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> None:
     """Refuse to go on with the results of another study, or of this one before it was changed."""
-    before, now = stored.get("study", {}), asked["study"]
+    before, now = stored.get("study", {}), requested["study"]
     if before.get("name") != now["name"]:
         raise StudyError(
             f"{place.address}: contains the results of the study '{before.get('name')}', not of '{now['name']}'; "
             "choose another folder"
         )
-    changed = [line for key in _COMPARED for line in _differences(key, stored.get(key), asked[key])]
+    changed = [line for key in _COMPARED for line in _differences(key, stored.get(key), requested[key])]
     if changed:
         named = "; ".join(changed[:_NAMED]) + (f"; and {len(changed) - _NAMED} more" if len(changed) > _NAMED else "")
         raise StudyError(

@@ -89,9 +89,9 @@ class StudyResults(Solved):
         """Return the bands: configuration, channel, time and a column for each quantile."""
         return as_numpy(read_parquet(self.place.open(BANDS), BANDS))
 
-    def thin(self, column: str, most: int) -> dict[str, np.ndarray[Any, Any]]:
-        """Return a column by name of the configuration, of about ``most`` runs in all: every so many of them."""
-        step = -(-int(self.document["runs"]) // most) | 1
+    def thin(self, column: str, maximum: int) -> dict[str, np.ndarray[Any, Any]]:
+        """Return a column by name of the configuration, of about ``maximum`` runs in all: every so many of them."""
+        step = -(-int(self.document["runs"]) // maximum) | 1
         return {name: self._every(name, column, step) for name in self.configurations}
 
     def _every(self, configuration: str, column: str, step: int) -> np.ndarray[Any, Any]:

@@ -27,7 +27,7 @@ _EXAMPLES = 5
 QUANTILE_DEFINITION = (
     "value at place (n - 1) q of the n sorted values, on a line between neighbours (Hyndman and Fan 1996, definition 7)"
 )
-MOST_IN_MEMORY = 16_000_000
+MAXIMUM_IN_MEMORY = 16_000_000
 """Values up to which a column is sorted in memory; beyond, order statistics are looked up digit by digit."""
 
 _DIGIT_BITS, _DIGITS = 16, 4
@@ -155,7 +155,7 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
 
 def quantiles(parts: Parts, count: int, fractions: Sequence[float]) -> dict[float, float]:
     """Return the quantile of each fraction."""
-    if count <= MOST_IN_MEMORY:
+    if count <= MAXIMUM_IN_MEMORY:
         values = np.quantile(np.concatenate(list(parts())), fractions, method="linear", overwrite_input=True)
         return dict(zip(fractions, values.tolist(), strict=True))
     places = {fraction: divmod((count - 1) * fraction, 1.0) for fraction in fractions}

@@ -84,16 +84,16 @@ def _draw_places(axes: "Axes", tuning: Tuning) -> None:
         axes.plot([0.0, 1.0], [row, row], "-", color=GREY, linewidth=1.0)
         for start in tuning.starts:
             axes.plot(
-                item.share(float(item.value(np.array(start.shares[searched.index(item)])))),
+                item.fraction(float(item.value(np.array(start.fractions[searched.index(item)])))),
                 row,
                 "|",
                 color=GREY,
                 markersize=11,
             )
         axes.plot(
-            np.clip(item.share(item.before), -0.05, 1.05), row, "o", color=VERMILION, markersize=7, label="before"
+            np.clip(item.fraction(item.before), -0.05, 1.05), row, "o", color=VERMILION, markersize=7, label="before"
         )
-        axes.plot(item.share(tuning.after.gains[item.path]), row, "o", color=BLUE, markersize=7, label="after")
+        axes.plot(item.fraction(tuning.after.gains[item.path]), row, "o", color=BLUE, markersize=7, label="after")
     axes.set_yticks(rows, [item.path for item in searched])
     axes.set_ylim(-0.6, len(searched) - 0.4)
     axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])

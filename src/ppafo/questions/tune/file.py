@@ -24,7 +24,7 @@ from ppafo.studies.outcomes import check_metrics, difference_of, level_of
 from ppafo.studies.varying import varied_path
 
 LARGEST_SEED = 2**32 - 1
-MOST_DRAWS = 4096
+MAXIMUM_DRAWS = 4096
 
 _STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 _Text = Annotated[str, Field(min_length=1)]
@@ -33,7 +33,7 @@ _Value = Annotated[str | float | int, Field(description="text with unit; a plain
 _Metric = Annotated[_Text, Field(description="name of a metric, such as 'rms_error'")]
 
 
-class Searched(BaseModel):
+class SearchRange(BaseModel):
     """A number that is searched, with the bounds between which it may lie."""
 
     model_config = _STRICT
@@ -78,7 +78,7 @@ class Robust(BaseModel):
     ] = "mean_and_deviations"
     deviations: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
     share: Annotated[float, Field(ge=0.5, lt=1.0)] = 0.9
-    draws: Annotated[int, Field(ge=8, le=MOST_DRAWS)] = 64
+    draws: Annotated[int, Field(ge=8, le=MAXIMUM_DRAWS)] = 64
 
 
 class Effort(BaseModel):
@@ -102,7 +102,7 @@ class TuningFile(BaseModel):
     description: str = ""
     scenario: Annotated[_Text, Field(description="name of a scenario, or a path relative to this file")]
     overrides: Annotated[_Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
-    search: Annotated[tuple[Searched, ...], Field(strict=False, min_length=1)]
+    search: Annotated[tuple[SearchRange, ...], Field(strict=False, min_length=1)]
     objective: Annotated[tuple[Goal, ...], Field(strict=False, min_length=1)]
     constraints: Annotated[tuple[Constraint, ...], Field(strict=False)] = ()
     robust: Annotated[
@@ -177,7 +177,7 @@ def _once(items: Sequence[Goal | Constraint]) -> list[str]:
     return list(dict.fromkeys(item.metric for item in items))
 
 
-def _search_variables(parsed: TuningFile, scenario: Scenario, refusal: Refusal) -> tuple[values.Searched, ...]:
+def _search_variables(parsed: TuningFile, scenario: Scenario, refusal: Refusal) -> tuple[values.SearchRange, ...]:
     paths = [item.path for item in parsed.search]
     repeated = first_twice(paths)
     if repeated is not None:
@@ -185,7 +185,7 @@ def _search_variables(parsed: TuningFile, scenario: Scenario, refusal: Refusal) 
     return tuple(_search_variable(item, scenario, refusal) for item in parsed.search)
 
 
-def _search_variable(item: Searched, scenario: Scenario, refusal: Refusal) -> values.Searched:
+def _search_variable(item: SearchRange, scenario: Scenario, refusal: Refusal) -> values.SearchRange:
     try:
         place = varied_path(item.path, scenario)
         minimum, maximum = place.level(item.minimum), place.level(item.maximum)
@@ -199,7 +199,7 @@ def _search_variable(item: Searched, scenario: Scenario, refusal: Refusal) -> va
     is_logarithmic = item.spacing == "logarithmic"
     if is_logarithmic and minimum <= 0.0:
         raise refusal(f"search '{item.path}': spacing = 'logarithmic' needs a minimum above 0, not {item.minimum!r}")
-    return values.Searched(item.path, minimum, maximum, is_logarithmic, before, place)
+    return values.SearchRange(item.path, minimum, maximum, is_logarithmic, before, place)
 
 
 def _goal(item: Goal, refusal: Refusal) -> values.Goal:

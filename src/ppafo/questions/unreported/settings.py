@@ -40,14 +40,14 @@ class Setting:
     choices: tuple[float, ...] = ()
     words: tuple[str, ...] = ()
 
-    def values_at(self, shares: Floats) -> Floats:
+    def values_at(self, fractions: Floats) -> Floats:
         """Values for fractions from 0 to 1, evenly spread."""
         if self.choices:
-            places = np.minimum((shares * len(self.choices)).astype(np.intp), len(self.choices) - 1)
+            places = np.minimum((fractions * len(self.choices)).astype(np.intp), len(self.choices) - 1)
             return np.array(self.choices)[places]
         if self.is_logarithmic:
-            return np.asarray(self.low * (self.high / self.low) ** shares)
-        return np.asarray(self.low + shares * (self.high - self.low))
+            return np.asarray(self.low * (self.high / self.low) ** fractions)
+        return np.asarray(self.low + fractions * (self.high - self.low))
 
 
 SETTINGS: tuple[Setting, ...] = (

@@ -60,7 +60,7 @@ def verdict(validation: Validation) -> str:
     if validation.passes:
         return f"{validation.device.name} agrees with {count} {noun}: every RMS error is within its limit"
     failed = [
-        f"{channel.channel} in {agreement.file} ({100 * channel.share:.3g} %, limit {100 * channel.limit:.3g} %)"
+        f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
         for agreement in validation.recordings
         for channel in agreement.channels
         if not channel.passes
@@ -132,7 +132,7 @@ def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
     return (
         channel.channel,
         _error(channel, channel.rms),
-        f"{_number(100 * channel.share)} %",
+        f"{_number(100 * channel.fraction)} %",
         f"{_number(100 * channel.limit)} %",
         _error(channel, channel.bias),
         _error(channel, channel.largest),
@@ -192,7 +192,7 @@ def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
     return {
         "unit": channel.unit,
         "rms": channel.rms,
-        "rms_share": channel.share,
+        "rms_share": channel.fraction,
         "limit_share": channel.limit,
         "passes": channel.passes,
         "full_range": channel.full_range,

@@ -25,7 +25,7 @@ _MARGINS = Margins(left=0.68, right=0.15, top=0.72, bottom=0.52, row_gap=0.44, c
 """Inches."""
 _HEIGHTS = (2.4, 1.0)
 _COLOURS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
-_MOST_DOTS = 400
+_MAXIMUM_DOTS = 400
 _NEAR_LIMIT = 0.25
 _SHORT = 3.0
 """Recordings shorter than this [s] have an axis in milliseconds."""
@@ -70,7 +70,7 @@ def _draw_channel(
         return
     colour = _COLOURS.get(name, ACTUAL)
     line = np.interp(times - agreement.delay.correction, model.time, model[name])
-    every = -(-times.size // _MOST_DOTS)
+    every = -(-times.size // _MAXIMUM_DOTS)
     upper.plot(
         scale * times[::every],
         _level_in_display_unit(given, name, atmosphere)[::every],
@@ -80,7 +80,7 @@ def _draw_channel(
         zorder=2,
     )
     upper.plot(scale * times, _level_in_display_unit(line, name, atmosphere), color=colour, linewidth=1.3, zorder=3)
-    upper.set_title(f"{COMPARED[name].title}: RMS {100 * channel.share:.2g} %", color=BLACK)
+    upper.set_title(f"{COMPARED[name].title}: RMS {100 * channel.fraction:.2g} %", color=BLACK)
     upper.set_ylabel(_level_unit(name))
     upper.margins(y=0.06)
     residual = display_values(line - given, quantity)

@@ -20,7 +20,7 @@ SHORTEST, LONGEST = 0.1, 1.0
 """Minutes: enough strides to learn from, and few enough to record every sample of."""
 
 PROFILE_KIND, PROFILE_VALVE = "event_proportional", "proportional"
-"""The controller whose settings say what is desired, on the valve that suits it; every other is told the same."""
+"""The controller whose settings say what is desired, on the valve that suits it; every other gets the same."""
 SWING_ANGLE = "swing_angle"
 COMMON = (*PUSH_OFF_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES, RATE, PERIOD)
 SHORTEST_PUSH_OFF = 0.1
