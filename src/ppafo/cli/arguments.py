@@ -15,7 +15,7 @@ _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
 _NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 
 
-RENAMED = {"--most-failed": "--maximum-failed", "--most": "--maximum"}
+RENAMED = {"--most-failed": "--maximum-failed", "--most": "--maximum", "--runs": "--draws"}
 """Options of version 0.1 and what they are called now."""
 
 

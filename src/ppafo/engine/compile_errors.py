@@ -92,11 +92,9 @@ def _problem(report: Report) -> str:
         if problem:
             return problem
     lines = [line.strip() for line in report.said.splitlines() if line.strip()]
-    lines = [
-        line for line in lines_said if not line.startswith(("Failed in nopython", "During:", "File ", "- Resolution"))
-    ]
+    lines = [line for line in lines if not line.startswith(("Failed in nopython", "During:", "File ", "- Resolution"))]
     where = f"'{report.written}' is not compiled: " if report.written else ""
-    return where + one_line(lines[0] if lines_said else "no reason given")[:_LONGEST]
+    return where + one_line(lines[0] if lines else "no reason given")[:_LONGEST]
 
 
 def _attribute(report: Report) -> str:

@@ -56,7 +56,7 @@ class NoParameters(NamedTuple):
 class Program:
     """One combination of pieces; each combination is compiled once.
 
-    ``angle`` None leaves the vane free, otherwise its angle is prescribed by that profile. ``controller`` None leaves the command
+    ``angle`` None leaves the vane free, otherwise that profile prescribes it. ``controller`` None leaves the command
     to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
     ``slow_sensors`` True a bandwidth and ``late_signals`` True a delay. ``late_commands`` True adds a dead time before
     the valve. ``is_thermal`` True gives the gas an energy balance instead of a constant temperature. ``walks`` True

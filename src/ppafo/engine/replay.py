@@ -60,7 +60,7 @@ class StepInputs:
 
 
 def prescribe_recorded_angle(program: Program) -> Program:
-    """The program with the vane prescribed along a recorded angle, by the parameters ``path.start``, ``.level``, ``.rate``."""
+    """The program with a recorded angle prescribed, by the parameters ``path.start``, ``.level``, ``.rate``."""
     return replace(program, angle=RECORDED_ANGLE)
 
 

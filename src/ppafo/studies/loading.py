@@ -29,11 +29,16 @@ def list_studies() -> tuple[str, ...]:
     return STUDY_FILES.names()
 
 
-def load_study(study: str | Path | Mapping[str, Any], overrides: Sequence[str] = (), runs: int | None = None) -> Study:
+def load_study(
+    study: str | Path | Mapping[str, Any],
+    overrides: Sequence[str] = (),
+    draws: int | None = None,
+    seed: int | None = None,
+) -> Study:
     """Return a study by its name in the package, by the path of a TOML file, or from data laid out as such a file.
 
-    ``overrides`` as on the command line change every configuration; ``runs`` is the number of draws in place of that
-    of the file. StudyError for anything that is not usable.
+    ``overrides`` as on the command line change every configuration; ``draws`` and ``seed`` replace the number of draws
+    and the random seed of the file. StudyError for anything that is not usable.
     """
     if isinstance(study, Mapping):
         STUDY_FILES.check_depth(study, "study")
@@ -41,7 +46,8 @@ def load_study(study: str | Path | Mapping[str, Any], overrides: Sequence[str] =
     else:
         source = _Source(label(str(study)), Path(study).parent, STUDY_FILES.read(study))
         document = STUDY_FILES.parse(source.text, source.file)
-    return _build(_apply_overrides(_with_kinds(document), overrides, runs, source.file), source)
+    changed = _apply_overrides(_with_kinds(document), overrides, {"runs": draws, "seed": seed}, source.file)
+    return _build(changed, source)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +72,22 @@ def _with_kinds(document: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-def _apply_overrides(document: dict[str, Any], overrides: Sequence[str], runs: int | None, file: str) -> dict[str, Any]:
+def _apply_overrides(
+    document: dict[str, Any], overrides: Sequence[str], sample: Mapping[str, int | None], file: str
+) -> dict[str, Any]:
     """Return the document as if what the command line changes stood in the file."""
     parsed = _parse(document, file)
     if overrides:
         for table in document["configurations"]:
             table["overrides"] = [*table.get("overrides", []), *overrides]
-    if runs is not None:
-        if parsed.sample is None:
-            raise StudyError(
-                f"{file}: has no [sample], so the number of runs is that of its grid and cannot be changed"
-            )
-        document["sample"]["runs"] = runs
+    given = {key: value for key, value in sample.items() if value is not None}
+    if given and parsed.sample is None:
+        raise StudyError(
+            f"{file}: has no [sample], so the number of runs is that of its grid and nothing is random: "
+            "it takes neither draws nor a seed"
+        )
+    if given:
+        document["sample"] |= given
     return document
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.cli.whole_numbers import whole_number
+from ppafo.questions.question import whole_number
 
 FULL = Path("/dev/full")
 
@@ -145,9 +145,7 @@ def test_number_or_key_without_end_is_one_line_that_can_be_read(
 def test_count_may_have_its_digits_in_groups_but_not_as_python_refuses_them(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert (
-        whole_number("1__000", "--runs") == whole_number("1_000", "--runs") == whole_number("1,000", "--runs") == 1000
-    )
-    assert main(["sweep", "pressure-and-area", "--runs", "1__0"]) == 2
+    assert whole_number("1__000") == whole_number("1_000") == whole_number("1,000") == 1000
+    assert main(["sweep", "pressure-and-area", "--draws", "1__0"]) == 2
     assert main(["sweep", "pressure-and-area", "--threads", "0"]) == 2
     assert "--threads 0: must be a whole number, 1 or more" in capsys.readouterr().err

@@ -210,8 +210,8 @@ def _tight_leak(
         for number in _numbers(settings, {item.fuller for item in closed}, most, text)
     )
     rises = slope + half < 0.0
-    check = "the pressure difference rises" if rises else "the pressure difference does not rise either"
-    check = Check("nothing flows in", not rises, f"{check}: {-slope * falls[0] * scale:+.3g} Pa/s at first sight")
+    slope_text = "the pressure difference rises" if rises else "the pressure difference does not rise either"
+    check = Check("nothing flows in", not rises, f"{slope_text}: {-slope * falls[0] * scale:+.3g} Pa/s at first sight")
     summary = (
         f"{count_of(len(closed), 'recording')} of closed chambers; no leak is visible, so there is only an upper bound"
     )

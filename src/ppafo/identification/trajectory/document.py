@@ -196,7 +196,7 @@ def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
 
 
 def experiment_without_scenario(item: ExperimentSection, source: Source, setting: Setting) -> Experiment:
-    """Return the experiment of a recording on the device of the set; it begins at the first sample unless stated otherwise."""
+    """Return the experiment of a recording on the device of the set; it begins at the first sample by default."""
     said = f"{setting.file}: experiment '{item.label}'"
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")

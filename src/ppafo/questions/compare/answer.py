@@ -227,8 +227,8 @@ def _skewness_warnings(comparison: Comparison, task: str) -> list[str]:
     """Return a warning for each mean difference that a few draws decide."""
     return [
         f"{name}, task '{task}': the mean difference of {item.metric} has an effective sample size of "
-        f"{item.effective_size:.3g} of {item.pairs:,} draws: do not trust its interval; the probability of being better "
-        "is not affected"
+        f"{item.effective_size:.3g} of {item.pairs:,} draws: do not trust its interval; the probability of being "
+        "better is not affected"
         for name in _others(comparison)
         for item in comparison.pairs(task, name)
         if item.effective_size < min(FEWEST_EFFECTIVE, 0.5 * item.pairs)

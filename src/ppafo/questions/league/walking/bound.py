@@ -1,8 +1,8 @@
 """Minimum error and gas of any control of a valve on the walking task, by optimal control of one stride.
 
-Isothermal gas, the gait, wearer and device of the task, a periodic stride. On the ground the ankle is prescribed as in the
-engine; from toe-off until the foot is flat it moves by the engine's own torques. When the foot lands is a phase that is
-tried out. Sampling, sensors, dead band, delays, spool and recognition of phases are left out: each can only make the
+Isothermal gas, the gait, wearer and device of the task, a periodic stride. On the ground the ankle is prescribed as in
+the engine; from toe-off until the foot is flat it moves by the engine's own torques. The phase in which the foot lands
+is tried out. Sampling, sensors, dead band, delays, spool and recognition of phases are left out: each can only make the
 task harder. What the optimiser finds is a local optimum; that nothing is better is checked only by every controller
 staying above it.
 """

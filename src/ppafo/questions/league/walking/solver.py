@@ -138,8 +138,8 @@ class StrideSolver:
         self._first = guess.unknowns(built, stride)
         self._near: Any = self._first
         self.unmeasurable = MEASURABLE * float(np.max(np.abs(stride.wanted * stride.asks_torque)))
-        weights = stride.grid.weights * stride.asks_torque
-        self.idle_error = float(np.sqrt(np.sum(stride.wanted**2 * weights) / np.sum(weights)))
+        torque_weights = stride.grid.weights * stride.asks_torque
+        self.idle_error = float(np.sqrt(np.sum(stride.wanted**2 * torque_weights) / np.sum(torque_weights)))
 
     def start_from(self, guess: Guess) -> None:
         """Start the next search near a stride."""

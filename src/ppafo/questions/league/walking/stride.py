@@ -41,8 +41,8 @@ class Grid:
 class Stride:
     """A stride whose foot comes down flat at the phase ``landing``, with the gait and what is requested at every point.
 
-    ``wanted`` [N m], ``asks_torque`` and ``asks_freedom`` for each point; ``asks_height`` for each free point; ``prescribed``
-    are the angles [rad] and rates [rad/s] of the points with the foot on the ground; ``begin`` those at toe-off.
+    ``wanted`` [N m], ``asks_torque`` and ``asks_freedom`` for each point; ``asks_height`` for each free point;
+    ``prescribed`` are the angles [rad] and rates [rad/s] of the points on the ground; ``begin`` those at toe-off.
     ``phases`` of the points and ``middle_phases`` of the intervals count on from the heel strike before the toe-off.
     """
 
