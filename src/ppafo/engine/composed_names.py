@@ -61,7 +61,7 @@ class Composer(ast.NodeTransformer):
         return node if value is _INSIDE else self.stand_in(value, node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Replace ``module.name``."""
+        """Replace ``module.name``. ProgramError where it cannot be compiled."""
         value = self.value_of(node)
         if value is not _INSIDE:
             return self.stand_in(value, node)
@@ -71,7 +71,10 @@ class Composer(ast.NodeTransformer):
         return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
-        """Check the arguments of what is called; those that a NamedTuple has of its own are written out."""
+        """Check the arguments of what is called; those that a NamedTuple has of its own are written out.
+
+        ProgramError where one does not fit.
+        """
         called = self.value_of(node.func)
         if called is _INSIDE:
             if isinstance(node.func, ast.Attribute):
@@ -88,7 +91,10 @@ class Composer(ast.NodeTransformer):
         return ast.Call(function, [*arguments, *own], [])
 
     def own_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
-        """Fields of a NamedTuple after those given by place, where some have the defaults of its class; else none."""
+        """Fields of a NamedTuple after those given by place, where some have the defaults of its class; else none.
+
+        ProgramError where they do not fit.
+        """
         if any(isinstance(item, ast.Starred) for item in node.args):
             return []  # how many there are is known only to the compiler
         is_function = isinstance(called, types.FunctionType)
@@ -110,7 +116,7 @@ class Composer(ast.NodeTransformer):
         ]
 
     def value_of(self, node: ast.expr) -> Any:
-        """What a name or ``module.name`` stands for outside the function."""
+        """What a name or ``module.name`` stands for outside the function. ProgramError where it has no value."""
         if isinstance(node, ast.Name):
             return self.global_value(node)
         if not isinstance(node, ast.Attribute):
@@ -126,7 +132,7 @@ class Composer(ast.NodeTransformer):
         return value
 
     def global_value(self, node: ast.Name) -> Any:
-        """What a global name stands for now."""
+        """What a global name stands for now. ProgramError where it has no value."""
         if node.id in self.local:
             return _INSIDE
         scope = self.function.__globals__
@@ -141,7 +147,7 @@ class Composer(ast.NodeTransformer):
         return getattr(builtins, node.id)
 
     def stand_in(self, value: Any, node: ast.expr) -> ast.expr:
-        """What is written for a value from outside."""
+        """What is written for a value from outside. ProgramError where it is nothing that can be compiled."""
         # ``inf`` and ``nan`` of math are written by name, as they are in most sources.
         if isinstance(node, ast.Attribute) and self.value_of(node.value) is math:
             return self.global_name("math", node.attr, node)
@@ -160,7 +166,7 @@ class Composer(ast.NodeTransformer):
         return self.literal(value, node, f"'{name}'")
 
     def global_name(self, module: str, name: str, node: ast.expr) -> ast.expr:
-        """A name of the generated module, which no local name may hide."""
+        """A name of the generated module, which no local name may hide. ProgramError where a local name hides it."""
         first = module or name
         if first in self.local:
             raise self.refuse(node, f"the local name '{first}' hides '{ast.unparse(node)}'; give it another name")
@@ -169,7 +175,7 @@ class Composer(ast.NodeTransformer):
         return ast.Attribute(ast.Name(module, ast.Load()), name, ast.Load())
 
     def literal(self, value: Any, where: ast.AST, name: str) -> ast.expr:
-        """A constant, to the last bit: a number, or a tuple or NamedTuple of them."""
+        """A constant, to the last bit: a number, or a tuple or NamedTuple of them. ProgramError for anything else."""
         if type(value) in (float, np.float64):
             size: ast.expr = ast.Constant(abs(float(value)))
             return ast.UnaryOp(ast.USub(), size) if math.copysign(1.0, value) < 0.0 else size

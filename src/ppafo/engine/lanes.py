@@ -56,7 +56,7 @@ class Clock:
 
 
 def samples_in(steps: int, interval: float) -> int:
-    """Number of samples every ``interval`` steps from step 0 to a number of steps, both among them."""
+    """Number of samples, one every ``interval`` steps [-] from step 0 to a number of steps, both included."""
     return math.floor((steps + SAME_MOMENT) / interval) + 1
 
 

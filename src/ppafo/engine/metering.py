@@ -24,7 +24,10 @@ def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] 
 
 
 def group_of(name: str, groups: dict[str, type], rows: Floats) -> Any:
-    """The NamedTuple of a group of rows (rows, runs), such as ``Program.state_rows`` names, with arrays (runs,)."""
+    """The NamedTuple of a group of rows (rows, runs), such as ``Program.state_rows`` names, with arrays (runs,).
+
+    KeyError where no group has that name.
+    """
     start = 0
     for group, row in groups.items():
         count = len(leaf_paths(row, group))
@@ -35,6 +38,6 @@ def group_of(name: str, groups: dict[str, type], rows: Floats) -> Any:
 
 
 def meters_of(program: Program, states: Floats) -> dict[str, Any]:
-    """The last state of each meter by its name, with arrays (runs,)."""
+    """The last state of each meter by its name, with arrays (runs,), in the units of the meter."""
     groups = program.state_rows()
     return {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}

@@ -58,7 +58,7 @@ def place(file: str, line: int) -> str:
 
 
 def check_grammar(tree: ast.FunctionDef, file: str) -> None:
-    """Refuse what is not compiled, the first of it in the file."""
+    """Refuse what is not compiled, the first of it in the file. ProgramError names the file and the line."""
     problems = list(_problems(tree))
     if problems:
         where, problem = min(problems, key=lambda item: (item[0].lineno, item[0].col_offset))
@@ -96,7 +96,10 @@ def _problem(node: ast.AST) -> str:
 
 
 def check_flow(tree: ast.FunctionDef, file: str, local: Iterable[str]) -> None:
-    """Refuse a function that can end without a value, or read one of its ``local`` names before it has a value."""
+    """Refuse a function that can end without a value, or read one of its ``local`` names before it has a value.
+
+    ProgramError names the file and the line.
+    """
     arguments = tree.args
     given = {item.arg for item in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)}
     if _Flow(file, set(local)).end_of(tree.body, given) is not None:

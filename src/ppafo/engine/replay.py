@@ -33,7 +33,7 @@ def segment_value(segment: Segment, time: float) -> tuple[float, float, float]:
 
 
 def segment_bounds(_segment: Segment) -> tuple[float, float]:
-    """No bounds: the next piece may lead anywhere between the stops."""
+    """Bounds [rad] of a segment: none, because the next one may lead anywhere between the stops."""
     return -math.inf, math.inf
 
 

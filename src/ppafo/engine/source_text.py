@@ -130,7 +130,7 @@ class SourceCollector:
 
 
 def check_is_plain(function: Any) -> None:
-    """Refuse what is no plain function: its source text would not be what Python runs."""
+    """Refuse what is no plain function: its source text would not be what Python runs. ProgramError says why."""
     name = getattr(function, "__qualname__", None) or repr(function)
     if type(function) is not FunctionType:
         if not callable(function):
@@ -155,7 +155,10 @@ def place_of(item: Any) -> str:
 
 
 def parse_definition(function: FunctionType) -> ast.FunctionDef:
-    """The definition of a plain function with the lines of its file; refused where it is not what Python runs."""
+    """The definition of a plain function with the lines of its file; refused where it is not what Python runs.
+
+    ProgramError where the definition cannot be read or is not what Python runs.
+    """
     code = function.__code__
     file, name = code.co_filename, function.__qualname__
     try:

@@ -155,7 +155,10 @@ class ProblemFile(BaseModel):
 
 
 def load_problem(path: str | Path) -> ProblemFile:
-    """Return the problem in a TOML file; paths in it begin in its folder."""
+    """Return the problem in a TOML file; paths in it begin in its folder.
+
+    IdentificationError for a file that is not usable.
+    """
     try:
         content = read_regular_file(Path(path), MAXIMUM_BYTES_TYPED)
     except (OSError, ValueError) as error:
@@ -164,7 +167,10 @@ def load_problem(path: str | Path) -> ProblemFile:
 
 
 def parse_problem(content: bytes, file: str) -> ProblemFile:
-    """Return the problem in the bytes of a TOML file; ``file`` is what messages call it."""
+    """Return the problem in the bytes of a TOML file; ``file`` is what messages call it.
+
+    IdentificationError for one that is not usable.
+    """
     document = _with_hyphens(_FILE.parse(content, file))
     try:
         problem = ProblemFile.model_validate(document)

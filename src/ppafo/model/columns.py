@@ -50,12 +50,12 @@ def whole(number: Any) -> Any:
 
 
 def at(number: Any, run: int) -> float:
-    """The number of one run."""
+    """The number of one run, in its own unit."""
     return float(number[run]) if isinstance(number, np.ndarray) else float(number)
 
 
 def first(number: Any) -> float:
-    """The number of the first run."""
+    """The number of the first run, in its own unit."""
     return at(number, 0)
 
 

@@ -38,7 +38,7 @@ class Landing(NamedTuple):
 
 
 def is_free(contact: float) -> bool:
-    """True where the foot moves by its own dynamics."""
+    """True where the foot moves by its own dynamics; ``contact`` [-] is one of the states above."""
     return contact < 1.5
 
 
@@ -48,7 +48,7 @@ def foot_angle(shank: float, ankle: float) -> float:
 
 
 def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float) -> Ankle:
-    """What the ground prescribes: a flat foot leaves the ankle to the shank, on the toes it is as measured."""
+    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, on the toes it is as measured."""
     flat = contact < 2.5
     return Ankle(
         now.shank + QUARTER_TURN - ground_angle if flat else now.ankle,
@@ -79,7 +79,7 @@ SETTLES = 3.0
 
 
 def heel_fraction(contact: float, timing: GaitTiming, phase: float, toes_first: float) -> float:
-    """Fraction of the ground force under the heel: all while it rolls there, none on the toes, straight between.
+    """Fraction [-] of the ground force under the heel: all while it rolls there, none on the toes, straight between.
 
     A foot that met the ground with its toes (``toes_first`` 1) has none under the heel at first.
     """

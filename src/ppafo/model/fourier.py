@@ -49,7 +49,7 @@ class Harmonics(NamedTuple):
 
 
 def harmonics(turns: float) -> Harmonics:
-    """Cosines and sines of all harmonics at a phase in turns, by doubling and adding angles."""
+    """Cosines and sines [-] of all harmonics at a phase in turns, by doubling and adding angles."""
     s1, c1 = sine_and_cosine(turns)
     c2, s2 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
     c3, s3 = c2 * c1 - s2 * s1, s2 * c1 + c2 * s1

@@ -66,13 +66,16 @@ NOTHING_SEEN = GaitSeen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def lagged_reading(shown: float, true: float, follow_rate: float, step: float) -> float:
-    """What a first-order sensor shows after a step [s]; ``follow_rate`` [1/s] is the inverse of its time constant."""
+    """What a first-order sensor shows after a step [s]; ``follow_rate`` [1/s] is the inverse of its time constant.
+
+    Both readings are in the sensor's unit.
+    """
     fraction = follow_rate * step
     return shown + (true - shown) * fraction / (1.0 + fraction)
 
 
 def faulty(fault: Fault, reading: float, last: float, time: float) -> float:
-    """A reading as a sensor with a fault gives it."""
+    """A reading at ``time`` [s] as a sensor with a fault gives it, in the sensor's unit."""
     stuck = last if fault.holds > 0.5 else fault.reading
     return stuck if time >= fault.time else reading
 
@@ -84,12 +87,12 @@ def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, ch
 
 
 def previous_reading(last: float, reading: float, sample: int) -> float:
-    """What a sensor showed before; before the first sample it showed the same, as one that has settled."""
+    """The reading before, in the sensor's unit; before the first sample the same, as of a sensor that has settled."""
     return last if sample > 0 else reading
 
 
 def hold_if_lost(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
-    """A reading, or the last one where the sample is lost."""
+    """A reading, or the last one where the sample is lost, in the sensor's unit; ``lost_share`` [-] are lost."""
     return last if unit_noise(seed, sample, channel) < lost_share else reading
 
 
@@ -106,7 +109,7 @@ def measure_gait(
     time: float,
     sample: int,
 ) -> tuple[GaitMeasurement, GaitSeen]:
-    """Measurement of one sample with bandwidth, noise, steps, lost samples and faults, and what to remember of it."""
+    """Measurement [SI] of a sample with bandwidth, noise, steps, loss and faults, and what to remember of it."""
     seed = int(sensors.seed)
     # A sensor has settled before the walk begins.
     angle_memory = gait_sensors.angle_memory if sample > 0 else 0.0

@@ -16,13 +16,13 @@ FIT_POINTS = 400
 
 
 def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve of equations (6), (7) for a gas; within 3e-7 of the exact function below ``linear_ratio``."""
+    """Fitted curve [-] of equations (6), (7) for a gas; within 3e-7 of the exact function below ``linear_ratio``."""
     coefficients = over_runs(_isentropic_coefficients, heat_capacity_ratio)
     return _curve(critical_pressure_ratio(heat_capacity_ratio), linear_ratio, coefficients)
 
 
 def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve of ISO 6358 for a critical ratio b; within 1e-5 of the exact function below ``linear_ratio``.
+    """Fitted curve [-] of ISO 6358 for a critical ratio b; within 1e-5 of the exact function below ``linear_ratio``.
 
     The exact function depends on (1 - r) / (1 - b) alone, so one fit, scaled, serves every b.
     """

@@ -122,7 +122,7 @@ def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pres
 
 
 def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers for a steady opening from -1 to 1: above 0 feeds chamber 1 and vents 2. Equation (8)."""
+    """Ports of both chambers for a steady opening [-], -1 to 1: above 0 feeds chamber 1 and vents 2. Equation (8)."""
     conductance = abs(opening) * plant.valve_conductance
     feeds_1 = opening >= 0.0
     node_1 = plant.supply_pressure if feeds_1 else plant.atmospheric_pressure

@@ -104,7 +104,7 @@ def halves(value: int) -> int:
 
 
 def standard_noise(seed: int, sample: int, channel: int) -> float:
-    """Random number of mean 0 and variance 1 for one sample of one channel: twelve uniforms added up.
+    """Random number [-] of mean 0 and variance 1 for one sample of one channel: twelve uniforms added up.
 
     The sum is within 6 and has an excess kurtosis of -0.1, near enough to normal for a sensor.
     """
@@ -124,7 +124,7 @@ def unit_noise(seed: int, sample: int, channel: int) -> float:
 
 
 def quantise(value: float, quantum: float) -> float:
-    """``value`` rounded to a whole number of ``quantum`` (half upwards); unchanged where that is 0."""
+    """``value`` rounded to a whole number of ``quantum`` of the same unit (half upwards); unchanged where that is 0."""
     safe = quantum if quantum > 0.0 else 1.0
     rounded = quantum * float(int(value / safe + 0.5)) if value >= 0.0 else -quantum * float(int(0.5 - value / safe))
     return rounded if quantum > 0.0 else value

@@ -10,7 +10,7 @@ TERMS = 9
 
 
 def sine_and_cosine(turns: float) -> tuple[float, float]:
-    """Sine and cosine of a number of turns, good to 1e-9: power series within a quarter turn of the nearest half turn.
+    """Sine and cosine [-] of a number of turns to 1e-9: power series within a quarter turn of the nearest half turn.
 
     A library sine cannot run in many lanes at once.
     """

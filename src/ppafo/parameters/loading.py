@@ -42,7 +42,10 @@ def load_parameter_set(name_or_path: str | Path) -> ParameterSet:
 
 
 def parse_parameter_set(content: bytes, file: str) -> ParameterSet:
-    """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it."""
+    """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it.
+
+    ParameterError for one that is not usable.
+    """
     document = _FILE.parse(content, file)
     _find_valves(document)
     try:

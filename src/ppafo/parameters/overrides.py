@@ -57,7 +57,8 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
     Naming another gas brings that gas's molar mass and heat capacity ratio; giving an orifice in the form of ISO 6358
     drops its area and discharge coefficient, and the reverse. ``supply.pressure`` is that of both regulators where both
-    have one, unless ``supply.dorsiflexion_pressure`` is given apart.
+    have one, unless ``supply.dorsiflexion_pressure`` is given apart. ParameterError for an override that does not fit
+    the set.
     """
     chosen = chosen_valve(parameter_set, valve)
     orders = list(overrides)

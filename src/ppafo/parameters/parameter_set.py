@@ -52,7 +52,10 @@ class ParameterSet:
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
-    """Return the name of the valve to use: the requested one, else the set's default."""
+    """Return the name of the valve to use: the requested one, else the set's default.
+
+    ParameterError where the set has no such valve.
+    """
     name = valve or parameter_set.default_valve
     if name not in parameter_set.valve_kinds:
         known = ", ".join(parameter_set.valve_kinds)
@@ -62,7 +65,10 @@ def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
 
 
 def atmospheric_pressure(parameter_set: ParameterSet) -> float:
-    """Return the pressure [Pa absolute] from which the set's gauge pressures count."""
+    """Return the pressure [Pa absolute] from which the set's gauge pressures count.
+
+    ParameterError where it is not given as absolute.
+    """
     entry = parameter_set.numbers.get(ATMOSPHERE_PATH)
     if entry is None:
         return STANDARD_ATMOSPHERE

@@ -76,7 +76,10 @@ _FILE = TomlKind("file of column maps", "columns", resources.files("ppafo.storag
 
 
 def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
-    """Return a column map of a TOML file by its name; without a name the file's only one."""
+    """Return a column map of a TOML file by its name; without a name the file's only one.
+
+    DataError where it has no such map, or several and no name is given.
+    """
     file = label(str(path))
     document = _FILE.parse(_FILE.read(path), file)
     try:

@@ -22,7 +22,7 @@ MAXIMUM_BYTES_RECORDED = 2_000_000_000
 
 
 def read_bytes(path: str | Path, most: int = MAXIMUM_BYTES_RECORDED) -> bytes:
-    """Return the content of a regular file that is there and is not empty, refused above ``most`` bytes."""
+    """Return the content of a regular file; DataError where it is absent, empty or above ``most`` bytes."""
     try:
         content = read_regular_file(Path(path), most)
     except (OSError, ValueError) as error:

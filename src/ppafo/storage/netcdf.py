@@ -58,7 +58,10 @@ def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None
 
 
 def read_netcdf(path: str | Path) -> Recording:
-    """Return the recording in a NetCDF file; one that points outside itself or unpacks to far more is refused."""
+    """Return the recording in a NetCDF file; one that points outside itself or unpacks to far more is refused.
+
+    DataError says what is wrong with it.
+    """
     content = read_bytes(path)
     try:
         return _recording(content, path)

@@ -56,7 +56,10 @@ _UNMARKED: dict[str, dict[str, tuple[str, ...]]] = {
 
 
 def marked_folder(command: str) -> FolderKind:
-    """Return the kind of folder that a command writes which marks it by ``MARK``."""
+    """Return the kind of folder that a command writes which marks it by ``MARK``.
+
+    Its list of files is a DataError where another command wrote the folder.
+    """
 
     def files_of(folder: Path) -> set[str]:
         if marking_command(folder) != command:
@@ -109,7 +112,7 @@ def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: st
 
 
 def check_owned_folder(folder: Path, kind: FolderKind) -> None:
-    """Refuse a folder that holds anything of somebody else's, or that cannot be made."""
+    """Refuse a folder that holds anything of somebody else's, or that cannot be made. It is a DataError."""
     if os.path.isdir(folder):  # noqa: PTH112  # Path.is_dir raises where no file can have the name
         _check_own(folder, kind)
     elif os.path.lexists(folder):
@@ -124,7 +127,7 @@ def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: Folder
 
 
 def read_json(path: Path) -> Any:
-    """Return what a JSON file of ours holds, as plain data."""
+    """Return what a JSON file of ours holds, as plain data. DataError where it is none."""
     try:
         return json_document(read_bytes(path, _MAXIMUM_BYTES_WRITTEN))
     except ValueError as error:

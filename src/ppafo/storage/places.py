@@ -28,15 +28,21 @@ class Place(Protocol):
         ...
 
     def names(self) -> frozenset[str]:
-        """Return the names of all files in it and in its folders, none where it does not exist."""
+        """Return the names of all files in it and in its folders, none where it does not exist.
+
+        DataError where the place is a file.
+        """
         ...
 
     def open(self, name: str) -> io.BufferedIOBase:
-        """Return a file for reading; OSError where there is none."""
+        """Return a file for reading; OSError where there is none. OSError where it is no regular file."""
         ...
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file, replacing an earlier one; DataError where that is not possible."""
+        """Write a file, replacing an earlier one; DataError where that is not possible.
+
+        DataError where it cannot be written.
+        """
         ...
 
     def remove(self, name: str) -> None:
@@ -79,14 +85,17 @@ class DiskFolder:
         return str(self.folder)
 
     def names(self) -> frozenset[str]:
-        """Return the names of all files, those left aside by a killed process not among them."""
+        """Return the names of all files, those left aside by a killed process not among them.
+
+        DataError where it is a file.
+        """
         if self.folder.exists() and not self.folder.is_dir():
             raise DataError(f"{self.folder}: is a file; the results need a folder")
         files = (path for path in self.folder.rglob("*") if not path.is_dir() and LEFT_ASIDE not in path.name)
         return frozenset(path.relative_to(self.folder).as_posix() for path in files)
 
     def open(self, name: str) -> io.BufferedIOBase:
-        """Return a file for reading."""
+        """Return a file for reading. OSError where it is no regular file."""
         path = self.folder / name
         if not stat.S_ISREG(path.stat().st_mode):
             raise OSError(None, f"{path} is not a regular file")
@@ -131,7 +140,7 @@ class RemoteFolder:
         return io.BytesIO(self.system.cat_file(f"{self.root}/{name}"))
 
     def write(self, name: str, content: bytes) -> None:
-        """Put a file whole."""
+        """Put a file whole. DataError where it cannot be written."""
         try:
             self.system.makedirs(f"{self.root}/{name}".rpartition("/")[0], exist_ok=True)
             self.system.pipe_file(f"{self.root}/{name}", content)

@@ -18,7 +18,7 @@ WALK_RECORDING = "recording.nc"
 def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
     """Return the recording in a ``.nc`` or ``.csv`` file, or in a result folder or that of a walk.
 
-    Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute].
+    Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
     """
     place = Path(path)
     if place.is_dir():

@@ -37,7 +37,7 @@ except MemoryError:
 def check_can_be_read(path: Path, module: str, function: str, library: str) -> None:
     """Refuse a file on which ``function(path)`` of a module brings down a process, or which it refuses itself.
 
-    Memory is limited where the system can do it.
+    Memory is limited where the system can do it. DataError says why.
     """
     if not sys.executable or not path.is_file():
         return

@@ -78,7 +78,7 @@ def measure_agreement(run: Run, outcome: BatchResult, reference: ReferenceResult
 
 
 def plant_states(run: Run, outcome: BatchResult) -> Floats:
-    """The seven numbers of ``PlantState`` at each record (records, 7) of the first run in a result."""
+    """The seven numbers [SI] of ``PlantState`` at each record (records, 7) of the first run in a result."""
     paths = [path for name, row in run.program.state_rows().items() for path in leaf_paths(row, name)]
     first = paths.index("state.angle")
     return outcome.record[:, first : first + 7, 0]

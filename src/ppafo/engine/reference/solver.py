@@ -52,13 +52,13 @@ def load_right_hand_side(run: Run) -> Callable[..., None]:
 
 
 def right_hand_side_parameters(run: Run) -> Floats:
-    """The numbers that ``fill`` needs, in its order."""
+    """The numbers [SI] that ``fill`` needs, in its order."""
     groups = (run.plant, run.thermal, run.valve_orifice, run.leak_orifice, run.valve, run.path, run.sensor_rates)
     return np.array([number for group in groups for number in numbers(group)])
 
 
 def solve_reference(run: Run, tolerance: float = 1e-10) -> ReferenceResult:
-    """Solve a run with relative tolerance ``tolerance``; records at the run's record times.
+    """Solve a run to a relative tolerance [-]; the result [SI] is recorded at the run's record times.
 
     SimulationError where the extra ``reference`` is not installed or the solver gives up.
     """

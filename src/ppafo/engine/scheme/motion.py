@@ -61,7 +61,7 @@ class PrescribedStep(NamedTuple):
 
 
 def direction_of(value: float) -> float:
-    """Sign of a number: 1, -1 or 0."""
+    """Sign of a number [-]: 1, -1 or 0."""
     return (1.0 if value > 0.0 else 0.0) - (1.0 if value < 0.0 else 0.0)
 
 

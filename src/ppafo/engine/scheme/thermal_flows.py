@@ -167,7 +167,7 @@ def flow_response(slopes: FlowSlopes, content_1: float, content_2: float) -> The
 
 
 def combine_flows(one: ThermalFlows, factor_one: float, other: ThermalFlows, factor_other: float) -> ThermalFlows:
-    """Two sets of rates, each times a factor, added."""
+    """Two sets of rates [kg/s], each times a factor [-], added."""
     return ThermalFlows(
         factor_one * one.content_1 + factor_other * other.content_1,
         factor_one * one.content_2 + factor_other * other.content_2,

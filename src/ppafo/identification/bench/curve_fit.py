@@ -58,7 +58,7 @@ class LackOfFit:
 
 
 def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Sequence[Floats] = ()) -> LackOfFit:
-    """Return the lack of fit that widens intervals most, over numbers of blocks, in the order of samples and others.
+    """Return the lack of fit [-] that widens intervals most, over numbers of blocks, along samples and other orders.
 
     ``along`` are variables over which a misfit may run besides, such as a pressure. Readings that have some are steady
     ones, whose noise may differ from place to place; in a course of time a misfit may fill one block alone.
@@ -81,7 +81,7 @@ def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Se
 
 
 def quantile(confidence: float, freedom: int) -> float:
-    """Return the two-sided quantile of Student's distribution."""
+    """Return the two-sided quantile [-] of Student's distribution."""
     from scipy.stats import t
 
     return float(t.ppf(0.5 + confidence / 2.0, freedom))
@@ -95,7 +95,7 @@ def exceeds_chance(between: float, within: float, freedom: int, inner_freedom: i
 
 
 def jackknife(values_without: Sequence[Floats], confidence: float) -> Floats:
-    """Return half widths from the values that were fitted without each block in turn."""
+    """Return half widths (numbers,), in their units, from the values fitted without each block in turn."""
     stacked = np.array(values_without)
     count = stacked.shape[0]
     variance = (count - 1) / count * ((stacked - stacked.mean(axis=0)) ** 2).sum(axis=0)
@@ -194,7 +194,7 @@ def fit_curve(
     confidence: float,
     along: Sequence[Floats] = (),
 ) -> CurveFit:
-    """Return the bounded least-squares fit with, for each value, the widest of three intervals.
+    """Return the bounded least-squares fit; for each value, in its unit, the widest of three intervals.
 
     1. The variance is that of as many samples as are worth one on their own, where each resembles the one before.
     Where the law misses the samples by more than they scatter, in their order or ``along`` other variables
@@ -208,7 +208,7 @@ def fit_curve(
 def solve_curve(
     residuals_of: Callable[[Floats], Floats], start: Floats, lower: Floats, upper: Floats, confidence: float
 ) -> CurveFit:
-    """Return the bounded least-squares fit with the first of these intervals; enough to compare laws with."""
+    """Return the bounded least-squares fit, each value in its unit with the first of these intervals."""
     found = _BoundedProblem(residuals_of, lower, upper).solve(start)
     residuals, inverse = np.asarray(found.fun), _inverse(np.asarray(found.jac))
     spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
@@ -249,7 +249,7 @@ def _widen(fit: CurveFit, problem: _BoundedProblem, missing: LackOfFit, confiden
 
 
 def effective_samples(residuals: Floats) -> float:
-    """Return how many independent samples the residuals are worth, from how much each resembles the one before."""
+    """Return the effective sample size [-] of residuals, from how much each resembles the one before."""
     total = float(residuals @ residuals)
     if residuals.size < 3 or total == 0.0:
         return float(residuals.size)

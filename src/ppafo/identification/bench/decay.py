@@ -82,7 +82,10 @@ class Decay(NamedTuple):
 
 
 def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
-    """Return the decay in a recording between two times [s]; without a start it begins where the speed is largest."""
+    """Return the decay in a recording between two times [s]; without a start it begins where the speed is largest.
+
+    IdentificationError where too few samples are left.
+    """
     check_moves(source, PROCEDURE, "angle")
     part = window(source.recording, start, end)
     if len(part) < MINIMUM_SAMPLES:
@@ -147,7 +150,7 @@ def _check_velocity(source: Source, time: Floats, angle: Floats, measured: Float
 
 
 def noise_of(values: Floats) -> float:
-    """Return the scatter from sample to sample, from second differences; never nothing, so that it can be a weight."""
+    """Return the scatter, in the unit of the values, from second differences; never 0, so that it can be a weight."""
     return max(float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6.0)), _SMALLEST_NOISE * float(np.ptp(values)))
 
 

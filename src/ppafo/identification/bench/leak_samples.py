@@ -83,7 +83,10 @@ class ClosedChambers(NamedTuple):
 
 
 def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChambers:
-    """Return the chambers of a recording between its start and equal pressures."""
+    """Return the chambers of a recording between its start and equal pressures.
+
+    IdentificationError where too few samples are left.
+    """
     check_moves(source, PROCEDURE, "pressure_1")
     part = window(source.recording, settings.start, settings.end)
     _check_samples(source, part)
@@ -137,7 +140,7 @@ def _volume_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
 
 
 def volume_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
-    """Return the volume of the fuller chamber over that of the other; 0 where one of them is not known."""
+    """Return the volume of the fuller chamber over that of the other [-]; 0 where one of them is not known."""
     if settings.volume_1 is None or settings.volume_2 is None:
         return 0.0
     ratio = settings.volume_1 / settings.volume_2

@@ -55,7 +55,7 @@ class _Readings(NamedTuple):
 def steady_leak(
     sources: tuple[Source, ...], opening: Opening, confidence: float, calibration: float = 0.0
 ) -> BenchResult:
-    """Return the leak's size where the law of an opening describes flow over pressures, else the law that does.
+    """Return the leak's size [SI] where the law of an opening describes flow over pressures, else the law that does.
 
     Where the pressures differ enough, the zero of the flow meter is fitted with the law and reported.
     """

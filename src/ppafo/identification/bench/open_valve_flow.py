@@ -67,7 +67,7 @@ class OpenReadings:
 
     @property
     def steps(self) -> Floats:
-        """The ratio in coarse steps: sorted by its own noise, residuals would run with it where the law is right."""
+        """The ratio [-] in coarse steps: sorted by its own noise, residuals would follow it though the law is right."""
         return np.round(self.ratio / _RATIO_STEP)
 
 
@@ -125,7 +125,10 @@ def _check_source(source: Source, gas: GasAt) -> None:
 
 
 def open_readings(sources: tuple[Source, ...]) -> OpenReadings:
-    """Return the readings with the valve fully open; exchanged pressures and a valve that never was are refused."""
+    """Return the readings with the valve fully open; exchanged pressures and a valve that never was are refused.
+
+    IdentificationError says which.
+    """
     upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
     is_open = np.concatenate([_is_open(source) for source in sources])
     if is_open.sum() < MINIMUM_SAMPLES:

@@ -70,7 +70,7 @@ class BenchResult:
 
 
 def verdict_of(value: float, low: float, high: float, scale: float | None = None, is_capped: bool = False) -> Verdict:
-    """Return what an interval says of a value; ``scale`` stands in for a value that may well be zero.
+    """Return the verdict on a value and its interval, all in one unit; ``scale`` replaces a value that may be zero.
 
     ``is_capped`` says that the model does not explain the recordings, so that the value belongs to this model only.
     """
@@ -171,7 +171,7 @@ class Evidence:
 
 
 def prospect_of(name: str, half_width: float, size: float, where: str) -> Prospect:
-    """Return whether a number can be had, from half the width that scatter and design alone would give it.
+    """Return whether a number can be identified, from half the width [in its unit] that scatter and design alone give.
 
     Slow disturbances and a law that misses widen an interval later; nothing makes it narrower.
     """

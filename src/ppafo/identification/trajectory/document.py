@@ -68,7 +68,7 @@ def trajectory_from_dict(
 
 
 def trajectory_problem(section: TrajectorySection, setting: Setting) -> TrajectoryProblem:
-    """Return the problem of a section."""
+    """Return the problem of a section. IdentificationError where it repeats what the bench settles."""
     experiments = tuple(_experiment(item, setting) for item in section.experiments)
     scenarios = {item.label: item.scenario for item in experiments}
     twice = common_use(setting.used, map(use_of, experiments))
@@ -196,7 +196,10 @@ def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
 
 
 def experiment_without_scenario(item: ExperimentSection, source: Source, setting: Setting) -> Experiment:
-    """Return the experiment of a recording on the device of the set; it begins at the first sample by default."""
+    """Return the experiment of a recording on the device of the set; it begins at the first sample by default.
+
+    IdentificationError where a scenario is needed.
+    """
     said = f"{setting.file}: experiment '{item.label}'"
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")

@@ -55,7 +55,7 @@ class Experiment:
 
 
 def check_experiment(experiment: Experiment) -> None:
-    """Refuse an experiment that cannot be fitted; the message begins with its label."""
+    """Refuse an experiment that cannot be fitted; the message begins with its label. It is an IdentificationError."""
     said = f"experiment '{experiment.label}'"
     if len(experiment.recording) < 2:
         raise IdentificationError(f"{said}: {experiment.recording.label} has only one sample")
@@ -194,7 +194,7 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 
 def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
-    """Return the scenario with numbers replaced, by paths of ``declared_numbers``; a time offset is none of it."""
+    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``; a time offset is none of it."""
     return numbers.with_numbers(scenario, {path: number for path, number in changed.items() if path != TIME_OFFSET})
 
 

@@ -36,7 +36,10 @@ LARGE = 0.3
 
 
 def step_remarks(residuals: Residuals, point: Floats, signals: list[dict[str, Floats]]) -> tuple[str, ...]:
-    """Return a sentence for each experiment whose steps are too long; ``signals`` are its runs by channel."""
+    """Return a sentence for each experiment whose steps are too long; ``signals`` are its runs by channel.
+
+    ``point`` is in coordinates, signals are in SI units.
+    """
     remarks = []
     for prepared, coarse in zip(residuals.experiments, signals, strict=True):
         finer = with_half_steps(prepared, numbers_in(prepared.label, residuals.ranges, point))

@@ -65,16 +65,16 @@ class LinearModel:
 
     @property
     def residuals(self) -> Floats:
-        """Residuals of the samples at the point."""
+        """Residuals [-] of the samples at the point, over their standard deviation."""
         return self.columns[:, -1]
 
     @property
     def slopes(self) -> Floats:
-        """Slopes of the residuals."""
+        """Slopes of the residuals [-] with respect to the coordinates."""
         return self.columns[:, :-1]
 
     def segments(self, values: Floats, sensor: int) -> list[Floats]:
-        """Return the samples of a sensor, recording by recording."""
+        """Return the samples of a sensor, recording by recording, in the unit of the values."""
         return [values[place] for place in self.sensors[sensor]]
 
 
@@ -120,7 +120,7 @@ def draw_posterior(
 
 
 def whiten(model: LinearModel, noises: Sequence[SensorNoise], weights: Sequence[Sequence[Floats]]) -> Floats:
-    """Return the columns whitened by the noise of the sensors, of variance 1 each."""
+    """Return the columns whitened by the noise of the sensors, of variance 1 [-] each."""
     found = np.zeros_like(model.columns)
     for places, noise, parts in zip(model.sensors, noises, weights, strict=True):
         for place, level, weight in zip(places, noise.levels, parts, strict=True):

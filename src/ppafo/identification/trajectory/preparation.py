@@ -115,19 +115,19 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
 
 
 def prepare_times(label: str, scenario: Scenario, samples: Samples, numbers: Mapping[str, float]) -> PreparedExperiment:
-    """Return samples of a scenario's run made ready, at ``numbers`` by path."""
+    """Return samples of a scenario's run made ready, at ``numbers`` [SI] by path."""
     return _plan(label, scenario, samples, numbers, None)
 
 
 def with_half_steps(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> PreparedExperiment:
-    """Return the experiment with steps half as long and a quarter of the allowed error."""
+    """Return the experiment at ``numbers`` [SI] with steps half as long and a quarter of the allowed error."""
     scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
     run = plan_run(with_numbers(scenario, numbers))
     return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
 def noise_of(values: Floats) -> float:
-    """Return the standard deviation of white noise on a smooth signal, from third differences that are not unusual.
+    """Return the standard deviation of white noise [unit of the signal], from third differences that are not unusual.
 
     What the signal itself does between four samples counts as noise where it is larger; a few jumps do not matter.
     """

@@ -70,7 +70,7 @@ class ChannelFit:
 def channel_fits(
     requested: Sequence[Experiment], experiments: Sequence[PreparedExperiment], signals: Sequence[dict[str, Floats]]
 ) -> tuple[ChannelFit, ...]:
-    """Return what is left in every channel; ``signals`` are those of the fitted runs, by channel."""
+    """Return what is left in every channel [SI]; ``signals`` are those of the fitted runs, by channel."""
     return tuple(
         _channel_fit(experiment, channel, values[channel.name] - channel.values)
         for experiment, prepared, values in zip(requested, experiments, signals, strict=True)
@@ -167,7 +167,10 @@ class TrajectoryFit:
     optimum: Optimum
 
     def estimate(self, name: str) -> Estimate:
-        """Return the estimate of a parameter by its path; ``valve.area`` means the valve of the first experiment."""
+        """Return the estimate of a parameter by its path; ``valve.area`` means the valve of the first experiment.
+
+        IdentificationError where it was not fitted.
+        """
         full = full_path(name, self.scenarios[0])
         for estimate in self.estimates:
             if estimate.path == full:

@@ -43,7 +43,10 @@ class Optimum:
 
 
 def optimum(residuals: Residuals, search: Search, report: Report = report_nothing) -> Optimum:
-    """Return the best optimum of all starts; ``report`` hears what is being done."""
+    """Return the best optimum of all starts; ``report`` hears what is being done.
+
+    IdentificationError where the model diverges at every start.
+    """
     best: Optimum | None = None
     nested = _nested_descent(residuals, search, report)
     evaluations = 0 if nested is None else nested.evaluations
@@ -100,7 +103,10 @@ class Descent:
 def descend(
     residuals: Residuals, start: Floats, directions: Floats, search: Search, tolerance: float = _TOLERANCES[-1]
 ) -> Descent:
-    """Return where the trust region ends from one start, with fixed steps of differences."""
+    """Return where the trust region ends from one start, with fixed steps of differences.
+
+    Points and directions are in units of the coordinates, ``tolerance`` is relative [-].
+    """
     from scipy.optimize import least_squares
 
     low, high = coordinate_bounds(residuals.ranges)
@@ -158,7 +164,7 @@ def _descend_holding(residuals: Residuals, start: Floats, is_held: Mask, search:
 
 
 def is_at_bound(point: Floats, ranges: Sequence[Range]) -> Mask:
-    """Return which coordinates sit at a bound."""
+    """Return which coordinates, in their units, are at a bound."""
     low, high = coordinate_bounds(ranges)
     return np.asarray(np.minimum(point - low, high - point) <= AT_BOUND * np.minimum(high - low, 1.0))
 

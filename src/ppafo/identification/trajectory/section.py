@@ -163,7 +163,10 @@ class Setting:
 
 @contextmanager
 def name_in_refusals(file: str) -> Iterator[None]:
-    """Begin the line of every refusal with the file, where it does not yet."""
+    """Begin the line of every refusal with the file, where it does not yet.
+
+    IdentificationError and DataError keep their kind.
+    """
     try:
         yield
     except (IdentificationError, DataError) as error:
@@ -173,7 +176,7 @@ def name_in_refusals(file: str) -> Iterator[None]:
 
 
 def quantity_of(said: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the number in a text in ``unit``, or refuse it; ``said`` is file and key."""
+    """Return the number in a text in ``unit``; IdentificationError where it is none. ``said`` is file and key."""
     try:
         return parse_quantity(text, unit, atmosphere)
     except UnitError as error:
@@ -181,7 +184,10 @@ def quantity_of(said: str, text: str, unit: str, atmosphere: float = STANDARD_AT
 
 
 def noise_of_channels(given: Mapping[str, str], said: str) -> dict[str, float]:
-    """Return the standard deviations [rad], [Pa] that are given by channel."""
+    """Return the standard deviations [rad], [Pa] that are given by channel.
+
+    IdentificationError for a channel that has none here.
+    """
     for name in given:
         if name not in _NOISE_UNITS:
             hint = nearest_name(name, _NOISE_UNITS)

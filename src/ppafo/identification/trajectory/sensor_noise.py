@@ -69,7 +69,7 @@ class SensorNoise:
 
 
 def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNoise:
-    """Return the noise that explains residuals of one sensor best; ``is_given`` says that its size is at least 1."""
+    """Return the noise [-] that explains a sensor's residuals best; ``is_given`` says that its size is at least 1."""
     whole = np.concatenate(segments)
     white = from_reflections(np.zeros(0))
     if float(np.mean(whole * whole)) < max(_LEAST, 1.0 if is_given else 0.0):
@@ -97,12 +97,12 @@ def sample_weights(noise: SensorNoise, segments: Sequence[Floats]) -> list[Float
 
 
 def errors_of(shape: Shape, segment: Floats) -> Floats:
-    """Return the whitened samples with all weights 1."""
+    """Return the whitened samples [-] with all weights 1."""
     return shape.rows(segment[:, None], np.ones(len(segment)))[0][:, 0]
 
 
 def t_likelihood(errors: Floats, freedoms: Floats) -> Floats:
-    """Return the log likelihood of errors under t distributions of scale 1, one for each of ``freedoms``."""
+    """Return the log likelihood [-] of errors under t distributions of scale 1, one for each of ``freedoms``."""
     from scipy.special import gammaln
 
     half = 0.5 * freedoms
@@ -112,13 +112,13 @@ def t_likelihood(errors: Floats, freedoms: Floats) -> Floats:
 
 
 def previous_samples(segment: Floats, order: int) -> Floats:
-    """Return what a sample is predicted from, (samples after the first ``order``, order), the latest first."""
+    """Return what predicts a sample [its unit], (samples after the first ``order``, order), the latest first."""
     windows = np.lib.stride_tricks.sliding_window_view(segment[:-1], order)
     return windows[:, ::-1]
 
 
 def profile_likelihood(shape: Shape, segments: Sequence[Floats], weights: Sequence[Floats]) -> tuple[float, float]:
-    """Return the log likelihood at the best common level, and that level."""
+    """Return the log likelihood [-] at the best common level, and that level."""
     squares, logs, count = 0.0, 0.0, 0
     for one, weight in zip(segments, weights, strict=True):
         whitened, spread = shape.rows(one[:, None], weight)
@@ -130,7 +130,7 @@ def profile_likelihood(shape: Shape, segments: Sequence[Floats], weights: Sequen
 
 
 def drift_of(numbers: Floats, is_zeroed: bool) -> Drift:
-    """Return the drift with these logarithms of ratio and of memory in samples."""
+    """Return the drift with these logarithms of the ratio [-] and of the memory in samples."""
     return Drift(math.exp(float(numbers[0])), math.exp(-math.exp(-float(numbers[1]))), is_zeroed)
 
 
@@ -245,7 +245,7 @@ def _heavy_of_order(segments: list[Floats], order: int) -> SensorNoise:
 
 
 def regression_of(segments: Sequence[Floats], weights: Sequence[Floats], order: int) -> tuple[Floats, Floats]:
-    """Return the coefficients of an autoregression by weighted least squares, and their precision at level 1."""
+    """Return the coefficients [-] of an autoregression by weighted least squares, and their precision at level 1."""
     precision, product = np.zeros((order, order)), np.zeros(order)
     for one, weight in zip(segments, weights, strict=True):
         before, after = previous_samples(one, order), weight[order:]

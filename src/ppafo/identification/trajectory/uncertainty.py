@@ -74,17 +74,17 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
 
 
 def half_width(evidence: Evidence, index: int) -> float:
-    """Return half the width of the interval, in coordinates."""
+    """Return half the width of the interval, in units of the coordinate."""
     return 0.5 * float(evidence.interval[1][index] - evidence.interval[0][index])
 
 
 def interval_factor(confidence: float) -> float:
-    """Return the standard errors on each side of an interval with this confidence, 1.96 for 95 %."""
+    """Return the standard errors [-] on each side of an interval with this confidence, 1.96 for 95 %."""
     return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
 def relative_half_width(evidence: Evidence, index: int, half: float) -> float:
-    """Return a half width in coordinates relative to the number; to its range where the search began at zero."""
+    """Return a half width in coordinates over the number [-]; over its range where the search began at zero."""
     return relative_to_number(evidence.ranges[index], float(evidence.point[index]), half)
 
 
@@ -98,14 +98,14 @@ def relative_to_number(item: Range, at: float, half: float) -> float:
 
 
 def partners(evidence: Evidence, index: int) -> list[tuple[str, float]]:
-    """Return the parameters that trade against one, with the correlation, strongest first."""
+    """Return the parameters that trade against one, with the correlation [-], strongest first."""
     row = evidence.correlation[index]
     order = [int(other) for other in np.argsort(-np.abs(row)) if other != index and abs(row[other]) >= STRONG]
     return [(evidence.ranges[other].name, float(row[other])) for other in order[:_MAXIMUM_PARTNERS]]
 
 
 def half_width_alone(evidence: Evidence, index: int) -> float:
-    """Return half the width that the interval would have if all other parameters were known."""
+    """Return half the width of the interval, in units of the coordinate, if all other parameters were known."""
     information = float(evidence.information[index, index])
     factor = interval_factor(evidence.search.confidence)
     return factor * math.sqrt(evidence.inflation / information) if information > 0.0 else math.inf
@@ -219,7 +219,7 @@ class Uncertainty:
 
 
 def uncertainty_of(found: WhitenedFit, search: Search, low: Floats, high: Floats) -> Uncertainty:
-    """Return the uncertainty at an optimum whose noise is known; ``low`` and ``high`` bound the coordinates."""
+    """Return the uncertainty at an optimum of known noise; ``low`` and ``high`` [unit] bound the coordinates."""
     point = found.optimum.point
     kept = len(point)
     mixture, shown = draw_posterior(found.model, found.noises, kept, search.seed)

@@ -29,7 +29,7 @@ _FEWEST_SAMPLES = 64
 
 
 def hum_of(segments: Sequence[Floats]) -> tuple[float, ...]:
-    """Return the frequencies of hum in a sensor's recordings, in cycles per sample."""
+    """Return the frequencies of hum [cycles per sample] in a sensor's recordings."""
     found: list[float] = []
     if min(len(one) for one in segments) < _FEWEST_SAMPLES:
         return ()
@@ -43,13 +43,13 @@ def hum_of(segments: Sequence[Floats]) -> tuple[float, ...]:
 
 
 def hum_columns(count: int, frequencies: Sequence[float]) -> Floats:
-    """Return a cosine and a sine of each frequency at ``count`` samples, (samples, columns)."""
+    """Return a cosine and a sine [-] of each frequency [cycles per sample] at ``count`` samples, (samples, columns)."""
     phases = 2.0 * math.pi * np.outer(np.arange(count), np.array(frequencies))
     return np.hstack([np.cos(phases), np.sin(phases)])
 
 
 def without_hum(segment: Floats, frequencies: Sequence[float]) -> Floats:
-    """Return the samples less what sinusoids of these frequencies explain."""
+    """Return the samples, in their unit, less what sinusoids of these frequencies [cycles per sample] explain."""
     if not frequencies:
         return segment
     columns = hum_columns(len(segment), frequencies)
@@ -135,7 +135,7 @@ class Whitening:
     sensors: tuple[Sensor, ...]
 
     def of(self, values: Floats) -> Floats:
-        """Return columns (samples, columns) whitened."""
+        """Return columns (samples, columns) whitened [-]."""
         found = np.zeros_like(values)
         for sensor in self.sensors:
             for place, level, weight in zip(sensor.places, sensor.noise.levels, sensor.weights, strict=True):

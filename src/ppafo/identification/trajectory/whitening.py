@@ -36,7 +36,7 @@ class AutoRegression:
         return len(self.spreads) - 1
 
     def rows(self, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
-        """Return whitened columns (samples, columns) and the logarithm of the spread of each sample."""
+        """Return whitened columns [-] (samples, columns) and the logarithm of the spread of each sample."""
         roots = np.sqrt(weights)
         whitened = _prediction_errors(values, self.predictors, self.spreads) * roots[:, None]
         stages = np.minimum(np.arange(len(values)), self.order)
@@ -72,17 +72,17 @@ class Drift:
         return self.ratio if self.is_zeroed else self.stationary
 
     def rows(self, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
-        """Return whitened columns (samples, columns) and the logarithm of the spread of each sample."""
+        """Return whitened columns [-] (samples, columns) and the logarithm of the spread of each sample."""
         gains, spreads = _gains(1.0 / weights, self.memory, self.ratio, self.first)
         return _innovations(values, gains, spreads, self.memory), np.log(spreads)
 
     def path(self, values: Floats, weights: Floats, normals: Floats) -> tuple[Floats, Floats]:
-        """Return the drift, drawn given the samples, and its variance; normals of 0 give its mean."""
+        """Return the drift [unit of values], drawn given the samples, and its variance; normals of 0 give its mean."""
         drawn: tuple[Floats, Floats] = _smooth(values, 1.0 / weights, self.memory, self.ratio, self.first, normals)
         return drawn
 
     def heavy_likelihood(self, values: Floats, level: float, freedom: float) -> float:
-        """Return the log likelihood of samples whose white part has a t distribution, by a sum of normal ones."""
+        """Return the log likelihood [-] of samples whose white part has a t distribution, by a sum of normal ones."""
         weights, nodes = t_nodes(freedom)
         total: float = _mixture_likelihood(values / level, self.memory, self.ratio, self.first, weights, nodes)
         return total - len(values) * math.log(level)
@@ -92,7 +92,7 @@ Shape = AutoRegression | Drift
 
 
 def t_nodes(freedom: float) -> tuple[Floats, Floats]:
-    """Return weights and precisions of normal distributions whose sum is a t distribution, nearly."""
+    """Return weights [-] and precisions [-] of normal distributions whose sum is a t distribution, nearly."""
     weights, freedoms, logarithms = _table_of_nodes()
     place = float(np.clip(np.interp(math.log(freedom), freedoms, np.arange(len(freedoms))), 0.0, len(freedoms) - 1.001))
     first = int(place)
@@ -111,7 +111,7 @@ def _table_of_nodes() -> tuple[Floats, Floats, Floats]:
 
 
 def from_reflections(reflections: Floats) -> AutoRegression:
-    """Return the autoregression with these reflection coefficients, all between -1 and 1 (Levinson's recursion)."""
+    """Return the autoregression with these reflection coefficients [-], all between -1 and 1 (Levinson's recursion)."""
     order = len(reflections)
     predictors = np.zeros((order + 1, max(order, 1)))
     for stage, reflection in enumerate(reflections, start=1):
@@ -123,13 +123,13 @@ def from_reflections(reflections: Floats) -> AutoRegression:
 
 
 def from_coefficients(coefficients: Floats) -> AutoRegression | None:
-    """Return the autoregression with these coefficients; None where noise like that would grow without end."""
+    """Return the autoregression with these coefficients [-]; None where noise like that would grow without end."""
     reflections: Floats = _step_down(np.array(coefficients))
     return None if np.any(np.abs(reflections) >= 1.0) else from_reflections(reflections)
 
 
 def reflections_of(segments: list[Floats], most: int) -> tuple[Floats, Floats]:
-    """Return reflection coefficients and the variance left after each, 0 to ``most`` (Burg's method, pooled)."""
+    """Return reflection coefficients [-] and the variance left after each, 0 to ``most`` (Burg's method, pooled)."""
     ahead, behind = [one[1:] for one in segments], [one[:-1] for one in segments]
     reflections, left = np.zeros(most), np.zeros(most + 1)
     left[0] = sum(float(one @ one) for one in segments) / sum(len(one) for one in segments)

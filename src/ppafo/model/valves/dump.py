@@ -24,12 +24,12 @@ class DumpedOpening(NamedTuple):
 
 
 def spool_command(command: float) -> float:
-    """Command of the proportional valve: none while both chambers vent."""
+    """Command [-] of the proportional valve: 0 while both chambers vent."""
     return 0.0 if command > VENTS_ABOVE else command
 
 
 def vent_chambers(openings: Openings, command: float) -> Openings:
-    """Openings with both chambers vented where the command says so."""
+    """Openings [-] with both chambers vented where the command says so."""
     vents = command > VENTS_ABOVE
     return Openings(
         0.0 if vents else openings.source_1,
@@ -42,7 +42,7 @@ def vent_chambers(openings: Openings, command: float) -> Openings:
 def advance_ideal(
     valve: IdealProportional, state: NoValveState, command: float, time: float, step: float
 ) -> tuple[DumpedOpening, NoValveState]:
-    """What the valves show during the step."""
+    """Opening [-] and venting during the step [s], and the state at its end."""
     opening, after = proportional.advance_ideal(valve, state, spool_command(command), time, step)
     return DumpedOpening(opening, 1.0 if command > VENTS_ABOVE else 0.0), after
 
@@ -69,30 +69,30 @@ def connect_ideal(plant: PlantParameters, shown: DumpedOpening) -> tuple[SingleP
 
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
-    """Openings at an instant."""
+    """Openings [-] at an instant."""
     return vent_chambers(proportional.instant_ideal(valve, state, spool_command(command)), command)
 
 
 def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
-    """The opening that the command asks for."""
+    """Opening [-] that the command requests, taken at once."""
     return proportional.settle_ideal(valve, state, spool_command(command), time)
 
 
 def advance_moving(
     valve: MovingProportional, state: SpoolState, command: float, time: float, step: float
 ) -> tuple[Openings, SpoolState]:
-    """Mean openings during the step and the spool at its end."""
+    """Mean openings [-] during the step [s] and the spool at its end."""
     openings, after = proportional.advance_moving(valve, state, spool_command(command), time, step)
     return vent_chambers(openings, command), after
 
 
 def instant_moving(valve: MovingProportional, state: SpoolState, command: float) -> Openings:
-    """Openings at an instant."""
+    """Openings [-] at an instant."""
     return vent_chambers(proportional.instant_moving(valve, state, spool_command(command)), command)
 
 
 def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -> SpoolState:
-    """Rates of the spool."""
+    """Rates [1/s] of the spool."""
     return proportional.rates_moving(valve, state, spool_command(command))
 
 
@@ -102,7 +102,7 @@ def next_moving_event(valve: MovingProportional, state: SpoolState, command: flo
 
 
 def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
-    """The state with the requested opening at its target, where it has arrived."""
+    """The state with the requested opening [-] at its target, where it has arrived."""
     return proportional.settle_moving(valve, state, spool_command(command), time)
 
 
@@ -125,5 +125,5 @@ MOVING = replace(
 
 
 def choose(settings: Mapping[str, float]) -> ValveModel:
-    """The ideal model where nothing moves, else the moving one."""
+    """The ideal model where nothing moves, else the moving one, from ``settings`` [SI]."""
     return IDEAL if proportional.choose(settings) is proportional.IDEAL else MOVING

@@ -93,7 +93,7 @@ def slew_opening(requested: float, target: float, slew_limit: float, step: float
 
 
 def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float:
-    """Mean over a step of the part of an opening that is above 0; exact where it runs straight or keeps its sign."""
+    """Mean over a step of the positive part of an opening [-]; exact where it runs straight or keeps its sign."""
     higher = max(opening, next_opening)
     lower = min(opening, next_opening)
     crosses = higher > 0.0 and lower < 0.0
@@ -104,7 +104,7 @@ def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float
 def advance_moving(
     valve: MovingProportional, state: SpoolState, command: float, time: float, step: float
 ) -> tuple[Openings, SpoolState]:
-    """Mean openings during the step and the spool at its end; the request changes its rate at the beginning only."""
+    """Mean openings [-] in a step [s] and the spool at its end; the request changes its rate at the beginning only."""
     settled = settle_moving(valve, state, command, time)
     target = opening_of_command(command, valve.dead_band)
     requested, slew = slew_opening(settled.requested, target, valve.slew_limit, step)
@@ -138,7 +138,7 @@ def shift_of_spool(state: SpoolState, next_state: SpoolState) -> float:
 
 
 def openings_of(opening: float) -> Openings:
-    """Fractions of the full area for an opening from -1 to 1 (clipped there); above 0 feeds chamber 1. Equation (8)."""
+    """Fractions [-] of the full area for an opening from -1 to 1 (clipped); above 0 feeds chamber 1. Equation (8)."""
     clipped = max(-1.0, min(1.0, opening))
     towards_1 = max(clipped, 0.0)
     towards_2 = max(-clipped, 0.0)
@@ -146,27 +146,27 @@ def openings_of(opening: float) -> Openings:
 
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
-    """Openings at an instant of a valve that follows its command at once."""
+    """Openings [-] at an instant of a valve that follows its command at once."""
     return openings_of(opening_of_command(command, valve.dead_band))
 
 
 def rates_ideal(valve: IdealProportional, state: NoValveState, command: float) -> NoValveState:
-    """Nothing moves by itself."""
+    """Rates [1/s]: none, nothing moves by itself."""
     return NoValveState(0.0)
 
 
 def never_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> float:
-    """Nothing changes between two commands."""
+    """Time [s] of the next change: none between two commands."""
     return math.inf
 
 
 def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
-    """The opening that the command asks for."""
+    """Opening [-] that the command requests, taken at once."""
     return NoValveState(opening_of_command(command, valve.dead_band))
 
 
 def instant_moving(valve: MovingProportional, state: SpoolState, command: float) -> Openings:
-    """Openings at an instant."""
+    """Openings [-] at an instant."""
     return openings_of(state.opening)
 
 
@@ -187,7 +187,7 @@ def next_moving_event(valve: MovingProportional, state: SpoolState, command: flo
 
 
 def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
-    """The state with the requested opening at its target, where it has arrived or no slew limit holds it."""
+    """The state with the requested opening [-] at its target, where it has arrived or no slew limit holds it."""
     target = opening_of_command(command, valve.dead_band)
     if abs(target - state.requested) > SAME_INSTANT * valve.slew_limit:
         return state
@@ -235,12 +235,12 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
 
 
 def prepare_ideal(settings: Mapping[str, float]) -> IdealProportional:
-    """Parameters of the ideal valve."""
+    """Parameters of the ideal valve from ``settings`` [SI]."""
     return IdealProportional(settings["dead_band"], 1.0 / (1.0 - settings["dead_band"]))
 
 
 def prepare_moving(settings: Mapping[str, float]) -> MovingProportional:
-    """Parameters of the moving valve."""
+    """Parameters of the moving valve from ``settings`` [SI]."""
     limit = settings["slew_limit"] or NO_SLEW_LIMIT
     return MovingProportional(
         settings["dead_band"], limit, settings["spool_frequency"], settings["spool_damping_ratio"]
@@ -300,7 +300,7 @@ MOVING = ValveModel(
 
 
 def choose(settings: Mapping[str, float]) -> ValveModel:
-    """The ideal model where nothing moves, else the moving one."""
+    """The ideal model where nothing moves, else the moving one, from ``settings`` [SI]."""
     at_once = settings["spool_frequency"] == 0.0 and settings["slew_limit"] == 0.0 and settings["delay"] == 0.0
     return IDEAL if at_once else MOVING
 

@@ -56,14 +56,14 @@ class PairState(NamedTuple):
 
 
 def coil_commands(command: float) -> tuple[float, float]:
-    """What a command asks of valves A and B: 1 energised, 0 not. Equation (14)'s two voltages."""
+    """Commands [-] of valves A and B: 1 energised, 0 not. Equation (14)'s two voltages."""
     return (1.0 if command > 0.0 and command < VENTS_ABOVE else 0.0), (1.0 if command < 0.0 else 0.0)
 
 
 def advance_ideal(
     valve: IdealSolenoid, state: PairPositions, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairPositions]:
-    """Positions during the step of a pair that follows its command at once."""
+    """Positions [-] during the step [s] of a pair that follows its command at once."""
     position_a, position_b = coil_commands(command)
     positions = PairPositions(position_a, position_b)
     return positions, positions
@@ -134,51 +134,51 @@ def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, tim
 def advance_timed(
     valve: TimedSolenoid, state: PairState, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairState]:
-    """Positions during one part of a step, at whose beginning all that is due happens, and both coils."""
+    """Positions [-] during one part [s] of a step, at whose beginning all that is due happens, and both coils."""
     settled = settle_timed(valve, state, command, time)
     return PairPositions(settled.coil_a.position, settled.coil_b.position), settled
 
 
 def instant_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> Openings:
-    """Openings at an instant of a pair that follows its command at once."""
+    """Openings [-] at an instant of a pair that follows its command at once."""
     position_a, position_b = coil_commands(command)
     return Openings(position_a, 1.0 - position_a, position_b, 1.0 - position_b)
 
 
 def rates_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> PairPositions:
-    """Nothing moves by itself."""
+    """Rates [1/s]: none, nothing moves by itself."""
     return PairPositions(0.0, 0.0)
 
 
 def never_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time: float) -> float:
-    """Nothing changes between two commands."""
+    """Time [s] of the next change: none between two commands."""
     return math.inf
 
 
 def settle_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time: float) -> PairPositions:
-    """The positions that the command asks for."""
+    """Positions [-] that the command requests, taken at once."""
     return PairPositions(*coil_commands(command))
 
 
 def instant_timed(valve: TimedSolenoid, state: PairState, command: float) -> Openings:
-    """Openings at an instant."""
+    """Openings [-] at an instant."""
     position_a, position_b = state.coil_a.position, state.coil_b.position
     return Openings(position_a, 1.0 - position_a, position_b, 1.0 - position_b)
 
 
 def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairState:
-    """Nothing moves between two events."""
+    """Rates [1/s]: none, nothing moves between two events."""
     still = Coil(0.0, 0.0, 0.0, 0.0)
     return PairState(still, still)
 
 
 def prepare_ideal(settings: Mapping[str, float]) -> IdealSolenoid:
-    """Parameters of the ideal pair."""
+    """Parameters of the ideal pair from ``settings`` [SI]."""
     return IdealSolenoid()
 
 
 def prepare_timed(settings: Mapping[str, float]) -> TimedSolenoid:
-    """Parameters of the pair with delays."""
+    """Parameters [s] of the pair with delays."""
     return TimedSolenoid(settings["opening_delay"], settings["closing_delay"], settings["switching_interval"])
 
 
@@ -236,7 +236,7 @@ TIMED = ValveModel(
 
 
 def choose(settings: Mapping[str, float]) -> ValveModel:
-    """The ideal model where no time matters, else the timed one."""
+    """The ideal model where no time [s] matters, else the timed one."""
     return TIMED if any(value > 0.0 for value in settings.values()) else IDEAL
 
 

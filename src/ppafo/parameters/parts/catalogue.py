@@ -40,7 +40,10 @@ class Catalogue:
     groups: Mapping[str, Mapping[str, Part]]
 
     def part(self, group: str, name: str) -> Part:
-        """Return a part by its group (``valves``, ``bottles``, ...) and name."""
+        """Return a part by its group (``valves``, ``bottles``, ...) and name.
+
+        ParameterError with the nearest name where there is none.
+        """
         parts = self.groups[group]
         if name not in parts:
             known = ", ".join(parts) or "none"
@@ -60,7 +63,10 @@ def load_catalogue(name_or_path: str | Path = DEFAULT) -> Catalogue:
 
 
 def parse_catalogue(content: bytes, file: str) -> Catalogue:
-    """Return the catalogue in the bytes of a TOML file; ``file`` is what messages call it."""
+    """Return the catalogue in the bytes of a TOML file; ``file`` is what messages call it.
+
+    ParameterError for one that is not usable.
+    """
     document = _FILE.parse(content, file)
     try:
         parsed: Any = CATALOGUE_FILE.model_validate(document)
