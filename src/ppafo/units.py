@@ -192,7 +192,7 @@ def _unknown_unit(name: str) -> UnitError:
         return UnitError(f"'{name}': {_KIND_BELONGS}")
     hint = nearest_name(name, [prefix + unit for unit in _UNITS for prefix in ("", *_PREFIXES)])
     known = f"{', '.join(_UNITS)}, with the prefixes {', '.join(_PREFIXES)}"
-    return UnitError(f"'{name}' is not a known unit{hint}; known are {known}")
+    return UnitError(f"'{name}' is not a known unit{hint}; available: {known}")
 
 
 @functools.cache

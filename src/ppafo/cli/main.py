@@ -95,7 +95,7 @@ def _parse(words: list[str]) -> argparse.Namespace:
     check_options(words, parser)
     parsed = parser.parse_args(words)
     if parsed.command is None:
-        raise UsageError(f"no command was given; known are {', '.join(COMMANDS)}; 'ppafo --help' says what each does")
+        raise UsageError(f"no command was given; available: {', '.join(COMMANDS)}; 'ppafo --help' says what each does")
     return parsed
 
 

@@ -38,7 +38,7 @@ def add_override_argument(parser: argparse.ArgumentParser) -> None:
         metavar="PATH=VALUE",
         action="append",
         default=[],
-        help="change one value, for example valve.area=12.6mm^2; may be given again",
+        help="override one value, for example valve.area=12.6mm^2; may be repeated",
     )
 
 
@@ -54,7 +54,7 @@ def check_output(parsed: argparse.Namespace) -> None:
 def check_new_file(path: Path) -> None:
     """Refuse a file of ``--out`` that is there: nothing in it would say whose it is."""
     if os.path.lexists(path):
-        raise DataError(f"--out {path}: is there already; remove it or choose another name")
+        raise DataError(f"--out {path}: already exists; remove it or choose another name")
 
 
 @contextlib.contextmanager

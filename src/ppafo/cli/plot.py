@@ -21,7 +21,7 @@ _NAMED = 6
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("folder", metavar="DIR", type=Path, help="a folder that a command of ppafo has written")
+    parser.add_argument("folder", metavar="DIR", type=Path, help="a result folder written by ppafo")
     add_json_argument(parser)
     parser.add_argument(
         "--out", metavar="FILE", type=Path, help="a .png, .svg or .pdf file; default figure.png and figure.svg in DIR"
@@ -100,7 +100,7 @@ def _say_what_is_there(parsed: argparse.Namespace, names: list[str]) -> int:
     from ppafo.storage.owned_folder import MARK, marking_command
 
     if MARK not in names:
-        raise DataError(f"{parsed.folder}: is not a folder of results of ppafo")
+        raise DataError(f"{parsed.folder}: is not a result folder of ppafo")
     command = marking_command(parsed.folder)
     pictures = [name for name in names if name.endswith(_PICTURES)]
     page = next((name for name in names if name.endswith(".html")), None)

@@ -19,18 +19,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json_argument(listing)
     recording = actions.add_parser(
         "record",
-        help="do an experiment on the virtual rig",
-        description="Write what a laboratory would have, marked as synthetic, and rig.json with the truth behind it.",
+        help="run an experiment on the virtual rig",
+        description="Write the recording of a laboratory, marked as synthetic, and rig.json with the true values.",
     )
-    recording.add_argument("experiment", metavar="EXPERIMENT", help="one of those that 'ppafo rig list' shows")
+    recording.add_argument("experiment", metavar="EXPERIMENT", help="name of an experiment; see 'ppafo rig list'")
     recording.add_argument(
         "--preset", metavar="PRESET", default="paper-bench", help="preset or .toml file; default paper-bench"
     )
-    recording.add_argument("--seed", metavar="N", default="1", help="seed of noise and offsets; default 1")
+    recording.add_argument("--seed", metavar="N", default="1", help="random seed of noise and offsets; default 1")
     recording.add_argument(
         "--device", metavar="SET", default="ppafo2011", help="parameter set or .toml file; default ppafo2011"
     )
-    recording.add_argument("--valve", metavar="NAME", help="one of the set's valves; its default valve unless given")
+    recording.add_argument("--valve", metavar="NAME", help="valve of the parameter set; default: its default valve")
     add_override_argument(recording)
     add_json_argument(recording)
     recording.add_argument(

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check",
         action="store_true",
-        help="run again with half the error and from a start moved by 1e-7, and say which metrics the run determines",
+        help="run again with half the error and from a start moved by 1e-7, and report which metrics it determines",
     )
     add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, help="result folder; default out/NAME of the scenario")

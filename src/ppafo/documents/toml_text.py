@@ -36,7 +36,7 @@ class TomlKind:
             return (self.shipped / (name + _SUFFIX)).read_bytes()
         if path.suffix != _SUFFIX and not _exists(path):
             hint = nearest_name(name, self.names())
-            known = f"known are {', '.join(self.names())}, or " if self.names() else ""
+            known = f"available: {', '.join(self.names())}, or " if self.names() else ""
             raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; {known}give a .toml file")
         try:
             return read_regular_file(path, MAXIMUM_BYTES_TYPED)
@@ -50,7 +50,7 @@ class TomlKind:
         except UnicodeDecodeError as error:
             raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
         if not text.strip():
-            raise self.error(f"{file}: is empty; 'ppafo schema {self.schema}' prints what belongs in it")
+            raise self.error(f"{file}: is empty; 'ppafo schema {self.schema}' prints its format")
         try:
             document = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:

@@ -183,7 +183,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
         if name not in problem.columns:
             hint = nearest_name(name, problem.columns)
             known = ", ".join(problem.columns) or "none"
-            raise IdentificationError(f"{file}: {place}: there is no column map '{name}'{hint}; there are {known}")
+            raise IdentificationError(f"{file}: {place}: there is no column map '{name}'{hint}; available: {known}")
     return problem
 
 

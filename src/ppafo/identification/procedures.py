@@ -76,7 +76,7 @@ class Setting:
         if species not in SPECIES:
             hint = nearest_name(species, SPECIES)
             known = ", ".join(SPECIES)
-            raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; known are {known}")
+            raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; available: {known}")
         known_gas = SPECIES[species]
         return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, half_width)
 

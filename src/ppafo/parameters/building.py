@@ -92,7 +92,7 @@ def _species(parameter_set: ParameterSet) -> str:
     if name not in SPECIES:
         hint = nearest_name(name, SPECIES)
         known = ", ".join(SPECIES)
-        raise ParameterError(f"{parameter_set.file}: gas.species = '{name}' is unknown{hint}; known are {known}")
+        raise ParameterError(f"{parameter_set.file}: gas.species = '{name}' is unknown{hint}; available: {known}")
     return name
 
 

@@ -67,7 +67,9 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
         on_one_line = one_line(override)
         path, separator, text = (part.strip() for part in on_one_line.partition("="))
         if not separator or not path or not text:
-            raise ParameterError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
+            raise ParameterError(
+                f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2"
+            )
         change = _CHANGES.get(path, _with_number)
         is_for_both = path == PRESSURE_PATH and has_one_pressure(parameter_set) and not _is_apart(given, number)
         parameter_set = change(parameter_set, _Order(path, chosen, text))
@@ -109,7 +111,7 @@ def _with_species(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
     path, text = order.path, order.text
     species = SPECIES.get(text)
     if species is None:
-        raise order.refusal(f"unknown gas{nearest_name(text, SPECIES)}; known are {', '.join(SPECIES)}")
+        raise order.refusal(f"unknown gas{nearest_name(text, SPECIES)}; available: {', '.join(SPECIES)}")
     note = f"follows from the override {path}={text}"
     constants = {"gas.molar_mass": (species.molar_mass, "kg/mol")}
     constants["gas.heat_capacity_ratio"] = (species.heat_capacity_ratio, "")

@@ -142,20 +142,22 @@ def minutes(text: str) -> float:
     try:
         return float(text) if _NUMBER.fullmatch(text) else parse_quantity(text, "s") / 60.0
     except UnitError as error:
-        raise argparse.ArgumentTypeError(f"{text!r}: a number of minutes, or a time such as '90 s'; {error}") from error
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: must be a number of minutes, or a time such as '90 s': {error}"
+        ) from error
 
 
 SET = Argument(
     ("--set",),
     "overrides",
-    "change one value, for example valve.area=12.6mm^2; may be given again",
+    "override one value, for example valve.area=12.6mm^2; may be repeated",
     metavar="PATH=VALUE",
     action="append",
     default=(),
 )
-SEED = Argument(("--seed",), "seed", "random seed; that of the file unless given", metavar="N", type=whole_number)
+SEED = Argument(("--seed",), "seed", "random seed; default: that of the file", metavar="N", type=whole_number)
 THREADS = Argument(
-    ("--threads",), "threads", "number of threads; all cores unless given", metavar="N", type=counting_number
+    ("--threads",), "threads", "number of threads; default: all cores", metavar="N", type=counting_number
 )
 CONFIDENCE = Argument(
     ("--confidence",),

@@ -82,7 +82,7 @@ def _override(preset: Preset, path: str, text: str) -> Preset:
 def _parse(document: dict[str, Any], file: str) -> Preset:
     """Check keys, units and ranges of a document; every value must be there."""
     if not document:
-        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints what belongs in it")
+        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints its format")
     _check_names(document, (*_HEAD, *SECTIONS), "", file)
     if document.get("schema_version") != 1:
         raise ParameterError(f"{file}: schema_version must be 1, it is {quote(document.get('schema_version'))}")

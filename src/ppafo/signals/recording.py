@@ -138,7 +138,7 @@ class Recording:
     def _channel(self, name: str) -> Channel:
         if name not in self.channels:
             hint = nearest_name(name, self.names)
-            raise DataError(f"{self.label}: there is no channel '{name}'{hint}; there are {', '.join(self.names)}")
+            raise DataError(f"{self.label}: there is no channel '{name}'{hint}; available: {', '.join(self.names)}")
         return self.channels[name]
 
 
@@ -147,7 +147,7 @@ def recording_kind(name: str) -> RecordingKind:
     for kind in _KINDS:
         if kind == name:
             return kind
-    raise DataError(f"{name!r} is no kind of recording{nearest_name(name, _KINDS)}; there are {', '.join(_KINDS)}")
+    raise DataError(f"{name!r} is no kind of recording{nearest_name(name, _KINDS)}; available: {', '.join(_KINDS)}")
 
 
 def align(first: Recording, second: Recording) -> tuple[Recording, Recording]:

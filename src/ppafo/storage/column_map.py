@@ -88,9 +88,9 @@ def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
         raise DataError(f"{file}: {first_problem(error.errors(include_url=False), ColumnMaps)}") from error
     known = ", ".join(maps)
     if name is None and len(maps) > 1:
-        raise DataError(f"{file}: has several column maps; name one as {file}:NAME; there are {known}")
+        raise DataError(f"{file}: has several column maps; name one as {file}:NAME; available: {known}")
     if name is not None and name not in maps:
-        raise DataError(f"{file}: there is no column map '{name}'{nearest_name(name, maps)}; there are {known}")
+        raise DataError(f"{file}: there is no column map '{name}'{nearest_name(name, maps)}; available: {known}")
     return maps[name or next(iter(maps))]
 
 

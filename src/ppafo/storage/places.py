@@ -35,14 +35,11 @@ class Place(Protocol):
         ...
 
     def open(self, name: str) -> io.BufferedIOBase:
-        """Return a file for reading; OSError where there is none. OSError where it is no regular file."""
+        """Return a file for reading; OSError where there is none, or no regular one."""
         ...
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file, replacing an earlier one; DataError where that is not possible.
-
-        DataError where it cannot be written.
-        """
+        """Write a file, replacing an earlier one; DataError where that is not possible."""
         ...
 
     def remove(self, name: str) -> None:

@@ -131,7 +131,7 @@ def choose_configuration(study: Study, name: str | None) -> Configuration:
         return study.configurations[0]
     if name not in names:
         hint = nearest_name(name, names)
-        raise StudyError(f"study '{study.name}' has no configuration '{name}'{hint}; known are {', '.join(names)}")
+        raise StudyError(f"study '{study.name}' has no configuration '{name}'{hint}; available: {', '.join(names)}")
     return study.configurations[names.index(name)]
 
 

@@ -220,7 +220,7 @@ def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath], sou
         if not isinstance(item, declared.SameAs):
             continue
         if item.same_as not in own:
-            hint = nearest_name(item.same_as, own) or f"; there are {', '.join(own) or 'none'}"
+            hint = nearest_name(item.same_as, own) or f"; available: {', '.join(own) or 'none'}"
             raise source.refusal(
                 f"vary '{item.path}': same_as = '{item.same_as}' does not vary independently here{hint}"
             )
@@ -248,7 +248,7 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn], source: _Source)
         for path in item.between:
             if path not in paths:
                 raise source.refusal(
-                    f"correlations: '{path}' has no distribution here{nearest_name(path, paths)}; there are {paths}"
+                    f"correlations: '{path}' has no distribution here{nearest_name(path, paths)}; available: {paths}"
                 )
         if one == other or (one, other) in coefficients or (other, one) in coefficients:
             raise source.refusal(

@@ -84,7 +84,7 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
     for name in metrics:
         if name not in METRICS:
             hint = nearest_name(name, METRICS)
-            raise StudyError(f"there is no metric '{name}'{hint}; known are {', '.join(METRICS)}")
+            raise StudyError(f"there is no metric '{name}'{hint}; available: {', '.join(METRICS)}")
         if "reference" in METRICS[name].channels and scenario.control.kind == OPEN_LOOP:
             raise StudyError(f"scenario '{scenario.name}' has no '{name}': its controller follows no reference")
     repeated = first_twice(metrics)

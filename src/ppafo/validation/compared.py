@@ -57,7 +57,7 @@ ACCEPTABLE_FRACTION = 0.10
 """RMS error over full range that the paper calls acceptable (page with figure 7)."""
 
 _FRACTION_UNITS = ("%", "percent")
-_EXAMPLES = "write for example 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
+_EXAMPLES = "a threshold is written 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ def _channel(name: str, text: str) -> str:
         hint = nearest_name(name, COMPARED)
         known = ", ".join(COMPARED)
         raise DataError(
-            f"threshold '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; there are {known}"
+            f"threshold '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; available: {known}"
         )
     return name
 

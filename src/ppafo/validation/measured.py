@@ -89,7 +89,7 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
             raise DataError(f"{file}: channel '{name}' is not known{hint}")
     if COMMAND not in recording:
         names = ", ".join(recording.names)
-        raise DataError(f"{file}: there is no channel '{COMMAND}', which the replay needs; there are {names}")
+        raise DataError(f"{file}: there is no channel '{COMMAND}', which the replay needs; available: {names}")
     if not any(name in recording for name in COMPARED):
         raise DataError(f"{file}: has none of the channels to compare: {', '.join(COMPARED)}")
     return tuple(f"channel '{name}' is not known and was ignored" for name in unknown)

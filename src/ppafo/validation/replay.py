@@ -135,11 +135,16 @@ def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
     """Return initial values in SI by channel from texts such as ``pressure_1=0 psi_g``."""
     values = {}
     for text in texts:
-        name, _, value = (part.strip() for part in text.partition("="))
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise DataError(
+                f"initial value '{one_line(text)}' is not of the form CHANNEL=VALUE, for example '{_EXAMPLES[ANGLE]}'"
+            )
         if name not in _UNITS:
             hint = nearest_name(name, _UNITS)
             raise DataError(
-                f"initial value '{one_line(text)}': give {', '.join(_UNITS)}{hint}, as '{_EXAMPLES[ANGLE]}'"
+                f"initial value '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; "
+                f"available: {', '.join(_UNITS)}"
             )
         try:
             values[name] = parse_quantity(value, _UNITS[name], atmosphere)

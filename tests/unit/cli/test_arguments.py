@@ -16,11 +16,11 @@ FULL = Path("/dev/full")
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ([], "no command was given; known are reproduce, simulate"),
+        ([], "no command was given; available: reproduce, simulate"),
         (["simulat"], "there is no command 'simulat', did you mean 'simulate'?"),
-        (["--bogus"], "there is no option '--bogus'; here are --help, --version, -h"),
+        (["--bogus"], "there is no option '--bogus'; available: --help, --version, -h"),
         (["--bogus", "simulate", "step-response"], "there is no option '--bogus'"),
-        (["simulate", "--bogus"], "there is no option '--bogus'; here are --check, --help, --json"),
+        (["simulate", "--bogus"], "there is no option '--bogus'; available: --check, --help, --json"),
         (["audit", "--josn"], "there is no option '--josn', did you mean '--json'?"),
         (["audit", "ppafo2011", "--out=x", "--sett=valve.area=1mm^2"], "no option '--sett', did you mean '--set'?"),
         (["sets", "-j"], "there is no option '-j'"),

@@ -89,7 +89,7 @@ def test_the_next_command_is_one_that_there_is(kind: str, capsys: pytest.Capture
 def test_a_file_that_is_there_is_not_overwritten(capsys: pytest.CaptureFixture[str]) -> None:
     Path("mine.toml").write_text("mine")
     assert main(["new", "scenario", "mine"]) == 2
-    assert "mine.toml: is there already" in capsys.readouterr().err
+    assert "mine.toml: already exists" in capsys.readouterr().err
     assert Path("mine.toml").read_text() == "mine"
 
 

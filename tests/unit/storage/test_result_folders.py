@@ -237,5 +237,5 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     for place in (tmp_path / "a.xlsx", tmp_path / "nothing"):
         with pytest.raises(DataError, match=r"neither a \.nc or \.csv file nor a result folder"):
             read_recording(place)
-    with pytest.raises(DataError, match=r"holds no result of a walk or a simulation"):
+    with pytest.raises(DataError, match=r"contains no result of a walk or a simulation"):
         read_recording(tmp_path)

@@ -48,7 +48,7 @@ class Catalogue:
         if name not in parts:
             known = ", ".join(parts) or "none"
             hint = nearest_name(name, parts)
-            raise ParameterError(f"{self.file}: {group} has no part '{name}'{hint}; there are {known}")
+            raise ParameterError(f"{self.file}: {group} has no part '{name}'{hint}; available: {known}")
         return parts[name]
 
     @property
@@ -100,7 +100,7 @@ def _check_unknown(
     for key in unknown:
         if key not in declared:
             hint = nearest_name(key, declared)
-            raise ParameterError(f"{place}.unknown: there is no figure '{key}'{hint}; there are {', '.join(declared)}")
+            raise ParameterError(f"{place}.unknown: there is no figure '{key}'{hint}; available: {', '.join(declared)}")
         if key in figures:
             raise ParameterError(f"{place}.unknown: '{key}' is given in the same part")
 

@@ -289,7 +289,7 @@ def _constraints(document: DesignFile, file: str) -> tuple[Constraint, ...]:
         place = f"{file}: constraints.{name}"
         if name not in units:
             hint = nearest_name(name, units)
-            raise StudyError(f"{place}: there is no such metric{hint}; known are {', '.join(units)}")
+            raise StudyError(f"{place}: there is no such metric{hint}; available: {', '.join(units)}")
         least, most = (
             None if text is None else _limit(text, units[name], f"{place}.{key}")
             for key, text in (("least", table.least), ("most", table.most))

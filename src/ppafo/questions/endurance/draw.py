@@ -68,9 +68,9 @@ class Schedule:
 
 def draw_of_numbers(mass_per_step: float, step_time: float, peak_flow: float | None) -> Draw:
     """Return the draw of given numbers [kg, s, kg/s]; without a largest flow the mean one is taken for it."""
-    for name, value in (("gas per step", mass_per_step), ("step time", step_time)):
+    for name, value, unit in (("gas per step", mass_per_step, "kg"), ("step time", step_time, "s")):
         if not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(f"{name} must be above 0, it is {value:g}")
+            raise ParameterError(f"{name} must be above 0, it is {value:g} {unit}")
     mean = mass_per_step / step_time
     if peak_flow is not None and not (math.isfinite(peak_flow) and peak_flow >= mean):
         raise ParameterError(
@@ -83,7 +83,7 @@ def draw_of_numbers(mass_per_step: float, step_time: float, peak_flow: float | N
 def draw_of_recording(recording: Recording, step_time: float | None) -> Draw:
     """Return the draw of a recording with ``supplied_mass``, repeated for ever; all of it is one step by default."""
     if "supplied_mass" not in recording:
-        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; there are {', '.join(recording.names)}")
+        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; available: {', '.join(recording.names)}")
     supplied = _gas_use(recording)
     gain = float(supplied[-1] - supplied[0])
     if recording.duration <= 0.0 or gain <= 0.0:

@@ -32,7 +32,7 @@ def load_fluid(name: str) -> Fluid:
     known = list_fluids()
     if name not in known:
         raise ParameterError(
-            f"there is no property table of '{name}'{nearest_name(name, known)}; known are {', '.join(known)}"
+            f"there is no property table of '{name}'{nearest_name(name, known)}; available: {', '.join(known)}"
         )
     content = json.loads((_FOLDER / f"{name}{_SUFFIX}").read_text(encoding="utf-8"))
     table = FluidTable(

@@ -40,7 +40,7 @@ def sensitivity(
     """
     if method is not None and method not in METHODS:
         raise StudyError(
-            f"there is no method '{method}'{nearest_name(method, METHODS)}; known are {', '.join(METHODS)}"
+            f"there is no method '{method}'{nearest_name(method, METHODS)}; available: {', '.join(METHODS)}"
         )
     chosen = study_of(study, overrides)
     base = choose_configuration(chosen, configuration)

@@ -19,7 +19,7 @@ QUESTION = Question(
         Argument(
             ("--yes",),
             "agreed",
-            "start even if the results will take much of the disk",
+            "start even if the results will fill much of the disk",
             action="store_true",
             default=False,
         ),

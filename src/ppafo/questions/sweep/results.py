@@ -81,7 +81,9 @@ class StudyResults(Solved):
         """Return a kept channel of all runs, shape (runs, samples), nan where a run failed."""
         kept = self.document["study"]["outputs"].get("trajectories", ())
         if channel not in kept:
-            raise StudyError(f"no trajectories of '{channel}' were kept{nearest_name(channel, kept)}; there are {kept}")
+            raise StudyError(
+                f"no trajectories of '{channel}' were kept{nearest_name(channel, kept)}; available: {kept}"
+            )
         rows = [row for part in self.chunks(TRAJECTORIES_FOLDER, [channel]) for row in part.column(channel).to_numpy()]
         return np.stack(rows)
 
