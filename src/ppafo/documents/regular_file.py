@@ -23,4 +23,4 @@ def read_regular_file(path: Path, most: int | None = None) -> bytes:
                 content += file.read() if most is None else file.read(most + 1 - len(content))
         if most is None or len(content) <= most:
             return content
-    raise OSError(None, f"it is larger than {most / 1e6:g} MB, the most that is read of such a file")
+    raise OSError(None, f"it is larger than {most / 1e6:g} MB, the maximum size of such a file")

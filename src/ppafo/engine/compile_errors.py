@@ -93,7 +93,7 @@ def _problem(report: Report) -> str:
             return problem
     lines = [line.strip() for line in report.said.splitlines() if line.strip()]
     lines = [line for line in lines if not line.startswith(("Failed in nopython", "During:", "File ", "- Resolution"))]
-    where = f"'{report.written}' is not compiled: " if report.written else ""
+    where = f"'{report.written}' cannot be compiled: " if report.written else ""
     return where + one_line(lines[0] if lines else "no reason given")[:_LONGEST]
 
 
@@ -103,7 +103,7 @@ def _attribute(report: Report) -> str:
         return ""
     name, kind = found.groups()
     if kind.startswith("Module"):
-        return f"'math.{name}' is not compiled"
+        return f"'math.{name}' cannot be compiled"
     owner = re.search(rf"([\w.]+)\.{name}\b", report.text)
     what = owner[1] if owner else "it"
     fields = _fields(report.source, kind)
@@ -131,7 +131,7 @@ def _operator(report: Report) -> str:
         return ""
     name, kinds = found[1], [kind_of(kind) for kind in _split(found[2])]
     what = f"'{_SIGNS[name]}'" if name in _SIGNS else f"{name}()"
-    return f"{what} is not compiled for {' and '.join(kinds)}, in '{report.written}'"
+    return f"{what} cannot be compiled for {' and '.join(kinds)}, in '{report.written}'"
 
 
 def _arguments(report: Report) -> str:

@@ -67,7 +67,7 @@ class Composer(ast.NodeTransformer):
             return self.stand_in(value, node)
         owner = self.value_of(node.value)
         if owner is not _INSIDE and not isinstance(owner, tuple):
-            raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which is not compiled")
+            raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which cannot be compiled")
         return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
@@ -78,7 +78,7 @@ class Composer(ast.NodeTransformer):
         called = self.value_of(node.func)
         if called is _INSIDE:
             if isinstance(node.func, ast.Attribute):
-                raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which is not compiled")
+                raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which cannot be compiled")
             return self.generic_visit(node)  # type: ignore[return-value]
         own: list[ast.expr] = []
         if isinstance(called, types.FunctionType) or is_row(called):
@@ -141,7 +141,7 @@ class Composer(ast.NodeTransformer):
             return scope[node.id]
         if node.id not in COMPILED_BUILTINS:
             if hasattr(builtins, node.id):
-                raise self.refuse(node, f"'{node.id}' is not compiled")
+                raise self.refuse(node, f"'{node.id}' cannot be compiled")
             hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
             raise self.refuse(node, f"there is no '{node.id}'{hint}")
         return getattr(builtins, node.id)
@@ -161,7 +161,7 @@ class Composer(ast.NodeTransformer):
         name = ast.unparse(node)
         if getattr(value, "__module__", "") == "numpy" or own.startswith("numpy"):
             raise self.refuse(
-                node, f"'{name}' is of numpy, which is not compiled here; 'math' has its functions of one number"
+                node, f"'{name}' is from numpy, which cannot be compiled here; use 'math' for functions of one number"
             )
         return self.literal(value, node, f"'{name}'")
 

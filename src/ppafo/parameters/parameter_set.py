@@ -74,7 +74,9 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
         return STANDARD_ATMOSPHERE
     if not entry.unit.endswith("_a"):
         unit = entry.unit
-        raise ParameterError(f"{parameter_set.file}: {ATMOSPHERE_PATH} = {entry.value:g} {unit}: give it as absolute")
+        raise ParameterError(
+            f"{parameter_set.file}: {ATMOSPHERE_PATH} = {entry.value:g} {unit}: give it as an absolute pressure"
+        )
     return entry_in_si(entry, parameter_set.declarations()[ATMOSPHERE_PATH], STANDARD_ATMOSPHERE)
 
 

@@ -112,8 +112,8 @@ def shuffled_after_gzip(file: h5py.File) -> None:
 
 HOSTILE = {
     promised: "requires 808 MB of memory",
-    fill_value: "the file does not hold them",
-    some_chunks_missing: "the file does not hold all of them",
+    fill_value: "the file does not contain them",
+    some_chunks_missing: "the file does not contain all of them",
     huge_chunk: "requires 400 MB of memory",
     many_names: "requires 80 MB of memory",
     gzip_within_gzip: "compressed in a way that is not supported",

@@ -87,13 +87,13 @@ def filled_with_a_run_file_of_another_program(folder: Path) -> str:
 def filled_with_a_result_and_something_else(folder: Path) -> str:
     write_result(folder, recording(), DOCUMENT, {})
     (folder / "notes.txt").write_text("keep me")
-    return r"holds files that are not of its ppafo result \(notes.txt\)"
+    return r"contains files that are not part of its ppafo result \(notes.txt\)"
 
 
 def filled_with_a_result_and_a_folder_by_the_name_of_a_file(folder: Path) -> str:
     write_result(folder, recording(), DOCUMENT, {})
     (folder / "figure.png").mkdir()
-    return r"holds files that are not of its ppafo result \(figure.png\)"
+    return r"contains files that are not part of its ppafo result \(figure.png\)"
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,9 @@ def solve_reference(run: Run, tolerance: float = 1e-10) -> ReferenceResult:
     SimulationError where the extra ``reference`` is not installed or the solver gives up.
     """
     if run.lines is not None:
-        raise SimulationError("the reference solver knows no [supply_line]: leave the section out to compare with it")
+        raise SimulationError(
+            "the reference solver does not support [supply_line]; omit the section to compare with it"
+        )
     return _Solution(run, tolerance).solve()
 
 

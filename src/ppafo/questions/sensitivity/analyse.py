@@ -120,7 +120,7 @@ def _check(uncertainty: Uncertainty, method: Method, settings: Settings) -> None
     if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(
             f"sensitivity: the indices of {method.name} need values that are independent, and the study has "
-            "[[correlations]]; take '--method shapley', or treat the values as independent (--independent)"
+            "[[correlations]]; use '--method shapley', or treat the values as independent (--independent)"
         )
     if len(uncertainty.drawn) - (uncertainty.has_noise and not method.follows_noise) < 2:
         raise StudyError("sensitivity: there is only one uncertain value; vary two or more")
@@ -148,7 +148,7 @@ def _of_metric(name: str, outcomes: Outcomes, design: Evaluated, method: Method,
     if whole.size not in sizes:
         raise StudyError(
             f"sensitivity: {int(np.count_nonzero(whole)):,} of {whole.size:,} {method.sizes_label} have '{name}' in "
-            "all their runs, which is too few; take more samples, or mend what makes the runs fail"
+            "all their runs, which is too few; use more samples, or fix what makes the runs fail"
         )
     return OfMetric(
         name,

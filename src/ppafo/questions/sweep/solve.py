@@ -122,7 +122,7 @@ def _study_of(
     if not isinstance(study, Study):
         return load_study(study, overrides, draws, seed)
     if overrides or draws is not None or seed is not None:
-        raise StudyError("overrides, draws and seed of a loaded study cannot be changed: give them to load_study")
+        raise StudyError("a loaded Study takes no overrides, draws or seed; give them to load_study")
     return study
 
 

@@ -386,5 +386,5 @@ def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any])
 
 
 def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> None:
-    with pytest.raises(StudyError, match="of a loaded study cannot be changed: give them to load_study"):
+    with pytest.raises(StudyError, match="a loaded Study takes no overrides, draws or seed; give them to load_study"):
         sweep(load_study(small), draws=3)
