@@ -148,5 +148,5 @@ def _check_own(folder: Path, kind: FolderKind) -> None:
     if foreign:
         shown = ", ".join(foreign[:_NAMED]) + (", ..." if len(foreign) > _NAMED else "")
         raise DataError(
-            f"{folder}: contains files that are not part of its {kind.noun} ({shown}); move them or choose another folder"
+            f"{folder}: contains files that are not part of its {kind.noun} ({shown}); move them or use another folder"
         )

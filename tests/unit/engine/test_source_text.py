@@ -393,7 +393,8 @@ MEASUREMENT = (
         ),
         (
             "def law(measurement, x):\n    return np.clip(x, 0.0, 1.0)\n",
-            "my_law.py:13: 'np.clip' is from numpy, which cannot be compiled here; use 'math' for functions of one number",
+            "my_law.py:13: 'np.clip' is from numpy, which cannot be compiled here; "
+            "use 'math' for functions of one number",
         ),
         (
             "def law(measurement, x):\n    return measurement / x\n",

@@ -88,7 +88,7 @@ def sweep(
     place = place_at(kept.name if kept is not None else str(out))
     bins = _claim(chosen, place, means)
     _work(Task(chosen, bins, place.address, means.threads), place, means)
-    return replace(finished_results(chosen, place, bins), kept=kept)
+    return replace(finish_results(chosen, place, bins), kept=kept)
 
 
 def sweep_into_folder(
@@ -132,7 +132,7 @@ def studies_of_the_package() -> list[dict[str, Any]]:
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
 
 
-def finished_results(study: Study, place: Place, bins: BinsOf) -> StudyResults:
+def finish_results(study: Study, place: Place, bins: BinsOf) -> StudyResults:
     """Write summary and bands of a study all of whose chunks are there, and return its results."""
     results = StudyResults(place, read_manifest(place), {})
     summary = summary_of(study, results)
