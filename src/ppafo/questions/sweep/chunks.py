@@ -124,7 +124,7 @@ def check_room(study: Study, place: Place, agreed: bool) -> None:
     size = f"{study.runs:,} runs of '{study.name}' need about {_bytes_text(needed)}"
     if free is not None and needed > free:
         raise StudyError(
-            f"{place.address}: {size}, but only {_bytes_text(free)} are free: choose fewer runs, metrics or channels"
+            f"{place.address}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or trajectories"
         )
     if needed > ASKED_ABOVE and not agreed:
         raise StudyError(f"{place.address}: {size}; give --yes to start it anyway")
