@@ -26,10 +26,10 @@ FULL = Path("/dev/full")
         (["sets", "-j"], "there is no option '-j'"),
         (
             ["simulate", "step-response", "--set"],
-            "--set: expected one argument; 'ppafo simulate --help' shows",
+            "--set: expected one argument; see 'ppafo simulate --help'",
         ),
-        (["audit"], "the following arguments are required: SET; 'ppafo audit --help' shows"),
-        (["sets", "show"], "the following arguments are required: SET; 'ppafo sets show --help' shows"),
+        (["audit"], "the following arguments are required: SET; see 'ppafo audit --help'"),
+        (["sets", "show"], "the following arguments are required: SET; see 'ppafo sets show --help'"),
         (["sets", "shwo"], "invalid choice: 'shwo'"),
         (["plot", "one", "two"], "unrecognized arguments: two"),
         (["si\nmulate"], "there is no command 'si mulate', did you mean 'simulate'?"),
