@@ -82,7 +82,7 @@ def _name_numbers(axis: "Axis") -> None:
 
 
 def _draw_end(axes: "Axes", bounded: Bounded[Bound], colour: str) -> None:
-    """Draw how a bound goes on from its minimum error: upwards, or to the left where that error counts as none."""
+    """Draw how a bound continues from its minimum error: upwards, or to the left where that error counts as none."""
     (error, *_), (gas, *_) = _points(bounded)
     left, top = axes.get_xlim()[0], axes.get_ylim()[1]
     end = ([left, error], [gas, gas]) if bounded.bound.is_attainable else ([error, error], [gas, top])

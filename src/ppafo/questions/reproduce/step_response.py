@@ -97,7 +97,7 @@ class _Sentence:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """What the sentences are held against."""
+    """The values with which the sentences are compared."""
 
     recording: Recording
     levels: Levels
