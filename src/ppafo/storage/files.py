@@ -21,10 +21,10 @@ MAXIMUM_BYTES_RECORDED = 2_000_000_000
 """More than this is no recording that is read: an hour at 1 kHz with twenty channels stays below it, as text too."""
 
 
-def read_bytes(path: str | Path, most: int = MAXIMUM_BYTES_RECORDED) -> bytes:
-    """Return the content of a regular file; DataError where it is absent, empty or above ``most`` bytes."""
+def read_bytes(path: str | Path, maximum: int = MAXIMUM_BYTES_RECORDED) -> bytes:
+    """Return the content of a regular file; DataError where it is absent, empty or above ``maximum`` bytes."""
     try:
-        content = read_regular_file(Path(path), most)
+        content = read_regular_file(Path(path), maximum)
     except (OSError, ValueError) as error:
         raise DataError(f"{path}: cannot be read: {reason(error)}") from error
     if not content:

@@ -81,9 +81,9 @@ def replicate_seed(seed: int, replicate: int) -> int:
     return int(np.random.SeedSequence([seed, replicate]).generate_state(1, np.uint64)[0])
 
 
-def with_new_noise(columns: Columns, most: int) -> Columns:
-    """Return the first draws, at most so many, each with another noise stream and all else as it was."""
-    first = {path: column[:most] for path, column in columns.items()}
+def with_new_noise(columns: Columns, maximum: int) -> Columns:
+    """Return the first ``maximum`` draws, each with another noise stream and all else as it was."""
+    first = {path: column[:maximum] for path, column in columns.items()}
     return first | {NOISE: other_noise(first[NOISE])}
 
 

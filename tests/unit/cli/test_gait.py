@@ -77,7 +77,10 @@ def test_a_recording_is_exported_for_opensim(walk: Path, tmp_path: Path) -> None
         (["import", "WALK", "--body-mass", "62 kg", "--stature", "180"], "--stature '180': a number without a unit"),
         (["import", "WALK", "--body-mass", "62 kg", "--stature", "180 m"], "a stature of 180 m is not plausible"),
         (["import", "WALK", "--body-mass", "62 kg", "--side", "rigth"], "--side 'rigth': must be right or left"),
-        (["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "-"], "--minimum-strides '-': must be a whole"),
+        (
+            ["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "-"],
+            "--minimum-strides '-': must be a whole",
+        ),
         (["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "9"], "has 3 whole strides within"),
         (["import", "none.mot", "--body-mass", "62 kg"], "none.mot: cannot be read: no such file"),
         (["import", "WALK", "--body-mass", "62 kg", "--map", "none.toml"], "none.toml: cannot be read"),
