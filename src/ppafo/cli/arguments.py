@@ -16,12 +16,17 @@ _NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 
 
 RENAMED = {
+    "--first": "--first-draws",
+    "--maximum": "--draws",
+    "--most": "--draws",
     "--most-failed": "--maximum-failed",
-    "--most": "--maximum",
     "--runs": "--draws",
     "--least-strides": "--minimum-strides",
 }
 """Options of version 0.1 and what they are called now."""
+
+REMOVED = {"--config": "name what is run without it, as in 'ppafo walk solenoid'"}
+"""Options of version 0.1 that are none any more, and what to write instead."""
 
 
 class UsageError(PpafoError):
@@ -73,6 +78,8 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         if name in RENAMED and name not in known and RENAMED[name] in known:
             raise UsageError(f"{name} is now called {RENAMED[name]}")
         if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
+            if name in REMOVED:
+                raise UsageError(f"there is no option '{name}' any more: {REMOVED[name]}")
             raise UsageError(
                 f"there is no option '{name}'{_nearest_option(name, known)}; available: {', '.join(known)}"
             )

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Batch, BatchResult, run_batch
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
-from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.experiment import TIME_OFFSET, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment
@@ -20,7 +19,7 @@ from ppafo.identification.trajectory.problem import Range
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import exact_orifice, fed_plant, filled_lines, initial_state, thermal_parameters
+from ppafo.simulation.plan import exact_orifice, initial_lines, initial_state, plant_behind_lines, thermal_parameters
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import FreeMotion
 
@@ -68,7 +67,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
             f"model of the valve; start above 0 and give a lower bound above 0"
         )
     bare = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
-    plant = fed_plant(bare, scenario.supply_lines)
+    plant = plant_behind_lines(bare, scenario.supply_lines)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
     allowed = supply_range(base.plant) / supply_range(plant)
     return replace(
@@ -81,7 +80,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
         initial=initial_state(scenario, plant),
         valve=valve.prepare(device.valve.settings),
         command_delay=delay,
-        lines=filled_lines(plant, scenario.supply_lines),
+        lines=initial_lines(plant, scenario.supply_lines),
     )
 
 
