@@ -3,7 +3,7 @@
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_unit, display_value, quantity_of_unit
+from ppafo.answers.display_units import display_unit, display_value, display_values, quantity_of_unit
 from ppafo.gait.figure import gait_figure
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.events import Stride

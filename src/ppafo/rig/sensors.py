@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.model.sensors import quantise
 from ppafo.rig.preset import Preset
 
 Floats = NDArray[np.float64]

@@ -113,8 +113,8 @@ def test_the_knee_brings_the_free_foot_to_the_moment_that_was_measured() -> None
     tried = {
         "at rest": dict.fromkeys(knee),
         "moving": knee,
-        "backwards": knee | {"knee_forward": gait.curve("knee_forward").scaled(-1.0)},
-        "down": knee | {"knee_up": gait.curve("knee_up").scaled(-1.0)},
+        "backwards": knee | {"knee_forward": gait.curve("knee_forward").scale(-1.0)},
+        "down": knee | {"knee_up": gait.curve("knee_up").scale(-1.0)},
     }
     error = {
         how: float(np.sqrt(np.mean((needed_moment(replace(gait, **curves), SUBJECT, phases) - measured) ** 2)))

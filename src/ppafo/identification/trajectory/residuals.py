@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Batch, BatchResult, run_batch
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.experiment import TIME_OFFSET, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment

@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
-from ppafo.engine.metering import group_of, meters_of
+from ppafo.engine.metering import add_meters, group_of, meters_of
 from ppafo.engine.program import Program
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.engine.replay import StepInputs
+from ppafo.engine.replay import StepInputs, prescribe_recorded_angle
 from ppafo.engine.run import Run
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
