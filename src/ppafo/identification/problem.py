@@ -4,14 +4,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, one_of, published_schema
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import NAME, STRICT, Text, one_of, published_schema, validate
 from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name, reason
-from ppafo.identification.trajectory.section import STRICT, Text, TrajectorySection
+from ppafo.identification.trajectory.section import TrajectorySection
 from ppafo.storage.column_map import ColumnMap
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
@@ -165,12 +164,7 @@ def load_problem(path: str | Path) -> ProblemFile:
 
 def parse_problem(content: bytes, file: str) -> ProblemFile:
     """Return the problem in the bytes of a TOML file; ``file`` is what messages call it."""
-    document = _with_hyphens(_FILE.parse(content, file))
-    try:
-        problem = ProblemFile.model_validate(document)
-    except ValidationError as error:
-        text = first_problem(error.errors(include_url=False), ProblemFile)
-        raise IdentificationError(f"{file}: {text}") from error
+    problem = validate(ProblemFile, _with_hyphens(_FILE.parse(content, file)), file, IdentificationError)
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")
     for place, name in _column_maps(problem):

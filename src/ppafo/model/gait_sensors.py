@@ -62,7 +62,16 @@ class GaitSeen(NamedTuple):
     smooth_pressure_2: float
 
 
-NOTHING_SEEN = GaitSeen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NOTHING_SEEN = GaitSeen(
+    heel_force=0.0,
+    toe_force=0.0,
+    angle=0.0,
+    pressure_1=0.0,
+    pressure_2=0.0,
+    smooth_angle=0.0,
+    smooth_pressure_1=0.0,
+    smooth_pressure_2=0.0,
+)
 
 
 def followed(shown: float, true: float, follow_rate: float, step: float) -> float:
@@ -134,5 +143,21 @@ def measure_gait(
     shown_toe = faulty(gait_sensors.toe_fault, kept_toe, was_toe, time)
     # Who works out the torque has only the readings, true or not.
     torque = torque_constant * (shown_1 - shown_2)
-    remembered = GaitSeen(shown_heel, shown_toe, shown_angle, shown_1, shown_2, smooth_angle, smooth_1, smooth_2)
-    return GaitMeasurement(shown_angle, shown_1, shown_2, torque, shown_heel, shown_toe), remembered
+    remembered = GaitSeen(
+        heel_force=shown_heel,
+        toe_force=shown_toe,
+        angle=shown_angle,
+        pressure_1=shown_1,
+        pressure_2=shown_2,
+        smooth_angle=smooth_angle,
+        smooth_pressure_1=smooth_1,
+        smooth_pressure_2=smooth_2,
+    )
+    return GaitMeasurement(
+        angle=shown_angle,
+        pressure_1=shown_1,
+        pressure_2=shown_2,
+        torque=torque,
+        heel_force=shown_heel,
+        toe_force=shown_toe,
+    ), remembered

@@ -331,5 +331,15 @@ def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifi
     """An orifice for the reference solver, with the exact flow function."""
     conductance = orifice_conductance(orifice, device.gas)
     if isinstance(orifice, SonicOrifice):
-        return ExactOrifice(conductance, 1.0, orifice.critical_ratio, device.flow.linear_ratio)
-    return ExactOrifice(conductance, 0.0, device.gas.heat_capacity_ratio, device.flow.linear_ratio)
+        return ExactOrifice(
+            conductance=conductance,
+            is_iso6358=1.0,
+            number=orifice.critical_ratio,
+            linear_ratio=device.flow.linear_ratio,
+        )
+    return ExactOrifice(
+        conductance=conductance,
+        is_iso6358=0.0,
+        number=device.gas.heat_capacity_ratio,
+        linear_ratio=device.flow.linear_ratio,
+    )

@@ -116,17 +116,22 @@ def followed(
     torque = wanted_torque(parameters.assistance, phase, measurement.angle, rate)
     works = phases.lifts(phase.phase) or phase.phase == phases.PUSH_OFF
     return Assisted(
-        phase,
-        watch,
-        Wish(measurement.angle, rate, torque),
-        1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
-        1.0 if works and watch.vented < 0.5 else 0.0,
+        phase=phase,
+        safety=watch,
+        wish=Wish(measurement.angle, rate, torque),
+        goes_on=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
+        acts=1.0 if works and watch.vented < 0.5 else 0.0,
     )
 
 
 def torque_seen(measurement: GaitMeasurement) -> Measurement:
     """What a law of the torque task sees of it."""
-    return Measurement(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
+    return Measurement(
+        angle=measurement.angle,
+        pressure_1=measurement.pressure_1,
+        pressure_2=measurement.pressure_2,
+        torque=measurement.torque,
+    )
 
 
 def given(assisted: Assisted, command: float, period: float) -> tuple[float, SafetyState]:

@@ -63,7 +63,7 @@ def update(
     law = TorqueSlope(state.law.torque, state.law.slope * assisted.goes_on, state.law.started * assisted.goes_on)
     command, law = damped_command(parameters.law, law, assisted.wish.torque, torque, ahead, period)
     command, watch = assistance.given(assisted, command, period)
-    return command, EventDampedLearningState(phase, watch, assisted.wish, law, table)
+    return command, EventDampedLearningState(phase=phase, safety=watch, wish=assisted.wish, law=law, table=table)
 
 
 TUNED = {
@@ -86,7 +86,11 @@ KIND = ControllerKind(
     ),
     parameters=EventDampedLearningParameters,
     initial=EventDampedLearningState(
-        phases.START, safety.START, assistance.START, TorqueSlope(0.0, 0.0, 0.0), learnt_table.EMPTY
+        phase=phases.START,
+        safety=safety.START,
+        wish=assistance.START,
+        law=TorqueSlope(0.0, 0.0, 0.0),
+        table=learnt_table.EMPTY,
     ),
     update=update,
 )

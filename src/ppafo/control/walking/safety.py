@@ -79,7 +79,14 @@ class SafetyState(NamedTuple):
     followed: Followed
 
 
-START = SafetyState(0.0, Shown(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, Ordered(0.0, 0.0, 0.0), Followed(0.0, 0.0))
+START = SafetyState(
+    vented=0.0,
+    shown=Shown(heel_force=0.0, toe_force=0.0, angle=0.0, heel_still=0.0, toe_still=0.0, angle_still=0.0),
+    toe_strides=0.0,
+    steady=0.0,
+    ordered=Ordered(0.0, 0.0, 0.0),
+    followed=Followed(0.0, 0.0),
+)
 
 STEADY = 0.1
 """A stride that is longer or shorter than the stride time by less than this share of it is a usual one."""
@@ -102,12 +109,12 @@ def still(last: float, reading: float, since: float, period: float) -> float:
 def next_shown(last: Shown, seen: GaitMeasurement, period: float) -> Shown:
     """Readings after a sample."""
     return Shown(
-        seen.heel_force,
-        seen.toe_force,
-        seen.angle,
-        still(last.heel_force, seen.heel_force, last.heel_still, period),
-        still(last.toe_force, seen.toe_force, last.toe_still, period),
-        still(last.angle, seen.angle, last.angle_still, period),
+        heel_force=seen.heel_force,
+        toe_force=seen.toe_force,
+        angle=seen.angle,
+        heel_still=still(last.heel_force, seen.heel_force, last.heel_still, period),
+        toe_still=still(last.toe_force, seen.toe_force, last.toe_still, period),
+        angle_still=still(last.angle, seen.angle, last.angle_still, period),
     )
 
 
@@ -184,7 +191,14 @@ def watched(
     wrong = wrong | contradicts_gait(rules, before, phase, toe_strides, steady)
     followed = next_followed(state.followed, seen, period)
     fails = wrong | contradicts_valve(rules, state.ordered, followed, phase, seen)
-    return SafetyState(1.0 if fails else state.vented, shown, toe_strides, steady, state.ordered, followed)
+    return SafetyState(
+        vented=1.0 if fails else state.vented,
+        shown=shown,
+        toe_strides=toe_strides,
+        steady=steady,
+        ordered=state.ordered,
+        followed=followed,
+    )
 
 
 def fed(since: float, opening: float, period: float) -> float:
@@ -202,4 +216,11 @@ def carried_out(state: SafetyState, command: float, period: float) -> tuple[floa
         fed(state.ordered.filling_2, -opening, period),
         state.ordered.venting + period if vents else 0.0,
     )
-    return given, SafetyState(state.vented, state.shown, state.toe_strides, state.steady, ordered, state.followed)
+    return given, SafetyState(
+        vented=state.vented,
+        shown=state.shown,
+        toe_strides=state.toe_strides,
+        steady=state.steady,
+        ordered=ordered,
+        followed=state.followed,
+    )
