@@ -76,7 +76,8 @@ class Composer(ast.NodeTransformer):
         if called is _INSIDE:
             if isinstance(node.func, ast.Attribute):
                 raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which is not compiled")
-            return self.generic_visit(node)  # type: ignore[return-value]
+            self.generic_visit(node)
+            return node
         own: list[ast.expr] = []
         if isinstance(called, types.FunctionType) or is_row(called):
             own = self.own_arguments(called, node)

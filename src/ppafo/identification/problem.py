@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, STRICT, Text, one_of, published_schema, validate
+from ppafo.documents.models import NAME, STRICT, Text, published_schema, validate
 from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name, reason
@@ -131,7 +131,10 @@ class DeviceProblem(BaseModel):
 
 
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
-_KINDS = [StaticTorqueProblem, FreeDecayProblem, OpenValveFlowProblem, VaneLeakProblem, ValveMapProblem]
+_Procedure = Annotated[
+    StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem,
+    Field(discriminator="kind"),
+]
 
 
 class ProblemFile(BaseModel):
@@ -145,7 +148,7 @@ class ProblemFile(BaseModel):
     device: Annotated[DeviceProblem, Field(description="the set to start from")]
     columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = {}
     procedure: Annotated[
-        tuple[one_of(_KINDS), ...],  # type: ignore[valid-type]
+        tuple[_Procedure, ...],
         Field(strict=False, min_length=1, description="bench procedures to apply"),
     ] = ()
     trajectory: Annotated[
