@@ -141,8 +141,6 @@ def measure_gait(
     shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, was_2, time)
     shown_heel = faulty(gait_sensors.heel_fault, kept_heel, was_heel, time)
     shown_toe = faulty(gait_sensors.toe_fault, kept_toe, was_toe, time)
-    # Who works out the torque has only the readings, true or not.
-    torque = torque_constant * (shown_1 - shown_2)
     remembered = GaitSeen(
         heel_force=shown_heel,
         toe_force=shown_toe,
@@ -153,11 +151,16 @@ def measure_gait(
         smooth_pressure_1=smooth_1,
         smooth_pressure_2=smooth_2,
     )
+    return measurement_of(remembered, torque_constant), remembered
+
+
+def measurement_of(shown: GaitSeen, torque_constant: float) -> GaitMeasurement:
+    """What a controller gets of what the sensors show; its torque is that of the readings, true or not."""
     return GaitMeasurement(
-        angle=shown_angle,
-        pressure_1=shown_1,
-        pressure_2=shown_2,
-        torque=torque,
-        heel_force=shown_heel,
-        toe_force=shown_toe,
-    ), remembered
+        angle=shown.angle,
+        pressure_1=shown.pressure_1,
+        pressure_2=shown.pressure_2,
+        torque=torque_constant * (shown.pressure_1 - shown.pressure_2),
+        heel_force=shown.heel_force,
+        toe_force=shown.toe_force,
+    )
