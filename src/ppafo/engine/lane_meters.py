@@ -56,7 +56,7 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
         "pressure_2": "pressure_2",
         "torque": "torque",
         "command": "result.command",
-        "wanted": "wanted",
+        "reference": "wanted",
         "temperature_1": warm[0] if thermal else "0.0",
         "temperature_2": warm[1] if thermal else "0.0",
     }

@@ -265,14 +265,6 @@ def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: 
     )
 
 
-def end_moving_gas(
-    plant: PlantParameters, begun: MovingGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
-) -> GasChange:
-    """Changes of mass [kg] in one step [s] with moving volumes, from its first stage."""
-    second = second_moving_stage(plant, begun, port_1, port_2, port_flow)
-    return moving_change(plant, begun.still, second, step)
-
-
 def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle: float, step: float) -> float:
     """Estimated error of both pressures at the end of a step [s] over what is allowed [-].
 
