@@ -53,11 +53,11 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` replaces the
-    gait of the file.
+    gait of the file. ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
-    document = _changed(FILE.parse(FILE.read(name_or_path), file), given, file)
+    document = _apply_overrides(FILE.parse(FILE.read(name_or_path), file), given, file)
     load_walking_controller(kind_at(document, "controller"))
     validate(walk_file(), document, file, ScenarioError)
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
@@ -87,7 +87,7 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
     return configuration
 
 
-def _changed(document: dict[str, Any], overrides: tuple[str, ...], file: str) -> dict[str, Any]:
+def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file: str) -> dict[str, Any]:
     """Return a copy of the document with the overrides of the walk in it; those of the device are left out."""
     changed = copy.deepcopy(document)
     for override in overrides:

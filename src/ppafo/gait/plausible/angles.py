@@ -3,19 +3,19 @@
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.plausible.checked import Checked, Given
+from ppafo.gait.plausible.checked import MeanStride, SignSource
 
 SHANK_RANGE = (25.0, 120.0)
 ANKLE_RANGE = (5.0, 80.0)
 ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
 """Percent of the stride in which the foot stands: the ankle then turns as the shank does."""
-_LEAST_SHANK_TRAVEL = 8.0
+_MINIMUM_SHANK_TRAVEL = 8.0
 _LARGEST_FOOT_ANGLE = 35.0
 
 
-def check_shank(walk: Checked) -> None:
-    """Refuse a shank that no leg has."""
+def check_shank(walk: MeanStride) -> None:
+    """Raise DataError for a shank angle that no leg has."""
     phi = np.degrees(walk.curves["shank_angle"])
     place = f"{walk.file['shank_angle']}: shank_angle"
     travel = float(np.ptp(phi))
@@ -38,8 +38,8 @@ def check_shank(walk: Checked) -> None:
         )
 
 
-def check_ankle(walk: Checked) -> None:
-    """Refuse an ankle that no leg has, or not with this shank."""
+def check_ankle(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle that no leg has, or not with this shank."""
     theta, phi = (np.degrees(walk.curves[name]) for name in ("ankle_angle", "shank_angle"))
     place = f"{walk.file['ankle_angle']}: ankle_angle"
     travel = float(np.ptp(theta))
@@ -50,7 +50,7 @@ def check_ankle(walk: Checked) -> None:
             f"{_unit_hint(travel, low, high)}"
         )
     stand, lean = theta[MIDSTANCE], phi[MIDSTANCE]
-    slope = float(np.polyfit(lean, stand, 1)[0]) if np.ptp(lean) > _LEAST_SHANK_TRAVEL else 1.0
+    slope = float(np.polyfit(lean, stand, 1)[0]) if np.ptp(lean) > _MINIMUM_SHANK_TRAVEL else 1.0
     if slope < 0.0:
         raise DataError(
             f"{place} goes into plantarflexion while the shank rotates forward over the standing foot "
@@ -61,11 +61,11 @@ def check_ankle(walk: Checked) -> None:
     if abs(foot) > _LARGEST_FOOT_ANGLE or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
         raise DataError(
             f"{place} would tilt the standing foot by {foot:.0f} deg, plausible is within {_LARGEST_FOOT_ANGLE:g} deg "
-            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.given]}"
+            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.signs_from]}"
         )
 
 
-_NEUTRAL: dict[Given, str] = {
+_NEUTRAL: dict[SignSource, str] = {
     "map": "give ankle_angle.neutral in the gait map: the reading of the file when the foot is "
     "perpendicular to the shank",
     "columns": "write it as 90 deg when the foot is perpendicular to the shank, or give a gait map with "
@@ -74,8 +74,8 @@ _NEUTRAL: dict[Given, str] = {
 }
 
 
-def _other_foot(walk: Checked) -> str:
-    if walk.given == "gait_file" or "vertical_force" not in walk.curves:
+def _other_foot(walk: MeanStride) -> str:
+    if walk.signs_from == "gait_file" or "vertical_force" not in walk.curves:
         return ""
     return ", or the force is of the other foot: choose the other side, or the column of this foot"
 

@@ -22,7 +22,7 @@ def read_c3d(path: str | Path) -> tuple[Floats, dict[str, Floats], dict[str, str
     """Return time [s], columns and their units: points as ``LABEL.x``, ``.y``, ``.z``, analog channels by label.
 
     Analog channels are faster; the samples at the times of the points are taken. A gap in a point is NaN here, and
-    refused by whoever uses the column.
+    refused by whoever uses the column. DataError where the file cannot be read.
     """
     _check_is_c3d(path)
     check_can_be_read(Path(path), __name__, "open_c3d", "ezc3d")
@@ -59,7 +59,10 @@ def _check_is_c3d(path: str | Path) -> None:
 
 
 def open_c3d(path: str | Path) -> Any:
-    """Return what ezc3d makes of a file; a damaged one can bring down the process."""
+    """Return what ezc3d makes of a file; a damaged one can bring down the process.
+
+    DataError where it cannot be read.
+    """
     import ezc3d
 
     try:

@@ -9,11 +9,11 @@ import numpy as np
 from ppafo.errors import DataError
 from ppafo.gait.fourier import HARMONICS, FitError, fit_curve
 from ppafo.gait.gait import REQUIRED, Curve, Gait, Origin
-from ppafo.gait.plausible.checked import Checked, Given
+from ppafo.gait.plausible.checked import MeanStride, SignSource
 from ppafo.gait.plausible.loads import check_force_scale, force_remarks
 from ppafo.gait.plausible.stride import check_plausible
+from ppafo.gait.recorded.drop_outs import check_constant
 from ppafo.gait.recorded.events import Stride, strides_from_force, strides_from_shank
-from ppafo.gait.recorded.held import check_constant
 from ppafo.gait.recorded.knee import check_way, knee_remarks
 from ppafo.gait.recorded.mapping import CONVENTIONS, GaitMap, Side
 from ppafo.gait.recorded.noise import check_scatter, scatter_remarks
@@ -21,15 +21,15 @@ from ppafo.gait.recorded.settings import ImportSettings, check_settings
 from ppafo.gait.recorded.signal import Signal, low_pass
 from ppafo.gait.recorded.strides import CurveStatistics, mean_curve, strides_within, without_outliers
 from ppafo.gait.recorded.table import CSV, MotionTable, read_table
-from ppafo.gait.recorded.walk import Person, recorded_walk
+from ppafo.gait.recorded.walk import Person, walk_signals
 
 LARGEST_STRIDE_CHANGE = 0.25
-"""Share of the median stride time; a stride that differs by more has a missed event in it, or is no steady walking."""
+"""Fraction of the median stride time; a stride that differs by more has a missed event, or is not steady walking."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportedGait:
-    """The gait, the strides behind it, the curves of each stride by name, errors of the series, and remarks.
+    """The gait, its strides, the curves of each stride by name, errors of the series, and remarks.
 
     ``events`` says where the strides come from: ``vertical_force`` or ``shank_angle``.
     """
@@ -51,28 +51,28 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     file, column and row, and what to do.
     """
     check_settings(settings)
-    given: Given = "columns" if settings.columns is None else "map"
+    signs_from: SignSource = "columns" if settings.columns is None else "map"
     tables = [read_table(path) for path in files]
     if not tables:
         raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
     columns = settings.columns or _convention(tables, settings.side)
     person = Person(settings.body_mass, settings.stature)
-    walk = recorded_walk(tables, columns, person, is_default=settings.columns is None)
+    walk = walk_signals(tables, columns, person, is_default=settings.columns is None)
     events = "vertical_force" if "vertical_force" in walk else "shank_angle"
-    found = _strides(walk, events, given)
+    found = _strides(walk, events, signs_from)
     smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
     usable = [item for item in found if all(strides_within(walk[name], [item]) for name in REQUIRED)]
     strides, left_out = without_outliers(usable, LARGEST_STRIDE_CHANGE)
     _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events)}, settings.least_strides)
     check_constant(walk, tables, strides, left_out)
     curves = {name: mean_curve(name, signal, strides) for name, signal in smooth.items()}
-    share, time = _mean([item.stance_share for item in strides]), _mean([item.time for item in strides])
+    fraction, time = _mean([item.stance_share for item in strides]), _mean([item.time for item in strides])
     means = {name: item.mean for name, item in curves.items()}
     fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     check_scatter(curves, errors, walk)
-    check_plausible(Checked({name: signal.file for name, signal in walk.items()}, means, share, time, given))
-    check_way(walk, given)
+    check_plausible(MeanStride({name: signal.file for name, signal in walk.items()}, means, fraction, time, signs_from))
+    check_way(walk, signs_from)
     gait = _gait(settings, tables, strides, {name: curve for name, (curve, _) in fitted.items()}, events)
     remarks = (*_remarks(curves, strides, left_out), *knee_remarks(columns.knee, walk, settings.stature))
     remarks += tuple(scatter_remarks(curves, errors))
@@ -92,10 +92,10 @@ def _convention(tables: Sequence[MotionTable], side: Side) -> GaitMap:
     return CONVENTIONS[forms[0]](side)
 
 
-def _strides(walk: Mapping[str, Signal], events: str, given: Given) -> list[Stride]:
+def _strides(walk: Mapping[str, Signal], events: str, signs_from: SignSource) -> list[Stride]:
     if events != "vertical_force":
         return strides_from_shank(walk[events])
-    check_force_scale(walk[events].file, walk[events].values, given)
+    check_force_scale(walk[events].file, walk[events].values, signs_from)
     return strides_from_force(walk[events])
 
 

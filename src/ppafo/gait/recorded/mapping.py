@@ -174,7 +174,7 @@ CONVENTIONS = {"csv": package_map, "opensim": opensim_map, "c3d": plug_in_gait_m
 
 
 def load_map(path: str | Path) -> GaitMap:
-    """Return the map in a TOML file."""
+    """Return the map in a TOML file. DataError where it cannot be used."""
     file = label(str(path))
     try:
         content = read_regular_file(Path(path), MOST_BYTES_TYPED)

@@ -30,7 +30,10 @@ class MotionTable:
 
 
 def read_table(path: str | Path) -> MotionTable:
-    """Return the table in a ``.mot``, ``.sto``, ``.csv`` or ``.c3d`` file; its clock runs without a gap."""
+    """Return the table in a ``.mot``, ``.sto``, ``.csv`` or ``.c3d`` file; its clock runs without a gap.
+
+    DataError for any other file, or for one with a gap in its time.
+    """
     suffix = Path(path).suffix.lower()
     if suffix in (".mot", ".sto"):
         table = _of_opensim(str(path), read_opensim(path))
@@ -72,7 +75,7 @@ def _of_csv(path: str | Path) -> MotionTable:
 
 def _check_gaps(table: MotionTable) -> None:
     if table.time.size < 3:
-        raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs at least tens of them")
+        raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
     steps = np.diff(table.time)
     median = float(np.median(steps))
     index = int(np.argmax(steps))

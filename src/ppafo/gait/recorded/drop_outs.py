@@ -1,4 +1,4 @@
-"""Columns that stand still while the wearer walks: drop-outs that someone filled with the last value."""
+"""Columns that stay constant while the wearer walks: drop-outs that were filled with the last value."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,15 +18,15 @@ _LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 _ABOUT_STANCE = 0.05
 """Of the stride, at either end of the stance, in which a load may rest too."""
 _COARSE = 0.002
-"""Share of the range; a sensor with coarser steps keeps a value where its curve turns round."""
+"""Fraction of the range; a sensor with coarser steps keeps a value where its curve turns round."""
 
 
 def check_constant(
     walk: Mapping[str, Signal], tables: Sequence[MotionTable], strides: Sequence[Stride], left_out: Sequence[Stride]
 ) -> None:
-    """Refuse a column that keeps one value for longer than 0.1 s within the strides; in swing a load may.
+    """Raise DataError for a column that keeps one value for more than 0.1 s within the strides; a load may in swing.
 
-    Motions are looked at in strides that are left out too: what held everything made them longer. A column that never
+    Motions are checked in strides that are left out too: a drop-out made those longer. A column that never
     moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its smallest step is none either.
     """
     by_file = {table.file: table for table in tables}
