@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import ModuleType
+from typing import Any
 
 _LINEAR_ALGEBRA = "scipy.linalg"
 
@@ -15,7 +16,8 @@ def load_compiler() -> None:
     """Import Numba without SciPy's linear algebra, which it looks for at import; compiled models have none."""
     if "numba" in sys.modules or _LINEAR_ALGEBRA in sys.modules:
         return
-    sys.modules[_LINEAR_ALGEBRA] = None  # type: ignore[assignment]  # as where it is not installed: the import fails
+    modules: dict[str, Any] = sys.modules
+    modules[_LINEAR_ALGEBRA] = None  # as where it is not installed: the import fails
     try:
         import numba.np.arraymath  # noqa: F401
     finally:

@@ -44,9 +44,11 @@ def mistake(said: str, source: str) -> ProgramError:
     text = lines[number - 1].strip() if 0 < number <= len(lines) else ""
     found = place_in(lines, number) or _find_called(lines, text)
     if found is None:
-        return ProgramError(f"the model cannot be compiled: {_problem(Report(said, source, text, text))}")
+        return ProgramError(
+            f"the model cannot be compiled: {_problem(Report(said=said, source=source, text=text, written=text))}"
+        )
     written = linecache.getline(found.file, found.line).strip()
-    problem = _problem(Report(said, source, text, written or text))
+    problem = _problem(Report(said=said, source=source, text=text, written=written or text))
     return refusal(found.file, _line_of(said, found), problem)
 
 

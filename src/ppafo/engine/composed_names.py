@@ -78,8 +78,9 @@ class Composer(ast.NodeTransformer):
         called = self.value_of(node.func)
         if called is _INSIDE:
             if isinstance(node.func, ast.Attribute):
-                raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which cannot be compiled")
-            return self.generic_visit(node)  # type: ignore[return-value]
+                raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which is not compiled")
+            self.generic_visit(node)
+            return node
         own: list[ast.expr] = []
         if isinstance(called, types.FunctionType) or is_row(called):
             own = self.own_arguments(called, node)

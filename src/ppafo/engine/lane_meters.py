@@ -48,13 +48,24 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]"
     thermal = ("thermal", "masses") if program.is_thermal else ()
     warm = [f"thermal.temperature * (state.mass_{chamber} / masses.mass_{chamber})" for chamber in (1, 2)]
+    values = {
+        "number": "float(next_record)",
+        "angle": "state.angle",
+        "angular_velocity": "state.angular_velocity",
+        "pressure_1": "pressure_1",
+        "pressure_2": "pressure_2",
+        "torque": "torque",
+        "command": "result.command",
+        "reference": "wanted",
+        "temperature_1": warm[0] if thermal else "0.0",
+        "temperature_2": warm[1] if thermal else "0.0",
+    }
     return [
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal)],
         f"pressure_1, pressure_2 = {pressures}(plant, state.angle, state.mass_1, state.mass_2)",
         f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
         f"wanted = {wanted if program.has_reference else '0.0'}",
-        f"sample = {add(Sample)}(float(next_record), state.angle, state.angular_velocity, pressure_1, "
-        f"pressure_2, torque, result.command, wanted, {', '.join(warm if thermal else ['0.0', '0.0'])})",
+        f"sample = {add(Sample)}({', '.join(f'{name}={value}' for name, value in values.items())})",
     ]
 
 

@@ -133,7 +133,7 @@ class _Flow:
             return self.after_loop(statement, bound)
         if isinstance(statement, ast.Return) and getattr(statement.value, "value", statement) is None:
             raise refusal(self.file, statement, "'return' gives no value")
-        if isinstance(statement, ast.AugAssign) and statement.target.id not in bound:  # type: ignore[union-attr]
+        if isinstance(statement, ast.AugAssign) and _assigned_names(statement.target) - bound:
             raise self.unbound(statement, ast.unparse(statement.target))
         given = getattr(statement, "value", None)
         if isinstance(given, ast.expr):

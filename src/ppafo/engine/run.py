@@ -185,8 +185,15 @@ def initial_sensors(run: Run) -> SensorState | NoParameters:
     if not run.program.slow_sensors:
         return NoParameters()
     initial = run.initial
-    signals = initial.angle, *chamber_pressures(run.plant, initial.angle, initial.mass_1, initial.mass_2)
-    return SensorState(*signals, *signals)
+    pressure_1, pressure_2 = chamber_pressures(run.plant, initial.angle, initial.mass_1, initial.mass_2)
+    return SensorState(
+        angle=initial.angle,
+        pressure_1=pressure_1,
+        pressure_2=pressure_2,
+        true_angle=initial.angle,
+        true_pressure_1=pressure_1,
+        true_pressure_2=pressure_2,
+    )
 
 
 def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:

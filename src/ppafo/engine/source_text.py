@@ -102,7 +102,12 @@ class SourceCollector:
     def _function_text(self, function: Any, name: str) -> str:
         tree = parse_definition(function)
         file = function.__code__.co_filename
-        made = Made(function, function.__code__, function.__defaults__, dict(function.__kwdefaults__ or {}))
+        made = Made(
+            function=function,
+            code=function.__code__,
+            defaults=function.__defaults__,
+            named_defaults=dict(function.__kwdefaults__ or {}),
+        )
         if any(known.function is function for known in self.functions):
             raise refusal(file, tree, f"'{function.__name__}' calls itself, which cannot be compiled")
         self.functions.append(made)

@@ -4,14 +4,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, make_schema, one_of
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import NAME, STRICT, Text, make_schema, validate
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name, reason
-from ppafo.identification.trajectory.section import STRICT, Text, TrajectorySection
+from ppafo.identification.trajectory.section import TrajectorySection
 from ppafo.storage.column_map import ColumnMap
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
@@ -132,7 +131,10 @@ class DeviceProblem(BaseModel):
 
 
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
-_KINDS = [StaticTorqueProblem, FreeDecayProblem, OpenValveFlowProblem, VaneLeakProblem, ValveMapProblem]
+_Procedure = Annotated[
+    StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem,
+    Field(discriminator="kind"),
+]
 
 
 class ProblemFile(BaseModel):
@@ -146,7 +148,7 @@ class ProblemFile(BaseModel):
     device: Annotated[DeviceProblem, Field(description="the set to start from")]
     columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = {}
     procedure: Annotated[
-        tuple[one_of(_KINDS), ...],  # type: ignore[valid-type]
+        tuple[_Procedure, ...],
         Field(strict=False, min_length=1, description="bench procedures to apply"),
     ] = ()
     trajectory: Annotated[
@@ -171,12 +173,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
 
     IdentificationError for one that is not usable.
     """
-    document = _with_hyphens(_FILE.parse(content, file))
-    try:
-        problem = ProblemFile.model_validate(document)
-    except ValidationError as error:
-        text = first_problem(error.errors(include_url=False), ProblemFile)
-        raise IdentificationError(f"{file}: {text}") from error
+    problem = validate(ProblemFile, _with_hyphens(_FILE.parse(content, file)), file, IdentificationError)
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")
     for place, name in _column_maps(problem):

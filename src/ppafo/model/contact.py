@@ -71,7 +71,13 @@ def landing(contact: float, timing: GaitTiming, now: GaitNow, angle: float, offs
     after = SWING if leaves else after
     difference = angle - flat_angle if slaps else offset
     difference = angle - now.ankle if rises else difference
-    return Landing(after, difference, 1.0 if strikes else 0.0, 1.0 if slaps else 0.0, 1.0 if leaves else 0.0)
+    return Landing(
+        contact=after,
+        offset=difference,
+        strikes=1.0 if strikes else 0.0,
+        slaps=1.0 if slaps else 0.0,
+        leaves=1.0 if leaves else 0.0,
+    )
 
 
 SETTLES = 3.0

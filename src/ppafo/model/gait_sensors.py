@@ -62,7 +62,16 @@ class GaitSeen(NamedTuple):
     smooth_pressure_2: float
 
 
-NOTHING_SEEN = GaitSeen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NOTHING_SEEN = GaitSeen(
+    heel_force=0.0,
+    toe_force=0.0,
+    angle=0.0,
+    pressure_1=0.0,
+    pressure_2=0.0,
+    smooth_angle=0.0,
+    smooth_pressure_1=0.0,
+    smooth_pressure_2=0.0,
+)
 
 
 def lagged_reading(shown: float, true: float, follow_rate: float, step: float) -> float:
@@ -135,7 +144,26 @@ def measure_gait(
     shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, was_2, time)
     shown_heel = faulty(gait_sensors.heel_fault, kept_heel, was_heel, time)
     shown_toe = faulty(gait_sensors.toe_fault, kept_toe, was_toe, time)
-    # Who works out the torque has only the readings, true or not.
-    torque = torque_constant * (shown_1 - shown_2)
-    remembered = GaitSeen(shown_heel, shown_toe, shown_angle, shown_1, shown_2, smooth_angle, smooth_1, smooth_2)
-    return GaitMeasurement(shown_angle, shown_1, shown_2, torque, shown_heel, shown_toe), remembered
+    remembered = GaitSeen(
+        heel_force=shown_heel,
+        toe_force=shown_toe,
+        angle=shown_angle,
+        pressure_1=shown_1,
+        pressure_2=shown_2,
+        smooth_angle=smooth_angle,
+        smooth_pressure_1=smooth_1,
+        smooth_pressure_2=smooth_2,
+    )
+    return measurement_of(remembered, torque_constant), remembered
+
+
+def measurement_of(shown: GaitSeen, torque_constant: float) -> GaitMeasurement:
+    """What a controller gets of what the sensors show; its torque is that of the readings, true or not."""
+    return GaitMeasurement(
+        angle=shown.angle,
+        pressure_1=shown.pressure_1,
+        pressure_2=shown.pressure_2,
+        torque=torque_constant * (shown.pressure_1 - shown.pressure_2),
+        heel_force=shown.heel_force,
+        toe_force=shown.toe_force,
+    )

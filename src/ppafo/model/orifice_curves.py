@@ -9,9 +9,8 @@ import numpy as np
 from ppafo.constants import STANDARD_REFERENCE_DENSITY_AIR, STANDARD_REFERENCE_TEMPERATURE
 from ppafo.model.columns import over_runs, root
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
-from ppafo.model.orifice import FlowCurve, isentropic_flow_function, iso6358_flow_function
+from ppafo.model.orifice import TERMS, FlowCurve, isentropic_flow_function, iso6358_flow_function
 
-DEGREE = 6
 FIT_POINTS = 400
 
 
@@ -77,10 +76,15 @@ def _fit_curve(
 ) -> tuple[float, ...]:
     """Coefficients of a polynomial times a root, by relative least squares."""
     target = exact / np.sqrt(gaps)
-    powers = np.vander(gaps, DEGREE + 1, increasing=True)
+    powers = np.vander(gaps, TERMS, increasing=True)
     coefficients = np.linalg.lstsq(powers / target[:, None], np.ones_like(target), rcond=None)[0]
     return tuple(coefficients.tolist())
 
 
 def _curve(critical_ratio: float, linear_ratio: float, coefficients: Sequence[float]) -> FlowCurve:
-    return FlowCurve(critical_ratio, linear_ratio, 1.0 / (1.0 - linear_ratio), *coefficients)
+    return FlowCurve(
+        critical_ratio=critical_ratio,
+        linear_ratio=linear_ratio,
+        linear_slope=1.0 / (1.0 - linear_ratio),
+        coefficients=tuple(coefficients),
+    )

@@ -68,7 +68,12 @@ def single_port_flow(pressure: float, port: SinglePort, curve: FlowCurve) -> Por
 def single_port_flow_slopes(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlowSlopes:
     """As ``single_port_flow``, with derivatives."""
     flow, _, slope = check_valve_flow_slopes(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
-    return PortFlowSlopes(flow, slope, flow * port.source_fraction, slope * port.source_fraction)
+    return PortFlowSlopes(
+        total=flow,
+        total_slope=slope,
+        from_source=flow * port.source_fraction,
+        source_slope=slope * port.source_fraction,
+    )
 
 
 def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlow:
@@ -84,4 +89,6 @@ def blended_port_flow_slopes(pressure: float, port: BlendedPort, curve: FlowCurv
         port.source_pressure, pressure, port.source_conductance, port.takes_back, curve
     )
     vent, _, vent_slope = orifice_flow_slopes(port.vent_pressure, pressure, port.vent_conductance, curve)
-    return PortFlowSlopes(source + vent, source_slope + vent_slope, source, source_slope)
+    return PortFlowSlopes(
+        total=source + vent, total_slope=source_slope + vent_slope, from_source=source, source_slope=source_slope
+    )

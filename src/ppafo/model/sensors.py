@@ -76,12 +76,12 @@ def follow_signals(
 ) -> SensorState:
     """What the sensors show after a step [s] that leads to an angle [rad] and two absolute pressures [Pa]."""
     return SensorState(
-        follow(rates.angle, step, sensed.angle, sensed.true_angle, angle),
-        follow(rates.pressure, step, sensed.pressure_1, sensed.true_pressure_1, pressure_1),
-        follow(rates.pressure, step, sensed.pressure_2, sensed.true_pressure_2, pressure_2),
-        angle,
-        pressure_1,
-        pressure_2,
+        angle=follow(rates.angle, step, sensed.angle, sensed.true_angle, angle),
+        pressure_1=follow(rates.pressure, step, sensed.pressure_1, sensed.true_pressure_1, pressure_1),
+        pressure_2=follow(rates.pressure, step, sensed.pressure_2, sensed.true_pressure_2, pressure_2),
+        true_angle=angle,
+        true_pressure_1=pressure_1,
+        true_pressure_2=pressure_2,
     )
 
 
@@ -138,4 +138,4 @@ def measure(
     angle = quantise(angle + sensors.angle_noise * standard_noise(seed, sample, 0), sensors.angle_quantum)
     first = quantise(pressure_1 + sensors.pressure_noise * standard_noise(seed, sample, 1), sensors.pressure_quantum)
     second = quantise(pressure_2 + sensors.pressure_noise * standard_noise(seed, sample, 2), sensors.pressure_quantum)
-    return Measurement(angle, first, second, torque_constant * (first - second))
+    return Measurement(angle=angle, pressure_1=first, pressure_2=second, torque=torque_constant * (first - second))

@@ -78,7 +78,12 @@ def bottle_content(table: FluidTable, mass: float, volume: float, temperature: f
     vapour = min(density, densest_gas(table, temperature))
     pressure = fluid_pressure(table, temperature, density)
     enthalpy = gas_specific_energy(table, temperature, density) + pressure / vapour
-    return BottleContent(temperature, pressure, liquid_mass(table, mass, volume, temperature), enthalpy)
+    return BottleContent(
+        temperature=temperature,
+        pressure=pressure,
+        liquid_mass=liquid_mass(table, mass, volume, temperature),
+        outflow_enthalpy=enthalpy,
+    )
 
 
 def liquid_mass(table: FluidTable, mass: float, volume: float, temperature: float) -> float:

@@ -5,9 +5,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.valves.catalog import VALVES
@@ -48,12 +48,7 @@ def parse_parameter_set(content: bytes, file: str) -> ParameterSet:
     """
     document = _FILE.parse(content, file)
     _find_valves(document)
-    try:
-        parsed = parameter_file().model_validate(document)
-    except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), parameter_file())
-        raise ParameterError(f"{file}: {problem}") from error
-    parameter_set = _flatten(parsed, file)
+    parameter_set = _flatten(validate(parameter_file(), document, file, ParameterError), file)
     _check(parameter_set)
     return parameter_set
 

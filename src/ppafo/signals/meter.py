@@ -52,7 +52,12 @@ def is_away(reference: float, last: float, tolerance: float) -> bool:
 def advance_course(course: Course, sample: Sample) -> Course:
     """The course with one sample more, of a monotone reference: away from its last value first, then at rest."""
     away = is_away(sample.reference, course.last, course.tolerance)
-    return Course(course.last, course.largest, course.tolerance, sample.number + 1.0 if away else course.hold_start)
+    return Course(
+        last=course.last,
+        largest=course.largest,
+        tolerance=course.tolerance,
+        hold_start=sample.number + 1.0 if away else course.hold_start,
+    )
 
 
 def ends_before_hold(course: Course, sample: Sample) -> bool:

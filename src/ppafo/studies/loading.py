@@ -7,9 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics import METRICS
@@ -92,11 +90,7 @@ def _apply_overrides(
 
 
 def _parse(document: Mapping[str, Any], file: str) -> declared.StudyFile:
-    try:
-        return declared.StudyFile.model_validate(document)
-    except ValidationError as error:
-        text = first_problem(error.errors(include_url=False), declared.StudyFile)
-        raise StudyError(f"{file}: {text}") from error
+    return validate(declared.StudyFile, document, file, StudyError)
 
 
 def _build(document: dict[str, Any], source: _Source) -> Study:

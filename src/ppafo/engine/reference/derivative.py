@@ -91,7 +91,13 @@ def gas_rates(
     vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, openings.vent_1, valve_orifice)
     vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, openings.vent_2, valve_orifice)
     leak = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
-    return GasRates(source_1 - vent_1 - leak, source_2 - vent_2 + leak, source_1 + source_2, vent_1 + vent_2, abs(leak))
+    return GasRates(
+        mass_1=source_1 - vent_1 - leak,
+        mass_2=source_2 - vent_2 + leak,
+        supplied=source_1 + source_2,
+        vented=vent_1 + vent_2,
+        leaked=abs(leak),
+    )
 
 
 def transport(
@@ -138,13 +144,13 @@ def thermal_gas_rates(
     wall_1 = thermal.wall_exchange * volume_1 * (1.0 - warmth_1)
     wall_2 = thermal.wall_exchange * volume_2 * (1.0 - warmth_2)
     return ThermalGasRates(
-        source_1.content - vent_1.content - leak.content - compression * contents[0] / volume_1 + wall_1,
-        source_2.content - vent_2.content + leak.content + compression * contents[1] / volume_2 + wall_2,
-        source_1.mass - vent_1.mass - leak.mass,
-        source_2.mass - vent_2.mass + leak.mass,
-        source_1.mass + source_2.mass,
-        vent_1.mass + vent_2.mass,
-        abs(leak.mass),
+        content_1=source_1.content - vent_1.content - leak.content - compression * contents[0] / volume_1 + wall_1,
+        content_2=source_2.content - vent_2.content + leak.content + compression * contents[1] / volume_2 + wall_2,
+        mass_1=source_1.mass - vent_1.mass - leak.mass,
+        mass_2=source_2.mass - vent_2.mass + leak.mass,
+        supplied=source_1.mass + source_2.mass,
+        vented=vent_1.mass + vent_2.mass,
+        leaked=abs(leak.mass),
     )
 
 

@@ -103,11 +103,12 @@ class _Solution:
             self.result.evaluations += 1
             self.fill(t, y, yp, self.parameters, self.command, self.way)
 
-        def roots(_t: float, y: Floats, events: Floats) -> None:
+        def write_roots(_t: float, y: Floats, events: Floats) -> None:
             events[:] = self.roots(y)
 
-        roots.terminal = [True, True]  # type: ignore[attr-defined]
-        roots.direction = [-1, -1]  # type: ignore[attr-defined]
+        roots: Any = write_roots
+        roots.terminal = [True, True]
+        roots.direction = [-1, -1]
         gas_count = gas_unknowns(self.run.program) - PLANT_UNKNOWNS
         shown = SIGNAL_TOLERANCES if self.run.program.slow_sensors else ()
         valve_count = self.y.size - self.valve_from

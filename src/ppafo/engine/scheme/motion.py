@@ -140,7 +140,9 @@ def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tup
     stop = plant.angle_max if way > 0.0 else plant.angle_min
     free_angle = clamp_angle(plant, state.angle + length * (velocity + 0.5 * length * acceleration))
     next_angle = stop if meets_stop else free_angle
-    return FreePart(way, acceleration, torque, next_angle, 1.0 if meets_stop else 0.0), length
+    return FreePart(
+        way=way, acceleration=acceleration, torque=torque, next_angle=next_angle, meets_stop=1.0 if meets_stop else 0.0
+    ), length
 
 
 def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length: float) -> tuple[float, float, float]:
@@ -255,13 +257,13 @@ def end_free(
 def with_motion(state: PlantState, angle: float, angular_velocity: float) -> PlantState:
     """State with a new angle [rad] and angular velocity [rad/s]."""
     return PlantState(
-        angle,
-        angular_velocity,
-        state.mass_1,
-        state.mass_2,
-        state.supplied_mass,
-        state.vented_mass,
-        state.leaked_mass,
+        angle=angle,
+        angular_velocity=angular_velocity,
+        mass_1=state.mass_1,
+        mass_2=state.mass_2,
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
     )
 
 
@@ -269,11 +271,11 @@ def with_gas(state: PlantState, gas: GasChange) -> PlantState:
     """State with the gas of one step added."""
     vented = gas.supplied - gas.mass_1 - gas.mass_2
     return PlantState(
-        state.angle,
-        state.angular_velocity,
-        state.mass_1 + gas.mass_1,
-        state.mass_2 + gas.mass_2,
-        state.supplied_mass + gas.supplied,
-        state.vented_mass + vented,
-        state.leaked_mass + abs(gas.leaked),
+        angle=state.angle,
+        angular_velocity=state.angular_velocity,
+        mass_1=state.mass_1 + gas.mass_1,
+        mass_2=state.mass_2 + gas.mass_2,
+        supplied_mass=state.supplied_mass + gas.supplied,
+        vented_mass=state.vented_mass + vented,
+        leaked_mass=state.leaked_mass + abs(gas.leaked),
     )

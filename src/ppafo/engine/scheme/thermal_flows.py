@@ -100,15 +100,15 @@ def thermal_flows(
     leaked_enthalpy = leak * leak_carries.content
     work = (thermal.heat_capacity_ratio - 1.0) * growth
     return ThermalFlows(
-        enthalpy_1 - leaked_enthalpy - work * state.mass_1 / volume_1 + heat_1,
-        enthalpy_2 + leaked_enthalpy + work * state.mass_2 / volume_2 + heat_2,
-        supplied_1 + vent_1 * vent_1_carries.mass - leaked,
-        supplied_2 + vent_2 * vent_2_carries.mass + leaked,
-        supplied_1 + supplied_2,
-        leaked,
-        source_1 + source_2,
-        enthalpy_1 + enthalpy_2,
-        heat_1 + heat_2,
+        content_1=enthalpy_1 - leaked_enthalpy - work * state.mass_1 / volume_1 + heat_1,
+        content_2=enthalpy_2 + leaked_enthalpy + work * state.mass_2 / volume_2 + heat_2,
+        mass_1=supplied_1 + vent_1 * vent_1_carries.mass - leaked,
+        mass_2=supplied_2 + vent_2 * vent_2_carries.mass + leaked,
+        supplied=supplied_1 + supplied_2,
+        leaked=leaked,
+        source_content=source_1 + source_2,
+        port_content=enthalpy_1 + enthalpy_2,
+        heat=heat_1 + heat_2,
     )
 
 
@@ -133,49 +133,53 @@ def flow_slopes(
     by_1 = leak[1] * weight_1
     by_2 = leak[2] * weight_2
     return FlowSlopes(
-        (in_1.source_slope * source_1.content + vent_slope_1 * vent_1.content) * weight_1 - by_1 * leak_carries.content,
-        -by_2 * leak_carries.content,
-        by_1 * leak_carries.content,
-        (in_2.source_slope * source_2.content + vent_slope_2 * vent_2.content) * weight_2 + by_2 * leak_carries.content,
-        (in_1.source_slope * source_1.mass + vent_slope_1 * vent_1.mass) * weight_1 - by_1 * leak_carries.mass,
-        -by_2 * leak_carries.mass,
-        by_1 * leak_carries.mass,
-        (in_2.source_slope * source_2.mass + vent_slope_2 * vent_2.mass) * weight_2 + by_2 * leak_carries.mass,
-        in_1.source_slope * source_1.mass * weight_1,
-        in_2.source_slope * source_2.mass * weight_2,
-        by_1 * leak_carries.mass,
-        by_2 * leak_carries.mass,
-        in_1.source_slope * source_1.content * weight_1,
-        in_2.source_slope * source_2.content * weight_2,
+        content_1_by_1=(in_1.source_slope * source_1.content + vent_slope_1 * vent_1.content) * weight_1
+        - by_1 * leak_carries.content,
+        content_1_by_2=-by_2 * leak_carries.content,
+        content_2_by_1=by_1 * leak_carries.content,
+        content_2_by_2=(in_2.source_slope * source_2.content + vent_slope_2 * vent_2.content) * weight_2
+        + by_2 * leak_carries.content,
+        mass_1_by_1=(in_1.source_slope * source_1.mass + vent_slope_1 * vent_1.mass) * weight_1
+        - by_1 * leak_carries.mass,
+        mass_1_by_2=-by_2 * leak_carries.mass,
+        mass_2_by_1=by_1 * leak_carries.mass,
+        mass_2_by_2=(in_2.source_slope * source_2.mass + vent_slope_2 * vent_2.mass) * weight_2
+        + by_2 * leak_carries.mass,
+        supplied_by_1=in_1.source_slope * source_1.mass * weight_1,
+        supplied_by_2=in_2.source_slope * source_2.mass * weight_2,
+        leaked_by_1=by_1 * leak_carries.mass,
+        leaked_by_2=by_2 * leak_carries.mass,
+        source_content_by_1=in_1.source_slope * source_1.content * weight_1,
+        source_content_by_2=in_2.source_slope * source_2.content * weight_2,
     )
 
 
 def flow_response(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
     """Gamma h times the change of all flows but heat [kg/s] while both contents change at two rates [kg/s]."""
     return ThermalFlows(
-        slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2,
-        slopes.content_2_by_1 * content_1 + slopes.content_2_by_2 * content_2,
-        slopes.mass_1_by_1 * content_1 + slopes.mass_1_by_2 * content_2,
-        slopes.mass_2_by_1 * content_1 + slopes.mass_2_by_2 * content_2,
-        slopes.supplied_by_1 * content_1 + slopes.supplied_by_2 * content_2,
-        slopes.leaked_by_1 * content_1 + slopes.leaked_by_2 * content_2,
-        slopes.source_content_by_1 * content_1 + slopes.source_content_by_2 * content_2,
-        (slopes.content_1_by_1 + slopes.content_2_by_1) * content_1
+        content_1=slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2,
+        content_2=slopes.content_2_by_1 * content_1 + slopes.content_2_by_2 * content_2,
+        mass_1=slopes.mass_1_by_1 * content_1 + slopes.mass_1_by_2 * content_2,
+        mass_2=slopes.mass_2_by_1 * content_1 + slopes.mass_2_by_2 * content_2,
+        supplied=slopes.supplied_by_1 * content_1 + slopes.supplied_by_2 * content_2,
+        leaked=slopes.leaked_by_1 * content_1 + slopes.leaked_by_2 * content_2,
+        source_content=slopes.source_content_by_1 * content_1 + slopes.source_content_by_2 * content_2,
+        port_content=(slopes.content_1_by_1 + slopes.content_2_by_1) * content_1
         + (slopes.content_1_by_2 + slopes.content_2_by_2) * content_2,
-        0.0,
+        heat=0.0,
     )
 
 
 def combine_flows(one: ThermalFlows, factor_one: float, other: ThermalFlows, factor_other: float) -> ThermalFlows:
     """Two sets of rates [kg/s], each times a factor [-], added."""
     return ThermalFlows(
-        factor_one * one.content_1 + factor_other * other.content_1,
-        factor_one * one.content_2 + factor_other * other.content_2,
-        factor_one * one.mass_1 + factor_other * other.mass_1,
-        factor_one * one.mass_2 + factor_other * other.mass_2,
-        factor_one * one.supplied + factor_other * other.supplied,
-        factor_one * one.leaked + factor_other * other.leaked,
-        factor_one * one.source_content + factor_other * other.source_content,
-        factor_one * one.port_content + factor_other * other.port_content,
-        factor_one * one.heat + factor_other * other.heat,
+        content_1=factor_one * one.content_1 + factor_other * other.content_1,
+        content_2=factor_one * one.content_2 + factor_other * other.content_2,
+        mass_1=factor_one * one.mass_1 + factor_other * other.mass_1,
+        mass_2=factor_one * one.mass_2 + factor_other * other.mass_2,
+        supplied=factor_one * one.supplied + factor_other * other.supplied,
+        leaked=factor_one * one.leaked + factor_other * other.leaked,
+        source_content=factor_one * one.source_content + factor_other * other.source_content,
+        port_content=factor_one * one.port_content + factor_other * other.port_content,
+        heat=factor_one * one.heat + factor_other * other.heat,
     )

@@ -168,21 +168,29 @@ def advance_walk(
     on_toes = walk.contact == ground.TOE
     # A foot that met the ground with its toes brings its heel down: that is no slap.
     slaps = landed.slaps > 0.5 and foot_rate < 0.0
+    slap_rate = foot_rate if slaps else walk.slap_rate
+    clearance = NO_CLEARANCE if strikes else lowest
+    landing = 1.0 if slaps else 0.0
+    toe_landing = 1.0 if strikes and touches_first else 0.0
+    counted_rate = foot_rate if slaps else 0.0
+    counted_clearance = lowest if strikes and lowest < NO_CLEARANCE else 0.0
+    work = 0.5 * (given + walk.external_torque) * turned if on_toes else 0.0
+    # Numba takes more than 15 keywords only where no choice stands among them.
     return WalkState(
-        landed.contact,
-        landed.offset,
-        now,
-        foot,
-        given,
-        walk.heel_force + (heel - walk.heel_force) * share,
-        walk.toe_force + (toe - walk.toe_force) * share,
-        toes_first,
-        foot_rate if slaps else walk.slap_rate,
-        NO_CLEARANCE if strikes else lowest,
-        walk.strides + landed.strikes,
-        walk.landings + (1.0 if slaps else 0.0),
-        walk.toe_landings + (1.0 if strikes and touches_first else 0.0),
-        walk.slap_rates + (foot_rate if slaps else 0.0),
-        walk.clearances + (lowest if strikes and lowest < NO_CLEARANCE else 0.0),
-        walk.push_off_work + (0.5 * (given + walk.external_torque) * turned if on_toes else 0.0),
+        contact=landed.contact,
+        offset=landed.offset,
+        now=now,
+        foot=foot,
+        external_torque=given,
+        heel_force=walk.heel_force + (heel - walk.heel_force) * share,
+        toe_force=walk.toe_force + (toe - walk.toe_force) * share,
+        toes_first=toes_first,
+        slap_rate=slap_rate,
+        clearance=clearance,
+        strides=walk.strides + landed.strikes,
+        landings=walk.landings + landing,
+        toe_landings=walk.toe_landings + toe_landing,
+        slap_rates=walk.slap_rates + counted_rate,
+        clearances=walk.clearances + counted_clearance,
+        push_off_work=walk.push_off_work + work,
     )

@@ -110,10 +110,16 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
     time, angle = part.time[first:last], part["angle"][first:last]
     _check_not_at_limit(source, angle, skipped + first)
     if VELOCITY not in part:
-        return Decay(time - time[0], angle, sign, None, 0.0)
+        return Decay(time=time - time[0], angle=angle, sign=sign, velocity=None, velocity_weight=0.0)
     measured = part[VELOCITY][first:last]
     _check_velocity(source, time, angle, measured)
-    return Decay(time - time[0], angle, sign, measured, noise_of(angle) / noise_of(measured))
+    return Decay(
+        time=time - time[0],
+        angle=angle,
+        sign=sign,
+        velocity=measured,
+        velocity_weight=noise_of(angle) / noise_of(measured),
+    )
 
 
 def _check_course(source: Source, part: Recording) -> None:

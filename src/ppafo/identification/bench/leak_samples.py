@@ -104,7 +104,9 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
             f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
         )
     noise = float(np.std(np.diff(difference[:last]))) / np.sqrt(2.0)
-    return ClosedChambers(part.time[:last] - part.time[0], first[:last], second[:last], fuller, noise)
+    return ClosedChambers(
+        time=part.time[:last] - part.time[0], first=first[:last], second=second[:last], fuller=fuller, noise=noise
+    )
 
 
 def decay_in(closed: ClosedChambers, settings: VaneLeakSettings) -> Decay:

@@ -82,7 +82,9 @@ def _readings(sources: tuple[Source, ...]) -> _Readings:
     for source in sources:
         check_moves(source, PROCEDURE, "mass_flow")
         check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])
-    readings = _Readings(*(pool(sources, name) for name in CHANNELS))
+    readings = _Readings(
+        first=pool(sources, "pressure_1"), second=pool(sources, "pressure_2"), flow=pool(sources, "mass_flow")
+    )
     for source in sources:
         check_absolute(source, PROCEDURE, CHANNELS[:2])
     if float(readings.difference @ readings.flow) <= 0.0:

@@ -15,7 +15,7 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CHANCE, quantile
 from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pauses
-from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series, prospect_of
+from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Role, Series, prospect_of
 from ppafo.identification.bench.static_readings import PROCEDURE, Readings, Regression, labels_of, readings_of, regress
 from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
@@ -272,10 +272,12 @@ def _summary(readings: Readings, fit: Regression, grows: bool) -> str:
 def _panels(readings: Readings, fit: Regression) -> tuple[Panel, ...]:
     ends = np.array([readings.pressure.min(), readings.pressure.max()])
     nominal = fit.coefficients[_SLOPE] * ends + fit.coefficients[_ZERO]
-    branches = (("pressure rising", 1.0, "rising"), ("pressure falling", -1.0, "falling"))
-    chosen = [(name, readings.branch == sign, role) for name, sign, role in branches]
-    main = [Series(name, readings.pressure[on], readings.torque[on], role) for name, on, role in chosen]  # type: ignore[arg-type]
-    rest = [Series("", readings.pressure[on], fit.residuals[on], role) for _, on, role in chosen]  # type: ignore[arg-type]
+    branches: dict[Role, float] = {"rising": 1.0, "falling": -1.0}
+    main, rest = [], []
+    for role, sign in branches.items():
+        on = readings.branch == sign
+        main.append(Series(f"pressure {role}", readings.pressure[on], readings.torque[on], role))
+        rest.append(Series("", readings.pressure[on], fit.residuals[on], role))
     line = Series("nominal", ends, nominal, "law")
     zero = Series("", ends, np.zeros(2), "law")
     axis = ("Pressure difference", "Pa_d")

@@ -17,7 +17,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
 from ppafo.identification.bench.flow_laws import GasAt, orifice_shape
 from ppafo.identification.bench.inputs import check_absolute, check_moves, check_sources, kind_of, pauses
-from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series
+from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Role, Series
 from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.signals.faults import FEWEST_AT_LIMIT, plateaus, scatters
@@ -258,10 +258,11 @@ def _meter_check(sources: tuple[Source, ...]) -> Check:
 def _panels(measured: _Map, fit: CurveFit, scale: float) -> tuple[Panel, ...]:
     command = np.linspace(float(measured.command.min()), float(measured.command.max()), 401)
     series = []
-    for name, sign, role in (("command rising", 1.0, "rising"), ("command falling", -1.0, "falling")):
+    branches: dict[Role, float] = {"rising": 1.0, "falling": -1.0}
+    for role, sign in branches.items():
         on = measured.branch == sign
         if on.any():
-            series.append(Series(name, measured.command[on], measured.area[on], role))  # type: ignore[arg-type]
+            series.append(Series(f"command {role}", measured.command[on], measured.area[on], role))
             law = scale * area_of_command(command, np.full_like(command, sign), *fit.values.tolist())
             series.append(Series("fitted" if sign > 0 else "", command, law, "law"))
     rest = fit.residuals * scale

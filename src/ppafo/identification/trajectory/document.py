@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.errors import IdentificationError
 from ppafo.identification.source import Source, common_use, source_of
 from ppafo.identification.trajectory.experiment import (
@@ -54,11 +53,7 @@ def trajectory_from_dict(
 
     Texts have their units, the problem is in SI. IdentificationError or DataError, one line that names ``file``.
     """
-    try:
-        section = TrajectorySection.model_validate(dict(content))
-    except ValidationError as error:
-        text = first_problem(error.errors(include_url=False), TrajectorySection)
-        raise IdentificationError(f"{file}: {text}") from error
+    section = validate(TrajectorySection, dict(content), file, IdentificationError)
     home = folder or Path()
 
     def read(item: ExperimentSection) -> Source:

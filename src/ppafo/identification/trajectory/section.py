@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME
+from ppafo.documents.models import NAME, STRICT, Text, Texts
 from ppafo.errors import DataError, IdentificationError, UnitError, nearest_name
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, Use
@@ -18,9 +18,6 @@ from ppafo.identification.trajectory.problem import Loss, Scale
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.units import parse_quantity
 
-STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-Text = Annotated[str, Field(min_length=1)]
-Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
 _Noise = dict[str, Text]
 

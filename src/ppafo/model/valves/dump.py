@@ -32,10 +32,10 @@ def vent_chambers(openings: Openings, command: float) -> Openings:
     """Openings [-] with both chambers vented where the command says so."""
     vents = command > VENTS_ABOVE
     return Openings(
-        0.0 if vents else openings.source_1,
-        1.0 if vents else openings.vent_1,
-        0.0 if vents else openings.source_2,
-        1.0 if vents else openings.vent_2,
+        source_1=0.0 if vents else openings.source_1,
+        vent_1=1.0 if vents else openings.vent_1,
+        source_2=0.0 if vents else openings.source_2,
+        vent_2=1.0 if vents else openings.vent_2,
     )
 
 
@@ -54,16 +54,16 @@ def connect_ideal(plant: PlantParameters, shown: DumpedOpening) -> tuple[SingleP
     full, room = plant.valve_conductance, plant.atmospheric_pressure
     return (
         SinglePort(
-            full if vents else port_1.conductance,
-            room if vents else port_1.node_pressure,
-            0.0 if vents else port_1.source_fraction,
-            1.0 if vents else port_1.takes_back,
+            conductance=full if vents else port_1.conductance,
+            node_pressure=room if vents else port_1.node_pressure,
+            source_fraction=0.0 if vents else port_1.source_fraction,
+            takes_back=1.0 if vents else port_1.takes_back,
         ),
         SinglePort(
-            full if vents else port_2.conductance,
-            room if vents else port_2.node_pressure,
-            0.0 if vents else port_2.source_fraction,
-            1.0 if vents else port_2.takes_back,
+            conductance=full if vents else port_2.conductance,
+            node_pressure=room if vents else port_2.node_pressure,
+            source_fraction=0.0 if vents else port_2.source_fraction,
+            takes_back=1.0 if vents else port_2.takes_back,
         ),
     )
 

@@ -122,7 +122,9 @@ def advance_moving(
     mean = max(-1.0, min(1.0, spool_mean if has_spool else requested_mean))
     towards_1 = towards_chamber_1(settled.opening, opening, mean)
     towards_2 = towards_chamber_1(-settled.opening, -opening, -mean)
-    return Openings(towards_1, towards_2, towards_2, towards_1), SpoolState(requested, opening, rate)
+    return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1), SpoolState(
+        requested, opening, rate
+    )
 
 
 def spool_acceleration(opening: float, rate: float, target: float, frequency: float, damping_ratio: float) -> float:
@@ -142,7 +144,7 @@ def openings_of(opening: float) -> Openings:
     clipped = max(-1.0, min(1.0, opening))
     towards_1 = max(clipped, 0.0)
     towards_2 = max(-clipped, 0.0)
-    return Openings(towards_1, towards_2, towards_2, towards_1)
+    return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1)
 
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
@@ -225,12 +227,12 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
     per_rate = moving * SMALLEST_FRACTION
     faster = angular * small
     return SpoolStep(
-        exp_p,
-        exp_q * per_rate,
-        -exp_q * faster,
-        exp_p + exp_q * trace,
-        mean_p * fraction,
-        mean_q * per_rate * fraction,
+        next_by_opening=exp_p,
+        next_by_rate=exp_q * per_rate,
+        rate_by_opening=-exp_q * faster,
+        rate_by_rate=exp_p + exp_q * trace,
+        mean_by_opening=mean_p * fraction,
+        mean_by_rate=mean_q * per_rate * fraction,
     )
 
 
@@ -243,7 +245,10 @@ def prepare_moving(settings: Mapping[str, float]) -> MovingProportional:
     """Parameters of the moving valve from ``settings`` [SI]."""
     limit = settings["slew_limit"] or NO_SLEW_LIMIT
     return MovingProportional(
-        settings["dead_band"], limit, settings["spool_frequency"], settings["spool_damping_ratio"]
+        dead_band=settings["dead_band"],
+        slew_limit=limit,
+        frequency=settings["spool_frequency"],
+        damping_ratio=settings["spool_damping_ratio"],
     )
 
 

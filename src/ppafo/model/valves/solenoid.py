@@ -77,8 +77,18 @@ def connect_positions(plant: PlantParameters, shown: PairPositions) -> tuple[Sin
     node_2 = plant.dorsiflexion_pressure if open_b else plant.atmospheric_pressure
     back_1 = plant.relieving if open_a else 1.0
     back_2 = plant.relieving if open_b else 1.0
-    port_1 = SinglePort(plant.valve_conductance, node_1, 1.0 if open_a else 0.0, back_1)
-    port_2 = SinglePort(plant.valve_conductance, node_2, 1.0 if open_b else 0.0, back_2)
+    port_1 = SinglePort(
+        conductance=plant.valve_conductance,
+        node_pressure=node_1,
+        source_fraction=1.0 if open_a else 0.0,
+        takes_back=back_1,
+    )
+    port_2 = SinglePort(
+        conductance=plant.valve_conductance,
+        node_pressure=node_2,
+        source_fraction=1.0 if open_b else 0.0,
+        takes_back=back_2,
+    )
     return port_1, port_2
 
 
@@ -102,10 +112,10 @@ def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -
     delay = valve.opening_delay if wanted > 0.5 else valve.closing_delay
     at_once = accepts and delay <= SAME_INSTANT
     return Coil(
-        wanted if at_once else position,
-        wanted if accepts else coil.target,
-        time if accepts else coil.accepted_time,
-        time + delay if accepts else coil.change_time,
+        position=wanted if at_once else position,
+        target=wanted if accepts else coil.target,
+        accepted_time=time if accepts else coil.accepted_time,
+        change_time=time + delay if accepts else coil.change_time,
     )
 
 
@@ -142,7 +152,7 @@ def advance_timed(
 def instant_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> Openings:
     """Openings [-] at an instant of a pair that follows its command at once."""
     position_a, position_b = coil_commands(command)
-    return Openings(position_a, 1.0 - position_a, position_b, 1.0 - position_b)
+    return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
 
 
 def rates_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> PairPositions:
@@ -163,12 +173,12 @@ def settle_ideal(valve: IdealSolenoid, state: PairPositions, command: float, tim
 def instant_timed(valve: TimedSolenoid, state: PairState, command: float) -> Openings:
     """Openings [-] at an instant."""
     position_a, position_b = state.coil_a.position, state.coil_b.position
-    return Openings(position_a, 1.0 - position_a, position_b, 1.0 - position_b)
+    return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
 
 
 def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairState:
     """Rates [1/s]: none, nothing moves between two events."""
-    still = Coil(0.0, 0.0, 0.0, 0.0)
+    still = Coil(position=0.0, target=0.0, accepted_time=0.0, change_time=0.0)
     return PairState(still, still)
 
 
@@ -189,7 +199,7 @@ def both_off() -> PairPositions:
 
 def both_off_long_ago() -> PairState:
     """Two coils that were switched off long ago."""
-    coil = Coil(0.0, 0.0, NEVER, NEVER)
+    coil = Coil(position=0.0, target=0.0, accepted_time=NEVER, change_time=NEVER)
     return PairState(coil, coil)
 
 

@@ -7,10 +7,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.declaration import Quantity
@@ -67,12 +65,7 @@ def parse_catalogue(content: bytes, file: str) -> Catalogue:
 
     ParameterError for one that is not usable.
     """
-    document = _FILE.parse(content, file)
-    try:
-        parsed: Any = CATALOGUE_FILE.model_validate(document)
-    except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), CATALOGUE_FILE)
-        raise ParameterError(f"{file}: {problem}") from error
+    parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
     groups = {
         group: {name: _part(file, group, name, item) for name, item in getattr(parsed, group).items()}
         for group in GROUPS

@@ -5,10 +5,11 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from ppafo.documents.json_text import json_text
-from ppafo.documents.problems import first_problem, quote
+from ppafo.documents.models import validate
+from ppafo.documents.problems import quote
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.questions.sweep.bands import Bins
@@ -66,11 +67,7 @@ def read_manifest(place: Place) -> dict[str, Any]:
             f"{place.address}: has schema_version {quote(document.get('schema_version'))}, "
             f"this version of ppafo reads {SCHEMA_VERSION}"
         )
-    try:
-        _Stored.model_validate(document)
-    except ValidationError as error:
-        text = first_problem(error.errors(include_url=False), _Stored)
-        raise DataError(f"{place.address}: {MANIFEST}: {text}") from error
+    validate(_Stored, document, f"{place.address}: {MANIFEST}", DataError)
     return document
 
 

@@ -6,10 +6,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, make_schema
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice
 from ppafo.questions.tune import problem as values
@@ -26,19 +25,16 @@ from ppafo.studies.varying import varied_path
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
 
-_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-_Text = Annotated[str, Field(min_length=1)]
-_Texts = Annotated[tuple[_Text, ...], Field(strict=False)]
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
-_Metric = Annotated[_Text, Field(description="name of a metric, such as 'rms_error'")]
+_Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_error'")]
 
 
 class SearchRange(BaseModel):
     """A number that is searched, with the bounds between which it may lie."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    path: Annotated[_Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
+    path: Annotated[Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
     minimum: _Value
     maximum: _Value
     spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
@@ -47,11 +43,11 @@ class SearchRange(BaseModel):
 class Goal(BaseModel):
     """A term of the objective: weight times metric over scale; less is better, with a weight below 0 more is."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     metric: _Metric
     weight: float = 1.0
-    scale: Annotated[_Text | None, Field(description="value that is scaled to 1; default: the value before tuning")] = (
+    scale: Annotated[Text | None, Field(description="value that is scaled to 1; default: the value before tuning")] = (
         None
     )
 
@@ -59,19 +55,19 @@ class Goal(BaseModel):
 class Constraint(BaseModel):
     """A metric that must not be above, or below, a value."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     metric: _Metric
-    at_most: Annotated[_Text | None, Field(description="largest value with its unit")] = None
-    at_least: Annotated[_Text | None, Field(description="smallest value with its unit")] = None
+    at_most: Annotated[Text | None, Field(description="largest value with its unit")] = None
+    at_least: Annotated[Text | None, Field(description="smallest value with its unit")] = None
 
 
 class Robust(BaseModel):
     """Every candidate is run over the same draws from a study, and judged by the bad end of what comes from it."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    study: Annotated[_Text, Field(description="name of a study, or a path relative to this file")]
+    study: Annotated[Text, Field(description="name of a study, or a path relative to this file")]
     measure: Annotated[
         Literal["mean_and_deviations", "quantile"],
         Field(description="mean plus 'deviations' standard deviations, or the 'share' quantile"),
@@ -84,7 +80,7 @@ class Robust(BaseModel):
 class Effort(BaseModel):
     """How long is searched: independent starts, generations of each at most, candidates of a generation per gain."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     starts: Annotated[int, Field(ge=1, le=100)] = 3
     generations: Annotated[int, Field(ge=1, le=100_000)] = 100
@@ -95,13 +91,13 @@ class Effort(BaseModel):
 class TuningFile(BaseModel):
     """A tuning file, as it is written."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
     description: str = ""
-    scenario: Annotated[_Text, Field(description="name of a scenario, or a path relative to this file")]
-    overrides: Annotated[_Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
+    scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
+    overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
     search: Annotated[tuple[SearchRange, ...], Field(strict=False, min_length=1)]
     objective: Annotated[tuple[Goal, ...], Field(strict=False, min_length=1)]
     constraints: Annotated[tuple[Constraint, ...], Field(strict=False)] = ()
@@ -145,10 +141,7 @@ def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Seque
     def refusal(text: object) -> StudyError:
         return StudyError(f"{file}: {text}")
 
-    try:
-        parsed = TuningFile.model_validate(document)
-    except ValidationError as error:
-        raise refusal(first_problem(error.errors(include_url=False), TuningFile)) from error
+    parsed = validate(TuningFile, document, file, StudyError)
     try:
         scenario = load_scenario(_resolve(parsed.scenario, list_scenarios(), folder), (*parsed.overrides, *overrides))
         check_metrics(_once([*parsed.objective, *parsed.constraints]), scenario)

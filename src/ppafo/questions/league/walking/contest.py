@@ -70,8 +70,12 @@ class WalkingContest:
 
 
 def _reach(measures: Measures) -> Reached:
-    names = ("lagged_error", "toe_height", "torque_lag", "mid_stance_torque")
-    return Reached(*(measures[name] for name in names))
+    return Reached(
+        rms_error=measures["lagged_error"],
+        height=measures["toe_height"],
+        lag=measures["torque_lag"],
+        resistance=measures["mid_stance_torque"],
+    )
 
 
 def _is_bounded(measures: Measures) -> bool:
