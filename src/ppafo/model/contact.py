@@ -38,9 +38,9 @@ class Landing(NamedTuple):
     leaves: float
 
 
-def is_free(contact: float) -> bool:
-    """True where the foot moves by its own dynamics; ``contact`` [-] is one of the states above."""
-    return contact < 1.5
+def is_free(contact: float, keeps_gait: float) -> bool:
+    """True where the foot moves by its own dynamics; that of a wearer who keeps the gait (1) never does."""
+    return contact < 1.5 and keeps_gait < 0.5
 
 
 def foot_angle(shank: float, ankle: float) -> float:
@@ -49,8 +49,8 @@ def foot_angle(shank: float, ankle: float) -> float:
 
 
 def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float) -> Ankle:
-    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, on the toes it is as measured."""
-    flat = contact < 2.5
+    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, else it is as measured."""
+    flat = contact > 1.5 and contact < 2.5
     return Ankle(
         now.shank + QUARTER_TURN - ground_angle if flat else now.ankle,
         now.shank_rate if flat else now.ankle_rate,

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from ppafo.gait import load_gait
+from ppafo.walking.comparison import compare_walks
 from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import walk
 
@@ -44,3 +45,20 @@ def test_a_slow_walk_is_helped_without_alarm(valve: str) -> None:
         result = walk(configuration, MINUTES)
         assert "safe_state_time" not in result.metrics
         assert result.metrics["push_off_work"].value > 1.0
+
+
+def test_a_nondisabled_wearer_keeps_the_gait_and_the_device_takes_over_part_of_lifting_the_foot() -> None:
+    comparison = compare_walks(load_walk("proportional", ["wearer.keeps_gait=1"]), MINUTES)
+    worn, bare = comparison.with_device, comparison.without_device
+    for result in (worn, bare):
+        assert "safe_state_time" not in result.metrics
+        assert result.metrics["angle_difference"].value < math.radians(1.0)
+    moments = [metrics["dorsiflexor_moment"].value for metrics in (worn.metrics, bare.metrics, comparison.healthy)]
+    # The plate's weight has to be lifted too where the device is off.
+    assert 0.0 < moments[0] < moments[2] < moments[1]
+
+
+def test_an_impaired_wearer_has_no_moment_of_dorsiflexors_to_speak_of() -> None:
+    result = walk(load_walk("proportional"), MINUTES)
+    assert "dorsiflexor_moment" not in result.recording
+    assert "dorsiflexor_moment" not in result.metrics

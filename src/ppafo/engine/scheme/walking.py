@@ -76,9 +76,10 @@ def begin_walk(
     return WalkStep(free, led, offset)
 
 
-def next_angle(plant: PlantParameters, walk: WalkState, begun: WalkStep) -> float:
+def next_angle(plant: PlantParameters, leg: LegParameters, walk: WalkState, begun: WalkStep) -> float:
     """Angle [rad] to which the volumes run."""
-    return clamp_angle(plant, begun.free.free_angle) if ground.is_free(walk.contact) else begun.led.angle
+    is_free = ground.is_free(walk.contact, leg.keeps_gait)
+    return clamp_angle(plant, begun.free.free_angle) if is_free else begun.led.angle
 
 
 def external_torque(
@@ -120,7 +121,7 @@ def end_walk(
     step: float,
 ) -> tuple[PlantState, WalkState]:
     """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin; ``now`` is then."""
-    free = ground.is_free(walk.contact)
+    free = ground.is_free(walk.contact, leg.keeps_gait)
     predicted = clamp_angle(plant, begun.free.free_angle)
     # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
     foot = foot_direction(now.shank, predicted if free else begun.led.angle)

@@ -35,6 +35,7 @@ _ROWS = (
     ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
     ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
+    ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
     ("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
 )
 """Metric, title, kind of quantity and digits behind the point of each row."""
@@ -117,6 +118,7 @@ def comparison_table(comparison: Comparison) -> Table:
     rows = [
         (title_with_unit(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
         for name, title, quantity, digits in _ROWS
+        if any(name in metrics for metrics in columns)
     ]
     return Table(tuple(map(Column, _HEAD)), tuple(rows))
 
