@@ -73,7 +73,7 @@ CASES: dict[str, tuple[Change, str]] = {
     ),
     "ankle with zero as neutral": (
         changed(ANKLE, lambda x: x - np.pi / 2.0),
-        "would tilt the standing foot by -85 deg, plausible is within 35 deg",
+        "would tilt the standing foot by -85 deg, plausible is within 20 deg",
     ),
     "moment counted the other way": (changed(MOMENT, np.negative), "into dorsiflexion: its sign is reversed"),
     "moment of the body per kg": (changed(MOMENT, lambda x: 62.0 * x), "ankle_moment reaches 90.2 N m/kg, plausible"),

@@ -137,6 +137,7 @@ def _gait(
         origin=origin,
         source=f"imported from {names}, {settings.side} foot; strides from the {events.replace('_', ' ')}",
         body_mass=settings.body_mass,
+        stature=settings.stature,
         walking_speed=settings.walking_speed,
         stride_time=_mean([item.time for item in strides]),
         stance_share=_mean([item.stance_share for item in strides]),
