@@ -10,6 +10,9 @@ from ppafo.gait.recorded.table import OPENSIM, MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import to_si
 
+LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
+"""Where they were not measured, off a force plate, is no gap."""
+
 _KNEE = "knee_angle_"
 _LONGEST_SHOWN = 12
 
@@ -21,6 +24,7 @@ class Found:
     unit_key: str
     table: MotionTable
     terms: tuple[tuple[float, str], ...]
+    may_be_absent: bool = False
 
     def in_unit(self, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
         """Return the sum of the terms in the first SI unit that fits, and that unit."""
@@ -35,7 +39,8 @@ class Found:
         place = f"{self.table.file}: column {name!r}"
         unit = stated or self.table.units[name]
         values = self.table.columns[name]
-        check_finite(values, place, self.table.time)
+        if not self.may_be_absent:
+            check_finite(values, place, self.table.time)
         if not unit:
             raise DataError(f"{place}: the file does not state its unit; give {self.unit_key} in a gait map")
         given = "" if unit == "-" else unit
@@ -51,13 +56,17 @@ class Found:
 
 
 def check_finite(values: Floats, place: str, time: Floats) -> None:
-    """Refuse a column with a gap; ``place`` is what the message calls it."""
-    bad = np.flatnonzero(~np.isfinite(values))
+    """Refuse a column with a gap between its first and last number; ``place`` is what the message calls it."""
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size == 0:
+        raise DataError(f"{place} has no number at all; give a file or a gait map with another column")
+    first = int(known[0])
+    bad = first + np.flatnonzero(~np.isfinite(values[first : int(known[-1]) + 1]))
     if bad.size:
         row = int(bad[0])
         raise DataError(
             f"{place} has a gap of {bad.size} samples, the first in row {row + 1} at {time[row]:g} s; "
-            "fill it or cut the file there"
+            "fill it or cut the file there (--fill-gaps, --start, --end)"
         )
 
 
@@ -70,7 +79,8 @@ def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable
         raise DataError(f"{curve}: both {files} have the column {bare[0]!r}; give one of them, or name another column")
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
-        return Found(f"{curve}.unit", holders[0], _detect_knee(holders[0], tuple(zip(signs, bare, strict=True))))
+        terms = _detect_knee(holders[0], tuple(zip(signs, bare, strict=True)))
+        return Found(f"{curve}.unit", holders[0], terms, curve in LOADS)
     if optional and not any(name in table.columns for name in bare for table in tables):
         return None
     known = [name for table in tables for name in table.columns]
@@ -96,4 +106,4 @@ def _detect_knee(table: MotionTable, terms: tuple[tuple[float, str], ...]) -> tu
 
 
 def _bends_above_zero(values: Floats) -> bool:
-    return float(np.max(values)) > -float(np.min(values))
+    return float(np.nanmax(values)) > -float(np.nanmin(values))
