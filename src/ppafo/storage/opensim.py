@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.errors import DataError, first_twice, one_line
-from ppafo.signals import Recording
+from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.channels import TIME
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes, write_file
@@ -23,12 +23,14 @@ _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)",
 _DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
 _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
 _LONGEST_SHOWN = 40
+_KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSimTable:
     """A table: time [s] and columns by label; ``in_degrees`` is None where the header does not say.
 
+    ``kind`` is that of a recording that nobody measured, where this package wrote it.
     ``first_line`` is the line of the file in which the first row stands, ``remarks`` say what was mended.
     """
 
@@ -38,6 +40,7 @@ class OpenSimTable:
     in_degrees: bool | None
     first_line: int
     remarks: tuple[str, ...] = ()
+    kind: RecordingKind = "measured"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +50,7 @@ class _Header:
     width: int | None
     in_degrees: bool | None
     end: int
+    kind: RecordingKind
 
 
 def read_opensim(path: str | Path) -> OpenSimTable:
@@ -77,7 +81,7 @@ def _read(path: str | Path, cell: Cell) -> OpenSimTable:
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     columns = {label: values[:, index] for index, label in enumerate(labels) if index > 0}
-    return OpenSimTable(header.name, time, columns, header.in_degrees, number + 1, tuple(remarks))
+    return OpenSimTable(header.name, time, columns, header.in_degrees, number + 1, tuple(remarks), header.kind)
 
 
 def _width_remarks(labels: list[str], header: _Header) -> list[str]:
@@ -128,7 +132,8 @@ def _header(lines: list[str]) -> _Header:
     rows, width = (
         counts.get(new, counts.get(old)) for new, old in (("nrows", "datarows"), ("ncolumns", "datacolumns"))
     )
-    return _Header(one_line(name), rows, width, in_degrees, end)
+    kinds = [kind for line in lines[:end] for kind in _KINDS if line.strip() == f"kind={kind}"]
+    return _Header(one_line(name), rows, width, in_degrees, end, kinds[0] if kinds else "measured")
 
 
 def _whole(text: str, key: str, number: int) -> int:

@@ -37,7 +37,9 @@ def read_trc(path: str | Path) -> MarkerTable:
     try:
         lines = _lines(read_bytes(path))
         if not lines[0].startswith(_FIRST) or len(lines) <= _HEAD_LINES:
-            raise DataError(f"is not a .trc file: its first line begins with '{_FIRST}', and five lines come before rows")
+            raise DataError(
+                f"is not a .trc file: its first line begins with '{_FIRST}', and five lines come before rows"
+            )
         unit = _unit(lines)
         names = _names(lines[3])
         rows = [(number, line) for number, line in enumerate(lines[_HEAD_LINES:], _HEAD_LINES + 1) if line.strip()]
@@ -106,4 +108,6 @@ def _check_clock(time: Floats, lines: list[int]) -> None:
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
         index = int(stalled[0]) + 1
-        raise DataError(f"line {lines[index]}: the time {time[index]:g} s follows {time[index - 1]:g} s; it must increase")
+        raise DataError(
+            f"line {lines[index]}: the time {time[index]:g} s follows {time[index - 1]:g} s; it must increase"
+        )

@@ -1,11 +1,13 @@
 """The columns that make a curve: the one table that has them, their signs and their unit."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ppafo.errors import DataError, UnitError, nearest_name, one_line
+from ppafo.gait.recorded.repairs import LONGEST_FILLED
 from ppafo.gait.recorded.table import OPENSIM, MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import to_si
@@ -66,8 +68,16 @@ def check_finite(values: Floats, place: str, time: Floats) -> None:
         row = int(bad[0])
         raise DataError(
             f"{place} has a gap of {bad.size} samples, the first in row {row + 1} at {time[row]:g} s; "
-            "fill it or cut the file there (--fill-gaps, --start, --end)"
+            f"{_remedy(time, known)}"
         )
+
+
+def _remedy(time: Floats, known: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> str:
+    """Return how to get rid of gaps between the samples that are known: the longest decides."""
+    longest = float(np.max(np.diff(time[known])))
+    if longest > LONGEST_FILLED:
+        return f"fill it or cut the file there (--start, --end): {longest:.3g} s are too long to be filled here"
+    return f"fill it or cut the file there (--fill-gaps '{math.ceil(100.0 * longest) / 100.0:g} s', or --start, --end)"
 
 
 def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool) -> Found | None:

@@ -15,6 +15,7 @@ from ppafo.gait.recorded.mapping import (
     GaitMap,
     KneeMap,
     MomentMap,
+    PressureMap,
     ShankMap,
     Side,
     opensim_map,
@@ -102,15 +103,27 @@ def _marker_columns(markers: Sequence[str | None], forward: str, vertical: str) 
 
 def _of_opensim(table: MotionTable, side: Side) -> Convention:
     """Return the map of OpenSim's labels; a force plate with a number only is of the foot that moves with it."""
-    usual = opensim_map(side)
+    usual = opensim_map(side).model_copy(update=_written_by_us(table, side[0]))
     own, other, numbered = _forces(table.columns, side)
     if own or (other and len(numbered) == 1):
         terms = own or numbered
         said = (f"vertical force: the sum of {' and '.join(terms)}",) if len(terms) > 1 else ()
         return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=terms)}), (), said)
-    if len(numbered) > 1 or (side == "left" and numbered):
-        return Convention(usual.model_copy(update={"vertical_force": None}), numbered)
-    return Convention(usual)
+    if len(numbered) == 1 and side == "right":
+        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=numbered)}))
+    return Convention(usual.model_copy(update={"vertical_force": None}), numbered)
+
+
+def _written_by_us(table: MotionTable, foot: str) -> dict[str, object]:
+    """Return the maps of what this package writes for OpenSim beside its coordinates (``gait/opensim_names.py``)."""
+    found: dict[str, object] = {}
+    if f"shank_angle_{foot}" in table.columns:
+        found["shank_angle"] = ShankMap(terms=(f"shank_angle_{foot}",))
+    if {"knee_forward", "knee_up"} <= set(table.columns):
+        found["knee"] = KneeMap(forward=("knee_forward",), up=("knee_up",), unit="m/s^2")
+    if "centre_of_pressure" in table.columns:
+        found["centre_of_pressure"] = PressureMap(terms=("centre_of_pressure",), unit="m")
+    return found
 
 
 def _forces(names: Iterable[str], side: Side) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
@@ -186,7 +199,9 @@ def _load_maps(
         found["ankle_moment"] = MomentMap(terms=(f"{moment}.x",), positive="plantarflexion", unit=unit)
         remarks += said
     reactions = (_label(labels, foot + name) for name in _REACTIONS)
-    force = next((f"{name}.{vertical}" for name in reactions if name and _is_measured(table, f"{name}.{vertical}")), None)
+    force = next(
+        (f"{name}.{vertical}" for name in reactions if name and _is_measured(table, f"{name}.{vertical}")), None
+    )
     if force is not None:
         unit, said = load_unit(table, force, "force", body_mass)
         found["vertical_force"] = ForceMap(terms=(force,), unit=unit or "-")

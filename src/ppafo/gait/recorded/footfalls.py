@@ -24,6 +24,9 @@ _ABOUT_STANCE = 0.05
 _COVERED = 0.9
 """Share of the rest of the stance on the plate, for the load to be that of the stride."""
 
+LEAST_STRIDES = 2
+"""Where nobody states it; a walk past a plate and one cycle have one."""
+
 FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
 
 
@@ -40,12 +43,13 @@ class Footfalls:
 
 
 def find_footfalls(
-    walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, given: Given, least: int
+    walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, given: Given, given_least: int | None
 ) -> Footfalls:
     """Return the strides of a walk: from the force where it has enough of them, else from where there are more."""
+    least = given_least or LEAST_STRIDES
     found = _of_walk(walk, tables, side, given, least)
     usable = usable_strides(walk, found.strides)
-    if len(usable) >= least or least > 2:
+    if len(usable) >= (1 if found.is_overground else least) or least > LEAST_STRIDES:
         return found
     cycle = wrap_cycle(walk)
     if cycle is None:
@@ -79,7 +83,7 @@ def _of_walk(
     forced = strides_from_force(walk[FORCE])
     if len(usable_strides(walk, forced)) >= least:
         return Footfalls(walk, forced, FORCE)
-    contacts = [(a, b) for a, b in contacts_of(walk[FORCE]) if a is not None and b is not None]
+    contacts = [(a, b) for a, b in contacts_of(walk[FORCE]) if a is not None or b is not None]
     if recorded and contacts and len(usable_strides(walk, recorded)) > len(usable_strides(walk, forced)):
         return Footfalls(walk, recorded, FILE, is_overground=True)
     moved = _moved_strides(walk) if contacts else []

@@ -15,7 +15,14 @@ from ppafo.gait.plausible.loads import force_remarks
 from ppafo.gait.plausible.stride import check_plausible
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.events import Stride
-from ppafo.gait.recorded.footfalls import SHANK, Footfalls, covered_strides, find_footfalls, usable_strides
+from ppafo.gait.recorded.footfalls import (
+    LEAST_STRIDES,
+    SHANK,
+    Footfalls,
+    covered_strides,
+    find_footfalls,
+    usable_strides,
+)
 from ppafo.gait.recorded.held import check_constant
 from ppafo.gait.recorded.knee import check_way, knee_remarks
 from ppafo.gait.recorded.mapping import GaitMap
@@ -61,7 +68,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     footfalls = find_footfalls(source.walk, source.tables, settings.side, given, settings.least_strides)
     walk, events, found = footfalls.walk, footfalls.events, footfalls.strides
     strides, left_out = without_outliers(usable_strides(walk, found), LARGEST_STRIDE_CHANGE)
-    least = 1 if footfalls.is_one_cycle else settings.least_strides
+    least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
     _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events) if name in walk}, least)
     covered = {name: covered_strides(footfalls, name, signal, strides) for name, signal in walk.items()}
     unmeasured = [name for name in LOADS if name in walk and not covered[name] and strides_within(walk[name], strides)]

@@ -42,7 +42,9 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
     curves = np.array([_scaled(walk[name], time) for name in REQUIRED])
     features = np.concatenate([curves, _rates(curves)])
     shifts = np.arange(first, time.size)
-    misfits = np.array([np.sqrt(np.mean((features[:, shift:] - features[:, : time.size - shift]) ** 2)) for shift in shifts])
+    misfits = np.array(
+        [np.sqrt(np.mean((features[:, shift:] - features[:, : time.size - shift]) ** 2)) for shift in shifts]
+    )
     best = int(np.argmin(misfits))
     if misfits[best] > _MISFIT:
         return None

@@ -36,11 +36,16 @@ def force_of_plates(
                 chosen.append(f"'{name}' ({len(own)})")
     if total is None:
         return None, ["vertical force: no plate carries this foot, by the lean of its shank"] if names else []
-    return total, [f"vertical force: the contacts of this foot, by the lean of its shank, summed over {', '.join(chosen)}"]
+    return total, [
+        f"vertical force: the contacts of this foot, by the lean of its shank, summed over {', '.join(chosen)}"
+    ]
 
 
 def _is_own(contact: Contact, plate: Signal, shank: Signal) -> bool:
-    start, end = (plate.time[0] if contact[0] is None else contact[0], plate.time[-1] if contact[1] is None else contact[1])
+    start, end = (
+        plate.time[0] if contact[0] is None else contact[0],
+        plate.time[-1] if contact[1] is None else contact[1],
+    )
     start, end = max(float(start), float(shank.time[0])), min(float(end), float(shank.time[-1]))
     if end <= start:
         return False

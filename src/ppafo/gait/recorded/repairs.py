@@ -9,6 +9,9 @@ import numpy as np
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 
+LONGEST_FILLED = 0.25
+"""Seconds; over a quarter of a stride no curve can be drawn through what was not seen."""
+
 Gap = tuple[int, int]
 """First sample of a gap and the first after it."""
 

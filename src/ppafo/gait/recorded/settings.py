@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ppafo.documents.models import NAME
 from ppafo.errors import DataError
 from ppafo.gait.recorded.mapping import GaitMap, Side
+from ppafo.gait.recorded.repairs import LONGEST_FILLED
 
 _NAME = "imported-gait"
 
@@ -15,6 +16,7 @@ _NAME = "imported-gait"
 class ImportSettings:
     """What the files do not say: body mass [kg], side, speed [m/s], map, low pass [Hz], least number of strides.
 
+    The least number of strides is 2 unless given, and 1 overground and of one cycle that wraps around.
     ``body_mass`` may be None where a C3D file states it. ``stature`` [m] gives the length of the thigh where no map does.
     ``start`` and ``end`` [s] cut the files, ``longest_gap`` [s] is up to where gaps are filled, and ``ankle_neutral`` [rad]
     the reading of the file with the foot perpendicular to the shank, where it is not that of map or convention.
@@ -25,7 +27,7 @@ class ImportSettings:
     columns: GaitMap | None = None
     walking_speed: float | None = None
     low_pass: float | None = None
-    least_strides: int = 2
+    least_strides: int | None = None
     name: str = _NAME
     title: str = ""
     stature: float | None = None
@@ -33,10 +35,6 @@ class ImportSettings:
     end: float | None = None
     longest_gap: float = 0.0
     ankle_neutral: float | None = None
-
-
-LONGEST_FILLED = 0.25
-"""Seconds; over a quarter of a stride no curve can be drawn through what was not seen."""
 
 
 def check_settings(settings: ImportSettings) -> None:
@@ -55,5 +53,5 @@ def check_settings(settings: ImportSettings) -> None:
         raise DataError(f"the start, {settings.start:g} s, must be before the end, {settings.end:g} s")
     if re.fullmatch(NAME, settings.name) is None:
         raise DataError(f"name {settings.name!r} must consist of lower-case letters, digits, '-' and '_'")
-    if settings.least_strides < 1:
+    if settings.least_strides is not None and settings.least_strides < 1:
         raise DataError(f"the minimum number of strides must be 1 or more, not {settings.least_strides}")

@@ -96,15 +96,19 @@ def _with_subject(settings: ImportSettings, tables: Sequence[MotionTable]) -> tu
 def _ends(walk: Mapping[str, Signal], tables: Sequence[MotionTable]) -> list[str]:
     """Return a remark on each motion that was not seen at an end of its file, and on loads that were not measured."""
     spans = {table.file: (float(table.time[0]), float(table.time[-1])) for table in tables}
-    said = []
+    seen: dict[tuple[float, float, float, float], list[str]] = {}
+    loads: dict[int, list[str]] = {}
     for name, signal in walk.items():
         low, high = spans[signal.file]
         if signal.time[0] > low or signal.time[-1] < high:
-            said.append(
-                f"{name} from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s: not seen in the rest of {low:.4g} to "
-                f"{high:.4g} s"
-            )
+            seen.setdefault((float(signal.time[0]), float(signal.time[-1]), low, high), []).append(name)
         if signal.absent is not None:
-            absent = float(signal.absent.mean())
-            said.append(f"{name} was not measured in {100.0 * absent:.0f} % of the record, off the plate or the model's range")
-    return said
+            loads.setdefault(round(100.0 * float(signal.absent.mean())), []).append(name)
+    said = [
+        f"{', '.join(names)} from {first:.4g} to {last:.4g} s: not seen in the rest of {low:.4g} to {high:.4g} s"
+        for (first, last, low, high), names in seen.items()
+    ]
+    return said + [
+        f"{', '.join(names)}: absent in {percent} % of the record, where no plate measured this foot"
+        for percent, names in loads.items()
+    ]

@@ -84,7 +84,7 @@ def _of_opensim(file: str, table: OpenSimTable) -> MotionTable:
     paths = {match[1]: name for name in table.columns if (match := _STATE.fullmatch(name))}
     columns = {**table.columns, **{name: table.columns[path] for name, path in paths.items()}}
     units = {name: _opensim_unit(paths.get(name, name), name, angle) for name in columns}
-    return MotionTable(file, OPENSIM, table.time, columns, units, remarks=table.remarks)
+    return MotionTable(file, OPENSIM, table.time, columns, units, table.kind, table.remarks)
 
 
 def _opensim_unit(path: str, label: str, angle: str) -> str:

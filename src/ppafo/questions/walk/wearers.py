@@ -37,7 +37,11 @@ def wearers_answer(population: Population) -> Answer:
     ]
     figure = Figure("wearers", _CAPTION, lambda: population_figure(population))
     safe = f"safe state: the controllers of {population.vented} wearers vented both chambers permanently"
-    remarks = person_remarks(configuration) + [safe] * bool(population.vented) + [population.message] * bool(population.diverged)
+    remarks = (
+        person_remarks(configuration)
+        + [safe] * bool(population.vented)
+        + [population.message] * bool(population.diverged)
+    )
     return Answer(
         name="wearers",
         kicker="Walks of many wearers",
