@@ -1,4 +1,4 @@
-"""A walk of the built-in gait as laboratories record it: markers and loads of both feet, on plates that few strides meet."""
+"""A walk of the built-in gait as laboratories record it: markers and loads of both feet, on few plates."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -11,6 +11,9 @@ from ppafo.signals.recording import Floats
 
 GAIT = load_gait()
 STRIDE, MASS, SPEED, THIGH = GAIT.stride_time, GAIT.body_mass, 1.33, 0.4
+UNLOADED = 0.025
+"""Body weights that the built-in gait has in the swing, and a plate has not."""
+
 DELAY = {"right": 0.0, "left": 0.5 * STRIDE}
 
 
@@ -21,7 +24,7 @@ def curve(name: str, time: Floats, side: str = "right") -> Floats:
 
 def force(time: Floats, side: str = "right", strides: Iterable[int] | None = None, away: float = 0.0) -> Floats:
     """Vertical force [N], only in some strides where these are given; ``away`` is what stands off the plate."""
-    newton = MASS * STANDARD_GRAVITY * np.maximum(curve("vertical_force", time, side) - 0.025, 0.0)
+    newton = MASS * STANDARD_GRAVITY * np.maximum(curve("vertical_force", time, side) - UNLOADED, 0.0)
     if strides is None:
         return newton
     return np.where(on_plate(time, side, strides), newton, away)

@@ -36,14 +36,22 @@ def check_constant(
     for name, signal in walk.items():
         table = by_file[signal.file]
         spans = [_span(name, item) for item in (covered[name] if name in LOADS else [*strides, *left_out])]
-        for column in signal.columns:
-            found = constant_stretch(table.time, table.columns[column], spans)
+        for column, values in _looked_at(name, signal, table):
+            found = constant_stretch(table.time, values, spans)
             if found is not None:
                 raise DataError(
                     f"{table.file}: column {column!r} of {name} keeps one value from {found[0]:.4g} to "
                     f"{found[1]:.4g} s while the wearer walks: a drop-out was filled with it; cut the file there and "
                     "give the longer part"
                 )
+
+
+def _looked_at(name: str, signal: Signal, table: MotionTable) -> list[tuple[str, Floats]]:
+    """Return the columns of a curve; plates that are summed rest in turn, so their sum is looked at."""
+    columns = [(column, table.columns[column]) for column in signal.columns]
+    if name not in LOADS or len(columns) < 2:
+        return columns
+    return [(" + ".join(signal.columns), np.sum([np.abs(values) for _, values in columns], axis=0))]
 
 
 def constant_stretch(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
