@@ -105,9 +105,10 @@ class Curve:
 class Gait:
     """One stride of one wearer, as curves over the phase; those that nobody recorded are None.
 
-    ``body_mass`` [kg], ``stature`` [m] of the subject, None where not known, ``stride_time`` [s], ``stance_share`` (share of the stride until toe-off), ``walking_speed``
-    [m/s], None where nobody recorded it. The two deviations are between strides, 0 where not known. ``recorded_speed``
-    is the speed at which the curves were recorded, where it is another than ``walking_speed``.
+    ``body_mass`` [kg], ``stature`` [m] of the subject, None where not known, ``stride_time`` [s], ``stance_share``
+    (share of the stride until toe-off), ``walking_speed`` [m/s], None where nobody recorded it. The two deviations are
+    between strides, 0 where not known. ``recorded_speed`` is the speed at which the curves were recorded, where it is
+    another than ``walking_speed``.
     """
 
     name: str

@@ -1,8 +1,9 @@
 """A recording in OpenSim's names, zero and signs: what is written as ``.sto`` for its tools, and imported again.
 
-``ankle_angle_r`` is 0 with the foot square to the shank and grows in dorsiflexion [rad]; ``ankle_angle_r_moment`` is the
-moment along it [N m], below 0 in push-off, and ``ankle_angle_r_device_moment`` what a device adds; ``ground_force_r_vy`` is the vertical force [N]. ``shank_angle_r`` is no coordinate
-of OpenSim's models, whose legs have hip and knee; it stays as the package has it, as do channels without a counterpart.
+``ankle_angle_r`` is 0 with the foot square to the shank and grows in dorsiflexion [rad]. ``ankle_angle_r_moment`` is
+the moment along it [N m], below 0 in push-off, and ``ankle_angle_r_device_moment`` what a device adds.
+``ground_force_r_vy`` is the vertical force [N]. ``shank_angle_r`` is no coordinate of OpenSim's models, whose legs have
+hip and knee: it stays as the package has it, as do channels without a counterpart.
 """
 
 import math
@@ -10,6 +11,12 @@ import math
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.signals import Channel, Recording
 
+_ANGLES = {"ankle_angle": "{}", "angle": "{}", "healthy_angle": "healthy_{}"}
+_REVERSED = {
+    "angular_velocity": "{}_speed",
+    "ankle_moment": "{}_moment",
+    "external_torque": "{}_device_moment",
+}
 _KEPT = ("shank_angle",)
 _PER_MASS = ("ankle_moment", "vertical_force")
 
@@ -41,17 +48,12 @@ def _is_per_mass(recording: Recording, name: str) -> bool:
 def _renamed(recording: Recording, name: str, foot: str, body_mass: float) -> tuple[str, Channel]:
     """Return name and values of a channel as OpenSim has them."""
     values, unit = recording[name], recording.unit(name)
-    if name in ("ankle_angle", "angle") and unit == "rad":
-        return f"ankle_angle_{foot}", Channel(0.5 * math.pi - values, unit)
-    if name == "healthy_angle":
-        return f"healthy_ankle_angle_{foot}", Channel(0.5 * math.pi - values, unit)
-    if name == "angular_velocity":
-        return f"ankle_angle_{foot}_speed", Channel(-values, unit)
-    if name == "ankle_moment":
+    ankle = f"ankle_angle_{foot}"
+    if name in _ANGLES and unit == "rad":
+        return _ANGLES[name].format(ankle), Channel(0.5 * math.pi - values, unit)
+    if name in _REVERSED:
         factor = body_mass if unit == "N m/kg" else 1.0
-        return f"ankle_angle_{foot}_moment", Channel(-factor * values, "N m")
-    if name == "external_torque":
-        return f"ankle_angle_{foot}_device_moment", Channel(-values, unit)
+        return _REVERSED[name].format(ankle), Channel(-factor * values, "N m" if unit == "N m/kg" else unit)
     if name == "vertical_force":
         factor = {"-": body_mass * STANDARD_GRAVITY, "N/kg": body_mass}.get(unit, 1.0)
         return f"ground_force_{foot}_vy", Channel(factor * values, "N")

@@ -56,13 +56,14 @@ class _Header:
 def read_opensim(path: str | Path) -> OpenSimTable:
     """Return the table in a ``.mot`` or ``.sto`` file; DataError names file, line and column of what is wrong.
 
-    A count of columns in the header that the rows contradict, and last rows that repeat a time, are mended and remarked.
+    A count of columns in the header that all rows contradict, and last rows that repeat a time, are mended; remarks say
+    so.
     """
     return _read(path, _number)
 
 
 def read_opensim_with_gaps(path: str | Path) -> OpenSimTable:
-    """Return the table as ``read_opensim`` does, with NaN where a cell says so: what uses the column fills or refuses."""
+    """Return the table as ``read_opensim`` does, with NaN where a cell says so, to fill or to refuse."""
     return _read(path, _number_or_gap)
 
 

@@ -1,8 +1,8 @@
 """Tables of markers, ``.trc``: three columns a marker, as motion capture and OpenSim write them.
 
-Lines 1 to 3 are ``PathFileType 4 (X/Y/Z) NAME``, names of the header's values, and these. Line 4 has ``Frame#``, ``Time``
-and a name for every three columns, line 5 ``X1 Y1 Z1 ...``; then come the rows. A marker that was not seen leaves its cells
-empty, or has ``nan``.
+Lines 1 to 3 are ``PathFileType 4 (X/Y/Z) NAME``, names of the header's values, and these. Line 4 has ``Frame#``,
+``Time`` and a name for every three columns, line 5 ``X1 Y1 Z1 ...``; then come the rows. A marker that was not seen
+leaves its cells empty, or has ``nan``.
 """
 
 import re

@@ -1,7 +1,7 @@
 """Who walks where a walk file does not say it: the subject of the gait, or the paper's where no gait is named.
 
-The paper's subject is scaled to the body mass and the stature of the gait's: masses with body mass, lengths with stature,
-inertias with mass times length squared (``walking/anthropometry.py``). Tissue stays as it is.
+The paper's subject is scaled to the body mass and the stature of the gait's: masses with body mass, lengths with
+stature, inertias with mass times length squared (``walking/anthropometry.py``). Tissue stays as it is.
 """
 
 from dataclasses import replace

@@ -34,7 +34,7 @@ def trial(tmp_path: Path) -> Trial:
         has_subject: bool = True,
         plates: dict[str, tuple[int, ...]] | None = None,
         has_outputs: bool = True,
-        change: Callable[[dict[str, Floats]], None] = lambda points: None,
+        change: Callable[[dict[str, Floats]], None] | None = None,
     ) -> Path:
         time = START + np.arange(int(seconds * RATE)) / RATE
         nothing = np.zeros(time.size)
@@ -53,7 +53,8 @@ def trial(tmp_path: Path) -> Trial:
             if has_outputs:
                 points[f"{foot}AnkleMoment{suffix}"] = np.array([moment, nothing, nothing])
                 points[f"{foot}GroundReactionForce{suffix}"] = np.array([nothing, nothing, reaction])
-        change(points)
+        if change is not None:
+            change(points)
         file = ezc3d.c3d()
         _describe(file, list(points), moment_unit)
         if has_subject:

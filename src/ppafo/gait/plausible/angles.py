@@ -88,13 +88,14 @@ def zero_remarks(tilt: float, correction: str) -> list[str]:
         return []
     way = "toes down" if tilt > 0.0 else "toes up"
     return [
-        f"the zero of ankle_angle seems to be off by {abs(tilt):.1f} deg: the standing foot would be tilted {way} by as "
-        f"much (mean from 15 to 40 % of the stride; up to {REMARKED_TILT:g} is usual); on level ground {correction}"
+        f"the zero of ankle_angle seems to be off by {abs(tilt):.1f} deg: the standing foot would be tilted {way} "
+        f"by as much (mean from 15 to 40 % of the stride; up to {REMARKED_TILT:g} is usual); "
+        f"on level ground {correction}"
     ]
 
 
 def gait_file_remarks(gait: Gait) -> list[str]:
-    """Return what there is to say of the ankle's zero in a gait that is finished, with the new mean of its series."""
+    """Return what there is to say of the ankle's zero in a finished gait, with the new mean of its series."""
     percent = np.linspace(0.0, 1.0, 101)
     tilt = standing_tilt(gait.shank_angle.sampled(percent), gait.ankle_angle.sampled(percent))
     mean = float(np.degrees(gait.ankle_angle.mean)) - tilt

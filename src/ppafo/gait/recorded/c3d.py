@@ -104,7 +104,7 @@ def _check_is_c3d(path: str | Path) -> None:
 
 
 def open_c3d(path: str | Path) -> Any:
-    """Return what ezc3d makes of a file, with its force plates where it can; a damaged one can bring down the process."""
+    """Return what ezc3d makes of a file, with its force plates where it can; damage can bring down the process."""
     import ezc3d
 
     try:
@@ -149,7 +149,7 @@ def _channels(group: Any, analogs: Floats, frames: int) -> Iterator[tuple[str, F
 
 
 def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
-    """Yield the forces [N] of every plate in the axes of the laboratory, upwards above 0, at the times of the points."""
+    """Yield the forces [N] of every plate in the axes of the laboratory, upwards above 0, as often as the points."""
     for number, plate in enumerate(content["data"].get("platform", ()), start=1):
         force: Floats = np.asarray(plate["force"], dtype=np.float64)
         if frames == 0 or force.ndim != 2 or force.shape[1] < frames:
@@ -187,14 +187,14 @@ def _texts(group: Any, key: str) -> list[str]:
 
 def _trial(parameters: Any) -> Trial:
     """Return subject and events; those of other laboratories' spelling, or nonsense, are as if they were absent."""
-    group = parameters["PROCESSING"] if "PROCESSING" in parameters else {}
+    group = parameters.get("PROCESSING", {})
     mass, height = _number(group, _BODY), _number(group, _HEIGHT)
     # Plug-in Gait keeps the height in mm.
     stature = None if height is None else height / 1000.0 if height > 100.0 else height
     return Trial(
         mass if mass is not None and 1.0 <= mass <= 500.0 else None,
         stature if stature is not None and 0.5 <= stature <= 2.5 else None,
-        _events(parameters["EVENT"] if "EVENT" in parameters else {}),
+        _events(parameters.get("EVENT", {})),
     )
 
 

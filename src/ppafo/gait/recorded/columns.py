@@ -77,7 +77,8 @@ def _remedy(time: Floats, known: "np.ndarray[tuple[int], np.dtype[np.intp]]") ->
     longest = float(np.max(np.diff(time[known])))
     if longest > LONGEST_FILLED:
         return f"fill it or cut the file there (--start, --end): {longest:.3g} s are too long to be filled here"
-    return f"fill it or cut the file there (--fill-gaps '{math.ceil(100.0 * longest - 1e-6) / 100.0:g} s', or --start, --end)"
+    needed = math.ceil(100.0 * longest - 1e-6) / 100.0
+    return f"fill it or cut the file there (--fill-gaps '{needed:g} s', or --start, --end)"
 
 
 def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool) -> Found | None:

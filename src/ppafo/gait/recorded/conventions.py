@@ -21,7 +21,7 @@ from ppafo.gait.recorded.mapping import (
     opensim_map,
     package_map,
 )
-from ppafo.gait.recorded.table import CSV, MARKERS, OPENSIM, MotionTable
+from ppafo.gait.recorded.table import CSV, OPENSIM, MotionTable
 from ppafo.signals.recording import Floats
 
 _WORD = re.compile(r"[a-z]+|\d+")
@@ -128,7 +128,9 @@ def _written_by_us(table: MotionTable, foot: str) -> dict[str, object]:
 
 def _forces(names: Iterable[str], side: Side) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Return the columns of vertical force that name this foot, the other foot, or none."""
-    own, other, numbered = [], [], []
+    own: list[str] = []
+    other: list[str] = []
+    numbered: list[str] = []
     for name in names:
         words = _WORD.findall(name.lower())
         if "force" not in words or words[-1] != "vy":
@@ -145,13 +147,13 @@ def _of_markers(table: MotionTable, side: Side, body_mass: float) -> Convention:
     knee, ankle = _pair(labels, foot)
     forward, vertical, remarks = _axes(table, knee, ankle, foot, labels)
     backwards = "-" if forward.startswith("-") else ""
-    angle, said = _ankle_map(table, labels, foot, (forward, vertical))
+    angle, said = _ankle_map(labels, foot, (forward, vertical))
     loads, units = _load_maps(table, labels, foot, vertical, body_mass)
     columns = GaitMap(
-        shank_angle=ShankMap(knee=knee, ankle=ankle, forward=forward, vertical=vertical),  # type: ignore[arg-type]
+        shank_angle=ShankMap(knee=knee, ankle=ankle, forward=forward, vertical=vertical),
         ankle_angle=angle,
         knee=KneeMap(forward=(f"{backwards}{knee}.{forward[-1]}",), up=(f"{knee}.{vertical}",)),
-        **loads,  # type: ignore[arg-type]
+        **loads,
     )
     plates = tuple(name for name in table.columns if name.startswith(PLATE) and name.endswith(f".{vertical}"))
     return Convention(columns, plates, (*remarks, *said, *units))
@@ -172,16 +174,19 @@ def _label(labels: Sequence[str], pattern: str) -> str | None:
     return min(matching, key=len, default=None)
 
 
-def _ankle_map(
-    table: MotionTable, labels: Sequence[str], foot: str, axes: tuple[str, str]
-) -> tuple[AngleMap, tuple[str, ...]]:
+def _first(labels: Sequence[str], foot: str, names: Sequence[str]) -> str | None:
+    """Return the label of a foot's marker by the first of its usual names that is there."""
+    return next(filter(None, (_label(labels, foot + name) for name in names)), None)
+
+
+def _ankle_map(labels: Sequence[str], foot: str, axes: tuple[str, str]) -> tuple[AngleMap, tuple[str, ...]]:
     """Return the ankle angle of the model, or from heel and toe where the file has only markers."""
     angles = _label(labels, foot + _ANGLES)
-    heel, toe = (next(filter(None, (_label(labels, foot + name) for name in names)), None) for names in (_HEELS, _TOES))
+    heel, toe = (_first(labels, foot, names) for names in (_HEELS, _TOES))
     if angles is None and heel is not None and toe is not None:
         forward, vertical = axes
         said = f"ankle angle from the markers {heel} and {toe}; its zero is the foot that stands flat"
-        mapped = AngleMap(heel=heel, toe=toe, forward=forward, vertical=vertical, positive="plantarflexion")  # type: ignore[arg-type]
+        mapped = AngleMap(heel=heel, toe=toe, forward=forward, vertical=vertical, positive="plantarflexion")
         return mapped, (said,)
     column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
     return AngleMap(terms=(column,), positive="dorsiflexion", unit="deg"), ()
@@ -221,23 +226,23 @@ def _axes(
 
     Up is where the knee is from the ankle; forward where the foot points, or where the ankle goes.
     """
-    place = {name: _point(table, name) for name in (knee, ankle)}
-    if any(values is None for values in place.values()):
+    at_knee, at_ankle = _point(table, knee), _point(table, ankle)
+    if at_knee is None or at_ankle is None:
         return "x", "z", ()
-    up = int(np.argmax(np.nanmean(np.abs(place[knee] - place[ankle]), axis=1)))  # type: ignore[operator]
-    way = _way(place[ankle])  # type: ignore[arg-type]
-    heel, toe = (next(filter(None, (_label(labels, foot + name) for name in names)), None) for names in (_HEELS, _TOES))
-    if np.hypot(*np.delete(way, up)) < _LEAST_WAY * _per_metre(table, ankle) and heel and toe:
-        way = np.nanmean(_point(table, toe) - _point(table, heel), axis=1)  # type: ignore[operator]
-    elif np.hypot(*np.delete(way, up)) < _LEAST_WAY * _per_metre(table, ankle):
-        return "xyx"[up], "xyz"[up], ()
+    up = int(np.argmax(np.nanmean(np.abs(at_knee - at_ankle), axis=1)))
+    way = _way(at_ankle)
+    if np.hypot(*np.delete(way, up)) < _LEAST_WAY * _per_metre(table, ankle):
+        at_heel, at_toe = (_point(table, _first(labels, foot, names) or "") for names in (_HEELS, _TOES))
+        if at_heel is None or at_toe is None:
+            return "x" if up else "y", "xyz"[up], ()
+        way = np.nanmean(at_toe - at_heel, axis=1)
     along = max((axis for axis in range(3) if axis != up), key=lambda axis: abs(float(way[axis])))
     across = 3 - up - along
     oblique = float(np.degrees(np.arctan2(abs(way[across]), abs(way[along]))))
     if oblique > _MOST_OBLIQUE:
         raise DataError(
-            f"{table.file}: the walk goes {oblique:.0f} deg off the axis {'xyz'[along]} of the laboratory, and the lean of "
-            f"the shank is seen along an axis, to {_MOST_OBLIQUE:g} deg; turn the axes of the laboratory into the walk"
+            f"{table.file}: the walk goes {oblique:.0f} deg off the axis {'xyz'[along]} of the laboratory, and "
+            f"the lean of the shank is seen along an axis, to {_MOST_OBLIQUE:g} deg; turn the axes of the laboratory into the walk"
         )
     forward = f"{'-' if way[along] < 0.0 else ''}{'xyz'[along]}"
     said = () if (forward, up) == ("x", 2) else (f"the walk goes along {forward}, upwards is {'xyz'[up]}",)

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
+from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible.checked import Given
 from ppafo.gait.plausible.loads import check_force_scale
@@ -15,7 +17,6 @@ from ppafo.gait.recorded.one_cycle import wrap_cycle
 from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.strides import strides_within
 from ppafo.gait.recorded.table import MotionTable
-from ppafo.errors import DataError
 
 _NEAR = 0.15
 """Seconds between a strike or an off seen in the shank and by a plate, for both to be the same."""
@@ -60,8 +61,8 @@ def find_footfalls(
         return found
     span = walk[SHANK].time[-1] - walk[SHANK].time[0]
     said = (
-        f"one cycle that wraps around: {span:.3g} s of data around a stride of {cycle.period:.4g} s, whose start and end "
-        f"differ by {100.0 * cycle.misfit:.1f} % of the ranges; how much strides differ is not known"
+        f"one cycle that wraps around: {span:.3g} s of data around a stride of {cycle.period:.4g} s, whose start and "
+        f"end differ by {100.0 * cycle.misfit:.1f} % of the ranges; how much strides differ is not known"
     )
     return replace(again, walk=cycle.walk, strides=whole[:1], remarks=(*again.remarks, said), is_one_cycle=True)
 
@@ -108,7 +109,7 @@ def _recorded_strides(tables: Sequence[MotionTable], side: Side) -> list[Stride]
         return []
     strikes, offs = trials[0].strikes(side), trials[0].offs(side)
     strides = []
-    for start, end in zip(strikes, strikes[1:], strict=False):
+    for start, end in pairwise(strikes):
         between = [time for time in offs if start < time < end]
         if len(between) == 1:
             strides.append(Stride(start, between[0], end))
@@ -129,8 +130,8 @@ def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[li
     strike, off = (float(np.mean(values)) for values in zip(*early, strict=True))
     moved = [Stride(item.start + strike, item.toe_off + off, item.end + strike) for item in strides]
     return moved, (
-        f"few contacts on plates: strides from the shank, its strikes moved by {1000.0 * strike:.0f} ms and its toe-offs by "
-        f"{1000.0 * off:.0f} ms as {len(early)} contact{'' if len(early) == 1 else 's'} on plates show"
+        f"few contacts on plates: strides from the shank, its strikes moved by {1000.0 * strike:.0f} ms and its "
+        f"toe-offs by {1000.0 * off:.0f} ms as {len(early)} contact{'' if len(early) == 1 else 's'} on plates show"
     )
 
 

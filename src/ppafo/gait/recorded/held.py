@@ -30,7 +30,8 @@ def check_constant(
     """Refuse a column that keeps one value for longer than 0.1 s within the strides; in swing a load may.
 
     Loads are looked at in the strides that they cover, motions in strides that are left out too: what held everything
-    made them longer. A column that never moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its smallest step is none either.
+    made them longer. A column that never moves is no drop-out, and a stretch that a coarse sensor enters and leaves by
+    its smallest step is none either.
     """
     by_file = {table.file: table for table in tables}
     for name, signal in walk.items():

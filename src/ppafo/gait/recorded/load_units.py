@@ -12,7 +12,7 @@ _FACTORS = {
 """What makes N m/kg or N/kg of a number in the unit; None where the body mass does."""
 
 _PLAUSIBLE = {"moment": (0.35, 2.6), "force": (5.5, 20.0)}
-"""Peaks of walking in N m/kg and N/kg: narrow enough for no two units to fit, whatever the body mass from 20 to 200 kg."""
+"""Peaks of walking in N m/kg and N/kg, narrow enough for no two units to fit up to a body mass of 130 kg."""
 
 
 def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tuple[str, list[str]]:
@@ -24,13 +24,13 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
     stated = table.units.get(name, "")
     peak = float(np.percentile(values, 99.5)) if values.size else 0.0
     fitting = [unit for unit in _FACTORS[kind] if _fits(peak, unit, kind, body_mass)]
-    if stated in fitting or not fitting and stated in _FACTORS[kind]:
+    if stated in fitting or (not fitting and stated in _FACTORS[kind]):
         return stated, []
     if len(fitting) != 1:
         known = ", ".join(repr(unit) for unit in _FACTORS[kind])
         raise DataError(
-            f"{table.file}: column {name!r} reaches {peak:.4g} and its unit, {stated or 'not stated'!r}, does not fit a "
-            f"{kind} of walking; give it in a gait map: {known}"
+            f"{table.file}: column {name!r} reaches {peak:.4g} and its unit, {stated or 'not stated'!r}, does not fit "
+            f"a {kind} of walking; give it in a gait map: {known}"
         )
     was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file does not state it"
     return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'} by its size: {was}"]

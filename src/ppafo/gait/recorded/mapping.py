@@ -1,6 +1,7 @@
 """Gait maps: which columns of recorded files make the curves of a gait, in which unit and with which sign.
 
-A map is a TOML file, or what ``conventions`` finds for files without one. A term is the name of a column; ``-`` before it takes it away.
+A map is a TOML file, or what ``conventions`` finds for files without one. A term is the name of a column; ``-`` before
+it takes it away.
 """
 
 from importlib import resources

@@ -17,7 +17,7 @@ LONGEST = 1.5
 """Strides that a record of one cycle has at most; a longer one has strides to count."""
 
 _MISFIT = 0.06
-"""Root mean square of what start and end may differ by where they overlap, values and rates, shares of their ranges; two
+"""Root mean square of what start and end may differ by where they overlap, values and rates, over their ranges; two
 strides of one healthy walk differ by 0.03."""
 
 
@@ -82,4 +82,4 @@ def _tripled(signal: Signal, start: float, period: float) -> Signal:
     turns = np.arange(3)
     time = (turns[:, None] * period + one[None, :]).ravel()
     whole = (turns[:, None] * way + blended[None, :]).ravel()
-    return replace(signal, time=time, values=whole, columns=(), absent=None)
+    return replace(signal, time=time, values=np.asarray(whole, dtype=np.float64), columns=(), absent=None)

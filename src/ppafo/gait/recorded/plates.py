@@ -20,7 +20,7 @@ _LEAST_LEAN_OF_PART = 0.1
 def force_of_plates(
     tables: Sequence[MotionTable], names: Sequence[str], shank: Signal, body_mass: float
 ) -> tuple[Signal | None, list[str]]:
-    """Return the vertical force [body weights] of one foot as the sum of its contacts on several plates, and remarks."""
+    """Return the vertical force [body weights] of one foot, summed over its contacts on plates, and remarks."""
     total: Signal | None = None
     chosen = []
     for table in tables:

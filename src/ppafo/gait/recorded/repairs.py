@@ -26,7 +26,8 @@ def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> Motio
         if name in columns and longest > 0.0:
             columns[name], filled = _filled(table.time, columns[name], longest)
             said += [
-                f"column '{name}': {last - first} samples from {table.time[first]:g} to {table.time[last - 1]:g} s filled"
+                f"column '{name}': {last - first} samples from {table.time[first]:g} to {table.time[last - 1]:g} s "
+                "filled"
                 for first, last in filled
             ]
     return replace(table, columns=columns, remarks=(*table.remarks, *said))

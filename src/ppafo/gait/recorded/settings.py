@@ -17,9 +17,10 @@ class ImportSettings:
     """What the files do not say: body mass [kg], side, speed [m/s], map, low pass [Hz], least number of strides.
 
     The least number of strides is 2 unless given, and 1 overground and of one cycle that wraps around.
-    ``body_mass`` may be None where a C3D file states it. ``stature`` [m] gives the length of the thigh where no map does.
-    ``start`` and ``end`` [s] cut the files, ``longest_gap`` [s] is up to where gaps are filled, and ``ankle_neutral`` [rad]
-    the reading of the file with the foot perpendicular to the shank, where it is not that of map or convention.
+    ``body_mass`` may be None where a C3D file states it. ``stature`` [m] gives the length of the thigh where no map
+    does. ``start`` and ``end`` [s] cut the files, ``longest_gap`` [s] is up to where gaps are filled, and
+    ``ankle_neutral`` [rad] the reading of the file with the foot perpendicular to the shank, where it is not that of
+    map or convention.
     """
 
     body_mass: float | None = None

@@ -1,4 +1,4 @@
-"""Tables of motion from OpenSim, CSV, C3D and TRC files in one form: time, and named columns with the unit of the file."""
+"""Tables of motion from OpenSim, CSV, C3D and TRC files in one form: time, and columns with the unit of the file."""
 
 import re
 from collections.abc import Mapping
