@@ -224,12 +224,13 @@ def _axes(
 ) -> tuple[str, str, tuple[str, ...]]:
     """Return the axes along the walk and upwards, and a remark where they are not x and z.
 
-    Up is where the knee is from the ankle; forward where the foot points, or where the ankle goes.
+    Up is where the knee stays from the ankle; forward where the foot points, or where the ankle goes.
     """
     at_knee, at_ankle = _point(table, knee), _point(table, ankle)
     if at_knee is None or at_ankle is None:
         return "x", "z", ()
-    up = int(np.argmax(np.nanmean(np.abs(at_knee - at_ankle), axis=1)))
+    apart = at_knee - at_ankle
+    up = int(np.argmax(np.abs(np.nanmean(apart, axis=1)) - 2.0 * np.nanstd(apart, axis=1)))
     way = _way(at_ankle)
     if np.hypot(*np.delete(way, up)) < _LEAST_WAY * _per_metre(table, ankle):
         at_heel, at_toe = (_point(table, _first(labels, foot, names) or "") for names in (_HEELS, _TOES))
@@ -242,7 +243,8 @@ def _axes(
     if oblique > _MOST_OBLIQUE:
         raise DataError(
             f"{table.file}: the walk goes {oblique:.0f} deg off the axis {'xyz'[along]} of the laboratory, and "
-            f"the lean of the shank is seen along an axis, to {_MOST_OBLIQUE:g} deg; turn the axes of the laboratory into the walk"
+            f"the lean of the shank is seen along an axis, to {_MOST_OBLIQUE:g} deg; turn the axes into the "
+            "walk"
         )
     forward = f"{'-' if way[along] < 0.0 else ''}{'xyz'[along]}"
     said = () if (forward, up) == ("x", 2) else (f"the walk goes along {forward}, upwards is {'xyz'[up]}",)

@@ -38,7 +38,8 @@ def foot_markers_angle(found: Found, mapped: AngleMap, shank: Signal) -> Signal:
     if np.count_nonzero(flat) < _LEAST_FLAT * seen.rate:
         raise DataError(
             f"{found.table.file}: the line from {mapped.heel!r} to {mapped.toe!r} never stands still while the "
-            "shank leans forward, so the zero of the ankle is unknown; give the angle itself in ankle_angle.terms of a gait map"
+            "shank leans forward, so the zero of the ankle is unknown; give the angle itself in ankle_angle.terms "
+            "of a gait map"
         )
     angle = 0.5 * np.pi + lean - (values - float(np.median(values[flat])))
     return Signal(found.table.file, time, angle)
