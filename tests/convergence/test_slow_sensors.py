@@ -15,7 +15,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, LedMotion, ProfileChoice
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, ProfileChoice
 
 SLOW = ("sensors.angle_bandwidth=20 Hz", "sensors.pressure_bandwidth=40 Hz")
 LATE = ("sensors.delay=2.3 ms",)
@@ -57,7 +57,7 @@ def test_a_slow_angle_sensor_shows_a_sine_smaller_and_later_and_the_others_show_
     swing = ProfileChoice("sine", {"level": 1.3, "amplitude": 0.4, "frequency": frequency, "phase": 0.0})
     listener = Listener()
     listening = Control(PYTHON_CONTROLLER, {}, scenario.control.period, listener)
-    result = ppafo.simulate(dataclasses.replace(scenario, motion=LedMotion(swing), control=listening))
+    result = ppafo.simulate(dataclasses.replace(scenario, motion=PrescribedMotion(swing), control=listening))
     times = result.recording.time[: len(listener.seen)]
     ratio = frequency / bandwidth
     expected = 1.3 + 0.4 / math.hypot(1.0, ratio) * np.sin(2.0 * math.pi * frequency * times - math.atan(ratio))

@@ -11,7 +11,7 @@ from ppafo.errors import DataError, UnitError
 from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
 from ppafo.units import parse_quantity, to_si
 
-_MOST_HARMONICS = 40
+_MAXIMUM_HARMONICS = 40
 _SUMMARIES = {
     "shank_angle": "shank angle from the vertical, above 0 while the ankle is in front of the knee",
     "ankle_angle": "ankle angle, 90 deg neutral, growing in plantarflexion",
@@ -55,7 +55,10 @@ def gait_file() -> type[BaseModel]:
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=100)),
         "title": (str, Field("", description="one line: who walks, and how")),
-        "origin": (Literal["measured", "synthetic"], Field(description="synthetic: made by a model, nobody walked so")),
+        "origin": (
+            Literal["measured", "synthetic"],
+            Field(description="synthetic: made by a model, not recorded from a person"),
+        ),
         "source": (Annotated[str, Field(min_length=1)], Field(description="where the numbers come from")),
         "notes": (str, Field("", description="further remarks")),
         "subject": (table("Subject", subject), Field(description="the wearer")),
@@ -74,7 +77,7 @@ def gait_file() -> type[BaseModel]:
 def _curve_table(name: str, unit: str) -> type[BaseModel]:
     units: Any = Literal["deg", "rad"] if unit == "rad" else Literal[unit]
     number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
-    series = Annotated[list[number], Field(min_length=1, max_length=_MOST_HARMONICS)]
+    series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]
     return table(
         "".join(part.capitalize() for part in name.split("_")),
         {
@@ -91,7 +94,10 @@ def _curve_table(name: str, unit: str) -> type[BaseModel]:
 
 
 def gait_of(document: dict[str, Any], file: str) -> Gait:
-    """Return the gait in the document of a gait file; ``file`` is what messages call it."""
+    """Return the gait in the document of a gait file; ``file`` is what messages call it.
+
+    DataError where it is not a gait.
+    """
     try:
         gait_file().model_validate(document)
     except ValidationError as error:

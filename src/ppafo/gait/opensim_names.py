@@ -34,7 +34,7 @@ def opensim_recording(
     channels = {}
     for name in recording.names:
         if name not in missing:
-            renamed, channel = _renamed(recording, name, foot, body_mass or 0.0)
+            renamed, channel = _rename(recording, name, foot, body_mass or 0.0)
             channels[renamed] = channel
     if {"heel_force", "toe_force"} <= set(recording.names):
         channels[f"ground_force_{foot}_vy"] = Channel(recording["heel_force"] + recording["toe_force"], "N")
@@ -45,7 +45,7 @@ def _is_per_mass(recording: Recording, name: str) -> bool:
     return recording.unit(name) in ("N m/kg", "-", "N/kg")
 
 
-def _renamed(recording: Recording, name: str, foot: str, body_mass: float) -> tuple[str, Channel]:
+def _rename(recording: Recording, name: str, foot: str, body_mass: float) -> tuple[str, Channel]:
     """Return name and values of a channel as OpenSim has them."""
     values, unit = recording[name], recording.unit(name)
     ankle = f"ankle_angle_{foot}"

@@ -24,7 +24,7 @@ _HEAD = ("schema_version", "name", "title", "notes")
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """A preset: values in SI by dotted path, and why each is what it is."""
+    """A preset: values in SI by dotted path, and the reason for each."""
 
     name: str
     title: str
@@ -36,8 +36,8 @@ class Preset:
         """Return the values of one section by name, in SI."""
         return {item.name: self.values[f"{name}.{item.name}"] for item in SECTIONS[name]}
 
-    def changed(self, path: str, value: float, reason: str) -> "Preset":
-        """Return the preset with one value [SI] replaced."""
+    def with_value(self, path: str, value: float, reason: str) -> "Preset":
+        """Return the preset with one value [SI] replaced. ParameterError where it is unknown or out of range."""
         quantity = PATHS.get(path)
         if quantity is None:
             raise ParameterError(f"preset '{self.name}' has no value '{path}'{nearest_name(path, PATHS)}")
@@ -55,7 +55,8 @@ def list_presets() -> tuple[str, ...]:
 def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Preset:
     """Return a preset by its name in the package or by the path of a TOML file.
 
-    ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``.
+    ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``. ParameterError for anything that cannot be
+    used.
     """
     file = label(str(name_or_path))
     preset = _parse(_FILE.parse(_FILE.read(name_or_path), file), file)
@@ -76,7 +77,7 @@ def _override(preset: Preset, path: str, text: str) -> Preset:
         value = parse_quantity(text, PATHS[path].unit)
     except UnitError as error:
         raise ParameterError(f"override '{PREFIX}{path}={text}': {error}") from error
-    return preset.changed(path, value, "override")
+    return preset.with_value(path, value, "override")
 
 
 def _parse(document: dict[str, Any], file: str) -> Preset:
@@ -110,7 +111,7 @@ def _with_entry(preset: Preset, path: str, entry: dict[str, Any], file: str) -> 
     except UnitError as error:
         raise ParameterError(f"{file}: {path}: {error}") from error
     try:
-        return preset.changed(path, in_si, reason)
+        return preset.with_value(path, in_si, reason)
     except ParameterError as error:
         raise ParameterError(f"{file}: {error}") from error
 

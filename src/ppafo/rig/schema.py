@@ -10,7 +10,7 @@ from ppafo.rig.declaration import SECTIONS
 
 
 class PresetValue(BaseModel):
-    """A value of the rig, and why it is what it is."""
+    """A value of the rig, with its reason."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 

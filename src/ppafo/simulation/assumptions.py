@@ -1,4 +1,4 @@
-"""The values of a scenario that no source gives, each with what it is and why."""
+"""The assumed values of a scenario, which no source gives, each with its reason."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.parameter_set import entry_text
 from ppafo.simulation.declaration import quantities, value_at
 from ppafo.simulation.overriding import device_paths, scenario_paths, split_override
-from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.reading import Reading, quantity_text
 from ppafo.simulation.scenario import Assumption
 
 _SECTION = "assumed"
@@ -27,7 +27,10 @@ class Hardware:
 def read_assumptions(
     before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[str]
 ) -> tuple[Assumption, ...]:
-    """Return every assumption that still has a value; one that an override replaced says what it was ``before``."""
+    """Return every assumption that still has a value; one that an override replaced says what it was ``before``.
+
+    ScenarioError for a path that has no value.
+    """
     replaced = frozenset(split_override(text)[0] for text in overrides)
     notes: Mapping[str, str] = reading.document.get(_SECTION, {})
     assumptions = []
@@ -69,7 +72,7 @@ def _device_value(hardware: Hardware, path: str) -> str | None:
 
 
 def _default(quantity: Quantity) -> str | None:
-    return None if quantity.default is None else written(quantity.default, quantity.unit)
+    return None if quantity.default is None else quantity_text(quantity.default, quantity.unit)
 
 
 def _unknown(reading: Reading, path: str) -> ScenarioError:

@@ -10,7 +10,7 @@ from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.parameter_set import chosen_valve
 from ppafo.simulation.assumptions import Hardware, read_assumptions
-from ppafo.simulation.clock import MOST_STEPS_OF_DELAY, Clock, read_clock
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
     AT_REST,
     INITIAL,
@@ -24,16 +24,16 @@ from ppafo.simulation.declaration import (
 )
 from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.motion import read_motion, read_profile
-from ppafo.simulation.overriding import Changed
-from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.overriding import OverriddenDocument
+from ppafo.simulation.reading import Reading, quantity_text
 from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors
 
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
-    """What a scenario is made from.
+class ScenarioRequest:
+    """A scenario that is to be built.
 
     ``file`` is what messages call it, ``path`` the file itself if there is one, ``folder`` where relative paths begin,
     ``content`` the document as it was given. ``parameter_set`` takes the place of the set that the document names.
@@ -47,14 +47,17 @@ class Given:
     parameter_set: ParameterSet | None = None
 
 
-def build_scenario(given: Given, changed: Changed) -> Scenario:
-    """Return the scenario of a document that has the right keys, or refuse the first value that is not usable."""
+def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
+    """Return the scenario of a document that has the right keys.
+
+    ScenarioError or ParameterError for the first value that cannot be used.
+    """
     document = changed.document
-    reading = Reading(given.file, document, changed.paths)
-    hardware = _hardware(reading, given, changed.device)
+    reading = Reading(request.file, document, changed.paths)
+    hardware = _hardware(reading, request, changed.device)
     device = _device(reading, hardware)
     clock = read_clock(reading)
-    before = Reading(given.file, given.content)
+    before = Reading(request.file, request.content)
     return Scenario(
         name=document["name"],
         description=document.get("description", ""),
@@ -68,19 +71,19 @@ def build_scenario(given: Given, changed: Changed) -> Scenario:
         control=_control(reading, clock.period),
         reference=read_profile(reading, "reference", TORQUE_LEVEL) if "reference" in document else _NOTHING_TO_FOLLOW,
         sensors=_sensors(reading, clock),
-        assumptions=(*read_assumptions(before, reading, hardware, given.overrides), *assumed_lines(reading)),
-        origin=Origin(given.path, document["device"]["set"], hardware.valve, given.overrides, given.content),
+        assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
+        origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         thermal=read_thermal(reading),
         supply_lines=read_supply_lines(reading, device),
     )
 
 
-def _hardware(reading: Reading, given: Given, overrides: tuple[str, ...]) -> Hardware:
+def _hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then those of the caller."""
     section = reading.document["device"]
     valve = section.get("valve")
     try:
-        parameter_set = given.parameter_set or load_parameter_set(set_name(section["set"], given.folder))
+        parameter_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
         name = chosen_valve(parameter_set, valve)
         parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
     except ParameterError as error:
@@ -130,9 +133,9 @@ def _sensors(reading: Reading, clock: Clock) -> Sensors:
     values = reading.section("sensors", SENSORS)
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
-    if values["delay"] / clock.step > MOST_STEPS_OF_DELAY:
-        most = written(MOST_STEPS_OF_DELAY * clock.step, "s")
-        raise reading.refusal("sensors.delay", f"must be at most {most}, {MOST_STEPS_OF_DELAY:.0e} steps")
+    if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
+        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
+        raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
     return Sensors(
         delay=values["delay"],
         angle_noise=values["angle_noise"],

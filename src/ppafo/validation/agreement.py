@@ -10,7 +10,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.inputs import SUPPLY, regular_interval
-from ppafo.simulation.recorded.scenario import fixed_volume
+from ppafo.simulation.recorded.scenario import with_fixed_volume
 from ppafo.validation.alignment import DEFAULT_LIMIT, Curve, Delay, estimate_delay
 from ppafo.validation.compared import (
     ANGLE,
@@ -161,7 +161,7 @@ def _rms(error: Floats, weights: Floats) -> float:
 def compare_recording(measured: Measured, device: Device, settings: ReplaySettings) -> RecordingAgreement:
     """Return how far the model of a device is from one recording, on the inputs of that recording."""
     if settings.volume is not None:
-        device = fixed_volume(device, settings.volume)
+        device = with_fixed_volume(device, settings.volume)
         settings = replace(settings, motion="held", initial=initial_in_fixed_volume(device, settings.initial))
     _check_angle(measured, settings.motion)
     start = start_of(measured, device, settings.initial)

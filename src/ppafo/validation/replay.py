@@ -22,11 +22,11 @@ from ppafo.simulation.recorded.inputs import (
     SUPPLY,
     RecordedInputs,
     between_stops,
-    led_along,
     sample_period,
     step_inputs,
+    with_prescribed_angle,
 )
-from ppafo.simulation.recorded.scenario import held_at, recorded_scenario, with_highest_supply
+from ppafo.simulation.recorded.scenario import held_vane, replay_scenario, with_highest_supply
 from ppafo.simulation.recorded.start import Start, samples_at_rest
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.units import parse_quantity
@@ -55,7 +55,7 @@ def replay_recording(measured: Measured, device: Device, start: Start, motion: M
     """Run the model on the inputs of a recording and ``extra`` seconds longer, with the last inputs."""
     run = _plan(measured, device, start, motion, extra)
     if motion == "measured":
-        run = led_along(run, start.angle)
+        run = with_prescribed_angle(run, start.angle)
     inputs = _inputs(measured, motion)
     outcome = replay(batch_of(run), step_inputs(inputs, device, run))
     rows = state_row_numbers(run)
@@ -83,8 +83,8 @@ def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extr
     """The run of a free or a held vane; the steps of a free one are fine enough for a led one too."""
     recording = measured.recording
     duration = recording.duration + max(extra, sample_period(recording.time))
-    highest, held = with_highest_supply(device, recording), held_at(start.angle) if motion == "held" else None
-    scenario = recorded_scenario(recording, highest, start, duration, measured.file, held)
+    highest, held = with_highest_supply(device, recording), held_vane(start.angle) if motion == "held" else None
+    scenario = replay_scenario(recording, highest, start, duration, measured.file, held)
     run = plan_run(scenario)
     if run.step_count > MOST_STEPS:
         raise DataError(

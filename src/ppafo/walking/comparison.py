@@ -1,4 +1,4 @@
-"""The same wearer with the device, with the device switched off, and as the healthy gait would have it."""
+"""The same wearer with the device, with the device switched off, and with a healthy ankle."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from ppafo.control.walking import off
 from ppafo.metrics import Metric
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.followed_gait import landing_phase
+from ppafo.walking.gait_series import landing_phase
 from ppafo.walking.walk import Progress, WalkResult, silent, walk
 from ppafo.walking.walk_metrics import healthy_positive_work, healthy_toe_height, lowest_toes
 
@@ -28,28 +28,28 @@ class Comparison:
 
 
 def compare_walks(configuration: Configuration, minutes: float, progress: Progress = silent) -> Comparison:
-    """Walk some minutes with the device and as long with it switched off; ScenarioError for bad input."""
+    """Walk ``minutes`` [min] with the device and as long with it off; ScenarioError for bad input."""
     return Comparison(
         walk(configuration, minutes, progress=progress),
-        walk(switched_off(configuration), minutes, progress=progress),
+        walk(with_device_off(configuration), minutes, progress=progress),
         healthy_metrics(configuration),
     )
 
 
-def switched_off(configuration: Configuration) -> Configuration:
-    """The same wearer and device with both chambers vented; no gas flows, so it needs no lines."""
+def with_device_off(configuration: Configuration) -> Configuration:
+    """The same wearer and device with both chambers vented; no gas flows, so no supply lines are needed."""
     return replace(configuration, name=f"{configuration.name}-off", controller=off.KIND, settings={}, supply_lines=None)
 
 
 def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:
-    """What the numbers of a walk would be with a healthy ankle; without the moment there is no work."""
+    """The metrics of a walk with a healthy ankle, SI units; without a moment curve there is no work."""
     gait = configuration.gait
     found = {
         "slap_rate": Metric(_landing_rate(configuration), "rad/s", "rate of the measured foot as it comes down"),
-        "toe_clearance": Metric(0.0, "m", "the healthy gait is the measure"),
+        "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
         "lowest_toes": lowest_toes(configuration, healthy_toe_height(configuration)),
         "toe_landing": Metric(0.0, "-", "the heel comes first"),
-        "angle_difference": Metric(0.0, "rad", "the healthy gait is the measure"),
+        "angle_difference": Metric(0.0, "rad", "0 by definition: measured from the healthy gait"),
     }
     if gait.ankle_moment is not None:
         work = healthy_positive_work(configuration)

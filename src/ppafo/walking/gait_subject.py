@@ -13,7 +13,7 @@ from ppafo.gait import Gait
 from ppafo.gait.plausible.angles import gait_file_remarks
 from ppafo.simulation.declaration import value_at
 from ppafo.simulation.reading import Reading
-from ppafo.walking.anthropometry import Build, scaled_segments
+from ppafo.walking.anthropometry import Build, segment_values
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.wearer import WEARER, Wearer, paper_subject
 
@@ -30,7 +30,7 @@ def gait_subject(gait: Gait) -> Wearer:
     paper = paper_subject()
     stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
     build = Build(np.array([gait.body_mass / paper.body_mass]), np.array([stature]))
-    segments = {name: float(values[0]) for name, values in scaled_segments(paper, build).items()}
+    segments = {name: float(values[0]) for name, values in segment_values(paper, build).items()}
     return replace(paper, **segments)
 
 

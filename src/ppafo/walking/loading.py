@@ -56,10 +56,11 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` replaces the
     gait of the file. A gait that is named, by the file or by ``gait``, brings its subject as the default wearer.
+    ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
-    document = _changed(FILE.parse(FILE.read(name_or_path), file), given, file)
+    document = _apply_overrides(FILE.parse(FILE.read(name_or_path), file), given, file)
     load_walking_controller(kind_at(document, "controller"))
     try:
         walk_file().model_validate(document)
@@ -96,7 +97,7 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
     return configuration
 
 
-def _changed(document: dict[str, Any], overrides: tuple[str, ...], file: str) -> dict[str, Any]:
+def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file: str) -> dict[str, Any]:
     """Return a copy of the document with the overrides of the walk in it; those of the device are left out."""
     changed = copy.deepcopy(document)
     for override in overrides:

@@ -17,14 +17,14 @@ from ppafo.walking.posture import ankle_path
 
 PHASE_ROW = "controller_state.phase.phase"
 SAFE_ROW = "controller_state.safety.vented"
-"""Where event-based controllers keep the phase that they see, and whether they have vented for good."""
+"""Where event-based controllers keep the phase that they see, and whether they have vented permanently."""
 
-WISH_ROW = "controller_state.wish.torque"
+REQUEST_ROW = "controller_state.request.torque"
 """Where those that follow a torque keep the one they want."""
 
 
-def recorded(configuration: Configuration, run: Run, time: Floats, record: Mapping[str, Floats]) -> Recording:
-    """The recording of a walk from its rows (samples,) by path, at these times [s]."""
+def recording_of_walk(configuration: Configuration, run: Run, time: Floats, record: Mapping[str, Floats]) -> Recording:
+    """The recording of a walk [SI] from its rows (samples,) by path, at these times [s]."""
     assert run.walk is not None, "a walk has a leg"
     angle, rate = record["state.angle"], record["state.angular_velocity"]
     pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])
@@ -53,8 +53,8 @@ def recorded(configuration: Configuration, run: Run, time: Floats, record: Mappi
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
         channels["safe_state"] = (record[SAFE_ROW], "-")
-    if WISH_ROW in record:
-        channels["reference"] = (record[WISH_ROW], "N m")
+    if REQUEST_ROW in record:
+        channels["reference"] = (record[REQUEST_ROW], "N m")
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
 

@@ -18,9 +18,11 @@ WEARER = (
     Quantity("heel_lever", "m", "ankle back to the heel; bounds the lever of the ground force", 0.05, 0.0, 0.2),
     Quantity("toe_lever", "m", "ankle forward to the toes", 0.18, 0.0, 0.5),
     Quantity("ankle_stiffness", "N m/rad", "stiffness of tissue at the ankle", 4.0, 0.0, 500.0),
-    Quantity("ankle_rest_angle", "rad", "angle at which tissue pulls neither way", 1.92, 0.5, 3.0),
+    Quantity("ankle_rest_angle", "rad", "angle at which passive tissue exerts no torque", 1.92, 0.5, 3.0),
     Quantity("ankle_damping", "N m s/rad", "damping of tissue at the ankle", 0.2, 0.0, 50.0),
-    Quantity("residual_share", "1", "share of the healthy ankle moment that the wearer still has", 0.0, 0.0, 1.0),
+    Quantity(
+        "residual_share", "1", "fraction of the healthy ankle moment that the wearer can still produce", 0.0, 0.0, 1.0
+    ),
 )
 """Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008."""
 

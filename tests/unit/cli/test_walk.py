@@ -148,7 +148,7 @@ MISTAKES = {
     "--gait nobody": "there is no gait 'nobody'",
     "--minutes 0.01": "must be 0.087 min (5 strides) or more",
     "--minutes nan": "a walk of nan min: must be",
-    "--minutes 1e9": "a walk of 1e+09 min: must be 0.087 min (5 strides) or more and at most 60 min",
+    "--minutes 1e9": "a walk of 1e+09 min: must be 0.087 min (5 strides) or more, and at most 60 min",
     "--minutes -1": "a walk of -1 min: must be",
     "--minutes soon": "--minutes 'soon': a number of minutes, or a time such as '90 s'",
     "--set controller.unload_threshold=80N": "must be below controller.load_threshold, which is 60 N",
@@ -180,7 +180,8 @@ def test_a_failing_sensor_is_told_with_the_time_of_the_safe_state(
     told = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("safe state"))
     assert 3.3 <= float(told.split()[-2]) < 3.4
     assert (
-        "Safe state: when the controller vented both chambers for good" in (tmp_path / "walk/report.html").read_text()
+        "Safe state: time at which the controller vented both chambers permanently"
+        in (tmp_path / "walk/report.html").read_text()
     )
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())
     assert 3.3 <= document["metrics"]["safe_state_time"]["value"] < 3.4

@@ -19,7 +19,7 @@ DELAY = {"right": 0.0, "left": 0.5 * STRIDE}
 
 def curve(name: str, time: Floats, side: str = "right") -> Floats:
     """A curve of a foot at times [s]; the right heel strikes at 0."""
-    return GAIT.curve(name).sampled((time - DELAY[side]) / STRIDE)
+    return GAIT.curve(name).values_at((time - DELAY[side]) / STRIDE)
 
 
 def force(time: Floats, side: str = "right", strides: Iterable[int] | None = None, away: float = 0.0) -> Floats:

@@ -339,7 +339,7 @@ def test_an_unknown_kind_of_file_is_refused(tmp_path: Path) -> None:
         (ImportSettings(float("nan")), "a body mass of nan kg is not plausible"),
         (ImportSettings(62.0, walking_speed=50.0), "a walking speed of 50 m/s is not plausible"),
         (ImportSettings(62.0, stature=175.0), "a stature of 175 m is not plausible; give it in m, such as '1.75 m'"),
-        (ImportSettings(62.0, low_pass=0.1), "a low pass at 0.1 Hz removes the walking itself"),
+        (ImportSettings(62.0, low_pass=0.1), "a low pass at 0.1 Hz would remove the gait itself"),
         (ImportSettings(62.0, low_pass=500.0), "cannot be low-passed at 500 Hz: it has 200.3 samples a second"),
         (ImportSettings(62.0, least_strides=0), "the minimum number of strides must be 1 or more, not 0"),
         (ImportSettings(62.0, name="My gait"), "name 'My gait' must consist of lower-case letters"),

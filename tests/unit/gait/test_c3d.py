@@ -64,8 +64,10 @@ def written(
 def same(gait: Gait, truth: Gait) -> bool:
     """True where the curves agree, but for the 0.4 % of the stride by which the events differ."""
     shift = np.linspace(0.0, 0.01, 101)
-    errors = [np.max(np.abs(gait.ankle_angle.sampled(PHASES) - truth.ankle_angle.sampled(PHASES + s))) for s in shift]
-    lean = [np.max(np.abs(gait.shank_angle.sampled(PHASES) - truth.shank_angle.sampled(PHASES + s))) for s in shift]
+    errors = [
+        np.max(np.abs(gait.ankle_angle.values_at(PHASES) - truth.ankle_angle.values_at(PHASES + s))) for s in shift
+    ]
+    lean = [np.max(np.abs(gait.shank_angle.values_at(PHASES) - truth.shank_angle.values_at(PHASES + s))) for s in shift]
     return min(errors) < 0.004 and min(lean) < 0.004
 
 
@@ -74,7 +76,7 @@ def knee_error(gait: Gait, truth: Gait) -> float:
     shift = np.linspace(0.0, 0.01, 21)
     errors = [
         max(
-            float(np.sqrt(np.mean((gait.curve(name).sampled(PHASES) - truth.curve(name).sampled(PHASES + s)) ** 2)))
+            float(np.sqrt(np.mean((gait.curve(name).values_at(PHASES) - truth.curve(name).values_at(PHASES + s)) ** 2)))
             for name in ("knee_forward", "knee_up")
         )
         for s in shift

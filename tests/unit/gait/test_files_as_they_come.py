@@ -24,14 +24,14 @@ PERSON = ImportSettings(MASS)
 
 def error(gait: Gait, name: str) -> float:
     """Largest difference from the true curve, at the start that fits best."""
-    values = gait.curve(name).sampled(PHASES)
+    values = gait.curve(name).values_at(PHASES)
     shifts = np.linspace(-0.03, 0.03, 61)
     return min(float(np.max(np.abs(values - truth(name, PHASES + shift)))) for shift in shifts)
 
 
 def truth(name: str, phases: Floats) -> Floats:
     """A curve of the walk; the plates of the laboratory show nothing of the swing."""
-    values = GAIT.curve(name).sampled(phases)
+    values = GAIT.curve(name).values_at(phases)
     return np.maximum(values - UNLOADED, 0.0) if name == "vertical_force" else values
 
 
@@ -144,7 +144,7 @@ def test_markers_give_shank_knee_and_an_ankle_whose_zero_is_the_flat_foot(tmp_pa
     assert_true(found.gait, ("shank_angle", "vertical_force"))
     assert error(found.gait, "knee_forward") < 0.5
     turned = [
-        float(np.ptp(found.gait.ankle_angle.sampled(PHASES) - GAIT.ankle_angle.sampled(PHASES + shift)))
+        float(np.ptp(found.gait.ankle_angle.values_at(PHASES) - GAIT.ankle_angle.values_at(PHASES + shift)))
         for shift in np.linspace(-0.03, 0.03, 61)
     ]
     assert min(turned) < 0.02, "but for the zero it is the same curve"

@@ -42,19 +42,19 @@ def test_a_curve_is_the_sum_of_its_series_and_has_its_derivatives(phase: float) 
 
 
 def test_a_scaled_curve_differs_between_strides_as_much_more() -> None:
-    twice = CURVE.scaled(-2.0)
+    twice = CURVE.scale(-2.0)
     assert twice.deviation == 0.2
-    np.testing.assert_allclose(twice.sampled(PHASES), -2.0 * CURVE.sampled(PHASES))
+    np.testing.assert_allclose(twice.values_at(PHASES), -2.0 * CURVE.values_at(PHASES))
 
 
 def test_signs_are_those_of_the_package(normative: Gait) -> None:
     shank, ankle = normative.shank_angle, normative.ankle_angle
     assert shank.value(0.0) > 0.2, "at heel strike the ankle is in front of the knee"
     assert shank.value(normative.stance_share) < -0.7, "at toe-off it is behind"
-    foot = np.degrees(ankle.sampled([0.2, 0.3]) - np.pi / 2.0 - shank.sampled([0.2, 0.3]))
+    foot = np.degrees(ankle.values_at([0.2, 0.3]) - np.pi / 2.0 - shank.values_at([0.2, 0.3]))
     assert np.all(np.abs(foot) < 6.0), "with a flat foot the ankle angle is 90 deg plus the shank angle"
-    assert ankle.sampled(PHASES).argmax() / 200.0 > normative.stance_share, "the toes point down after push-off"
-    moment = normative.curve("ankle_moment").sampled(PHASES)
+    assert ankle.values_at(PHASES).argmax() / 200.0 > normative.stance_share, "the toes point down after push-off"
+    moment = normative.curve("ankle_moment").values_at(PHASES)
     assert moment.max() > 1.3
     assert moment.max() > -5.0 * moment.min()
 
@@ -62,7 +62,9 @@ def test_signs_are_those_of_the_package(normative: Gait) -> None:
 def test_a_gait_file_read_back_is_the_same_gait(normative: Gait) -> None:
     again = parse_gait(gait_toml(normative).encode(), "again.toml")
     assert dataclasses.replace(again, shank_angle=normative.shank_angle, ankle_angle=normative.ankle_angle) == normative
-    assert np.allclose(again.ankle_angle.sampled(PHASES), normative.ankle_angle.sampled(PHASES), rtol=0.0, atol=1e-12)
+    assert np.allclose(
+        again.ankle_angle.values_at(PHASES), normative.ankle_angle.values_at(PHASES), rtol=0.0, atol=1e-12
+    )
 
 
 def test_the_shipped_gaits_fit_the_published_schema() -> None:
@@ -93,7 +95,7 @@ def test_a_wrong_gait_file_is_refused_with_key_and_value(normative: Gait, old: s
 
 
 def negative(curve: Curve) -> Curve:
-    return curve.scaled(-1.0)
+    return curve.scale(-1.0)
 
 
 def turned(amplitudes: tuple[float, ...]) -> tuple[float, ...]:
@@ -112,14 +114,14 @@ IMPLAUSIBLE = {
         "write its mean so that it is 90 deg when the foot is perpendicular to the shank",
     ),
     "moment": ({"ankle_moment": negative}, "its sign is reversed; write mean, cosine and sine with the other sign"),
-    "unit of the shank": ({"shank_angle": lambda c: c.scaled(math.radians(1.0))}, "the numbers look like radians"),
-    "force in newton": ({"vertical_force": lambda c: c.scaled(608.0)}, "is the body mass right, and the unit"),
+    "unit of the shank": ({"shank_angle": lambda c: c.scale(math.radians(1.0))}, "the numbers look like radians"),
+    "force in newton": ({"vertical_force": lambda c: c.scale(608.0)}, "is the body mass right, and the unit"),
     "moment of the other foot": (
         {"ankle_moment": lambda c: dataclasses.replace(c, cosines=turned(c.cosines), sines=turned(c.sines))},
         "peaks at 98 % of the stride, but the foot is off the ground from 64 % on; write the moment of this foot",
     ),
     "knee in g": (
-        {"knee_forward": lambda c: c.scaled(1.0 / 9.80665), "knee_up": lambda c: c.scaled(1.0 / 9.80665)},
+        {"knee_forward": lambda c: c.scale(1.0 / 9.80665), "knee_up": lambda c: c.scale(1.0 / 9.80665)},
         "are in units of g: while the foot is flat",
     ),
     "knee forward": (
@@ -135,7 +137,7 @@ IMPLAUSIBLE = {
         "knee_up is 9.81 m/s^2 on average, and a periodic stride has 0",
     ),
     "knee in another unit": (
-        {"knee_forward": lambda c: c.scaled(100.0)},
+        {"knee_forward": lambda c: c.scale(100.0)},
         "knee_forward covers a range of 2.02e+03 m/s^2 in a stride, plausible is 0.5 to 80 m/s^2; is the unit right",
     ),
 }
@@ -192,7 +194,7 @@ def test_a_scaled_gait_keeps_the_walk_ratio_and_all_curves(normative: Gait) -> N
 def test_the_way_of_the_knee_stays_when_the_speed_changes(normative: Gait) -> None:
     slow = at_speed(at_speed(normative, 1.2), 1.1)
     for name in KNEE:
-        ways = [gait.curve(name).scaled(gait.stride_time**2).sampled(PHASES) for gait in (normative, slow)]
+        ways = [gait.curve(name).scale(gait.stride_time**2).values_at(PHASES) for gait in (normative, slow)]
         np.testing.assert_allclose(ways[1], ways[0], rtol=1e-12, atol=1e-12)
 
 
@@ -249,7 +251,7 @@ def test_the_series_stay_as_near_to_the_data_as_the_notes_say(normative: Gait, s
         shared_data / "gait" / "falisse2019_derived" / "falisse2019_s1_1p33_stride.csv", delimiter=",", names=True
     )
     column, largest = LARGEST_FIT_ERRORS[name]
-    series = normative.curves[name].sampled(table["pct"] / 100.0)
+    series = normative.curves[name].values_at(table["pct"] / 100.0)
     if name == "ankle_angle":
         series = 0.5 * np.pi - series
     if name.endswith("_angle"):
@@ -304,7 +306,7 @@ def test_an_ankle_zero_that_is_off_is_remarked_with_the_correction(tilt: float, 
 
 def standing_tilt_of(gait: Gait) -> float:
     percent = np.linspace(0.0, 1.0, 101)
-    return standing_tilt(gait.shank_angle.sampled(percent), gait.ankle_angle.sampled(percent))
+    return standing_tilt(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
 
 
 @pytest.mark.parametrize("tilt", [17.0, -26.0])

@@ -102,9 +102,9 @@ def _add_events(file: Any, seconds: float) -> None:
 def error(found: ImportedGait, name: str) -> float:
     """Largest difference of a curve in stance from the true one, at the start that fits best."""
     stance = PHASES[PHASES < 0.6]
-    values = found.gait.curve(name).sampled(stance)
+    values = found.gait.curve(name).values_at(stance)
     shifts = np.linspace(-0.03, 0.03, 61)
-    return min(float(np.max(np.abs(values - GAIT.curve(name).sampled(stance + shift)))) for shift in shifts)
+    return min(float(np.max(np.abs(values - GAIT.curve(name).values_at(stance + shift)))) for shift in shifts)
 
 
 def assert_true(found: ImportedGait) -> None:

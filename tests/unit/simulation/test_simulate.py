@@ -22,7 +22,7 @@ from ppafo.simulation.ensemble import _result as ensemble_result
 from ppafo.simulation.ensemble.running import Outcome, Request
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import LedMotion, ProfileChoice, Scenario
+from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.simulate import REMEDY, simulate, simulate_many
 from ppafo.walking.walk import _status as walk_status
 
@@ -171,7 +171,7 @@ def test_led_vane_follows_its_path_and_reports_the_torque_that_it_takes(
     torque_task: Callable[[str], Scenario],
 ) -> None:
     sine = ProfileChoice("sine", {"level": 1.3, "amplitude": 0.2, "frequency": 1.0, "phase": 0.0})
-    result = simulate(dataclasses.replace(torque_task("proportional"), motion=LedMotion(sine)))
+    result = simulate(dataclasses.replace(torque_task("proportional"), motion=PrescribedMotion(sine)))
     time = result.recording.time
     assert result.recording["angle"] == pytest.approx(1.3 + 0.2 * np.sin(2 * np.pi * time), abs=1e-8)
     device = result.scenario.device

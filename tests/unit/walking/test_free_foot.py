@@ -17,7 +17,7 @@ from ppafo.model import contact as ground
 from ppafo.model.gait import gait_at
 from ppafo.model.leg import foot_inertia_about_ankle, passive_torque
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.walking.followed_gait import followed
+from ppafo.walking.gait_series import truncate
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import Wearer, paper_subject
 
@@ -31,9 +31,9 @@ class Judge:
 
     def __init__(self, gait: Gait, wearer: Wearer, plate: DeviceShare) -> None:
         self.wearer, self.plate, self.stride = wearer, plate, gait.stride_time
-        self.shank = followed(gait.shank_angle)
-        self.healthy = followed(gait.ankle_angle)
-        self.knee = [followed(gait.curve(name)) for name in ("knee_forward", "knee_up")]
+        self.shank = truncate(gait.shank_angle)
+        self.healthy = truncate(gait.ankle_angle)
+        self.knee = [truncate(gait.curve(name)) for name in ("knee_forward", "knee_up")]
         self.moment = wearer.foot_mass * wearer.foot_mass_centre
         self.inertia = wearer.foot_inertia + self.moment * wearer.foot_mass_centre
 

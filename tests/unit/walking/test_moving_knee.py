@@ -23,7 +23,7 @@ from ppafo.model.leg import (
 )
 from ppafo.signals.recording import Floats
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.walking.followed_gait import gait_series, gait_timing
+from ppafo.walking.gait_series import gait_series, gait_timing
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import paper_subject
 
@@ -108,7 +108,7 @@ def needed_moment(gait: Gait, leg: LegParameters, phases: Floats) -> Floats:
 def test_the_knee_brings_the_free_foot_to_the_moment_that_was_measured() -> None:
     gait = load_gait()
     phases = np.linspace(0.68, 0.95, 109)
-    measured = gait.body_mass * gait.curve("ankle_moment").sampled(phases)
+    measured = gait.body_mass * gait.curve("ankle_moment").values_at(phases)
     knee = {"knee_forward": gait.knee_forward, "knee_up": gait.knee_up}
     tried = {
         "at rest": dict.fromkeys(knee),

@@ -13,12 +13,12 @@ class ConstantProfile(NamedTuple):
 
 
 def value(profile: ConstantProfile, time: float) -> tuple[float, float, float]:
-    """Level, rate 0 and second derivative 0."""
+    """Level [N m or rad], rate 0 and second derivative 0."""
     return profile.level, 0.0, 0.0
 
 
 def bounds(profile: ConstantProfile) -> tuple[float, float]:
-    """The level, twice."""
+    """The level [N m or rad], twice."""
     return profile.level, profile.level
 
 

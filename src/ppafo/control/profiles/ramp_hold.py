@@ -20,12 +20,12 @@ def value(profile: RampHold, time: float) -> tuple[float, float, float]:
     gain = profile.level - profile.start_level
     progress = (time - profile.ramp_start) / profile.ramp_time
     inside = progress >= 0.0 and progress < 1.0
-    share = max(0.0, min(1.0, progress))
-    return profile.start_level + gain * share, (gain / profile.ramp_time if inside else 0.0), 0.0
+    fraction = max(0.0, min(1.0, progress))
+    return profile.start_level + gain * fraction, (gain / profile.ramp_time if inside else 0.0), 0.0
 
 
 def bounds(profile: RampHold) -> tuple[float, float]:
-    """The lower and the higher of both levels."""
+    """The lower and the higher level [N m or rad]."""
     return min(profile.start_level, profile.level), max(profile.start_level, profile.level)
 
 

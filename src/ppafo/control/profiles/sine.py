@@ -25,7 +25,7 @@ def value(profile: Sine, time: float) -> tuple[float, float, float]:
 
 
 def bounds(profile: Sine) -> tuple[float, float]:
-    """Trough and crest."""
+    """Lowest and highest value [N m or rad]."""
     swing = abs(profile.amplitude)
     return profile.level - swing, profile.level + swing
 

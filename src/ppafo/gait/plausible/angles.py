@@ -4,7 +4,7 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.gait import Gait
-from ppafo.gait.plausible.checked import Checked, Given
+from ppafo.gait.plausible.checked import MeanStride, SignSource
 from ppafo.signals.recording import Floats
 
 SHANK_RANGE = (25.0, 120.0)
@@ -12,7 +12,7 @@ ANKLE_RANGE = (5.0, 80.0)
 ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
 """Percent of the stride in which the foot stands: the ankle then turns as the shank does."""
-_LEAST_SHANK_TRAVEL = 8.0
+_MINIMUM_SHANK_TRAVEL = 8.0
 REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
 """Degrees that the standing foot may be tilted, on average over mid-stance, before it is remarked and refused.
 
@@ -22,8 +22,8 @@ foot further than 20: a shoe with a heel of 6 cm on a foot of 17 cm from heel to
 """
 
 
-def check_shank(walk: Checked) -> None:
-    """Refuse a shank that no leg has."""
+def check_shank(walk: MeanStride) -> None:
+    """Raise DataError for a shank angle that no leg has."""
     phi = np.degrees(walk.curves["shank_angle"])
     place = f"{walk.file['shank_angle']}: shank_angle"
     travel = float(np.ptp(phi))
@@ -46,8 +46,8 @@ def check_shank(walk: Checked) -> None:
         )
 
 
-def check_ankle(walk: Checked) -> None:
-    """Refuse an ankle that no leg has, or not with this shank."""
+def check_ankle(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle that no leg has, or not with this shank."""
     theta, phi = (np.degrees(walk.curves[name]) for name in ("ankle_angle", "shank_angle"))
     place = f"{walk.file['ankle_angle']}: ankle_angle"
     travel = float(np.ptp(theta))
@@ -58,7 +58,7 @@ def check_ankle(walk: Checked) -> None:
             f"{_unit_hint(travel, low, high)}"
         )
     stand, lean = theta[MIDSTANCE], phi[MIDSTANCE]
-    slope = float(np.polyfit(lean, stand, 1)[0]) if np.ptp(lean) > _LEAST_SHANK_TRAVEL else 1.0
+    slope = float(np.polyfit(lean, stand, 1)[0]) if np.ptp(lean) > _MINIMUM_SHANK_TRAVEL else 1.0
     if slope < 0.0:
         raise DataError(
             f"{place} goes into plantarflexion while the shank rotates forward over the standing foot "
@@ -69,7 +69,7 @@ def check_ankle(walk: Checked) -> None:
     if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
         raise DataError(
             f"{place} would tilt the standing foot by {foot:.0f} deg, plausible is within {REFUSED_TILT:g} deg "
-            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.given]}"
+            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.signs_from]}"
         )
 
 
@@ -97,12 +97,12 @@ def zero_remarks(tilt: float, correction: str) -> list[str]:
 def gait_file_remarks(gait: Gait) -> list[str]:
     """Return what there is to say of the ankle's zero in a finished gait, with the new mean of its series."""
     percent = np.linspace(0.0, 1.0, 101)
-    tilt = standing_tilt(gait.shank_angle.sampled(percent), gait.ankle_angle.sampled(percent))
+    tilt = standing_tilt(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
     mean = float(np.degrees(gait.ankle_angle.mean)) - tilt
     return zero_remarks(tilt, f"the mean of [ankle_angle] in gait '{gait.name}' would be {mean:.1f} deg")
 
 
-_NEUTRAL: dict[Given, str] = {
+_NEUTRAL: dict[SignSource, str] = {
     "map": "give ankle_angle.neutral in the gait map: the reading of the file when the foot is "
     "perpendicular to the shank",
     "columns": "write it as 90 deg when the foot is perpendicular to the shank, or give a gait map with "
@@ -111,8 +111,8 @@ _NEUTRAL: dict[Given, str] = {
 }
 
 
-def _other_foot(walk: Checked) -> str:
-    if walk.given == "gait_file" or "vertical_force" not in walk.curves:
+def _other_foot(walk: MeanStride) -> str:
+    if walk.signs_from == "gait_file" or "vertical_force" not in walk.curves:
         return ""
     return ", or the force is of the other foot: choose the other side, or the column of this foot"
 

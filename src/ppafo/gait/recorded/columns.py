@@ -20,7 +20,7 @@ _LONGEST_SHOWN = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class CurveColumns:
     """The table of a curve, its columns with their signs, and the key that states their unit in a gait map."""
 
     unit_key: str
@@ -29,7 +29,7 @@ class Found:
     may_be_absent: bool = False
 
     def in_unit(self, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
-        """Return the sum of the terms in the first SI unit that fits, and that unit."""
+        """Return the sum of the terms in the first SI unit that fits, and that unit. DataError where none fits."""
         total = np.zeros(self.table.time.size)
         chosen = si_units[0]
         for sign, name in self.terms:
@@ -58,7 +58,7 @@ class Found:
 
 
 def check_finite(values: Floats, place: str, time: Floats) -> None:
-    """Refuse a column with a gap between its first and last number; ``place`` is what the message calls it."""
+    """Raise DataError for a column with a gap within its ``time`` [s]; ``place`` is what the message calls it."""
     known = np.flatnonzero(np.isfinite(values))
     if known.size == 0:
         raise DataError(f"{place} has no number at all; give a file or a gait map with another column")
@@ -81,7 +81,9 @@ def _remedy(time: Floats, known: "np.ndarray[tuple[int], np.dtype[np.intp]]") ->
     return f"fill it or cut the file there (--fill-gaps '{needed:g} s', or --start, --end)"
 
 
-def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool) -> Found | None:
+def find_columns(
+    curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool
+) -> CurveColumns | None:
     """Return the one table that has every column of a curve; None where it may be missing and no table has one."""
     bare = [name.removeprefix("-") for name in names]
     holders = [table for table in tables if all(name in table.columns for name in bare)]
@@ -91,7 +93,7 @@ def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
         terms = _detect_knee(holders[0], tuple(zip(signs, bare, strict=True)))
-        return Found(f"{curve}.unit", holders[0], terms, curve in LOADS)
+        return CurveColumns(f"{curve}.unit", holders[0], terms, curve in LOADS)
     if optional and not any(name in table.columns for name in bare for table in tables):
         return None
     known = [name for table in tables for name in table.columns]
@@ -100,10 +102,9 @@ def found_columns(curve: str, names: Sequence[str], tables: Sequence[MotionTable
         ", ..." if len(known) > _LONGEST_SHOWN else ""
     )
     files = ", ".join(table.file for table in tables)
-    why = f"no column {missing!r}{nearest_name(missing, known)}" if missing not in known else "its columns in two files"
-    raise DataError(
-        f"{curve}: there is {why} ({files}: {shown}); name the columns in a gait map, 'ppafo schema gait-map'"
-    )
+    hint = nearest_name(missing, known)
+    why = f"there is no column {missing!r}{hint}" if missing not in known else "no file has all of its columns"
+    raise DataError(f"{curve}: {why} ({files}: {shown}); name the columns in a gait map, 'ppafo schema gait-map'")
 
 
 def _detect_knee(table: MotionTable, terms: tuple[tuple[float, str], ...]) -> tuple[tuple[float, str], ...]:

@@ -82,10 +82,10 @@ def _together(found: Sequence[Convention], tables: Sequence[MotionTable]) -> Con
 
 
 def _is_there(mapped: object, known: set[str]) -> bool:
-    return all(name.removeprefix("-") in known for name in mapped_columns(mapped))
+    return all(name.removeprefix("-") in known for name in column_names(mapped))
 
 
-def mapped_columns(mapped: object) -> tuple[str, ...]:
+def column_names(mapped: object) -> tuple[str, ...]:
     """Return the columns that the map of one curve names, a minus before those that are taken away."""
     if isinstance(mapped, KneeMap):
         return (*mapped.forward, *mapped.up, *(mapped.thigh or ()))
@@ -103,7 +103,7 @@ def _marker_columns(markers: Sequence[str | None], forward: str, vertical: str) 
 
 def _of_opensim(table: MotionTable, side: Side) -> Convention:
     """Return the map of OpenSim's labels; a force plate with a number only is of the foot that moves with it."""
-    usual = opensim_map(side).model_copy(update=_written_by_us(table, side[0]))
+    usual = opensim_map(side).model_copy(update=_own_columns(table, side[0]))
     own, other, numbered = _forces(table.columns, side)
     if own or (other and len(numbered) == 1):
         terms = own or numbered
@@ -114,7 +114,7 @@ def _of_opensim(table: MotionTable, side: Side) -> Convention:
     return Convention(usual.model_copy(update={"vertical_force": None}), numbered)
 
 
-def _written_by_us(table: MotionTable, foot: str) -> dict[str, object]:
+def _own_columns(table: MotionTable, foot: str) -> dict[str, object]:
     """Return the maps of what this package writes for OpenSim beside its coordinates (``gait/opensim_names.py``)."""
     found: dict[str, object] = {}
     if f"shank_angle_{foot}" in table.columns:

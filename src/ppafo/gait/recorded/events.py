@@ -20,7 +20,7 @@ _SMOOTH = 6.0
 _SHORTEST_STRIDE = 0.5
 """Seconds between two heel strikes of one foot."""
 _TOP = 0.35
-"""Share of the range of the shank angle, from above, in which heel strikes lie."""
+"""Fraction of the range of the shank angle, from above, in which heel strikes lie."""
 _DEEPEST = np.radians(-15.0)
 """Before the swing the shank leans back further than this."""
 
@@ -40,7 +40,7 @@ class Stride:
 
     @property
     def stance_share(self) -> float:
-        """Share of the stride until toe-off."""
+        """Fraction [-] of the stride until toe-off."""
         return (self.toe_off - self.start) / self.time
 
 
@@ -103,15 +103,16 @@ def _without_short(time: Floats, contacts: list[tuple[int, int]]) -> list[tuple[
 def _crossing(signal: Signal, index: int, level: float) -> float:
     """Return when a line between the samples before and at ``index`` passes a level [s]."""
     before, after = signal.values[index - 1], signal.values[index]
-    share = 0.5 if after == before else float(np.clip((level - before) / (after - before), 0.0, 1.0))
-    return float(signal.time[index - 1] + share * (signal.time[index] - signal.time[index - 1]))
+    fraction = 0.5 if after == before else float(np.clip((level - before) / (after - before), 0.0, 1.0))
+    return float(signal.time[index - 1] + fraction * (signal.time[index] - signal.time[index - 1]))
 
 
 def strides_from_shank(shank: Signal) -> list[Stride]:
     """Return the whole strides in a shank angle phi [rad], above 0 while the ankle is in front.
 
-    Heel strike is where the forward swing of the shank ends, its largest angle. Toe-off is where it leans back
-    fastest before the swing, after Aminian et al. 2002, J Biomech 35:689, who find both in a gyroscope on the shank.
+    Heel strike is where the forward swing of the shank ends, its largest angle. Toe-off is where it leans back fastest
+    before the swing, after Aminian et al. 2002, J Biomech 35:689, who find both in a gyroscope on the shank. DataError
+    where there is no toe-off.
     """
     smooth = low_pass(shank, _SMOOTH)
     peaks = _heel_strikes(smooth)

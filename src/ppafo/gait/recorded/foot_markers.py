@@ -3,7 +3,7 @@
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.recorded.columns import Found, check_finite
+from ppafo.gait.recorded.columns import CurveColumns, check_finite
 from ppafo.gait.recorded.mapping import AngleMap, ShankMap
 from ppafo.gait.recorded.signal import Signal, without_ends
 from ppafo.signals.recording import Floats
@@ -15,7 +15,7 @@ _LEAST_FLAT = 0.1
 """Seconds of flat foot that there must be to take the zero of the angle from."""
 
 
-def between_markers(found: Found, mapped: ShankMap | AngleMap, first: str, second: str) -> tuple[Floats, Floats]:
+def between_markers(found: CurveColumns, mapped: ShankMap | AngleMap, first: str, second: str) -> tuple[Floats, Floats]:
     """Return how far the second marker is ahead of the first and above it, in the unit of the file."""
     place = {name: found.table.columns[name] for _, name in found.terms}
     for name, values in place.items():
@@ -26,7 +26,7 @@ def between_markers(found: Found, mapped: ShankMap | AngleMap, first: str, secon
     return ahead, place[f"{second}.{vertical}"] - place[f"{first}.{vertical}"]
 
 
-def foot_markers_angle(found: Found, mapped: AngleMap, shank: Signal) -> Signal:
+def foot_markers_angle(found: CurveColumns, mapped: AngleMap, shank: Signal) -> Signal:
     """Return the ankle angle [rad] of a line from heel to toes; it stands at 90 deg plus the shank while flat."""
     ahead, up = between_markers(found, mapped, str(mapped.heel), str(mapped.toe))
     pitch = Signal(found.table.file, found.table.time, np.arctan2(up, ahead))

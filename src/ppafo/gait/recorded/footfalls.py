@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.plausible.checked import Given
+from ppafo.gait.plausible.checked import SignSource
 from ppafo.gait.plausible.loads import check_force_scale
 from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.events import UNLOADED, Contact, Stride, contacts_of, strides_from_force, strides_from_shank
@@ -44,18 +44,22 @@ class Footfalls:
 
 
 def find_footfalls(
-    walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, given: Given, given_least: int | None
+    walk: Mapping[str, Signal],
+    tables: Sequence[MotionTable],
+    side: Side,
+    signs_from: SignSource,
+    given_least: int | None,
 ) -> Footfalls:
     """Return the strides of a walk: from the force where it has enough of them, else from where there are more."""
     least = given_least or LEAST_STRIDES
-    found = _of_walk(walk, tables, side, given, least)
+    found = _of_walk(walk, tables, side, signs_from, least)
     usable = usable_strides(walk, found.strides)
     if len(usable) >= (1 if found.is_overground else least) or least > LEAST_STRIDES:
         return found
     cycle = wrap_cycle(walk)
     if cycle is None:
         return found
-    again = _of_walk(cycle.walk, (), side, given, 1)
+    again = _of_walk(cycle.walk, (), side, signs_from, 1)
     whole = usable_strides(cycle.walk, again.strides)
     if not whole:
         return found
@@ -73,28 +77,28 @@ def usable_strides(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> lis
 
 
 def _of_walk(
-    walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, given: Given, least: int
+    walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, signs_from: SignSource, least: int
 ) -> Footfalls:
-    recorded = _recorded_strides(tables, side)
+    recorded = _strides_of_file(tables, side)
     if FORCE not in walk:
         if recorded:
             return Footfalls(walk, recorded, FILE, is_overground=True)
         return Footfalls(walk, strides_from_shank(walk[SHANK]), SHANK)
-    check_force_scale(walk[FORCE].file, walk[FORCE].values, given)
+    check_force_scale(walk[FORCE].file, walk[FORCE].values, signs_from)
     forced = strides_from_force(walk[FORCE])
     if len(usable_strides(walk, forced)) >= least:
         return Footfalls(walk, forced, FORCE)
     contacts = [(a, b) for a, b in contacts_of(walk[FORCE]) if a is not None or b is not None]
     if recorded and contacts and len(usable_strides(walk, recorded)) > len(usable_strides(walk, forced)):
         return Footfalls(walk, recorded, FILE, is_overground=True)
-    moved = _moved_strides(walk) if contacts else []
+    moved = _strides_of_shank(walk) if contacts else []
     if len(usable_strides(walk, moved)) <= len(usable_strides(walk, forced)):
         return Footfalls(walk, forced, FORCE)
     shifted, said = _by_contacts(moved, contacts)
     return Footfalls(walk, shifted, SHANK, (said,), is_overground=True)
 
 
-def _moved_strides(walk: Mapping[str, Signal]) -> list[Stride]:
+def _strides_of_shank(walk: Mapping[str, Signal]) -> list[Stride]:
     try:
         return strides_from_shank(walk[SHANK])
     except DataError:
@@ -102,7 +106,7 @@ def _moved_strides(walk: Mapping[str, Signal]) -> list[Stride]:
         return []
 
 
-def _recorded_strides(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
+def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
     """Return the strides between the events that a C3D file has of a foot; a stride needs its toe-off."""
     trials = [table.trial for table in tables if table.trial is not None]
     if len(trials) != 1:
@@ -135,7 +139,7 @@ def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[li
     )
 
 
-def covered_strides(footfalls: Footfalls, name: str, signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
+def strides_of_curve(footfalls: Footfalls, name: str, signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
     """Return the strides that a curve covers: those within its record, and of a load those that it was measured in."""
     inside = strides_within(signal, strides)
     if name not in LOADS or not (footfalls.is_overground or signal.absent is not None):

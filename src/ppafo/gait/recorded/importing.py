@@ -10,20 +10,20 @@ from ppafo.errors import DataError
 from ppafo.gait.fourier import HARMONICS, FitError, fit_curve
 from ppafo.gait.gait import REQUIRED, Curve, Gait, Origin
 from ppafo.gait.plausible.angles import standing_tilt, zero_remarks
-from ppafo.gait.plausible.checked import Checked
+from ppafo.gait.plausible.checked import MeanStride
 from ppafo.gait.plausible.loads import force_remarks
 from ppafo.gait.plausible.stride import check_plausible
 from ppafo.gait.recorded.columns import LOADS
+from ppafo.gait.recorded.drop_outs import check_constant
 from ppafo.gait.recorded.events import Stride
 from ppafo.gait.recorded.footfalls import (
     LEAST_STRIDES,
     SHANK,
     Footfalls,
-    covered_strides,
     find_footfalls,
+    strides_of_curve,
     usable_strides,
 )
-from ppafo.gait.recorded.held import check_constant
 from ppafo.gait.recorded.knee import check_way, knee_remarks
 from ppafo.gait.recorded.mapping import GaitMap
 from ppafo.gait.recorded.noise import check_scatter, scatter_remarks
@@ -36,12 +36,12 @@ from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity
 
 LARGEST_STRIDE_CHANGE = 0.25
-"""Share of the median stride time; a stride that differs by more has a missed event in it, or is no steady walking."""
+"""Fraction of the median stride time; a stride that differs by more has a missed event, or is not steady walking."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportedGait:
-    """The gait, the strides behind it, the curves of each stride by name, errors of the series, and remarks.
+    """The gait, its strides, the curves of each stride by name, errors of the series, and remarks.
 
     ``events`` says where the strides come from: ``vertical_force``, ``shank_angle`` or ``events of the file``.
     """
@@ -64,26 +64,26 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     """
     check_settings(settings)
     source = read_source(files, settings)
-    given, settings = source.given, source.settings
-    footfalls = find_footfalls(source.walk, source.tables, settings.side, given, settings.least_strides)
+    signs_from, settings = source.signs_from, source.settings
+    footfalls = find_footfalls(source.walk, source.tables, settings.side, signs_from, settings.least_strides)
     walk, events, found = footfalls.walk, footfalls.events, footfalls.strides
     strides, left_out = without_outliers(usable_strides(walk, found), LARGEST_STRIDE_CHANGE)
     least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
     _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events) if name in walk}, least)
-    covered = {name: covered_strides(footfalls, name, signal, strides) for name, signal in walk.items()}
+    covered = {name: strides_of_curve(footfalls, name, signal, strides) for name, signal in walk.items()}
     unmeasured = [name for name in LOADS if name in walk and not covered[name] and strides_within(walk[name], strides)]
     walk = {name: signal for name, signal in walk.items() if name not in unmeasured}
     check_constant(walk, source.tables, strides, covered, left_out)
     smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
     curves = {name: mean_curve(name, signal, strides, covered[name]) for name, signal in smooth.items()}
     remarks = [*source.remarks, *footfalls.remarks, *(_NOT_MEASURED.format(name) for name in unmeasured)]
-    return _finished(source, replace(footfalls, walk=walk), curves, (strides, left_out), remarks)
+    return _finish(source, replace(footfalls, walk=walk), curves, (strides, left_out), remarks)
 
 
 _NOT_MEASURED = "{} is left out: in no whole stride was it measured throughout the stance"
 
 
-def _finished(
+def _finish(
     source: Source,
     footfalls: Footfalls,
     curves: Mapping[str, CurveStatistics],
@@ -91,14 +91,14 @@ def _finished(
     remarks: Sequence[str],
 ) -> ImportedGait:
     """Return the gait of mean curves that legs can have; ``strides`` are those taken and those left out."""
-    (taken, left_out), walk, settings, given = strides, footfalls.walk, source.settings, source.given
+    (taken, left_out), walk, settings, signs_from = strides, footfalls.walk, source.settings, source.signs_from
     share, time = _mean([item.stance_share for item in taken]), _mean([item.time for item in taken])
     means = {name: item.mean for name, item in curves.items()}
     fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     check_scatter(curves, errors, walk)
-    check_plausible(Checked({name: signal.file for name, signal in walk.items()}, means, share, time, given))
-    check_way(walk, given)
+    check_plausible(MeanStride({name: signal.file for name, signal in walk.items()}, means, share, time, signs_from))
+    check_way(walk, signs_from)
     gait = _gait(settings, source.tables, taken, {name: curve for name, (curve, _) in fitted.items()}, footfalls.events)
     said = [*remarks, *_remarks(curves, taken, left_out, footfalls.events)]
     said += knee_remarks(source.columns.knee, walk, settings.stature)

@@ -176,7 +176,7 @@ def opensim_map(side: Side) -> GaitMap:
 
 
 def load_map(path: str | Path) -> GaitMap:
-    """Return the map in a TOML file."""
+    """Return the map in a TOML file. DataError where it cannot be used."""
     file = label(str(path))
     try:
         content = read_regular_file(Path(path), MOST_BYTES_TYPED)

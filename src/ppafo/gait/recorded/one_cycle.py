@@ -39,7 +39,7 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
     first = int(np.ceil(shortest * _RATE))
     if time.size <= max(first, 3):
         return None
-    curves = np.array([_scaled(walk[name], time) for name in REQUIRED])
+    curves = np.array([_scale(walk[name], time) for name in REQUIRED])
     features = np.concatenate([curves, _rates(curves)])
     shifts = np.arange(first, time.size)
     misfits = np.array(
@@ -49,11 +49,11 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
     if misfits[best] > _MISFIT:
         return None
     period = float(shifts[best]) / _RATE
-    wrapped = {name: _tripled(signal, start, period) for name, signal in walk.items() if _covers(signal, start, period)}
+    wrapped = {name: _repeat(signal, start, period) for name, signal in walk.items() if _covers(signal, start, period)}
     return Cycle(wrapped, period, float(misfits[best]))
 
 
-def _scaled(signal: Signal, time: Floats) -> Floats:
+def _scale(signal: Signal, time: Floats) -> Floats:
     values = np.interp(time, signal.time, signal.values)
     return values / np.ptp(signal.values)
 
@@ -68,7 +68,7 @@ def _covers(signal: Signal, start: float, period: float) -> bool:
     return bool(signal.time[0] <= start + slack and signal.time[-1] >= start + period - slack)
 
 
-def _tripled(signal: Signal, start: float, period: float) -> Signal:
+def _repeat(signal: Signal, start: float, period: float) -> Signal:
     """Return three periods; where start and end overlap one fades into the other. A position goes on by its way."""
     count = max(2, round(period * signal.rate))
     one = start + period * np.arange(count) / count

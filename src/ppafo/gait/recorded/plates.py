@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.gait.recorded.columns import Found
+from ppafo.gait.recorded.columns import CurveColumns
 from ppafo.gait.recorded.events import Contact, contacts_of
 from ppafo.gait.recorded.signal import Signal, with_absence
 from ppafo.gait.recorded.table import MotionTable
@@ -25,7 +25,7 @@ def force_of_plates(
     chosen = []
     for table in tables:
         for name in [item for item in names if item in table.columns]:
-            values, _ = Found("vertical_force.unit", table, ((1.0, name),), True).in_unit(None, ("N",))
+            values, _ = CurveColumns("vertical_force.unit", table, ((1.0, name),), True).in_unit(None, ("N",))
             plate = with_absence(Signal(table.file, table.time, values / (body_mass * STANDARD_GRAVITY)))
             own = [contact for contact in contacts_of(plate) if _is_own(contact, plate, shank)]
             if own:

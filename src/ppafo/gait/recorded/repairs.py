@@ -24,7 +24,7 @@ def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> Motio
     columns, said = dict(table.columns), []
     for name in dict.fromkeys(names):
         if name in columns and longest > 0.0:
-            columns[name], filled = _filled(table.time, columns[name], longest)
+            columns[name], filled = _fill(table.time, columns[name], longest)
             said += [
                 f"column '{name}': {last - first} samples from {table.time[first]:g} to {table.time[last - 1]:g} s "
                 "filled"
@@ -33,7 +33,7 @@ def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> Motio
     return replace(table, columns=columns, remarks=(*table.remarks, *said))
 
 
-def _filled(time: Floats, values: Floats, longest: float) -> tuple[Floats, list[Gap]]:
+def _fill(time: Floats, values: Floats, longest: float) -> tuple[Floats, list[Gap]]:
     from scipy.interpolate import CubicSpline
 
     gaps = [gap for gap in gaps_within(values) if time[gap[1]] - time[gap[0] - 1] <= longest + 1e-9]

@@ -1,4 +1,4 @@
-"""What recorded files do not say and an import has to know."""
+"""What an import has to know and recorded files do not say."""
 
 import math
 import re
@@ -39,7 +39,7 @@ class ImportSettings:
 
 
 def check_settings(settings: ImportSettings) -> None:
-    """Refuse settings that make no sense."""
+    """Raise DataError for settings that are not plausible."""
     if settings.body_mass is not None and not 1.0 <= settings.body_mass <= 500.0:
         raise DataError(f"a body mass of {settings.body_mass:g} kg is not plausible; give it in kg, such as '62 kg'")
     if settings.walking_speed is not None and not 0.05 <= settings.walking_speed <= 4.0:
@@ -47,7 +47,7 @@ def check_settings(settings: ImportSettings) -> None:
     if settings.stature is not None and not 0.5 <= settings.stature <= 2.5:
         raise DataError(f"a stature of {settings.stature:g} m is not plausible; give it in m, such as '1.75 m'")
     if settings.low_pass is not None and not (math.isfinite(settings.low_pass) and settings.low_pass >= 1.0):
-        raise DataError(f"a low pass at {settings.low_pass:g} Hz removes the walking itself; 6 Hz is usual")
+        raise DataError(f"a low pass at {settings.low_pass:g} Hz would remove the gait itself; 6 Hz is usual")
     if not 0.0 <= settings.longest_gap <= LONGEST_FILLED:
         raise DataError(f"gaps of {settings.longest_gap:g} s cannot be filled; allowed is 0 to {LONGEST_FILLED:g} s")
     if settings.start is not None and settings.end is not None and not settings.start < settings.end:

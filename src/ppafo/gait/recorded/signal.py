@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
 
-_LEAST_SAMPLES = 20
+_MINIMUM_SAMPLES = 20
 _ORDER = 2
 _DOUBLE_PASS = (2.0**0.5 - 1.0) ** 0.25
 """A filter passed twice has its -3 dB lower by this; so it is designed higher (Winter, Biomechanics, section 2.4)."""
@@ -32,7 +32,7 @@ class Signal:
 
     @property
     def rate(self) -> float:
-        """Samples per second."""
+        """Samples per second [Hz]."""
         return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
 
 
@@ -50,10 +50,13 @@ def with_absence(signal: Signal) -> Signal:
 
 
 def low_pass(signal: Signal, cut_off: float) -> Signal:
-    """Return the signal through a Butterworth filter passed forwards and backwards, -3 dB at ``cut_off`` [Hz]."""
+    """Return the signal through a Butterworth filter passed forwards and backwards, -3 dB at ``cut_off`` [Hz].
+
+    DataError where it has too few samples.
+    """
     from scipy.signal import butter, sosfiltfilt
 
-    if signal.time.size < _LEAST_SAMPLES:
+    if signal.time.size < _MINIMUM_SAMPLES:
         raise DataError(f"{signal.file}: {signal.time.size} rows are too short for a stride; give a longer recording")
     even = np.linspace(signal.time[0], signal.time[-1], signal.time.size)
     relative = cut_off / _DOUBLE_PASS / (0.5 * signal.rate)

@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ppafo.errors import DataError
-from ppafo.gait.plausible.checked import Given
-from ppafo.gait.recorded.conventions import Convention, find_convention, mapped_columns
+from ppafo.gait.plausible.checked import SignSource
+from ppafo.gait.recorded.conventions import Convention, column_names, find_convention
 from ppafo.gait.recorded.mapping import GaitMap
 from ppafo.gait.recorded.plates import force_of_plates
 from ppafo.gait.recorded.repairs import fill_gaps
 from ppafo.gait.recorded.settings import ImportSettings
 from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.table import MotionTable, cut, read_table
-from ppafo.gait.recorded.walk import Person, recorded_walk
+from ppafo.gait.recorded.walk import Person, walk_signals
 from ppafo.units import format_quantity
 
 _SAME = 0.02
@@ -28,7 +28,7 @@ class Source:
     columns: GaitMap
     walk: Mapping[str, Signal]
     settings: ImportSettings
-    given: Given
+    signs_from: SignSource
     remarks: tuple[str, ...]
 
 
@@ -47,20 +47,20 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings) -> Source
     columns = _with_neutral(convention.columns, settings.ankle_neutral)
     names = [name.removeprefix("-") for name in _names_of(columns)]
     tables = [fill_gaps(table, names, settings.longest_gap) for table in tables]
-    walk = recorded_walk(tables, columns, person, is_default=settings.columns is None)
+    walk = walk_signals(tables, columns, person, is_default=settings.columns is None)
     if convention.plates and "vertical_force" not in walk:
         force, more = force_of_plates(tables, convention.plates, walk["shank_angle"], person.body_mass)
         walk |= {} if force is None else {"vertical_force": force}
         said += more
     mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
     mended += _ends(walk, tables)
-    given: Given = "columns" if settings.columns is None else "map"
-    return Source(tables, columns, walk, settings, given, (*said, *convention.remarks, *mended))
+    signs_from: SignSource = "columns" if settings.columns is None else "map"
+    return Source(tables, columns, walk, settings, signs_from, (*said, *convention.remarks, *mended))
 
 
 def _names_of(columns: GaitMap) -> list[str]:
     mapped = [getattr(columns, name) for name in GaitMap.model_fields if name != "schema_version"]
-    return [name for item in mapped if item is not None for name in mapped_columns(item)]
+    return [name for item in mapped if item is not None for name in column_names(item)]
 
 
 def _with_neutral(columns: GaitMap, neutral: float | None) -> GaitMap:

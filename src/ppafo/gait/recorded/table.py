@@ -116,7 +116,7 @@ def _of_trc(path: str | Path) -> MotionTable:
 def _bridge_gaps(table: MotionTable, longest: float) -> MotionTable:
     """Return the table with a remark on rows that are missing; DataError where they are missing for too long."""
     if table.time.size < 3:
-        raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs at least tens of them")
+        raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
     steps = np.diff(table.time)
     median = float(np.median(steps))
     jumps = np.flatnonzero(steps > _LARGEST_JUMP * median).tolist()

@@ -36,7 +36,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, LONGEST_STEP, between_stops
-from ppafo.simulation.recorded.scenario import fixed_volume, held_at, recorded_scenario
+from ppafo.simulation.recorded.scenario import held_vane, replay_scenario, with_fixed_volume
 from ppafo.simulation.recorded.start import Start, samples_at_rest
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import read_csv
@@ -209,8 +209,8 @@ def experiment_without_scenario(item: ExperimentSection, source: Source, setting
     device, fixed = _fixed(item, device, said)
     inputs = _inputs(item, recording, said)
     start = _start_of(used, device, fixed, said)
-    motion = held_at(start.angle) if fixed else None
-    scenario = recorded_scenario(recording, device, start, used.duration, said, motion)
+    motion = held_vane(start.angle) if fixed else None
+    scenario = replay_scenario(recording, device, start, used.duration, said, motion)
     noise, channels = noise_of_channels(item.noise, said), compared_channels(item)
     return Experiment(item.label, scenario, recording, first, channels, noise, inputs, source=source.trace)
 
@@ -239,7 +239,7 @@ def _fixed(item: ExperimentSection, device: Device, said: str) -> tuple[Device, 
     if not volume > 0.0:
         raise IdentificationError(f"{said}: volume = '{item.volume}' must be above zero")
     known = {ANGLE: device.actuator.angle_min, "pressure_2": device.supply.atmospheric_pressure}
-    return fixed_volume(device, volume), known
+    return with_fixed_volume(device, volume), known
 
 
 def _inputs(item: ExperimentSection, recording: Recording, said: str) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from ppafo.simulation import numbers
 from ppafo.simulation.declaration import FREE, INITIAL
 from ppafo.simulation.recorded.checks import check_absolute, check_command, check_gaps
 from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, EXTERNAL_TORQUE, SUPPLY, between_stops
-from ppafo.simulation.recorded.scenario import recorded_control, with_highest_supply
+from ppafo.simulation.recorded.scenario import replay_control, with_highest_supply
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario, Sensors
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
@@ -114,7 +114,7 @@ def scenario_of(experiment: Experiment) -> Scenario:
         scenario = replace(scenario, device=with_highest_supply(scenario.device, recording))
     if COMMAND in experiment.inputs:
         # Nobody measures for a controller that nobody asks.
-        scenario = replace(scenario, control=recorded_control(recording), sensors=Sensors())
+        scenario = replace(scenario, control=replay_control(recording), sensors=Sensors())
     if ANGLE in experiment.inputs:
         scenario = replace(scenario, motion=FreeMotion(_angle_at_start(experiment, scenario)))
     return scenario if experiment.initial_state == "scenario" else _with_initial_state(experiment, scenario)

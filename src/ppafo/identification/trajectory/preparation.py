@@ -16,7 +16,7 @@ from ppafo.engine.run import Run
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.experiment import Experiment, scenario_of, with_numbers
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.inputs import ANGLE, RecordedInputs, led_along, step_inputs
+from ppafo.simulation.recorded.inputs import ANGLE, RecordedInputs, step_inputs, with_prescribed_angle
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
 Floats = NDArray[np.float64]
@@ -164,7 +164,7 @@ def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment
     share[share < _FITS] = 0.0
     frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
     if recorded is not None and recorded.has(ANGLE) and isinstance(prepared.scenario.motion, FreeMotion):
-        frozen = led_along(frozen, prepared.scenario.motion.angle)
+        frozen = with_prescribed_angle(frozen, prepared.scenario.motion.angle)
     inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
     return replace(prepared, run=frozen, place=place, share=share, inputs=inputs)
 

@@ -20,7 +20,7 @@ from ppafo.identification.trajectory.problem import Range
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import exact_orifice, fed_plant, filled_lines, initial_state, thermal_parameters
+from ppafo.simulation.plan import exact_orifice, initial_lines, initial_state, plant_behind_lines, thermal_parameters
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import FreeMotion
 
@@ -65,7 +65,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
             f"model of the valve; start above 0 and give a lower bound above 0"
         )
     bare = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
-    plant = fed_plant(bare, scenario.supply_lines)
+    plant = plant_behind_lines(bare, scenario.supply_lines)
     # The engine allows a share of the supply pressure. Where that pressure is fitted, the error in pascals must stay.
     allowed = supplied_range(base.plant) / supplied_range(plant)
     return replace(
@@ -78,7 +78,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
         initial=initial_state(scenario, plant),
         valve=valve.prepare(device.valve.settings),
         command_delay=delay,
-        lines=filled_lines(plant, scenario.supply_lines),
+        lines=initial_lines(plant, scenario.supply_lines),
     )
 
 

@@ -16,7 +16,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import PlantParameters, chamber_volumes
 from ppafo.simulation.plan import plan_run, profile_values
-from ppafo.simulation.scenario import LedMotion, Scenario
+from ppafo.simulation.scenario import PrescribedMotion, Scenario
 
 Openings = Callable[..., tuple[Any, Any, Any, Any]]
 """From the fractions of time of a valve's ways, towards chamber 1 first, to source 1, vent 1, source 2 and vent 2."""
@@ -212,7 +212,7 @@ def _volumes(scenario: Scenario, plant: PlantParameters, grid: Grid) -> Volumes:
     """Volumes at every point of a fixed or prescribed ankle, each as a row."""
     import casadi
 
-    if not isinstance(scenario.motion, LedMotion):
+    if not isinstance(scenario.motion, PrescribedMotion):
         raise TypeError("the bound is for a fixed or prescribed ankle")
     angle, velocity = profile_values(scenario.motion.profile, grid.times)[:2]
     rows = [casadi.DM(np.asarray(item)).T for item in chamber_volumes(plant, angle)]

@@ -25,7 +25,7 @@ from ppafo.questions.league.bound_solver import BoundSolver, Optimum
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, LedMotion, Scenario
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, Scenario
 
 MISSING_EXTRA = "the lower bound needs CasADi: pip install ppafo[optimal]"
 FIRST_INTERVALS = 75
@@ -84,7 +84,7 @@ def check_bounded(scenario: Scenario) -> None:
     """Refuse a scenario that the bound cannot be computed for, with the reason; SimulationError."""
     if find_spec("casadi") is None:
         raise SimulationError(MISSING_EXTRA)
-    if not isinstance(scenario.motion, LedMotion):
+    if not isinstance(scenario.motion, PrescribedMotion):
         raise SimulationError(f"{scenario.name}: the lower bound needs a fixed or prescribed ankle, not a free one")
     if scenario.thermal is not None:
         raise SimulationError(f"{scenario.name}: the lower bound is for isothermal gas; omit [gas_model]")

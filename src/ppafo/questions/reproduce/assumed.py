@@ -10,7 +10,7 @@ from ppafo.parameters.parameter_set import number_text
 from ppafo.parameters.provenance import Entry
 from ppafo.simulation.declaration import quantities
 from ppafo.simulation.overriding import apply_overrides
-from ppafo.simulation.scenario import LedMotion, Scenario
+from ppafo.simulation.scenario import PrescribedMotion, Scenario
 
 _NOT_OF_THE_PAPER = ("assumed", "derived")
 _ONLY_FOR_A_FREE_VANE = frozenset({"actuator.restitution", "foot_plate.gravity_torque"})
@@ -88,7 +88,7 @@ def _without_effect(scenario: Scenario, parameter_set: ParameterSet) -> set[str]
     reported = {path for path in parameter_set.numbers if path.startswith("reported.")}
     valve = f"valves.{scenario.origin.valve}."
     others = {path for path in parameter_set.numbers if path.startswith("valves.") and not path.startswith(valve)}
-    return reported | others | (_ONLY_FOR_A_FREE_VANE if isinstance(scenario.motion, LedMotion) else frozenset())
+    return reported | others | (_ONLY_FOR_A_FREE_VANE if isinstance(scenario.motion, PrescribedMotion) else frozenset())
 
 
 def _reason(entry: Entry) -> tuple[str, str]:

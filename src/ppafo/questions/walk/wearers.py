@@ -11,7 +11,7 @@ from ppafo.answers.shown_units import shown, titled
 from ppafo.signals.recording import Floats
 from ppafo.simulation.document import UNITS, plain
 from ppafo.version import __version__
-from ppafo.walking.anthropometry import CORRELATION, MASS_VARIATION, MOST_DEVIATIONS, STATURE_VARIATION
+from ppafo.walking.anthropometry import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 from ppafo.walking.figures.wearers import SHOWN, population_figure
 from ppafo.walking.gait_subject import person_remarks
 from ppafo.walking.population import OUTCOMES, TRAITS, Number, Population
@@ -82,7 +82,7 @@ def _data(population: Population) -> dict[str, Any]:
             "thresholds": THRESHOLD_VARIATION,
             "push_off_start": START_VARIATION,
             "gait": "stride time, stance share and series coefficients by the deviations of the gait",
-            "most_deviations": MOST_DEVIATIONS,
+            "most_deviations": MAXIMUM_DEVIATIONS,
         },
         **all_quantiles(population),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},

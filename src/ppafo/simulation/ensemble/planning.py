@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import Members, batches_of
 from ppafo.simulation.ensemble.columns import Columns
-from ppafo.simulation.ensemble.screening import Screen, screened
+from ppafo.simulation.ensemble.screening import Screen, screen_columns
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
 
@@ -24,15 +24,15 @@ class EnsemblePlan:
 
 def plan_ensemble(columns: Columns) -> EnsemblePlan:
     """Batches of all runs that can be; each run has the rows, bit for bit, that ``plan_run`` gives it alone."""
-    screen = screened(columns)
+    screen = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []
     if screen.members.size:
         for places in _of_one_program(screen.scenario, screen.members.size):
-            batches += _planned(screen, places)
+            batches += _plan_batches(screen, places)
     return EnsemblePlan(tuple(batches), screen.reasons)
 
 
-def _planned(screen: Screen, places: Members) -> list[tuple[Members, Batch]]:
+def _plan_batches(screen: Screen, places: Members) -> list[tuple[Members, Batch]]:
     """Batches of some runs that ask for one program; what cannot be planned is refused."""
     part = screen.at(places)
     while part.members.size:

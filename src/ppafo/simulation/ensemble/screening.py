@@ -1,4 +1,4 @@
-"""Which runs of an ensemble cannot be: the checks of a single scenario, over columns."""
+"""Which runs of an ensemble are impossible: the checks of a single scenario, over columns."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, final
@@ -11,7 +11,7 @@ from ppafo.engine.run import Members
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.clock import Clock
-from ppafo.simulation.ensemble.columns import Columns, TimeTexts, clock_of, clock_with, time_texts, varied
+from ppafo.simulation.ensemble.columns import Columns, TimeTexts, clock_of, clock_with, time_texts, varied_scenario
 from ppafo.simulation.ensemble.rules import RULES, Rule
 from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.plan import Problem
@@ -23,7 +23,7 @@ _SEED = "sensors.seed"
 
 @final
 class Screen:
-    """The runs that are still in: their places in the ensemble, their columns and clocks; and why others are not."""
+    """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not."""
 
     def __init__(self, columns: Columns) -> None:
         self.columns = columns
@@ -33,10 +33,10 @@ class Screen:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that stands for the runs that are still in."""
+        """The scenario that represents the runs that are left. ScenarioError before the times are read."""
         if self.clock is None:
             raise ScenarioError("the times of an ensemble are not read yet")
-        return varied(self.columns, self.clock)
+        return varied_scenario(self.columns, self.clock)
 
     def at(self, places: Members) -> "Screen":
         """The screen of some of these runs, which writes its reasons to the same place."""
@@ -46,7 +46,7 @@ class Screen:
         return part
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
-        """Drop runs, by a mask over those still in or a truth for all; ``line(place)`` says why."""
+        """Drop runs, by a mask over those left or one truth value for all; ``line(place)`` says why."""
         bad = np.broadcast_to(np.asarray(is_bad, dtype=bool), self.members.shape)
         if not bad.any():
             return
@@ -57,7 +57,7 @@ class Screen:
         self.clock = None if self.clock is None else _clock_of(self.clock, ~bad)
 
 
-def screened(columns: Columns) -> Screen:
+def screen_columns(columns: Columns) -> Screen:
     """The runs whose values are in range and fit together."""
     screen = Screen(columns)
     for path in columns.values:
@@ -126,7 +126,7 @@ def _clock_of(clock: Clock, kept: Any) -> Clock:
 
 
 def _keep(screen: Screen, rule: Rule) -> None:
-    """Drop the runs that break a rule; after each problem that some have, the others are looked at anew."""
+    """Drop the runs that break a rule; after each problem that some have, the others are checked again."""
     while screen.members.size:
         found = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
         if not found:

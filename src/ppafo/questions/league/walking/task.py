@@ -12,7 +12,7 @@ from ppafo.simulation.declaration import PERIOD, RATE
 from ppafo.simulation.overriding import split_override
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
-from ppafo.walking.walk import checked_seconds
+from ppafo.walking.walk import walk_duration
 
 CONFIGURATION = "proportional"
 MINUTES = 0.2
@@ -85,7 +85,7 @@ def walking_task(
             f"controller.peak_time: the torque begins at {profile.peak_time - profile.rise_time:g} of the stride, "
             f"too late for a push-off that ends at {judged.gait.stance_share:g}; at most {latest:g}"
         )
-    seconds = checked_seconds(judged, minutes)
+    seconds = walk_duration(judged, minutes)
     return WalkingTask(str(file), None if gait is None else str(gait), tuple(overrides), profile, seconds)
 
 

@@ -1,4 +1,4 @@
-"""Columns that stand still while the wearer walks: drop-outs that someone filled with the last value."""
+"""Columns that stay constant while the wearer walks: drop-outs that were filled with the last value."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,7 +17,7 @@ LONGEST_HELD = 0.1
 _ABOUT_STANCE = 0.05
 """Of the stride, at either end of the stance, in which a load may rest too."""
 _COARSE = 0.002
-"""Share of the range; a sensor with coarser steps keeps a value where its curve turns round."""
+"""Fraction of the range; a sensor with coarser steps keeps a value where its curve turns round."""
 
 
 def check_constant(
@@ -27,17 +27,18 @@ def check_constant(
     covered: Mapping[str, Sequence[Stride]],
     left_out: Sequence[Stride],
 ) -> None:
-    """Refuse a column that keeps one value for longer than 0.1 s within the strides; in swing a load may.
+    """Raise DataError for a column that keeps one value for more than 0.1 s within the strides; a load may in swing.
 
-    Loads are looked at in the strides that they cover, motions in strides that are left out too: what held everything
-    made them longer. A column that never moves is no drop-out, and a stretch that a coarse sensor enters and leaves by
-    its smallest step is none either.
+    <<<<<<< HEAD:src/ppafo/gait/recorded/held.py
+        Loads are checked in the strides that they cover, motions in strides that are left out too: a drop-out made those
+    longer. A column that never moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its smallest
+    step is none either.
     """
     by_file = {table.file: table for table in tables}
     for name, signal in walk.items():
         table = by_file[signal.file]
         spans = [_span(name, item) for item in (covered[name] if name in LOADS else [*strides, *left_out])]
-        for column, values in _looked_at(name, signal, table):
+        for column, values in _series_of(name, signal, table):
             found = constant_stretch(table.time, values, spans)
             if found is not None:
                 raise DataError(
@@ -47,7 +48,7 @@ def check_constant(
                 )
 
 
-def _looked_at(name: str, signal: Signal, table: MotionTable) -> list[tuple[str, Floats]]:
+def _series_of(name: str, signal: Signal, table: MotionTable) -> list[tuple[str, Floats]]:
     """Return the columns of a curve; plates that are summed rest in turn, so their sum is looked at."""
     columns = [(column, table.columns[column]) for column in signal.columns]
     if name not in LOADS or len(columns) < 2:

@@ -1,4 +1,4 @@
-"""A gait as the engine follows it: eight harmonics of each curve, its events, and how the heel meets the ground."""
+"""A gait as the engine uses it: eight harmonics of each curve, its events, and how the heel meets the ground."""
 
 import math
 from dataclasses import replace
@@ -35,7 +35,7 @@ ZERO = Series(**dict.fromkeys(Series._fields, 0.0))
 
 
 def gait_series(gait: Gait) -> GaitSeries:
-    """The gait as the engine takes it; a moment, a force or a motion of the knee that nobody measured is 0."""
+    """The curves of a gait for the engine; a moment, force or knee motion that was not measured is 0."""
     return GaitSeries(
         _series(gait, "shank_angle"),
         _series(gait, "ankle_angle"),
@@ -55,8 +55,8 @@ def _series(gait: Gait, name: str) -> Series:
     return Series(curve.mean, *[number for pair in pairs for number in pair])
 
 
-def followed(curve: Curve) -> Curve:
-    """The curve with the harmonics that the engine follows."""
+def truncate(curve: Curve) -> Curve:
+    """The curve with its first eight harmonics, as the engine has it."""
     return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
 
 
@@ -68,12 +68,12 @@ def heel_lever(gait: Gait, wearer: Wearer) -> float:
     if gait.ankle_moment is None or gait.vertical_force is None:
         return wearer.heel_lever
     landing = landing_phase(gait)
-    moment, force = followed(gait.ankle_moment).value(landing), followed(gait.vertical_force).value(landing)
+    moment, force = truncate(gait.ankle_moment).value(landing), truncate(gait.vertical_force).value(landing)
     return min(max(-moment / max(force * STANDARD_GRAVITY, 1.0), 0.0), wearer.heel_lever)
 
 
 def landing_phase(gait: Gait) -> float:
-    """Phase at which the measured foot has come down: within ``NEARLY_FLAT`` of flat for the first time.
+    """Phase [strides] at which the measured foot has come down: the first time within ``NEARLY_FLAT`` of flat.
 
     The last degrees are those of heel pad and shoe, which the foot of the engine has not: it is flat at once.
     """
@@ -84,12 +84,12 @@ def landing_phase(gait: Gait) -> float:
 
 def _foot_angles(gait: Gait, phases: Floats) -> Floats:
     """Angles [rad] of the measured foot over the horizontal."""
-    shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
-    return shank.sampled(phases) - ankle.sampled(phases) + 0.5 * math.pi
+    shank, ankle = truncate(gait.shank_angle), truncate(gait.ankle_angle)
+    return shank.values_at(phases) - ankle.values_at(phases) + 0.5 * math.pi
 
 
 def gait_timing(gait: Gait) -> GaitTiming:
-    """Events of the gait, the heel's rise and the flat foot's angle from its own angles."""
+    """Frequency [Hz], events [strides] and the flat foot's angle [rad]; heel rise and angle come from the curves."""
     foot = _foot_angles(gait, EVENT_PHASES)
     events = gait_events(foot[None, :], np.array([gait.stance_share]))
     return GaitTiming(1.0 / gait.stride_time, 0.0, *(float(values[0]) for values in events))
