@@ -31,8 +31,8 @@ def check_constant(
 
     <<<<<<< HEAD:src/ppafo/gait/recorded/held.py
         Loads are checked in the strides that they cover, motions in strides that are left out too: a drop-out made those
-    longer. A column that never moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its smallest
-    step is none either.
+    longer. A column that never moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its
+    smallest step is none either.
     """
     by_file = {table.file: table for table in tables}
     for name, signal in walk.items():
