@@ -30,6 +30,7 @@ _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 class OpenSimTable:
     """A table: time [s] and columns by label; ``in_degrees`` is None where the header does not say.
 
+    ``is_old`` tells a header of the older style, that of SIMM, whose angles are in degrees.
     ``kind`` is that of a recording that nobody measured, where this package wrote it.
     ``first_line`` is the line of the file in which the first row stands, ``remarks`` say what was mended.
     """
@@ -41,6 +42,7 @@ class OpenSimTable:
     first_line: int
     remarks: tuple[str, ...] = ()
     kind: RecordingKind = "measured"
+    is_old: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +53,7 @@ class _Header:
     in_degrees: bool | None
     end: int
     kind: RecordingKind
+    is_old: bool
 
 
 def read_opensim(path: str | Path) -> OpenSimTable:
@@ -82,7 +85,9 @@ def _read(path: str | Path, cell: Cell) -> OpenSimTable:
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     columns = {label: values[:, index] for index, label in enumerate(labels) if index > 0}
-    return OpenSimTable(header.name, time, columns, header.in_degrees, number + 1, tuple(remarks), header.kind)
+    return OpenSimTable(
+        header.name, time, columns, header.in_degrees, number + 1, tuple(remarks), header.kind, header.is_old
+    )
 
 
 def _width_remarks(labels: list[str], header: _Header) -> list[str]:
@@ -134,7 +139,9 @@ def _header(lines: list[str]) -> _Header:
         counts.get(new, counts.get(old)) for new, old in (("nrows", "datarows"), ("ncolumns", "datacolumns"))
     )
     kinds = [kind for line in lines[:end] for kind in _KINDS if line.strip() == f"kind={kind}"]
-    return _Header(one_line(name), rows, width, in_degrees, end, kinds[0] if kinds else "measured")
+    return _Header(
+        one_line(name), rows, width, in_degrees, end, kinds[0] if kinds else "measured", "datacolumns" in counts
+    )
 
 
 def _whole(text: str, key: str, number: int) -> int:

@@ -238,3 +238,32 @@ def test_the_export_has_opensims_zero_and_signs() -> None:
     assert "ankle_angle_r_moment" not in bare.names
     newton = Recording("plate", walk.time, {"vertical_force": Channel(600.0 * walk["vertical_force"], "N")})
     assert opensim_recording(newton)[0].names == ("ground_force_r_vy",)
+
+
+@pytest.fixture
+def real_trial(shared_data: Path, tmp_path: Path) -> list[Path]:
+    """The tables of one overground trial, written as OpenSim had them before they were kept as .mat."""
+    from scipy.io import loadmat
+
+    written = []
+    for file, key in (("IK_gait_1", "Qsall"), ("ID_gait_1", "IDall"), ("GRF_gait_1", "GRFall")):
+        kept = loadmat(shared_data / "gait" / "falisse2019_subject1" / f"{file}.mat", simplify_cells=True)[key]
+        head = [str(row[0]) for row in kept["textdata"] if isinstance(row[0], str) and row[0] != "time"]
+        rows = ["\t".join(f"{cell:.8f}" for cell in row) for row in kept["data"]]
+        path = tmp_path / f"{file}.mot"
+        path.write_text("\n".join([*head, "\t".join(map(str, kept["colheaders"])), *rows]) + "\n")
+        written.append(path)
+    return written
+
+
+@pytest.mark.parametrize(("side", "plate"), [("right", "'1_ground_force_vy' (1)"), ("left", "'ground_force_vy' (1)")])
+def test_a_real_trial_of_one_stride_and_two_plates_is_imported(real_trial: list[Path], side: Side, plate: str) -> None:
+    found = import_gait(real_trial, ImportSettings(62.0, side))
+    gait = found.gait
+    assert plate in "\n".join(found.remarks)
+    assert gait.strides == 1
+    assert gait.stride_time == pytest.approx(1.05, abs=0.03)
+    assert gait.stance_share == pytest.approx(0.64, abs=0.015)
+    assert 1.4 < float(gait.curve("ankle_moment").values_at(PHASES).max()) < 1.55
+    assert gait.curve("vertical_force").mean == pytest.approx(0.46, abs=0.05)
+    assert np.degrees(error(gait, "shank_angle")) < 7.0

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.gait.gait import REQUIRED
+from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.signal import Signal
 from ppafo.signals.recording import Floats
 
@@ -49,7 +50,8 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
     if misfits[best] > _MISFIT:
         return None
     period = float(shifts[best]) / _RATE
-    wrapped = {name: _repeat(signal, start, period) for name, signal in walk.items() if _covers(signal, start, period)}
+    covering = {name: signal for name, signal in walk.items() if _covers(signal, start, period)}
+    wrapped = {name: _repeat(signal, (start, float(end)), period, name in LOADS) for name, signal in covering.items()}
     return Cycle(wrapped, period, float(misfits[best]))
 
 
@@ -68,18 +70,23 @@ def _covers(signal: Signal, start: float, period: float) -> bool:
     return bool(signal.time[0] <= start + slack and signal.time[-1] >= start + period - slack)
 
 
-def _repeat(signal: Signal, start: float, period: float) -> Signal:
-    """Return three periods; where start and end overlap one fades into the other. A position goes on by its way."""
+def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: bool) -> Signal:
+    """Return three periods of what lies within a span [s]; where its start and end overlap one fades into the other.
+
+    A load is taken from where the plate carried it, and a position goes on by its way.
+    """
+    start, end = span
     count = max(2, round(period * signal.rate))
     one = start + period * np.arange(count) / count
-    values = np.interp(one, signal.time, signal.values)
-    overlap = float(signal.time[-1]) - start - period
-    later = np.interp(one + period, signal.time, signal.values)
+    values, later = (np.interp(one + shift, signal.time, signal.values) for shift in (0.0, period))
+    overlap = min(end, float(signal.time[-1])) - start - period
     inside = one <= start + max(overlap, 0.0)
     way = float(np.mean((later - values)[inside])) if signal.is_position else 0.0
     weight = np.clip((one - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
-    blended = np.where(inside, weight * values + (1.0 - weight) * (later - way), values)
+    blend = weight * values + (1.0 - weight) * (later - way)
+    if is_load:
+        blend = np.where(np.abs(later) > np.abs(values), later, values)
     turns = np.arange(3)
     time = (turns[:, None] * period + one[None, :]).ravel()
-    whole = (turns[:, None] * way + blended[None, :]).ravel()
+    whole = (turns[:, None] * way + np.where(inside, blend, values)[None, :]).ravel()
     return replace(signal, time=time, values=np.asarray(whole, dtype=np.float64), columns=(), absent=None)

@@ -80,11 +80,15 @@ def _of_opensim(file: str, table: OpenSimTable) -> MotionTable:
 
     A coordinate that is named by its path among the states is there by its own name too.
     """
-    angle = {True: "deg", False: "rad", None: ""}[table.in_degrees]
+    is_unstated = table.in_degrees is None and table.is_old
+    angle = "deg" if is_unstated else {True: "deg", False: "rad", None: ""}[table.in_degrees]
     paths = {match[1]: name for name in table.columns if (match := _STATE.fullmatch(name))}
     columns = {**table.columns, **{name: table.columns[path] for name, path in paths.items()}}
     units = {name: _opensim_unit(paths.get(name, name), name, angle) for name in columns}
-    return MotionTable(file, OPENSIM, table.time, columns, units, table.kind, table.remarks)
+    remarks = table.remarks
+    if is_unstated and any(unit == "deg" for unit in units.values()):
+        remarks = (*remarks, "the header does not state the unit of angles: degrees, as in files of its older style")
+    return MotionTable(file, OPENSIM, table.time, columns, units, table.kind, remarks)
 
 
 def _opensim_unit(path: str, label: str, angle: str) -> str:
