@@ -29,7 +29,7 @@ def check_constant(
 ) -> None:
     """Raise DataError for a column that keeps one value for more than 0.1 s within the strides; a load may in swing.
 
-        Loads are checked in the strides that they cover, motions in strides that are left out too: a drop-out made
+    Loads are checked in the strides that they cover, motions in strides that are left out too: a drop-out made
     those longer. A column that never moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its
     smallest step is none either.
     """
