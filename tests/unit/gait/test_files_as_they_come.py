@@ -267,3 +267,43 @@ def test_a_real_trial_of_one_stride_and_two_plates_is_imported(real_trial: list[
     assert 1.4 < float(gait.curve("ankle_moment").values_at(PHASES).max()) < 1.55
     assert gait.curve("vertical_force").mean == pytest.approx(0.46, abs=0.05)
     assert np.degrees(error(gait, "shank_angle")) < 7.0
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "unit", "comma"), [(",", " (deg)", False), (";", " [deg]", True), ("\t", " (deg)", False)]
+)
+def test_a_plain_table_with_opensims_names_is_read(tmp_path: Path, delimiter: str, unit: str, comma: bool) -> None:
+    columns = {f"{name}{unit}": values for name, values in angles(TIME).items()} | {"ground_force_r_vy": force(TIME)}
+    rows = [delimiter.join(f"{cell:.6f}" for cell in row) for row in np.column_stack([TIME, *columns.values()])]
+    text = "\n".join([delimiter.join(["time", *columns]), *rows]) + "\n"
+    path = tmp_path / "walk.csv"
+    path.write_text(text.replace(".", ",") if comma else text)
+    assert_true(import_gait([path], PERSON).gait)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("frame,shank\n1,2\n", "the first column must be 'time', it is 'frame'"),
+        ("time,a,a\n0,1,2\n", "there are two columns 'a'; every column needs a name of its own"),
+        ("time,a,\n0,1,2\n", "a column has no name"),
+        ("time,a\n0,1,2\n", "line 2 has 3 values for 2 columns"),
+        ("time,a\n0,one\n", "line 2"),
+        ("time (h2),a\n0,1\n", "h2"),
+    ],
+)
+def test_a_damaged_plain_table_is_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "walk.csv"
+    path.write_text(text)
+    with pytest.raises(DataError) as refused:
+        import_gait([path], PERSON)
+    assert message in str(refused.value)
+    assert str(refused.value).startswith(str(path))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_plain_table_without_units_asks_for_them(tmp_path: Path) -> None:
+    path = tmp_path / "walk.csv"
+    path.write_text("time,shank_angle,ankle_angle\n" + "".join(f"{0.01 * k},1,2\n" for k in range(30)))
+    with pytest.raises(DataError, match=r"'shank_angle': the file does not state its unit; give shank_angle.unit in a"):
+        import_gait([path], PERSON)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.recorded.c3d import Trial, read_c3d
+from ppafo.gait.recorded.plain_csv import is_plain, read_plain_csv
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.opensim import OpenSimTable, read_opensim_with_gaps
@@ -105,6 +106,12 @@ def _opensim_unit(path: str, label: str, angle: str) -> str:
 
 
 def _of_csv(path: str | Path) -> MotionTable:
+    """Return a table of this package, or a plain one; columns that OpenSim names mean what they mean there."""
+    if is_plain(path):
+        time, columns, units = read_plain_csv(path)
+        form = OPENSIM if any(name.startswith("ankle_angle_") for name in columns) else CSV
+        implied = {name: _opensim_unit(name, name, "") if form == OPENSIM else "" for name in columns}
+        return MotionTable(str(path), form, time, columns, {name: units[name] or implied[name] for name in columns})
     recording = read_csv(path)
     columns = {name: recording[name] for name in recording.names}
     units = {name: recording.unit(name) for name in recording.names}
