@@ -27,8 +27,8 @@ SETS = ("ppafo2011", "ppafo2011-printed")
 
 LINES: dict[str, str] = {
     **{f"simulate-{name}": f"simulate {name} --out {{out}}" for name in SCENARIOS},
-    **{f"walk-{name}": f"walk --config {name} --minutes 0.1 --out {{out}}" for name in WALKS},
-    "wearers": "walk --config proportional --minutes 0.1 --wearers 20 --out {out}",
+    **{f"walk-{name}": f"walk {name} --minutes 0.1 --out {{out}}" for name in WALKS},
+    "wearers": "walk proportional --minutes 0.1 --wearers 20 --out {out}",
     **{f"audit-{name}": f"audit {name}" for name in SETS},
     **{f"set-{name}": f"sets {name}" for name in SETS},
     "parts": "parts",

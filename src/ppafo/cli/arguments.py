@@ -15,8 +15,16 @@ _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
 _NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 
 
-RENAMED = {"--most-failed": "--maximum-failed", "--most": "--maximum"}
+RENAMED = {
+    "--first": "--first-draws",
+    "--maximum": "--draws",
+    "--most": "--draws",
+    "--most-failed": "--maximum-failed",
+}
 """Options of version 0.1 and what they are called now."""
+
+REMOVED = {"--config": "name what is run without it, as in 'ppafo walk solenoid'"}
+"""Options of version 0.1 that are none any more, and what to write instead."""
 
 
 class UsageError(PpafoError):
@@ -68,6 +76,8 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         if name in RENAMED and name not in known and RENAMED[name] in known:
             raise UsageError(f"{name} is now called {RENAMED[name]}")
         if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
+            if name in REMOVED:
+                raise UsageError(f"there is no option '{name}' any more: {REMOVED[name]}")
             raise UsageError(f"there is no option '{name}'{_nearest_option(name, known)}; here are {', '.join(known)}")
 
 

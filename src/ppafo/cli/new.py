@@ -45,7 +45,7 @@ KINDS: dict[str, _NewFile] = {
         "walk",
         "walking/configurations",
         "ppafo.walking.loading:load_walk",
-        "ppafo walk --config FILE --minutes 0.2 --out out/NAME",
+        "ppafo walk FILE --minutes 0.2 --out out/NAME",
     ),
     "gait-map": _NewFile(
         "gait map",

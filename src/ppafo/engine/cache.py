@@ -292,14 +292,19 @@ def _is_whole(kept: Path) -> bool:
     """Tell whether a program's folder is as it was written, file by file."""
     try:
         stated = json.loads(read_regular_file(kept / _CHECKSUMS))
-        return _is_own(kept) and bool(stated) and stated == _checksums(kept)
+        # What else lies there is no part of it: Numba tries, for an instant, whether it could write a file of its own.
+        files = stated.items() if isinstance(stated, dict) else ()
+        return _is_own(kept) and bool(files) and all(_checksum(kept / name) == given for name, given in files)
     except (OSError, ValueError, RecursionError):
         return False
 
 
 def _is_own(kept: Path) -> bool:
     """Tell whether a program and all in it is this user's: one that came while others could write stays theirs."""
-    found = [place.lstat() for place in (kept, *kept.rglob("*"))]
+    found = [kept.lstat()]
+    for place in kept.rglob("*"):
+        with contextlib.suppress(FileNotFoundError):
+            found.append(place.lstat())
     if not hasattr(os, "geteuid"):
         return stat.S_ISDIR(found[0].st_mode)
     is_whose = all(item.st_uid in (0, os.geteuid()) for item in found)
@@ -310,7 +315,11 @@ def _is_own(kept: Path) -> bool:
 def _checksums(folder: Path) -> dict[str, str]:
     """Return the hash of every file of a program but the list of them itself."""
     files = sorted(path for path in folder.rglob("*") if not path.is_dir() and path.name != _CHECKSUMS)
-    return {path.relative_to(folder).as_posix(): hashlib.sha256(read_regular_file(path)).hexdigest() for path in files}
+    return {path.relative_to(folder).as_posix(): _checksum(path) for path in files}
+
+
+def _checksum(path: Path) -> str:
+    return hashlib.sha256(read_regular_file(path)).hexdigest()
 
 
 def _named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:

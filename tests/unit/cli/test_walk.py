@@ -50,7 +50,7 @@ def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_walk_prints_its_table_and_where_the_files_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["walk", "--config", "proportional", *SHORT, "--out", str(tmp_path / "walk")]) == 0
+    assert main(["walk", "proportional", *SHORT, "--out", str(tmp_path / "walk")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "proportional: completed, 4 strides of falisse2019-subject1"
     assert lines[2].split() == ["with", "without", "healthy"]
@@ -118,7 +118,7 @@ def test_an_earlier_walk_is_replaced_and_other_folders_are_not(
     copy = tmp_path / "copy"
     copy.mkdir()
     (copy / "walk.json").write_bytes((walked / "walk.json").read_bytes())
-    assert main(["walk", "--config", "off", *SHORT, "--out", str(copy)]) == 0
+    assert main(["walk", "off", *SHORT, "--out", str(copy)]) == 0
     assert json.loads((copy / "walk.json").read_text())["configuration"]["name"] == "off"
 
 
@@ -144,7 +144,7 @@ def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[st
 
 
 MISTAKES = {
-    "--config solenoit": "there is no walk 'solenoit', did you mean 'solenoid'?",
+    "solenoit": "there is no walk 'solenoit', did you mean 'solenoid'?",
     "--gait nobody": "there is no gait 'nobody'",
     "--minutes 0.01": "must be 0.087 min (5 strides) or more",
     "--minutes nan": "a walk of nan min: must be",

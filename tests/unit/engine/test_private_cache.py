@@ -75,6 +75,14 @@ def test_damaged_program_is_compiled_anew(compiled: Path, ending: str, damage: s
     assert cache._is_whole(compiled)
 
 
+def test_what_another_process_tries_beside_a_program_is_no_damage(compiled: Path) -> None:
+    (index,) = compiled.rglob("*.nbi")
+    index.with_name("tmpabcdefgh").write_bytes(b"")
+    before = compiled.stat().st_ino
+    assert loaded() == 42.0
+    assert compiled.stat().st_ino == before
+
+
 def test_file_in_the_place_of_a_program_is_no_error(compiled: Path) -> None:
     clear(compiled.parent)
     compiled.parent.mkdir(mode=0o700)

@@ -174,8 +174,8 @@ def test_widths_are_read_in_the_unit_of_the_metric() -> None:
 
 
 def test_a_scenario_is_drawn_until_its_error_is_known() -> None:
-    found = monte_carlo(STUDY, METRIC, width="10 %", configuration="proportional", first=64, maximum=1024)
+    found = monte_carlo(STUDY, METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024)
     assert found.is_met
     assert found.last.interval.low < 0.875 < found.last.interval.high
-    again = monte_carlo(STUDY, METRIC, width="10 %", configuration="proportional", first=64, maximum=1024)
+    again = monte_carlo(STUDY, METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024)
     assert again.last == found.last

@@ -63,7 +63,7 @@ class WalkingContest:
     def _command(self, entrant: Entrant) -> str:
         """Return the command that walks this entrant again."""
         task = self.task
-        words = ["ppafo", "walk", "--config", task.file, *(() if task.gait is None else ("--gait", task.gait))]
+        words = ["ppafo", "walk", task.file, *(() if task.gait is None else ("--gait", task.gait))]
         words += ["--minutes", f"{task.seconds / 60.0:g}"]
         overrides = task.overrides_for(entrant.kind, entrant.valve)
         return shlex.join([*words, *(word for override in overrides for word in ("--set", override))])
