@@ -43,7 +43,7 @@ LINES: dict[str, str] = {
     "league": "league --draws 8",
     "league-walk": "league --walk --minutes 0.1 --draws 8",
     "unreported": "unreported --draws 8192",
-    "sweep": "sweep torque-task-uncertainty --runs 256 --out {out}",
+    "sweep": "sweep torque-task-uncertainty --draws 256 --out {out}",
     "reproduce": "reproduce --out {out}",
 }
 

@@ -28,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json_argument(_action(actions, "list", "list the gaits that come with the package"))
     showing = _action(actions, "show", "show and draw a gait")
     showing.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
-    showing.add_argument("--speed", metavar="SPEED", help="at another walking speed, such as '1.2 m/s'")
+    showing.add_argument("--speed", metavar="SPEED", help="walking speed to scale to, such as '1.2 m/s'")
     add_output_arguments(showing)
-    _add_import_arguments(_action(actions, "import", "make a gait of recorded files (.mot, .sto, .csv, .c3d, .trc)"))
+    _add_import_arguments(_action(actions, "import", "make a gait from recorded files (.mot, .sto, .csv, .c3d, .trc)"))
     recording = _action(actions, "record", "write some strides of a gait as a synthetic recording")
     recording.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
     recording.add_argument("--strides", metavar="N", default="10", help="number of strides; default 10")
@@ -61,27 +61,33 @@ def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
         "--speed", metavar="SPEED", help="walking speed, such as '1.2 m/s'; needed to scale the gait later"
     )
     parser.add_argument(
-        "--stature", metavar="LENGTH", help="of the wearer, such as '1.75 m'; gives the thigh that OpenSim files lack"
+        "--stature",
+        metavar="LENGTH",
+        help="stature of the wearer, such as '1.75 m'; gives the thigh length that OpenSim files lack",
+    )
+    parser.add_argument(
+        "--low-pass", metavar="FREQUENCY", help="cutoff of a low-pass filter, such as '6 Hz'; default: none"
+    )
+    parser.add_argument(
+        "--minimum-strides", metavar="N", help="minimum number of whole strides; default 2, overground 1"
     )
     parser.add_argument("--start", metavar="TIME", help="leave out what is before, such as '1.2 s'")
     parser.add_argument("--end", metavar="TIME", help="leave out what is after, such as '3.4 s'")
     parser.add_argument(
-        "--fill-gaps", metavar="TIME", help="fill gaps up to this length, such as '0.1 s'; not unless given"
+        "--fill-gaps", metavar="TIME", help="fill gaps up to this length, such as '0.1 s'; default: none"
     )
     parser.add_argument(
         "--ankle-neutral",
         metavar="ANGLE",
         help="reading of the ankle with the foot square to the shank, such as '3 deg'",
     )
-    parser.add_argument("--low-pass", metavar="FREQUENCY", help="smooth the curves, such as '6 Hz'; not unless given")
-    parser.add_argument("--least-strides", metavar="N", help="refuse fewer whole strides; default 2, overground 1")
     parser.add_argument("--name", metavar="NAME", default="imported-gait", help="name of the gait and of its file")
     parser.add_argument("--title", metavar="TEXT", default="", help="one line: who walks, and how")
     add_output_arguments(parser)
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Do what was asked for."""
+    """Run the action that was given."""
     actions = {"list": _list, "show": _show, "import": _import, "record": _record, "export": _export}
     return actions[parsed.action](parsed)
 
@@ -127,7 +133,7 @@ def _settings(parsed: argparse.Namespace) -> "ImportSettings":
         columns=None if parsed.map is None else load_map(parsed.map),
         walking_speed=_optional("--speed", parsed.speed, "m/s"),
         low_pass=_optional("--low-pass", parsed.low_pass, "Hz"),
-        least_strides=None if parsed.least_strides is None else _whole("--least-strides", parsed.least_strides),
+        least_strides=None if parsed.minimum_strides is None else _whole("--minimum-strides", parsed.minimum_strides),
         name=parsed.name,
         title=parsed.title,
         stature=_optional("--stature", parsed.stature, "m"),
@@ -140,12 +146,12 @@ def _settings(parsed: argparse.Namespace) -> "ImportSettings":
 
 def _check_side(side: str) -> None:
     if side not in _SIDES:
-        raise DataError(f"--side {side!r} is not known; it is right or left")
+        raise DataError(f"--side {side!r}: must be right or left")
 
 
 def _whole(option: str, text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) < 7):
-        raise DataError(f"{option} {text!r} is not a whole number, such as 2")
+        raise DataError(f"{option} {text!r}: must be a whole number, such as 2")
     return int(text)
 
 
@@ -190,7 +196,7 @@ def _export(parsed: argparse.Namespace) -> int:
     _check_side(parsed.side)
     mass = _optional("--body-mass", parsed.body_mass, "kg")
     if parsed.out.suffix.lower() != ".sto":
-        raise DataError(f"--out {parsed.out}: OpenSim's name for such a file ends in .sto")
+        raise DataError(f"--out {parsed.out}: the name must end in .sto")
     check_new_file(parsed.out)
     recording, missing = opensim_recording(read_recording(parsed.recording), parsed.side, mass)
     write_opensim(parsed.out, recording)

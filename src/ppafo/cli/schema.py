@@ -35,7 +35,7 @@ def run(parsed: argparse.Namespace) -> int:
     """Print the schema, which is JSON with or without ``--json``."""
     if parsed.format not in FORMATS:
         hint = nearest_name(parsed.format, FORMATS)
-        raise DataError(f"there is no file format '{parsed.format}'{hint}; known are {', '.join(FORMATS)}")
+        raise DataError(f"there is no file format '{parsed.format}'{hint}; available: {', '.join(FORMATS)}")
     check_output(parsed)
     document = importlib.import_module(FORMATS[parsed.format]).json_schema()
     parsed.json = True

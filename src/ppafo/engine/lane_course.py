@@ -1,7 +1,7 @@
-"""What the meters of the lanes are told of the reference: looked at once before the first sample, then followed."""
+"""What the meters of the lanes know of the reference: looked at once before the first sample, then followed."""
 
-from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
-from ppafo.signals.meter import SAME_LEVEL, followed, is_away
+from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
+from ppafo.signals.meter import SAME_LEVEL, advance_course, is_away
 
 
 def course_lines(rows: LaneRows) -> list[str]:
@@ -28,12 +28,12 @@ def course_lines(rows: LaneRows) -> list[str]:
     return [
         *over_lanes(ends),
         "for index in range(last_record):",
-        *indented(over_lanes([*given, f"{cell['largest']} = max({cell['largest']}, abs({_value(rows, 'index')}))"])),
+        *indent(over_lanes([*given, f"{cell['largest']} = max({cell['largest']}, abs({_value(rows, 'index')}))"])),
         *tolerance,
         "for index in range(last_record - 1, -1, -1):",
-        *indented(over_lanes([*given, f"{cell['hold_start']} = {found}"])),
+        *indent(over_lanes([*given, f"{cell['hold_start']} = {found}"])),
         "    earliest = 1.0",
-        *indented(over_lanes([f"earliest = min(earliest, {cell['hold_start']})"])),
+        *indent(over_lanes([f"earliest = min(earliest, {cell['hold_start']})"])),
         "    if earliest > 0.0:",
         "        break",
     ]
@@ -47,7 +47,7 @@ def follow_lines(rows: LaneRows) -> list[str]:
         return [rows.load("course")]
     return [
         rows.load("course"),
-        f"course = {rows.add(followed)}(course, sample)",
+        f"course = {rows.add(advance_course)}(course, sample)",
         f"{rows.cells['course.hold_start']} = course.hold_start",
     ]
 

@@ -4,7 +4,7 @@ Samples are the ones that a recording would have.
 """
 
 from ppafo.engine.lane_course import course_lines, follow_lines
-from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
+from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.model.plant import chamber_pressures_in_one_division
 from ppafo.model.vane import actuator_torque
 from ppafo.signals.meter import Sample
@@ -35,9 +35,9 @@ def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
     lines = [*sample_lines(rows, moment), *follow_lines(rows)]
     return [
         "if next_record == 0:",
-        *indented([*course_lines(rows), *over_lanes([*lines, *begin])]),
+        *indent([*course_lines(rows), *over_lanes([*lines, *begin])]),
         "else:",
-        *indented(over_lanes([*lines, *update])),
+        *indent(over_lanes([*lines, *update])),
     ]
 
 
@@ -48,13 +48,24 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]"
     thermal = ("thermal", "masses") if program.is_thermal else ()
     warm = [f"thermal.temperature * (state.mass_{chamber} / masses.mass_{chamber})" for chamber in (1, 2)]
+    values = {
+        "number": "float(next_record)",
+        "angle": "state.angle",
+        "angular_velocity": "state.angular_velocity",
+        "pressure_1": "pressure_1",
+        "pressure_2": "pressure_2",
+        "torque": "torque",
+        "command": "result.command",
+        "reference": "wanted",
+        "temperature_1": warm[0] if thermal else "0.0",
+        "temperature_2": warm[1] if thermal else "0.0",
+    }
     return [
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal)],
         f"pressure_1, pressure_2 = {pressures}(plant, state.angle, state.mass_1, state.mass_2)",
         f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
         f"wanted = {wanted if program.has_reference else '0.0'}",
-        f"sample = {add(Sample)}(float(next_record), state.angle, state.angular_velocity, pressure_1, "
-        f"pressure_2, torque, result.command, wanted, {', '.join(warm if thermal else ['0.0', '0.0'])})",
+        f"sample = {add(Sample)}({', '.join(f'{name}={value}' for name, value in values.items())})",
     ]
 
 
@@ -65,5 +76,5 @@ def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
     keep = [f"trace[next_record // trace_every, {row}, lane] = {TRACED[name]}" for row, name in enumerate(traced)]
     return [
         "if next_record % trace_every == 0:",
-        *indented(over_lanes([*sample_lines(rows, moment), *keep])),
+        *indent(over_lanes([*sample_lines(rows, moment), *keep])),
     ]

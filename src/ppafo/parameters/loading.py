@@ -5,9 +5,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.valves.catalog import VALVES
@@ -42,15 +42,13 @@ def load_parameter_set(name_or_path: str | Path) -> ParameterSet:
 
 
 def parse_parameter_set(content: bytes, file: str) -> ParameterSet:
-    """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it."""
+    """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it.
+
+    ParameterError for one that is not usable.
+    """
     document = _FILE.parse(content, file)
     _find_valves(document)
-    try:
-        parsed = parameter_file().model_validate(document)
-    except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), parameter_file())
-        raise ParameterError(f"{file}: {problem}") from error
-    parameter_set = _flatten(parsed, file)
+    parameter_set = _flatten(validate(parameter_file(), document, file, ParameterError), file)
     _check(parameter_set)
     return parameter_set
 
@@ -95,7 +93,7 @@ def _leaves(node: object, path: str) -> Iterator[tuple[str, object]]:
 def _check(parameter_set: ParameterSet) -> None:
     """Refuse units that do not exist and names of valves that the set does not have."""
     chosen_valve(parameter_set, None)
-    declared = parameter_set.declared()
+    declared = parameter_set.declarations()
     for path, entry in parameter_set.numbers.items():
         if path not in declared:
             valve = path.split(".")[2]

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, one_of, optional, published_schema, table
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
@@ -81,4 +81,4 @@ def _parameter_file(_kinds: Any) -> type[BaseModel]:
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a parameter set file, with the valves of all packages."""
     VALVES.load_all()
-    return published_schema(parameter_file(), "ppafo parameter set")
+    return make_schema(parameter_file(), "ppafo parameter set")

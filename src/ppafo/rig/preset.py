@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ppafo.documents.problems import shown
+from ppafo.documents.problems import quote
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.parameters.declaration import is_within
@@ -83,10 +83,10 @@ def _override(preset: Preset, path: str, text: str) -> Preset:
 def _parse(document: dict[str, Any], file: str) -> Preset:
     """Check keys, units and ranges of a document; every value must be there."""
     if not document:
-        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints what belongs in it")
+        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints its format")
     _check_names(document, (*_HEAD, *SECTIONS), "", file)
     if document.get("schema_version") != 1:
-        raise ParameterError(f"{file}: schema_version must be 1, it is {shown(document.get('schema_version'))}")
+        raise ParameterError(f"{file}: schema_version must be 1, it is {quote(document.get('schema_version'))}")
     for key in _HEAD[1:]:
         if not isinstance(document.get(key), str):
             raise ParameterError(f"{file}: '{key}' must be a text in quotation marks")
@@ -103,7 +103,7 @@ def _with_entry(preset: Preset, path: str, entry: dict[str, Any], file: str) -> 
     _check_names(entry, _ENTRY, f"{path}.", file)
     value, unit, reason = (entry.get(name) for name in _ENTRY)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ParameterError(f"{file}: {path}.value = {shown(value)} must be a number")
+        raise ParameterError(f"{file}: {path}.value = {quote(value)} must be a number")
     if not isinstance(unit, str) or not isinstance(reason, str) or not reason:
         raise ParameterError(f"{file}: {path} needs a unit and a reason, both texts")
     try:

@@ -2,9 +2,9 @@
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import published_schema, table
+from ppafo.documents.models import STRICT, make_schema, table
 from ppafo.model.declaration import Quantity
 from ppafo.rig.declaration import SECTIONS
 
@@ -12,7 +12,7 @@ from ppafo.rig.declaration import SECTIONS
 class PresetValue(BaseModel):
     """A value of the rig, with its reason."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = STRICT
 
     value: float = Field(description="the number, in the unit beside it")
     unit: str = Field(description="unit of the number, such as 'mm^2'; empty for a plain number")
@@ -37,4 +37,4 @@ def json_schema() -> dict[str, Any]:
         "notes": (str, Field(description="what is on, what is off, and where the values come from")),
     }
     fields |= {name: (_section(name, members), Field()) for name, members in SECTIONS.items()}
-    return published_schema(table("RigPreset", fields), "ppafo rig preset")
+    return make_schema(table("RigPreset", fields), "ppafo rig preset")

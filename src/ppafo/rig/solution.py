@@ -193,7 +193,12 @@ class _Rig:
         )
         names = ("angle", "pressure_1", "pressure_2")
         angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, signals, strict=True))
-        return Measurement(angle, first, second, actuator_torque(first, second, self.plant.torque_constant))
+        return Measurement(
+            angle=angle,
+            pressure_1=first,
+            pressure_2=second,
+            torque=actuator_torque(first, second, self.plant.torque_constant),
+        )
 
     def advance_to(self, end: float) -> None:
         """Integrate over all that happens on the way."""

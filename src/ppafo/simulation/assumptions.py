@@ -63,7 +63,7 @@ def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
 def _device_value(hardware: Hardware, path: str) -> str | None:
     full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
     entry = hardware.parameter_set.entries().get(full)
-    quantity = hardware.parameter_set.declared().get(full)
+    quantity = hardware.parameter_set.declarations().get(full)
     if entry is not None:
         return entry_text(entry)
     if path == RELIEVING_PATH:

@@ -241,7 +241,7 @@ def test_a_foreign_rig_file_is_not_overwritten(tmp_path: Path) -> None:
 def test_an_empty_preset_points_to_the_schema(tmp_path: Path) -> None:
     for text in ("", "# nothing yet\n"):
         (tmp_path / "mine.toml").write_text(text)
-        with pytest.raises(ParameterError, match="'ppafo schema rig' prints what belongs in it"):
+        with pytest.raises(ParameterError, match="'ppafo schema rig' prints its format"):
             load_preset(tmp_path / "mine.toml")
 
 

@@ -62,6 +62,9 @@ class SampledControl:
         if run.program.ideal_sensors:
             angle, pressure_1, pressure_2 = signals
             return Measurement(
-                angle, pressure_1, pressure_2, actuator_torque(pressure_1, pressure_2, run.plant.torque_constant)
+                angle=angle,
+                pressure_1=pressure_1,
+                pressure_2=pressure_2,
+                torque=actuator_torque(pressure_1, pressure_2, run.plant.torque_constant),
             )
         return measure(run.sensors, *signals, run.plant.torque_constant, sample)

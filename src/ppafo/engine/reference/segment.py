@@ -1,4 +1,4 @@
-"""One stretch of a CVODE solution, between two events: the times it is asked for, and its failure as one line."""
+"""One stretch of a CVODE solution, between two events: the times requested, and its failure as one line."""
 
 from typing import Any
 

@@ -7,10 +7,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.declaration import Quantity
@@ -40,12 +38,15 @@ class Catalogue:
     groups: Mapping[str, Mapping[str, Part]]
 
     def part(self, group: str, name: str) -> Part:
-        """Return a part by its group (``valves``, ``bottles``, ...) and name."""
+        """Return a part by its group (``valves``, ``bottles``, ...) and name.
+
+        ParameterError with the nearest name where there is none.
+        """
         parts = self.groups[group]
         if name not in parts:
             known = ", ".join(parts) or "none"
             hint = nearest_name(name, parts)
-            raise ParameterError(f"{self.file}: {group} has no part '{name}'{hint}; there are {known}")
+            raise ParameterError(f"{self.file}: {group} has no part '{name}'{hint}; available: {known}")
         return parts[name]
 
     @property
@@ -60,13 +61,11 @@ def load_catalogue(name_or_path: str | Path = DEFAULT) -> Catalogue:
 
 
 def parse_catalogue(content: bytes, file: str) -> Catalogue:
-    """Return the catalogue in the bytes of a TOML file; ``file`` is what messages call it."""
-    document = _FILE.parse(content, file)
-    try:
-        parsed: Any = CATALOGUE_FILE.model_validate(document)
-    except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), CATALOGUE_FILE)
-        raise ParameterError(f"{file}: {problem}") from error
+    """Return the catalogue in the bytes of a TOML file; ``file`` is what messages call it.
+
+    ParameterError for one that is not usable.
+    """
+    parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
     groups = {
         group: {name: _part(file, group, name, item) for name, item in getattr(parsed, group).items()}
         for group in GROUPS
@@ -94,7 +93,7 @@ def _check_unknown(
     for key in unknown:
         if key not in declared:
             hint = nearest_name(key, declared)
-            raise ParameterError(f"{place}.unknown: there is no figure '{key}'{hint}; there are {', '.join(declared)}")
+            raise ParameterError(f"{place}.unknown: there is no figure '{key}'{hint}; available: {', '.join(declared)}")
         if key in figures:
             raise ParameterError(f"{place}.unknown: '{key}' is given in the same part")
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, one_of, optional, published_schema, table
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.parts.declaration import GROUPS, NEEDED, figures_of
@@ -56,4 +56,4 @@ CATALOGUE_FILE = _catalogue_file()
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a catalogue of parts."""
-    return published_schema(CATALOGUE_FILE, "ppafo catalogue of parts")
+    return make_schema(CATALOGUE_FILE, "ppafo catalogue of parts")

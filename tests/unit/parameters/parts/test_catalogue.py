@@ -51,7 +51,8 @@ source = "s"
 
 
 def test_the_shipped_catalogue_keeps_its_published_schema() -> None:
-    jsonschema.validate(tomllib.loads(SHIPPED.read_text(encoding="utf-8")), json_schema())
+    validator = jsonschema.Draft202012Validator(json_schema())
+    assert not list(validator.iter_errors(tomllib.loads(SHIPPED.read_text(encoding="utf-8"))))
 
 
 def test_the_parts_of_the_paper_have_the_figures_that_it_prints() -> None:
