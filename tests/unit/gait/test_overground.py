@@ -230,3 +230,42 @@ def test_nonsense_in_subject_and_events_is_as_if_it_were_absent(trial: Trial) ->
     found = read_table(path).trial
     assert found is not None
     assert (found.body_mass, found.events) == (None, {})
+
+
+def test_plates_without_outputs_of_the_model_are_chosen_by_their_contacts(trial: Trial) -> None:
+    import ezc3d
+
+    path = trial(has_outputs=False, has_events=False)
+    file = ezc3d.c3d(str(path))
+    frames = file["data"]["points"].shape[2]
+    time = START + np.arange(10 * frames) / (10.0 * RATE)
+    channels = []
+    for side, stride in (("left", 0), ("right", 1)):
+        load = force(time, side, [stride])
+        # A plate of type 2 measures what the foot does to it, in axes of its own with z downwards.
+        channels += [0.0 * load, 0.0 * load, load, 0.0 * load, 0.0 * load, 0.0 * load]
+    names = [f"{name}{plate}" for plate in (1, 2) for name in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")]
+    analog = file["parameters"]["ANALOG"]
+    analog["RATE"]["value"], analog["LABELS"]["value"] = [10.0 * RATE], names
+    analog["UNITS"]["value"] = ["N", "N", "N", "Nmm", "Nmm", "Nmm"] * 2
+    corners = np.zeros((3, 4, 2))
+    corners[:2, :, 0] = [[400.0, 400.0, 0.0, 0.0], [0.0, 600.0, 600.0, 0.0]]
+    corners[:, :, 1] = corners[:, :, 0] + np.array([[700.0], [0.0], [0.0]])
+    plates = {
+        "USED": [2],
+        "TYPE": [2, 2],
+        "CORNERS": corners,
+        "ORIGIN": np.array([[0.0, 0.0], [0.0, 0.0], [-40.0, -40.0]]),
+        "CHANNEL": np.arange(1, 13).reshape(2, 6).T,
+    }
+    for name, value in plates.items():
+        group = file["parameters"]["FORCE_PLATFORM"]
+        group[name] = {**group[name], "value": np.array(value)}
+    file["data"]["analogs"] = np.array(channels)[None, :, :]
+    file.write(str(path))
+    for side, plate in (("right", 2), ("left", 1)):
+        found = import_gait([path], ImportSettings(side=side))  # type: ignore[arg-type]
+        text = "\n".join(found.remarks)
+        assert f"summed over 'force plate {plate}.z' (1)" in text
+        assert error(found, "vertical_force") < 0.05
+        assert len(found.curves["vertical_force"].strides) == 1
