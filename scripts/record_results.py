@@ -36,7 +36,7 @@ LINES: dict[str, str] = {
     "compare": "compare torque-task-solenoid torque-task-proportional --study torque-task-uncertainty --draws 256",
     "sensitivity": "sensitivity torque-task-uncertainty --samples 256",
     "sensitivity-morris": "sensitivity torque-task-uncertainty --samples 32 --method morris",
-    "montecarlo": "montecarlo torque-task-uncertainty --metric rms_error --most 2048",
+    "montecarlo": "montecarlo torque-task-uncertainty --metric rms_error --draws 2048",
     "endurance": "endurance --gas-per-step '0.3 g'",
     "size": "size",
     "tune": "tune pid-gains",

@@ -26,6 +26,7 @@ from types import ModuleType
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.engine.compile_errors import mistake
 from ppafo.engine.compile_times import SECONDS_FILE, announce, estimate_seconds, number_models
+from ppafo.engine.private_folder import WRITTEN_BY_OTHERS, refusal
 from ppafo.engine.program_lock import LOCK, one_process
 from ppafo.engine.shared_functions import compile_text, run_text
 from ppafo.engine.source_text import without_origins
@@ -47,7 +48,6 @@ _ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{_PROGRAM.patte
 _LONGEST_ASIDE = 86400.0
 _CHECKSUMS = "checksums.json"
 _KEPT, _NOT_KEPT = "cache=True", "cache=False"
-_WRITTEN_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _LOADING = threading.RLock()
 
 
@@ -100,47 +100,6 @@ def _name(kind: str, source: str) -> str:
 
 def _is_there(name: str, folder: Path | None) -> bool:
     return name in sys.modules or (folder is not None and os.path.lexists(folder / f"{name}-{_machine()}"))
-
-
-def refusal(folder: Path | None) -> str:
-    """Return why programs are neither read from nor kept in a folder, as the end of a sentence; empty where they are.
-
-    The folder is made if need be. It must be this user's own and no link, and nobody else may write it or put another
-    in its place.
-    """
-    if folder is None:
-        return "this user has no home folder"
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
-        found = folder.lstat()
-        above = [place.stat() for place in Path(os.path.realpath(folder)).parents]
-    except (OSError, ValueError) as error:
-        return f"{folder} cannot be made: {reason(error)}"
-    whose = _why_not_private(folder, found, above)
-    if whose or os.access(folder, os.W_OK | os.X_OK):
-        return whose
-    return f"{folder} cannot be written"
-
-
-def _why_not_private(folder: Path, found: os.stat_result, above: list[os.stat_result]) -> str:
-    if not stat.S_ISDIR(found.st_mode):
-        return f"{folder} is {'a link' if stat.S_ISLNK(found.st_mode) else 'not a folder'}"
-    if not hasattr(os, "geteuid"):
-        return ""
-    if found.st_uid != os.geteuid():
-        return f"{folder} belongs to another user"
-    if found.st_mode & _WRITTEN_BY_OTHERS:
-        return f"others can write into {folder}; 'ppafo cache --clear' and 'chmod 700' make it safe"
-    is_exchanged = any(_can_be_exchanged(place) for place in above)
-    return f"others can put another folder in the place of {folder}" if is_exchanged else ""
-
-
-def _can_be_exchanged(place: os.stat_result) -> bool:
-    """Tell whether another user can rename what lies in a folder."""
-    is_theirs = place.st_uid not in (0, os.geteuid())
-    return is_theirs or bool(place.st_mode & stat.S_IWOTH and not place.st_mode & stat.S_ISVTX)
 
 
 def list_programs(folder: Path) -> list[CachedProgram]:
@@ -309,7 +268,7 @@ def _is_own(kept: Path) -> bool:
         return stat.S_ISDIR(found[0].st_mode)
     is_whose = all(item.st_uid in (0, os.geteuid()) for item in found)
     folders = [item for item in found if stat.S_ISDIR(item.st_mode)]
-    return is_whose and found[0] in folders and not any(item.st_mode & _WRITTEN_BY_OTHERS for item in folders)
+    return is_whose and found[0] in folders and not any(item.st_mode & WRITTEN_BY_OTHERS for item in folders)
 
 
 def _checksums(folder: Path) -> dict[str, str]:

@@ -5,7 +5,7 @@ from typing import NamedTuple, get_type_hints
 
 from ppafo.control.controllers import constant as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
-from ppafo.control.profiles import constant
+from ppafo.control.profiles import CONSTANT
 from ppafo.engine.scheme.ankle_torque import DeviceShare
 from ppafo.engine.scheme.motion import FreePart, PrescribedStep
 from ppafo.engine.scheme.parts import Pace
@@ -144,7 +144,7 @@ class Program:
     @property
     def is_held(self) -> bool:
         """True where the angle is prescribed by a profile that never changes."""
-        return self.angle is constant.KIND
+        return self.angle is CONSTANT
 
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that the first stage of a step hands to the later phases, in order."""

@@ -10,11 +10,10 @@ from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.metrics.catalog import evaluate
-from ppafo.model.friction import sliding_friction
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.model.thermal import energy_per_content
-from ppafo.model.vane import gravity_torque
+from ppafo.model.vane import gravity_torque, sliding_friction
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario

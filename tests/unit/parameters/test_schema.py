@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import list_sets
-from ppafo.parameters.schema import json_schema
+from ppafo.parameters.loading import json_schema
 
 
 def document_of(name: str) -> dict[str, Any]:

@@ -13,8 +13,7 @@ from ppafo.rig.bench.static_torque import on_scale
 from ppafo.rig.catalog import EXPERIMENTS
 from ppafo.rig.declaration import PATHS, SECTIONS
 from ppafo.rig.folder import write_rig_recording
-from ppafo.rig.preset import Preset
-from ppafo.rig.schema import json_schema
+from ppafo.rig.preset import Preset, json_schema
 from ppafo.rig.solution import make_solver
 from ppafo.signals.channels import CHANNELS
 from ppafo.storage import read_csv

@@ -11,8 +11,7 @@ from ppafo.engine.cache import load_generated
 from ppafo.engine.lanes import samples_in
 from ppafo.engine.program import NoParameters
 from ppafo.engine.reference import vane_mode
-from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals
-from ppafo.engine.reference.segment import solve_segment
+from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals, solve_segment
 from ppafo.engine.reference.source import (
     PLANT_UNKNOWNS,
     gas_unknowns,

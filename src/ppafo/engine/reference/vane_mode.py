@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from ppafo.model.friction import holds_still
 from ppafo.model.plant import PlantParameters, chamber_pressures, driving_torque
+from ppafo.model.vane import holds_still
 
 SLOWEST_REBOUND = 1.0e-7
 

@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import GasChange
-from ppafo.model.friction import holds_still
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, driving_torque
+from ppafo.model.vane import holds_still
 
 ALLOWED_OF_ANGLE = 2.0e-6
 """Error of one part over the range of the angle; with it a run keeps to 2e-4 of the range."""

@@ -10,8 +10,7 @@ import pytest
 
 from ppafo.errors import ParameterError
 from ppafo.parameters.parts import load_catalogue
-from ppafo.parameters.parts.catalogue import parse_catalogue
-from ppafo.parameters.parts.schema import json_schema
+from ppafo.parameters.parts.catalogue import json_schema, parse_catalogue
 
 SHIPPED = Path(__file__).parents[4] / "src" / "ppafo" / "parameters" / "parts" / "catalogues" / "parts.toml"
 GOOD = """
