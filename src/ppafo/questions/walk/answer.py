@@ -23,12 +23,14 @@ from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.phases import strip_figure
+from ppafo.walking.gait_subject import person_remarks
 from ppafo.walking.strides import PER_STRIDE, PHASES
 from ppafo.walking.walk import WalkResult
 
 SCHEMA_VERSION = 1
 _HEAD = ("", "with", "without", "healthy")
 _ROWS = (
+    ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
     ("push_off_work", "Work on the wearer in push-off", "energy", 2),
     ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
@@ -71,7 +73,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
     worn, bare = comparison.with_device, comparison.without_device
     configuration = worn.configuration
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    remarks = [_bottle(pair.life), _safety(comparison)]
+    remarks = [*person_remarks(configuration), _bottle(pair.life), _safety(comparison)]
     remarks += [
         f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
     ]
@@ -114,7 +116,11 @@ def comparison_table(comparison: Comparison) -> Table:
     healthy = dict(comparison.healthy)
     if "push_off_work" in healthy:
         healthy["push_off_share"] = Metric(1.0, "-", "")
-    columns = (comparison.with_device.metrics, comparison.without_device.metrics, healthy)
+    person = {"body_mass": Metric(comparison.with_device.configuration.wearer.body_mass, "kg", "who walks")}
+    columns = tuple(
+        person | dict(metrics)
+        for metrics in (comparison.with_device.metrics, comparison.without_device.metrics, healthy)
+    )
     rows = [
         (title_with_unit(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
         for name, title, quantity, digits in _ROWS
