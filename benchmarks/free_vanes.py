@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.report import Line, Target, has_avx512
 from benchmarks.timing import Contender, time_in_turn
 from ppafo.engine.lanes import Batch, run_batch
-from ppafo.simulation.ensemble.columns import checked_columns
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import number_at
@@ -70,7 +70,7 @@ def free_vanes(runs: int) -> dict[str, list[Batch]]:
     mixed = {path: np.exp(draw.uniform(*ends, runs)) for path in DEAD_VOLUMES}
     kinds = {"alike": (base, same), "large": (large, same), "spread": (base, spread), "mixed": (base, mixed)}
     return {
-        name: [_silent(batch) for _, batch in plan_ensemble(checked_columns(scenario, columns)).batches]
+        name: [_silent(batch) for _, batch in plan_ensemble(check_columns(scenario, columns)).batches]
         for name, (scenario, columns) in kinds.items()
     }
 

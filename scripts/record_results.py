@@ -27,8 +27,8 @@ SETS = ("ppafo2011", "ppafo2011-printed")
 
 LINES: dict[str, str] = {
     **{f"simulate-{name}": f"simulate {name} --out {{out}}" for name in SCENARIOS},
-    **{f"walk-{name}": f"walk --config {name} --minutes 0.1 --out {{out}}" for name in WALKS},
-    "wearers": "walk --config proportional --minutes 0.1 --wearers 20 --out {out}",
+    **{f"walk-{name}": f"walk {name} --minutes 0.1 --out {{out}}" for name in WALKS},
+    "wearers": "walk proportional --minutes 0.1 --wearers 20 --out {out}",
     **{f"audit-{name}": f"audit {name}" for name in SETS},
     **{f"set-{name}": f"sets {name}" for name in SETS},
     "parts": "parts",
@@ -36,14 +36,14 @@ LINES: dict[str, str] = {
     "compare": "compare torque-task-solenoid torque-task-proportional --study torque-task-uncertainty --draws 256",
     "sensitivity": "sensitivity torque-task-uncertainty --samples 256",
     "sensitivity-morris": "sensitivity torque-task-uncertainty --samples 32 --method morris",
-    "montecarlo": "montecarlo torque-task-uncertainty --metric rms_error --most 2048",
+    "montecarlo": "montecarlo torque-task-uncertainty --metric rms_error --draws 2048",
     "endurance": "endurance --gas-per-step '0.3 g'",
     "size": "size",
     "tune": "tune pid-gains",
     "league": "league --draws 8",
     "league-walk": "league --walk --minutes 0.1 --draws 8",
     "unreported": "unreported --draws 8192",
-    "sweep": "sweep torque-task-uncertainty --runs 256 --out {out}",
+    "sweep": "sweep torque-task-uncertainty --draws 256 --out {out}",
     "reproduce": "reproduce --out {out}",
 }
 

@@ -29,7 +29,7 @@ from ppafo.parameters.device import Valve
 from ppafo.parameters.loading import parse_parameter_set
 from ppafo.simulation.loading import parse_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import LedMotion
+from ppafo.simulation.scenario import PrescribedMotion
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
 
@@ -82,7 +82,7 @@ def hysteresis(install: Callable[..., ModuleType]) -> ModuleType:
 def test_the_scenario_of_the_page_loads_and_says_what_the_page_says() -> None:
     scenario = parse_scenario(blocks("write-a-scenario.md", "toml")[0].encode(), "stairs.toml")
     assert scenario.name == "stairs"
-    assert isinstance(scenario.motion, LedMotion)
+    assert isinstance(scenario.motion, PrescribedMotion)
     assert (scenario.time_step, scenario.output_interval, scenario.control.period) == (0.001, 0.002, 0.002)
     assert [item.path for item in scenario.assumptions] == ["motion.profile.level"]
 
@@ -126,7 +126,7 @@ def test_the_check_of_the_scenario_page_finds_what_the_page_shows(
     names, shown_names = ([line.split("  ")[0] for line in table] for table in tables)
     assert names == shown_names
     assert {"rms_error", "angle over time"} <= set(names)
-    cause = "a measurement moved by 1e-07 of its range, which nobody could measure"
+    cause = "a measurement moved by 1e-07 of its range, far less than anybody can measure"
     assert cause in " ".join(shown.split())
     assert cause in printed
 

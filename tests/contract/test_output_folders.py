@@ -152,7 +152,7 @@ def test_rig_adds_an_experiment_and_replaces_nothing_of_others(
     (out / "step-response.csv").write_text("mine")
     capsys.readouterr()
     assert main(["rig", "record", "step-response", "--out", str(out)]) == 2
-    assert "has a step-response.csv that is not of the rig" in capsys.readouterr().err
+    assert "has a step-response.csv that the rig did not write" in capsys.readouterr().err
     assert (out / "step-response.csv").read_text() == "mine"
 
 
@@ -165,7 +165,7 @@ def test_file_that_is_there_is_not_replaced(name: str, tmp_path: Path, capsys: p
     out.write_text("mine")
     given = [word.format(result=result) for word in words]
     assert main([*name.split(), *given, "--out", str(out)]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     assert out.read_text() == "mine"
     out.unlink()
     assert main([*name.split(), *given, "--out", str(out)]) == 0

@@ -19,7 +19,7 @@ from ppafo.parameters.device import (
     Valve,
 )
 from ppafo.simulation.loading import load_scenario as load_from_file
-from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice, Scenario, Sensors
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Sensors
 
 PSI = 6894.757293168361
 ATMOSPHERE = 101325.0
@@ -108,7 +108,7 @@ def random_scenario(seed: int) -> Scenario:
         base,
         device=device,
         duration=1.0,
-        motion=LedMotion(ProfileChoice("constant", {"level": angle})),
+        motion=PrescribedMotion(ProfileChoice("constant", {"level": angle})),
         reference=ProfileChoice(
             "ramp_hold", {"start_level": 0.0, "level": level, "ramp_start": 0.0, "ramp_time": ramp_time}
         ),

@@ -12,7 +12,7 @@ from ppafo.engine.reference.solver import solve_reference
 from ppafo.engine.run import Run, batch_of
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice, Scenario, Thermal
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Thermal
 
 LARGEST_ANGLE = 2.0e-4
 LARGEST_PRESSURE = 1.0e-3
@@ -42,7 +42,7 @@ def swung(name: str, is_relieving: bool, command: float, overrides: tuple[str, .
     scenario = load_scenario(name, (f"supply.relieving={str(is_relieving).lower()}", *overrides))
     open_loop = dataclasses.replace(scenario.control, kind="constant", settings={"command": command})
     return dataclasses.replace(
-        scenario, motion=LedMotion(ProfileChoice("sine", SWING)), control=open_loop, duration=1.0
+        scenario, motion=PrescribedMotion(ProfileChoice("sine", SWING)), control=open_loop, duration=1.0
     )
 
 
@@ -91,7 +91,7 @@ def pushed_about(scenario: Scenario, seed: int) -> Scenario:
         motion = FreeMotion(float(angle), float(chance.uniform(-8.0, 8.0)), float(chance.uniform(-25.0, 25.0)))
         return dataclasses.replace(scenario, motion=motion, initial_pressure_1=device.supply.pressure)
     swing = SWING | {"frequency": float(chance.uniform(0.5, 4.0)), "phase": float(chance.uniform(-1.0, 1.0))}
-    return dataclasses.replace(scenario, motion=LedMotion(ProfileChoice("sine", swing)))
+    return dataclasses.replace(scenario, motion=PrescribedMotion(ProfileChoice("sine", swing)))
 
 
 @pytest.mark.parametrize("first", [0, 10])

@@ -10,12 +10,12 @@ import ppafo
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.engine.run import batch_of
-from ppafo.model.sensors import Measurement, faded
+from ppafo.model.sensors import Measurement, decay_factors
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, LedMotion, ProfileChoice
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, ProfileChoice
 
 SLOW = ("sensors.angle_bandwidth=20 Hz", "sensors.pressure_bandwidth=40 Hz")
 LATE = ("sensors.delay=2.3 ms",)
@@ -46,7 +46,9 @@ class Listener:
 
 @pytest.mark.parametrize("share", [1e-3, 0.3, 1.0, 20.0, 39.0, 41.0, 1e3, 1e5, 1e8])
 def test_what_fades_in_a_step_is_the_exponential_and_its_mean_however_long_the_step(share: float) -> None:
-    assert faded(share / 0.01, 0.01) == pytest.approx((math.exp(-share), -math.expm1(-share) / share), abs=1e-12)
+    assert decay_factors(share / 0.01, 0.01) == pytest.approx(
+        (math.exp(-share), -math.expm1(-share) / share), abs=1e-12
+    )
 
 
 def test_a_slow_angle_sensor_shows_a_sine_smaller_and_later_and_the_others_show_the_truth() -> None:
@@ -57,7 +59,7 @@ def test_a_slow_angle_sensor_shows_a_sine_smaller_and_later_and_the_others_show_
     swing = ProfileChoice("sine", {"level": 1.3, "amplitude": 0.4, "frequency": frequency, "phase": 0.0})
     listener = Listener()
     listening = Control(PYTHON_CONTROLLER, {}, scenario.control.period, listener)
-    result = ppafo.simulate(dataclasses.replace(scenario, motion=LedMotion(swing), control=listening))
+    result = ppafo.simulate(dataclasses.replace(scenario, motion=PrescribedMotion(swing), control=listening))
     times = result.recording.time[: len(listener.seen)]
     ratio = frequency / bandwidth
     expected = 1.3 + 0.4 / math.hypot(1.0, ratio) * np.sin(2.0 * math.pi * frequency * times - math.atan(ratio))

@@ -11,7 +11,7 @@ from ppafo.engine.reference.agreement import chamber_pressures_of, compare_with_
 from ppafo.engine.run import batch_of
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import LedMotion, ProfileChoice, Scenario, Thermal
+from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario, Thermal
 from ppafo.simulation.simulate import simulate
 
 LARGEST_ANGLE = 2.0e-4
@@ -67,7 +67,7 @@ def compressed(step: float) -> float:
     scenario = load_scenario("torque-task-proportional", (NO_LEAK,))
     swing = ProfileChoice("sine", {"level": 1.3, "amplitude": 0.6, "frequency": 2.0, "phase": 0.0})
     shut = dataclasses.replace(scenario.control, kind="constant", settings={"command": 0.0}, period=step)
-    planned = plan_run(with_walls(dataclasses.replace(scenario, motion=LedMotion(swing), control=shut), 0.0))
+    planned = plan_run(with_walls(dataclasses.replace(scenario, motion=PrescribedMotion(swing), control=shut), 0.0))
     counts = {"steps_per_sample": 1, "step_count": round(1.0 / step), "record_every": 1}
     run = dataclasses.replace(planned, step=step, tolerance=1e9, **counts)
     states = plant_states(run, run_batch(batch_of(run)))

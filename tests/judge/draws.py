@@ -285,8 +285,8 @@ def loops_without_friction(chance: Chance) -> Document:
     return document(lines, free(chance, speed=100.0, torque=1.0), law, **rest)
 
 
-def led(chance: Chance) -> Document:
-    """A vane led along a sine, ideal valve and sensors, PID."""
+def prescribed(chance: Chance) -> Document:
+    """A vane on a prescribed sine, ideal valve and sensors, PID."""
     lines = gas(chance) + actuator(chance, (0.05, 30.0)) + supplies(chance) + leak(chance, none=0.2)
     lines += orifice(chance, "valve", logarithmic(chance, 1.0, 40.0))
     wave = {
@@ -297,7 +297,7 @@ def led(chance: Chance) -> Document:
         "phase": f"{chance.random()}",
     }
     rest = {"initial": start(chance), "reference": ramp(chance)}
-    return document(lines, {"kind": "led", "profile": wave}, sampled(chance, pid(chance)), **rest)
+    return document(lines, {"kind": "prescribed", "profile": wave}, sampled(chance, pid(chance)), **rest)
 
 
 def mixed(chance: Chance) -> Document:
@@ -314,7 +314,7 @@ def mixed(chance: Chance) -> Document:
     if chance.random() < 0.3:
         level, low = f"{chance.uniform(40.0, 110.0)} deg", f"{chance.uniform(40.0, 110.0)} deg"
         path = {"kind": "ramp_hold", "start_level": low, "level": level, "ramp_start": "0.05 s", "ramp_time": "0.1 s"}
-        motion = chance.choice([{"kind": "held", "angle": level}, {"kind": "led", "profile": path}])
+        motion = chance.choice([{"kind": "held", "angle": level}, {"kind": "prescribed", "profile": path}])
     more: Document = {"initial": start(chance, 90.0), "reference": ramp(chance)}
     if chance.random() < 0.5:
         more["sensors"] = sensors(chance)
@@ -338,7 +338,7 @@ FAMILIES: Mapping[str, Callable[[Chance], Document]] = {
     "solenoid loops": solenoid_loops,
     "dead volumes": dead_volumes,
     "loops without friction": loops_without_friction,
-    "led": led,
+    "prescribed": prescribed,
     "mixed": mixed,
 }
 

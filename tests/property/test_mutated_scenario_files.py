@@ -33,7 +33,19 @@ UNITS += [
     "m" * 300,
     "\\n",
 ]
-WORDS = ["", "supply", "atmosphere", "pid", "on_off", "free", "held", "led", "sine", "ramp_hold", "ppafo2011-printed"]
+WORDS = [
+    "",
+    "supply",
+    "atmosphere",
+    "pid",
+    "on_off",
+    "free",
+    "held",
+    "prescribed",
+    "sine",
+    "ramp_hold",
+    "ppafo2011-printed",
+]
 WORDS += [
     "solenoid",
     "nowhere.toml",

@@ -15,8 +15,18 @@ _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
 _NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 
 
-RENAMED = {"--most-failed": "--maximum-failed", "--most": "--maximum"}
+RENAMED = {
+    "--first": "--first-draws",
+    "--maximum": "--draws",
+    "--most": "--draws",
+    "--most-failed": "--maximum-failed",
+    "--runs": "--draws",
+    "--least-strides": "--minimum-strides",
+}
 """Options of version 0.1 and what they are called now."""
+
+REMOVED = {"--config": "name what is run without it, as in 'ppafo walk solenoid'"}
+"""Options of version 0.1 that are none any more, and what to write instead."""
 
 
 class UsageError(PpafoError):
@@ -32,7 +42,7 @@ class CommandParser(argparse.ArgumentParser):
         bad_value = _BAD_VALUE.fullmatch(message)
         if bad_value is not None:
             raise UsageError(f"{bad_value[1]} {bad_value[2]}")
-        raise UsageError(f"{message.removeprefix('argument ')}; '{self.prog} --help' shows what belongs here")
+        raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
         """End the process after ``--help`` or ``--version``, once their text has really been written."""
@@ -57,7 +67,7 @@ def check_command(word: str | None, known: Sequence[str], moved: Mapping[str, st
         raise UsageError(f"'{word}' is no longer a command of the package: run {moved[word]} in a checkout of ppafo")
     if word is not None and word not in known:
         hint = nearest_name(word, known)
-        raise UsageError(f"there is no command '{word}'{hint}; known are {', '.join(known)}")
+        raise UsageError(f"there is no command '{word}'{hint}; available: {', '.join(known)}")
 
 
 def check_options(words: Sequence[str], parser: CommandParser) -> None:
@@ -68,7 +78,11 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         if name in RENAMED and name not in known and RENAMED[name] in known:
             raise UsageError(f"{name} is now called {RENAMED[name]}")
         if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
-            raise UsageError(f"there is no option '{name}'{_nearest_option(name, known)}; here are {', '.join(known)}")
+            if name in REMOVED:
+                raise UsageError(f"there is no option '{name}' any more: {REMOVED[name]}")
+            raise UsageError(
+                f"there is no option '{name}'{_nearest_option(name, known)}; available: {', '.join(known)}"
+            )
 
 
 def _nearest_option(name: str, known: Sequence[str]) -> str:

@@ -62,12 +62,12 @@ def _counts(findings: "list[Finding]") -> dict[str, int]:
 
 def _table(found: "list[tuple[ParameterSet, list[Finding]]]") -> str:
     """Return a row for each finding and a column for each set, with how serious it is there."""
-    from ppafo.answers.text import aligned
+    from ppafo.answers.text import align_columns
 
     columns = [{finding.id: _verdict(finding) for finding in findings} for _, findings in found]
     names = dict.fromkeys(name for column in columns for name in column)
     head = ["finding", *(parameter_set.name for parameter_set, _ in found)]
-    return "\n".join(aligned([head, *([name, *(column.get(name, "-") for column in columns)] for name in names)]))
+    return "\n".join(align_columns([head, *([name, *(column.get(name, "-") for column in columns)] for name in names)]))
 
 
 def _verdict(finding: "Finding") -> str:
@@ -83,7 +83,8 @@ def _text(parameter_set: "ParameterSet", findings: "list[Finding]") -> str:
 def _lines(finding: "Finding") -> list[str]:
     lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
     lines += [
-        f"{_INDENT}{value.path} = {_written(value.value)} {value.unit} ({value.origin})" for value in finding.values
+        f"{_INDENT}{value.path} = {_format_value(value.value)} {value.unit} ({value.origin})"
+        for value in finding.values
     ]
     lines += textwrap.wrap(finding.paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
     if finding.accepted:
@@ -92,5 +93,5 @@ def _lines(finding: "Finding") -> list[str]:
     return lines
 
 
-def _written(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"

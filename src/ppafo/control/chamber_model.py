@@ -94,8 +94,8 @@ def torque_rates(
     return TorqueRates(closed, rising, falling)
 
 
-def opening_for_rate(rates: TorqueRates, wanted: float) -> float:
+def opening_for_rate(rates: TorqueRates, requested: float) -> float:
     """Opening from -1 to 1 that gives a torque rate [N m/s], the inverse of ``torque_rates``; clipped to full."""
-    needed = wanted - rates.closed
+    needed = requested - rates.closed
     gain = rates.rising if needed >= 0.0 else rates.falling
     return max(-1.0, min(1.0, needed / max(gain, SMALLEST_GAIN)))

@@ -17,8 +17,8 @@ class ControllerKind:
     reference, measurement, period)`` returns the command from -1 to 1 and the next state, once every ``period`` [s].
     At a command of 0 a proportional valve is closed and both chambers hold their gas; a solenoid pair vents both.
 
-    ``restart(state, wanted, goes_on)`` is the state of a torque law while a task of a gait goes on (1) and where
-    another one begins (0), at a torque wanted [N m]; without it the law begins anew there. A law that
+    ``restart(state, requested, continues)`` is the state of a torque law while a task of a gait goes on (1) and where
+    another one begins (0), at a requested torque [N m]; without it the law begins anew there. A law that
     ``only_switches`` asks for full openings or none, so that it fits a pair of solenoid valves in walking.
     """
 

@@ -7,9 +7,10 @@ import numpy as np
 
 from ppafo.answers.layout import Margins, figure_of_panels
 from ppafo.answers.style import BLACK, BLUE, GREY, ORANGE, house_style, mark_kind
-from ppafo.gait.gait import Gait
+from ppafo.gait.gait import Gait, clinical_angle
 from ppafo.gait.recorded.importing import ImportedGait
 from ppafo.gait.recorded.strides import phases
+from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +23,8 @@ _STANCE = "#f1f1f1"
 
 @dataclass(frozen=True, slots=True)
 class _CurvePanel:
+    """Title, what one SI unit is in that of the title, and where the level line lies."""
+
     title: str
     factor: float
     level: float
@@ -30,10 +33,10 @@ class _CurvePanel:
 _DEGREES = float(np.degrees(1.0))
 _PANELS: dict[str, _CurvePanel] = {
     "shank_angle": _CurvePanel("Shank angle (deg, above 0: ankle in front of the knee)", _DEGREES, 0.0),
-    "ankle_angle": _CurvePanel("Ankle angle (deg, 90 neutral, growing in plantarflexion)", _DEGREES, 90.0),
+    "ankle_angle": _CurvePanel("Ankle angle (deg, 0 neutral, dorsiflexion positive)", _DEGREES, 0.0),
     "ankle_moment": _CurvePanel("Ankle moment (N m/kg, above 0: plantarflexion)", 1.0, 0.0),
     "vertical_force": _CurvePanel("Vertical ground reaction (body weights)", 1.0, 0.0),
-    "centre_of_pressure": _CurvePanel("Centre of pressure (cm forward of the ankle)", 100.0, 0.0),
+    "centre_of_pressure": _CurvePanel("Centre of pressure (cm in front of the ankle)", 100.0, 0.0),
     "knee_forward": _CurvePanel("Acceleration of the knee forward (m/s$^2$)", 1.0, 0.0),
     "knee_up": _CurvePanel("Acceleration of the knee upwards (m/s$^2$, without gravity)", 1.0, 0.0),
 }
@@ -68,20 +71,25 @@ def _draw(axes: "Axes", gait: Gait, name: str, imported: ImportedGait | None) ->
     axes.axvspan(0.0, 100.0 * gait.stance_share, color=_STANCE, zorder=0, linewidth=0.0)
     axes.axhline(shown.level, color=GREY, linewidth=0.8)
     axes.axvline(100.0 * gait.stance_share, color=ORANGE, linewidth=1.0)
-    series = shown.factor * curve.sampled(phases())
+    series = _shown_values(name, curve.values_at(phases()))
     if imported is None:
         mean, band = series, np.full(series.size, shown.factor * curve.deviation)
         label = "standard deviation, mean over the stride"
     else:
         found = imported.curves[name]
-        mean, band = shown.factor * found.mean, shown.factor * found.deviation
+        mean, band = _shown_values(name, found.mean), shown.factor * found.deviation
         label = "standard deviation"
-        axes.plot(percent, shown.factor * found.curves.T, color=GREY, linewidth=0.6, alpha=0.5)
+        axes.plot(percent, _shown_values(name, found.curves).T, color=GREY, linewidth=0.6, alpha=0.5)
     axes.fill_between(percent, mean - band, mean + band, color=BLUE, alpha=0.2, linewidth=0.0, label=label)
     axes.plot(percent, mean, color=BLUE, label="mean of the strides" if imported is not None else "series")
     if imported is not None:
         axes.plot(percent, series, color=BLACK, linewidth=1.0, linestyle=(0, (4, 2)), label="series")
     axes.set_title(shown.title)
+
+
+def _shown_values(name: str, values: Floats) -> Floats:
+    """Return values of a curve in the unit and the sign of its panel."""
+    return _PANELS[name].factor * (clinical_angle(values) if name == "ankle_angle" else values)
 
 
 def _name_events(axes: "Axes", gait: Gait) -> None:

@@ -22,14 +22,17 @@ HARMONICS: dict[str, int] = {
 
 @dataclass(frozen=True, slots=True)
 class FitError:
-    """What the series leaves: root mean square and largest distance, in the unit of the curve."""
+    """Error of the series: root mean square and largest, in the unit of the curve."""
 
     root_mean_square: float
     largest: float
 
 
 def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[Curve, FitError]:
-    """Return the series through values at even phases from 0 to 1, both ends counted, and what it leaves."""
+    """Return the series through values at even phases from 0 to 1, both ends counted, and its errors.
+
+    All in the unit of ``values`` [SI]. DataError where there are too few values.
+    """
     if values.size < 2 * harmonics + 2:
         raise DataError(f"{values.size} samples are too few for {harmonics} harmonics")
     turns = 2.0 * np.pi * np.linspace(0.0, 1.0, values.size)

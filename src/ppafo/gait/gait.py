@@ -10,6 +10,7 @@
 With a flat foot theta is 90 deg plus phi. The phase counts strides from one heel strike of the foot to its next.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -37,6 +38,11 @@ REQUIRED = ("shank_angle", "ankle_angle")
 
 KNEE = ("knee_forward", "knee_up")
 """Curves that are accelerations: they go with the square of the cadence."""
+
+
+def clinical_angle(angle: "Floats") -> "Floats":
+    """Return an ankle angle theta [rad] as people read it [rad]: 0 at neutral, dorsiflexion positive."""
+    return 0.5 * math.pi - angle
 
 
 def plain_unit(unit: str) -> str:
@@ -67,7 +73,7 @@ class Curve:
 
     def value(self, phase: float) -> float:
         """Return the value at a phase [strides]."""
-        return float(self.sampled(phase))
+        return float(self.values_at(phase))
 
     def rate(self, phase: float, stride_time: float) -> float:
         """Return the first derivative by time at a phase [strides], for a stride of this time [s]."""
@@ -85,14 +91,14 @@ class Curve:
         cosines, sines = angular * np.array(self.sines), -angular * np.array(self.cosines)
         return Curve(0.0, tuple(cosines.tolist()), tuple(sines.tolist()))
 
-    def scaled(self, factor: float) -> "Curve":
-        """Return the curve times a factor, the deviation between strides with it."""
+    def scale(self, factor: float) -> "Curve":
+        """Return the curve times a factor [-], with its deviation between strides."""
         cosines, sines = (tuple(factor * value for value in values) for values in (self.cosines, self.sines))
         return replace(
             self, mean=factor * self.mean, cosines=cosines, sines=sines, deviation=abs(factor) * self.deviation
         )
 
-    def sampled(self, phases: "ArrayLike") -> "Floats":
+    def values_at(self, phases: "ArrayLike") -> "Floats":
         """Return the values at many phases [strides]."""
         import numpy as np
 
@@ -103,11 +109,12 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """One stride of one wearer, as curves over the phase; those that nobody recorded are None.
+    """One stride of one wearer, as curves over the phase; those that were not recorded are None.
 
-    ``body_mass`` [kg], ``stride_time`` [s], ``stance_share`` (share of the stride until toe-off), ``walking_speed``
-    [m/s], None where nobody recorded it. The two deviations are between strides, 0 where not known. ``recorded_speed``
-    is the speed at which the curves were recorded, where it is another than ``walking_speed``.
+    ``body_mass`` [kg], ``stature`` [m] of the subject, None where not known, ``stride_time`` [s], ``stance_share``
+    (share of the stride until toe-off), ``walking_speed`` [m/s], None where nobody recorded it. The two deviations are
+    between strides, 0 where not known. ``recorded_speed`` is the speed at which the curves were recorded, where it is
+    another than ``walking_speed``.
     """
 
     name: str
@@ -130,6 +137,7 @@ class Gait:
     strides: int = 0
     recorded_speed: float | None = None
     notes: str = ""
+    stature: float | None = None
 
     def __post_init__(self) -> None:
         if not (self.body_mass > 0.0 and self.stride_time > 0.0 and 0.0 < self.stance_share < 1.0):

@@ -21,7 +21,10 @@ def list_gaits() -> tuple[str, ...]:
 
 
 def load_gait(name_or_path: str | Path = NORMATIVE) -> Gait:
-    """Return a gait by its name in the package or by the path of a gait file (TOML), in SI units."""
+    """Return a gait by its name in the package or by the path of a gait file (TOML), in SI units.
+
+    DataError where it cannot be used.
+    """
     return parse_gait(_FILE.read(name_or_path), str(name_or_path))
 
 

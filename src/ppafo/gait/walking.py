@@ -1,4 +1,4 @@
-"""A gait walked over and over: the recording of a wearer who takes every stride alike."""
+"""A gait repeated: the recording of a wearer whose strides are all equal."""
 
 import numpy as np
 
@@ -11,14 +11,17 @@ _MAXIMUM_STRIDES = 100_000
 
 
 def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:
-    """Return so many equal strides at about ``rate`` samples a second, marked synthetic; SI units, package signs."""
+    """Return a number of equal strides, sampled at about ``rate`` [Hz], marked synthetic; SI units, package signs.
+
+    DataError for a number that is not plausible.
+    """
     if not 1 <= strides <= _MAXIMUM_STRIDES:
-        raise DataError(f"{strides} strides cannot be recorded; choose 1 to {_MAXIMUM_STRIDES}")
+        raise DataError(f"the number of strides must be from 1 to {_MAXIMUM_STRIDES}, not {strides}")
     per_stride = max(10, round(rate * gait.stride_time))
     phase = np.arange(strides * per_stride + 1) / per_stride
     one = np.arange(per_stride) / per_stride
     channels = {
-        name: Channel(np.append(np.tile(curve.sampled(one), strides), curve.value(0.0)), CURVES[name])
+        name: Channel(np.append(np.tile(curve.values_at(one), strides), curve.value(0.0)), CURVES[name])
         for name, curve in gait.curves.items()
     }
     return Recording(f"{gait.name}, {strides} equal strides", phase * gait.stride_time, channels, "synthetic")

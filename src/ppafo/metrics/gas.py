@@ -25,7 +25,7 @@ def gas_vented(recording: Recording) -> float:
 
 
 def gas_leaked(recording: Recording) -> float:
-    """Gas leaked past the vane [kg], either way."""
+    """Gas leaked past the vane [kg], in either direction."""
     return _gain(recording, "leaked_mass")
 
 
@@ -207,7 +207,7 @@ METRICS = (
     MetricKind(
         "gas_leaked",
         "kg",
-        "gas leaked past the vane, either way",
+        "gas leaked past the vane, in either direction",
         ("leaked_mass",),
         gas_leaked,
         lambda readings: readings.gains["leaked_mass"],

@@ -1,4 +1,4 @@
-"""What a metric declares of itself, and what it gives."""
+"""What a metric declares, and what it gives."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

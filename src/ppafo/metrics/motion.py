@@ -8,8 +8,8 @@ from ppafo.metrics.metric import Floats, MetricKind, Readings
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 
-TRAVEL_SHARE = 0.01
-"""A move has begun when this share of its travel is done, and has arrived when this share is left."""
+TRAVEL_FRACTION = 0.01
+"""A move has begun when this fraction of its travel is done, and has arrived when this fraction is left."""
 
 _STANDSTILL = 1.0e-6
 
@@ -24,24 +24,24 @@ def largest_speed(recording: Recording) -> float:
     return float(np.max(np.abs(recording["angular_velocity"])))
 
 
-def _time_of_share(recording: Recording, share: float) -> float | None:
-    """Return the time [s] at which a share of the way from the first to the last angle is first done, by a line."""
+def _time_of_fraction(recording: Recording, fraction: float) -> float | None:
+    """Return the time [s] at which a fraction of the way from the first to the last angle is first done, by a line."""
     travelled = recording["angle"] - recording["angle"][0]
     if abs(travelled[-1]) < _STANDSTILL:
         return None
     done = travelled / travelled[-1]
-    after = int(np.flatnonzero(done >= share)[0])
-    return float(np.interp(share, done[after - 1 : after + 1], recording.time[after - 1 : after + 1]))
+    after = int(np.flatnonzero(done >= fraction)[0])
+    return float(np.interp(fraction, done[after - 1 : after + 1], recording.time[after - 1 : after + 1]))
 
 
 def departure_time(recording: Recording) -> float | None:
     """Time [s] at which 1 % of the way from the first to the last angle is done; None without a move."""
-    return _time_of_share(recording, TRAVEL_SHARE)
+    return _time_of_fraction(recording, TRAVEL_FRACTION)
 
 
 def arrival_time(recording: Recording) -> float | None:
     """Time [s] at which 99 % of the way from the first to the last angle is done; None without a move."""
-    return _time_of_share(recording, 1.0 - TRAVEL_SHARE)
+    return _time_of_fraction(recording, 1.0 - TRAVEL_FRACTION)
 
 
 class AngleRange(NamedTuple):
@@ -95,26 +95,26 @@ def read_largest_speed(readings: Readings) -> Floats:
     return speed
 
 
-def _read_time_of_share(readings: Readings, share: float) -> Floats:
-    """As ``_time_of_share``, of traces (samples, runs): the last angle must be known before the first can be judged."""
+def _read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
+    """As ``_time_of_fraction``, of traces (samples, runs): the first angle is judged by the last."""
     travelled = readings.traces["angle"] - readings.traces["angle"][0]
     moves = np.abs(travelled[-1]) >= _STANDSTILL
     done = travelled / np.where(moves, travelled[-1], np.nan)
-    after = np.argmax(done >= share, axis=0)
+    after = np.argmax(done >= fraction, axis=0)
     runs = np.arange(after.size)
     before, reached = done[after - 1, runs], done[after, runs]
-    part = (share - before) / (reached - before)
+    part = (fraction - before) / (reached - before)
     return np.asarray((after - 1 + part) * readings.interval)
 
 
 def read_departure_time(readings: Readings) -> Floats:
     """``departure_time`` [s]."""
-    return _read_time_of_share(readings, TRAVEL_SHARE)
+    return _read_time_of_fraction(readings, TRAVEL_FRACTION)
 
 
 def read_arrival_time(readings: Readings) -> Floats:
     """``arrival_time`` [s]."""
-    return _read_time_of_share(readings, 1.0 - TRAVEL_SHARE)
+    return _read_time_of_fraction(readings, 1.0 - TRAVEL_FRACTION)
 
 
 METRICS = (
@@ -130,7 +130,7 @@ METRICS = (
     MetricKind(
         "largest_speed",
         "rad/s",
-        "largest angular velocity, either way",
+        "largest absolute angular velocity",
         ("angular_velocity",),
         largest_speed,
         read_largest_speed,

@@ -31,7 +31,10 @@ def hold(recording: Recording) -> Recording | None:
 
 
 def spans(readings: Readings) -> tuple[Floats, Floats]:
-    """Samples before the hold and intervals on it, of runs that were metered; nan where there is no such part."""
+    """Number of samples before the hold and of intervals on it, of metered runs; nan where there is no such part.
+
+    ValueError where no meter follows the reference.
+    """
     if readings.course is None:
         raise ValueError("no meter that needs the reference was asked for")
     start = np.asarray(readings.course.hold_start)

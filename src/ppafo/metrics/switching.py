@@ -1,4 +1,4 @@
-"""How restless a task is: switchings of the valve and oscillations of the torque."""
+"""How restless a task is: sign changes of the command and oscillations of the torque."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample, starts_hold
 
 OSCILLATION_THRESHOLD = 0.05
-"""Smallest swing that counts as an oscillation, as a share of the largest absolute reference."""
+"""Smallest swing that counts as an oscillation, as a fraction of the largest absolute reference."""
 
 _NEEDED = ("torque", "reference")
 
@@ -23,7 +23,7 @@ def switchings(recording: Recording) -> float:
 
 
 def reversals(values: Floats, swing: float) -> int:
-    """Return how often a signal turns back by more than ``swing`` from its last extreme.
+    """Return the number of times that a signal turns back by more than ``swing`` (its own unit) from its last extreme.
 
     Smaller wiggles, noise among them, count for nothing, however many they are. A signal that only rises or only
     falls has none.
@@ -97,8 +97,8 @@ class Swing(NamedTuple):
 UNDECIDED = -0.5
 
 
-def swung(state: Swing, value: float, swing: float) -> Swing:
-    """The state after one value more."""
+def next_swing(state: Swing, value: float, swing: float) -> Swing:
+    """The state after one more value, in the unit of ``swing`` [N m]."""
     play = min(max(state.play, value - swing), value)
     turns_back = (play - state.play) * state.turns < 0.0
     turned = -state.turns + (1.0 if state.turns < 0.0 else -1.0)
@@ -127,7 +127,7 @@ def start_oscillations(course: Course, sample: Sample) -> Oscillations:
 def update_oscillations(state: Oscillations, course: Course, sample: Sample) -> Oscillations:
     """One sample more; the first one of the hold is the last one of the ramp too."""
     torque = sample.torque
-    swing = swung(state.swing, torque, OSCILLATION_THRESHOLD * course.largest)
+    swing = next_swing(state.swing, torque, OSCILLATION_THRESHOLD * course.largest)
     anew = starts_hold(course, sample)
     begun = Swing(torque if anew else swing.play, UNDECIDED if anew else swing.turns, torque if anew else swing.highest)
     return Oscillations(begun, swing.turns if anew else state.turns_on_ramp)
@@ -137,18 +137,18 @@ OSCILLATIONS = MeterKind("oscillations", Oscillations, start_oscillations, updat
 
 
 def read_switchings(readings: Readings) -> Floats:
-    """``switchings``."""
+    """``switchings``, the number of sign changes of the command."""
     changes: Floats = readings.meters[SWITCHINGS.name].changes
     return changes
 
 
 def read_oscillations_ramp(readings: Readings) -> Floats:
-    """``oscillations_ramp``."""
+    """``oscillations_ramp``, the number of torque reversals."""
     return _where_swinging(readings, spans(readings)[0], count_of(readings.meters[OSCILLATIONS.name].turns_on_ramp))
 
 
 def read_oscillations_hold(readings: Readings) -> Floats:
-    """``oscillations_hold``."""
+    """``oscillations_hold``, the number of torque reversals."""
     return _where_swinging(readings, spans(readings)[1], count_of(readings.meters[OSCILLATIONS.name].swing.turns))
 
 

@@ -149,12 +149,12 @@ METRICS = (
         "rms_error_hold", "N m", f"{_RMS} on the hold", _NEEDED, rms_error_hold, read_rms_error_hold, (SQUARED_ERROR,)
     ),
     MetricKind(
-        "peak_error", "N m", "largest torque error, either sign", _NEEDED, peak_error, read_peak_error, (PEAK_ERROR,)
+        "peak_error", "N m", "largest absolute torque error", _NEEDED, peak_error, read_peak_error, (PEAK_ERROR,)
     ),
     MetricKind(
         "final_error",
         "N m",
-        "torque error at the end, without its sign",
+        "absolute torque error at the end",
         _NEEDED,
         final_error,
         read_final_error,

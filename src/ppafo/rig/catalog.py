@@ -23,7 +23,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         Experiment("free-decay", "angle after an impulse, chambers open to the room", dynamic.record_free_decay),
         Experiment("open-valve-flow", "flow of the open valve at many pressures", flow.record_open_valve),
         Experiment("vane-leak", "pressures of plugged chambers as gas leaks across the vane", dynamic.record_vane_leak),
-        Experiment("vane-leak-steady", "flow that keeps up the pressure in chamber 1", flow.record_steady_leak),
+        Experiment("vane-leak-steady", "flow that maintains the pressure in chamber 1", flow.record_steady_leak),
         Experiment("valve-map", "flow of the valve over its command, up and down", flow.record_valve_map),
         Experiment(
             "step-response", "figure 7: valve opened fully, vane from stop to stop", dynamic.record_step_response

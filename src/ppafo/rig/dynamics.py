@@ -19,10 +19,10 @@ from ppafo.model.thermal import (
     temperature_flow_factor,
 )
 from ppafo.model.vane import vane_acceleration
-from ppafo.rig.rows import Exchange, Look, Node, RigPhysics, RigState, Side
+from ppafo.rig.rows import Exchange, Node, Observables, RigPhysics, RigState, Side
 
 BREAKAWAY_DROP = 0.1
-"""Share of the fall from static to dynamic friction that happens as soon as the vane moves, so that it does move."""
+"""Fraction of the fall from static to dynamic friction that happens as soon as the vane moves, so that it does move."""
 
 
 def gas_node(rig: RigPhysics, mass: float, energy: float, volume: float) -> Node:
@@ -40,21 +40,23 @@ def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> Node:
     return Node(pressure, temperature, enthalpy)
 
 
-def passed(rig: RigPhysics, a: Node, b: Node, share: float, orifice: ExactOrifice, takes_back: float) -> Exchange:
-    """What passes a share of an orifice, positive from a to b, with the upstream gas's temperature. Eqs (6) to (8).
+def orifice_exchange(
+    rig: RigPhysics, a: Node, b: Node, fraction: float, orifice: ExactOrifice, takes_back: float
+) -> Exchange:
+    """Mass [kg/s] and enthalpy [W] through a fraction of an orifice, positive from a to b. Equations (6) to (8).
 
-    ``takes_back`` is 1 where gas may flow back into a, else 0.
+    The gas has the temperature upstream. ``takes_back`` is 1 where gas may flow back into a, else 0.
     """
-    flow = admitted_flow(exact_flow(a.pressure, b.pressure, share, orifice), takes_back)
+    flow = admitted_flow(exact_flow(a.pressure, b.pressure, fraction, orifice), takes_back)
     upstream_temperature = a.temperature if flow >= 0.0 else b.temperature
     enthalpy = a.enthalpy if flow >= 0.0 else b.enthalpy
     flow = flow * temperature_flow_factor(rig.reference_temperature, upstream_temperature)
     return Exchange(flow, flow * enthalpy)
 
 
-def leaked(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> Exchange:
-    """What leaks across the vane, positive from a to b: an orifice, and a laminar gap if there is one."""
-    through_orifice = passed(rig, a, b, 1.0, orifice, 1.0)
+def leak_exchange(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> Exchange:
+    """Leak across the vane [kg/s], [W], positive from a to b: an orifice, and a laminar gap if there is one."""
+    through_orifice = orifice_exchange(rig, a, b, 1.0, orifice, 1.0)
     laminar = rig.laminar_conductance * (a.pressure * a.pressure - b.pressure * b.pressure)
     enthalpy = a.enthalpy if laminar >= 0.0 else b.enthalpy
     return Exchange(through_orifice.mass + laminar, through_orifice.energy + laminar * enthalpy)
@@ -84,7 +86,7 @@ def kinetic_friction(
 
 
 def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> tuple[Node, Node]:
-    """Gas in both chambers; the air of the room where the chambers are open."""
+    """Gas in both chambers [Pa], [K], [J/kg] at an angle [rad]; the air of the room where the chambers are open."""
     if rig.chambers_open > 0.5:
         room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
         return room, room
@@ -94,20 +96,25 @@ def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angl
     return node_1, node_2
 
 
-def look(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> Look:
-    """What there is to see at an angle [rad]."""
+def observables(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> Observables:
+    """What a bench could observe at an angle [rad]."""
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure)
-    return Look(node_1, node_2, torque, static_limit(plant, rig, node_1.pressure, node_2.pressure))
+    return Observables(
+        node_1=node_1,
+        node_2=node_2,
+        torque=torque,
+        static_limit=static_limit(plant, rig, node_1.pressure, node_2.pressure),
+    )
 
 
-def followed(seen: float, true: float, rate: float) -> float:
-    """Slope of what a first-order sensor shows, in its unit per second; 0 for a sensor that is not slow."""
-    return rate * (true - seen)
+def sensor_rate(reading: float, true: float, rate: float) -> float:
+    """Rate at which a first-order sensor's reading changes, its unit per second [1/s]; 0 for an instant one."""
+    return rate * (true - reading)
 
 
-def drooped(rig: RigPhysics, drop: float, flow: float) -> float:
-    """Slope [Pa/s] of the fall of a regulated pressure under a mass flow [kg/s]."""
+def droop_rate(rig: RigPhysics, drop: float, flow: float) -> float:
+    """Rate [Pa/s] at which the fall of a regulated pressure grows under a mass flow [kg/s]."""
     return rig.supply_rate * (rig.supply_droop * flow - drop)
 
 
@@ -117,23 +124,42 @@ def side(
     port: Node,
     source: Node,
     room: Node,
-    source_share: float,
-    vent_share: float,
+    source_fraction: float,
+    vent_fraction: float,
     valve_orifice: ExactOrifice,
     line_orifice: ExactOrifice,
     takes_back: float,
 ) -> Side:
-    """All that happens between the valve and one chamber; without a line the port is the chamber itself."""
-    supplied = passed(rig, source, port, rig.ports_open * source_share, valve_orifice, takes_back)
-    vented = passed(rig, port, room, rig.ports_open * vent_share, valve_orifice, 1.0)
+    """Flows [kg/s], [W] between the valve and one chamber; without a line the port is the chamber itself.
+
+    ``source_fraction`` and ``vent_fraction`` are the openings of the valve [-].
+    """
+    supplied = orifice_exchange(rig, source, port, rig.ports_open * source_fraction, valve_orifice, takes_back)
+    vented = orifice_exchange(rig, port, room, rig.ports_open * vent_fraction, valve_orifice, 1.0)
     mass, energy = supplied.mass - vented.mass, supplied.energy - vented.energy
     if rig.line_volume <= 0.0:
-        return Side(supplied.mass, vented.mass, energy, mass, energy, 0.0, 0.0, 0.0)
-    through = passed(rig, port, node, 1.0, line_orifice, 1.0)
+        return Side(
+            supplied_mass=supplied.mass,
+            vented_mass=vented.mass,
+            enthalpy_in=energy,
+            into_mass=mass,
+            into_energy=energy,
+            line_mass=0.0,
+            line_energy=0.0,
+            line_heat=0.0,
+        )
+    through = orifice_exchange(rig, port, node, 1.0, line_orifice, 1.0)
     heat = wall_heat(rig, port, rig.line_volume)
     line_energy = energy_rate(energy - through.energy, port.pressure, 0.0, heat)
     return Side(
-        supplied.mass, vented.mass, energy, through.mass, through.energy, mass - through.mass, line_energy, heat
+        supplied_mass=supplied.mass,
+        vented_mass=vented.mass,
+        enthalpy_in=energy,
+        into_mass=through.mass,
+        into_energy=through.energy,
+        line_mass=mass - through.mass,
+        line_energy=line_energy,
+        line_heat=heat,
     )
 
 
@@ -169,14 +195,17 @@ def sides(
 
 
 def sliding_acceleration(
-    plant: PlantParameters, rig: RigPhysics, state: RigState, node_1: Node, node_2: Node, angle: float, way: float
+    plant: PlantParameters, rig: RigPhysics, state: RigState, node_1: Node, node_2: Node, angle: float, direction: float
 ) -> float:
-    """Angular acceleration [rad/s^2] of a vane that slides towards ``way``, 0 of one that does not. Equation (1)."""
-    if way == 0.0:
+    """Angular acceleration [rad/s^2] of a vane that slides towards ``direction`` (1 or -1). Equation (1).
+
+    0 for one that does not slide.
+    """
+    if direction == 0.0:
         return 0.0
     speed = state.angular_velocity
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure)
-    friction = way * kinetic_friction(plant, rig, speed, node_1.pressure, node_2.pressure)
+    friction = direction * kinetic_friction(plant, rig, speed, node_1.pressure, node_2.pressure)
     return vane_acceleration(torque, speed, friction, plant.viscous_damping, plant.inertia)
 
 
@@ -190,37 +219,37 @@ def rig_rates(
     state: RigState,
     angle: float,
     rate: float,
-    way: float,
+    direction: float,
 ) -> RigState:
-    """Slopes of all unknowns; the vane slides towards ``way`` (0: it is held, or led at ``rate`` [rad/s])."""
+    """Time derivatives of all unknowns [SI]; the vane slides towards ``direction`` (0: it is held or prescribed)."""
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     volume_1, volume_2 = chamber_volumes(plant, angle)
     side_1, side_2 = sides(plant, rig, valve_orifice, line_orifice, openings, state, node_1, node_2)
-    leak = leaked(rig, node_1, node_2, leak_orifice)
-    sliding = state.angular_velocity if way != 0.0 else 0.0
-    grows = plant.volume_per_angle * (sliding if way != 0.0 else rate)
+    leak = leak_exchange(rig, node_1, node_2, leak_orifice)
+    sliding = state.angular_velocity if direction != 0.0 else 0.0
+    grows = plant.volume_per_angle * (sliding if direction != 0.0 else rate)
     heat_1, heat_2 = wall_heat(rig, node_1, volume_1), wall_heat(rig, node_2, volume_2)
     gas = 1.0 - rig.chambers_open
     return RigState(
-        sliding,
-        sliding_acceleration(plant, rig, state, node_1, node_2, angle, way),
-        gas * (side_1.into_mass - leak.mass),
-        gas * energy_rate(side_1.into_energy - leak.energy, node_1.pressure, grows, heat_1),
-        gas * (side_2.into_mass + leak.mass),
-        gas * energy_rate(side_2.into_energy + leak.energy, node_2.pressure, -grows, heat_2),
-        gas * side_1.line_mass,
-        gas * side_1.line_energy,
-        gas * side_2.line_mass,
-        gas * side_2.line_energy,
-        gas * (side_1.supplied_mass + side_2.supplied_mass),
-        gas * (side_1.vented_mass + side_2.vented_mass),
-        gas * leak.mass,
-        drooped(rig, state.supply_drop_1, side_1.supplied_mass),
-        drooped(rig, state.supply_drop_2, side_2.supplied_mass),
-        gas * (side_1.enthalpy_in + side_2.enthalpy_in),
-        gas * grows * (node_1.pressure - node_2.pressure),
-        gas * (heat_1 + heat_2 + side_1.line_heat + side_2.line_heat),
-        followed(state.seen_angle, angle, rig.angle_follow_rate),
-        followed(state.seen_pressure_1, node_1.pressure, rig.pressure_follow_rate),
-        followed(state.seen_pressure_2, node_2.pressure, rig.pressure_follow_rate),
+        angle=sliding,
+        angular_velocity=sliding_acceleration(plant, rig, state, node_1, node_2, angle, direction),
+        mass_1=gas * (side_1.into_mass - leak.mass),
+        energy_1=gas * energy_rate(side_1.into_energy - leak.energy, node_1.pressure, grows, heat_1),
+        mass_2=gas * (side_2.into_mass + leak.mass),
+        energy_2=gas * energy_rate(side_2.into_energy + leak.energy, node_2.pressure, -grows, heat_2),
+        line_mass_1=gas * side_1.line_mass,
+        line_energy_1=gas * side_1.line_energy,
+        line_mass_2=gas * side_2.line_mass,
+        line_energy_2=gas * side_2.line_energy,
+        supplied_mass=gas * (side_1.supplied_mass + side_2.supplied_mass),
+        vented_mass=gas * (side_1.vented_mass + side_2.vented_mass),
+        leaked_mass=gas * leak.mass,
+        supply_drop_1=droop_rate(rig, state.supply_drop_1, side_1.supplied_mass),
+        supply_drop_2=droop_rate(rig, state.supply_drop_2, side_2.supplied_mass),
+        enthalpy_in=gas * (side_1.enthalpy_in + side_2.enthalpy_in),
+        work_done=gas * grows * (node_1.pressure - node_2.pressure),
+        heat_in=gas * (heat_1 + heat_2 + side_1.line_heat + side_2.line_heat),
+        sensor_angle=sensor_rate(state.sensor_angle, angle, rig.angle_follow_rate),
+        sensor_pressure_1=sensor_rate(state.sensor_pressure_1, node_1.pressure, rig.pressure_follow_rate),
+        sensor_pressure_2=sensor_rate(state.sensor_pressure_2, node_2.pressure, rig.pressure_follow_rate),
     )

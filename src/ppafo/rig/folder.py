@@ -20,13 +20,16 @@ def csv_name(experiment: str) -> str:
 
 
 def check_rig_folder(folder: Path, experiment: str) -> None:
-    """Refuse, before anything runs, a folder that cannot be written or whose ``rig.json`` is not the rig's."""
+    """Raise DataError, before anything runs, for a folder that cannot be written or belongs to something else."""
     _check_own(folder, csv_name(experiment))
     check_files_can_be_added(folder, [csv_name(experiment), RIG_FILE])
 
 
 def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
-    """Write recording and truth into a folder beside those of other experiments; returns the file names."""
+    """Write recording and truth into a folder beside those of other experiments; returns the file names.
+
+    DataError for a folder that belongs to something else.
+    """
     name = csv_name(made.truth["experiment"])
     _check_own(folder, name)
     recordings = {**_earlier(folder), name: dict(made.truth)}
@@ -51,7 +54,7 @@ def _check_own(folder: Path, name: str) -> None:
     if present and RIG_FILE not in present:
         raise DataError(f"{folder}: is not empty and has no recordings of the rig ({RIG_FILE}); choose another folder")
     if name in present and name not in earlier:
-        raise DataError(f"{folder}: has a {name} that is not of the rig; move it or choose another folder")
+        raise DataError(f"{folder}: has a {name} that the rig did not write; move it or choose another folder")
 
 
 def _earlier(folder: Path) -> dict[str, Any]:

@@ -30,7 +30,10 @@ def real_device(device: Device, preset: Preset) -> Device:
 
 
 def rig_plant(plant: PlantParameters, preset: Preset) -> PlantParameters:
-    """Return the plant with the lines taken out of the dead volumes, of which they are a part."""
+    """Return the plant with the lines taken out of the dead volumes, of which they are a part.
+
+    ParameterError where a line is larger than a dead volume.
+    """
     line = preset.values["line.volume"]
     smallest = min(plant.dead_volume_1, plant.dead_volume_2)
     if line >= smallest:
@@ -48,7 +51,10 @@ def _scale(orifice: Orifice | SonicOrifice, factor: float) -> Orifice | SonicOri
 
 
 def rig_physics(device: Device, preset: Preset) -> RigPhysics:
-    """Return the numbers that the rig has beyond the plant, in SI; 0 where something is off."""
+    """Return the numbers that the rig has beyond the plant, in SI; 0 where something is off.
+
+    ParameterError for a droop without a time.
+    """
     gas, values = device.gas, preset.values
     constant = gas.specific_gas_constant
     return RigPhysics(
@@ -82,7 +88,7 @@ def _supply_rate(preset: Preset) -> float:
 
 
 def line_orifice(device: Device, preset: Preset) -> ExactOrifice:
-    """Return the orifice between line and chamber."""
+    """Return the orifice between line and chamber. ParameterError for a line without an orifice."""
     gas, line = device.gas, preset.section("line")
     if line["volume"] > 0.0 and line["area"] * line["discharge_coefficient"] <= 0.0:
         raise ParameterError(
@@ -95,4 +101,6 @@ def line_orifice(device: Device, preset: Preset) -> ExactOrifice:
         gas.specific_gas_constant,
         gas.temperature,
     )
-    return ExactOrifice(conductance, 0.0, gas.heat_capacity_ratio, device.flow.linear_ratio)
+    return ExactOrifice(
+        conductance=conductance, is_iso6358=0.0, number=gas.heat_capacity_ratio, linear_ratio=device.flow.linear_ratio
+    )

@@ -5,14 +5,50 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from ppafo.documents.problems import shown
+from pydantic import BaseModel, Field
+
+from ppafo.documents.models import STRICT, make_schema, table
+from ppafo.documents.problems import quote
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
+from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import is_within
 from ppafo.rig.declaration import PATHS, SECTIONS
 from ppafo.units import parse_quantity, to_si
+
+
+class PresetValue(BaseModel):
+    """A value of the rig, with its reason."""
+
+    model_config = STRICT
+
+    value: float = Field(description="the number, in the unit beside it")
+    unit: str = Field(description="unit of the number, such as 'mm^2'; empty for a plain number")
+    reason: str = Field(min_length=1, description="reason for the number: a source, or why it was chosen")
+
+
+def _description(quantity: Quantity) -> str:
+    return f"{quantity.summary} [{quantity.unit or '-'}]"
+
+
+def _section(name: str, quantities: tuple[Quantity, ...]) -> type[BaseModel]:
+    title = "".join(part.capitalize() for part in name.split("_"))
+    return table(title, {item.name: (PresetValue, Field(description=_description(item))) for item in quantities})
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a preset; every value is needed."""
+    fields: dict[str, Any] = {
+        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "name": (str, Field(description="name of the preset")),
+        "title": (str, Field(description="which test bench it represents, in one line")),
+        "notes": (str, Field(description="what is on, what is off, and where the values come from")),
+    }
+    fields |= {name: (_section(name, members), Field()) for name, members in SECTIONS.items()}
+    return make_schema(table("RigPreset", fields), "ppafo rig preset")
+
 
 PREFIX = "rig."
 """An override whose path begins so belongs to the preset, any other one to the device or the experiment."""
@@ -24,7 +60,7 @@ _HEAD = ("schema_version", "name", "title", "notes")
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """A preset: values in SI by dotted path, and why each is what it is."""
+    """A preset: values in SI by dotted path, and the reason for each."""
 
     name: str
     title: str
@@ -36,8 +72,8 @@ class Preset:
         """Return the values of one section by name, in SI."""
         return {item.name: self.values[f"{name}.{item.name}"] for item in SECTIONS[name]}
 
-    def changed(self, path: str, value: float, reason: str) -> "Preset":
-        """Return the preset with one value [SI] replaced."""
+    def with_value(self, path: str, value: float, reason: str) -> "Preset":
+        """Return the preset with one value [SI] replaced. ParameterError where it is unknown or out of range."""
         quantity = PATHS.get(path)
         if quantity is None:
             raise ParameterError(f"preset '{self.name}' has no value '{path}'{nearest_name(path, PATHS)}")
@@ -55,7 +91,8 @@ def list_presets() -> tuple[str, ...]:
 def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Preset:
     """Return a preset by its name in the package or by the path of a TOML file.
 
-    ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``.
+    ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``. ParameterError for anything that cannot be
+    used.
     """
     file = label(str(name_or_path))
     preset = _parse(_FILE.parse(_FILE.read(name_or_path), file), file)
@@ -76,16 +113,16 @@ def _override(preset: Preset, path: str, text: str) -> Preset:
         value = parse_quantity(text, PATHS[path].unit)
     except UnitError as error:
         raise ParameterError(f"override '{PREFIX}{path}={text}': {error}") from error
-    return preset.changed(path, value, "override")
+    return preset.with_value(path, value, "override")
 
 
 def _parse(document: dict[str, Any], file: str) -> Preset:
     """Check keys, units and ranges of a document; every value must be there."""
     if not document:
-        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints what belongs in it")
+        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints its format")
     _check_names(document, (*_HEAD, *SECTIONS), "", file)
     if document.get("schema_version") != 1:
-        raise ParameterError(f"{file}: schema_version must be 1, it is {shown(document.get('schema_version'))}")
+        raise ParameterError(f"{file}: schema_version must be 1, it is {quote(document.get('schema_version'))}")
     for key in _HEAD[1:]:
         if not isinstance(document.get(key), str):
             raise ParameterError(f"{file}: '{key}' must be a text in quotation marks")
@@ -102,7 +139,7 @@ def _with_entry(preset: Preset, path: str, entry: dict[str, Any], file: str) -> 
     _check_names(entry, _ENTRY, f"{path}.", file)
     value, unit, reason = (entry.get(name) for name in _ENTRY)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ParameterError(f"{file}: {path}.value = {shown(value)} must be a number")
+        raise ParameterError(f"{file}: {path}.value = {quote(value)} must be a number")
     if not isinstance(unit, str) or not isinstance(reason, str) or not reason:
         raise ParameterError(f"{file}: {path} needs a unit and a reason, both texts")
     try:
@@ -110,7 +147,7 @@ def _with_entry(preset: Preset, path: str, entry: dict[str, Any], file: str) -> 
     except UnitError as error:
         raise ParameterError(f"{file}: {path}: {error}") from error
     try:
-        return preset.changed(path, in_si, reason)
+        return preset.with_value(path, in_si, reason)
     except ParameterError as error:
         raise ParameterError(f"{file}: {error}") from error
 

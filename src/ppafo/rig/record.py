@@ -18,7 +18,7 @@ LARGEST_SEED = 2**32 - 1
 DEFAULT_DEVICE = "ppafo2011"
 DEFAULT_PRESET = "paper-bench"
 
-NOTICE = "synthetic: made by the virtual rig of ppafo to stand for a measurement; nobody measured it"
+NOTICE = "synthetic: made by the virtual test rig of ppafo in place of a measurement"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,22 +54,22 @@ def record(
 
 
 def find_experiment(name: str) -> Experiment:
-    """Return the experiment of this name."""
+    """Return the experiment of this name. ParameterError where there is none."""
     if name not in EXPERIMENTS:
         hint = nearest_name(name, EXPERIMENTS)
-        raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; there are {', '.join(EXPERIMENTS)}")
+        raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; available: {', '.join(EXPERIMENTS)}")
     return EXPERIMENTS[name]
 
 
 def check_seed(seed: int) -> None:
-    """Refuse a seed that is no whole number from 0 to 4294967295."""
+    """Raise ParameterError for a seed that is not a whole number from 0 to 4294967295."""
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
         raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
 
 
 def _refuse_overrides(preset: Preset, overrides: tuple[str, ...]) -> Preset:
     if overrides:
-        raise ParameterError(f"override '{overrides[0]}': change a preset object itself, with Preset.changed")
+        raise ParameterError(f"override '{overrides[0]}': change a preset object itself, with Preset.with_value")
     return preset
 
 

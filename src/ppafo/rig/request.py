@@ -1,4 +1,4 @@
-"""What is asked of the rig, and what it gives back."""
+"""What the rig is to do, and what it gives back."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What an experiment gives: recording, the true device, what the sensors were off by, and further true values."""
+    """The result of an experiment: recording, true device, offsets that the sensors had, and further true values."""
 
     recording: Recording
     device: Device

@@ -56,9 +56,9 @@ class RigState(NamedTuple):
     enthalpy_in: float
     work_done: float
     heat_in: float
-    seen_angle: float
-    seen_pressure_1: float
-    seen_pressure_2: float
+    sensor_angle: float
+    sensor_pressure_1: float
+    sensor_pressure_2: float
 
 
 class Node(NamedTuple):
@@ -92,8 +92,8 @@ class Side(NamedTuple):
     line_heat: float
 
 
-class Look(NamedTuple):
-    """What a bench could see: both nodes, driving torque [N m] and the static limit of friction [N m] now."""
+class Observables(NamedTuple):
+    """What a bench could observe: both nodes, driving torque [N m] and the static limit of friction [N m] now."""
 
     node_1: Node
     node_2: Node

@@ -1,4 +1,4 @@
-"""A run on the rig as values: what the solver is given and what it returns."""
+"""A run on the rig as values: what the solver takes and what it returns."""
 
 from dataclasses import dataclass, field
 
@@ -44,7 +44,7 @@ class RigSolution:
     breakaways: list[float] = field(default_factory=list)
 
 
-def played(position: float, command: float, width: float) -> float:
+def spool_position(position: float, command: float, width: float) -> float:
     """Position [-1, 1] of a spool with play of a whole ``width`` [-] behind a command; it reaches full opening."""
     half = 0.5 * width
     inner = position * (1.0 - half)
@@ -52,11 +52,11 @@ def played(position: float, command: float, width: float) -> float:
     return max(-1.0, min(1.0, inner / (1.0 - half)))
 
 
-def seen_signals(given: RigRun, state: Floats, pressures: Floats) -> tuple[float, float, float]:
+def sensor_signals(rig_run: RigRun, state: Floats, pressures: Floats) -> tuple[float, float, float]:
     """Angle [rad] and both pressures [Pa] behind the bandwidth of the sensors, before noise."""
     names = RigState._fields
-    slow_angle, slow_pressure = given.physics.angle_follow_rate > 0.0, given.physics.pressure_follow_rate > 0.0
-    angle = state[names.index("seen_angle")] if slow_angle else state[0]
-    first = state[names.index("seen_pressure_1")] if slow_pressure else pressures[0]
-    second = state[names.index("seen_pressure_2")] if slow_pressure else pressures[1]
+    slow_angle, slow_pressure = rig_run.physics.angle_follow_rate > 0.0, rig_run.physics.pressure_follow_rate > 0.0
+    angle = state[names.index("sensor_angle")] if slow_angle else state[0]
+    first = state[names.index("sensor_pressure_1")] if slow_pressure else pressures[0]
+    second = state[names.index("sensor_pressure_2")] if slow_pressure else pressures[1]
     return float(angle), float(first), float(second)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.model.sensors import quantised
+from ppafo.model.sensors import quantise
 from ppafo.rig.preset import Preset
 
 Floats = NDArray[np.float64]
@@ -43,11 +43,11 @@ class Sensor:
     noise: Floats
 
     def reads(self, true: float, sample: int) -> float:
-        """Return what the sensor reads at a sample, in the unit of ``true``."""
-        return quantised(true + self.offset + float(self.noise[sample]), self.quantum)
+        """Return the reading at a sample, in the unit of ``true`` [SI]."""
+        return quantise(true + self.offset + float(self.noise[sample]), self.quantum)
 
     def readings(self, true: Floats) -> Floats:
-        """Return what the sensor reads at the first samples."""
+        """Return the readings [SI] at the first samples."""
         return np.array([self.reads(float(value), sample) for sample, value in enumerate(true)])
 
 
@@ -56,10 +56,13 @@ def random_stream(seed: int, channel: str) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, _STREAMS[channel]])))
 
 
-def sensor(preset: Preset, channel: str, seed: int, samples: int, share_of_range: float = 1.0) -> Sensor:
-    """Return the sensor of a channel for a number of samples; one of a smaller range is finer in everything."""
+def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_range: float = 1.0) -> Sensor:
+    """Return the sensor of a channel for a number of samples; one of a smaller range is finer in everything.
+
+    ``fraction_of_range`` [-] scales offset, noise and step.
+    """
     given = preset.section(CHANNEL_SENSORS[channel])
-    offset, noise, quantum = (share_of_range * given[name] for name in ("offset", "noise", "quantum"))
+    offset, noise, quantum = (fraction_of_range * given[name] for name in ("offset", "noise", "quantum"))
     stream = random_stream(seed, channel)
     drawn = offset * float(stream.standard_normal())
     return Sensor(drawn, quantum, noise * stream.standard_normal(samples))

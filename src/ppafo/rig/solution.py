@@ -12,40 +12,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.reference import vane_mode
-from ppafo.engine.reference.sampling import SAME_TIME
-from ppafo.engine.reference.segment import solve_segment
+from ppafo.engine.reference.sampling import SAME_TIME, solve_segment
 from ppafo.engine.rows import numbers, rebuild
 from ppafo.errors import SimulationError
-from ppafo.model.friction import holds_still
 from ppafo.model.sensors import Measurement
-from ppafo.model.vane import actuator_torque
+from ppafo.model.vane import actuator_torque, holds_still
 from ppafo.rig.rows import RigState
-from ppafo.rig.run import RigRun, RigSolution, played, seen_signals
-from ppafo.rig.source import ANGLE, INPUTS, RATE, SEEN, UNKNOWNS, compiled
+from ppafo.rig.run import RigRun, RigSolution, sensor_signals, spool_position
+from ppafo.rig.source import ANGLE, INPUTS, OUTPUTS, RATE, UNKNOWNS, load_rig_program
 
 Floats = NDArray[np.float64]
 
 TOLERANCE = 1.0e-8
-MOST_STEPS = 100_000
+MAXIMUM_STEPS = 100_000
 _TOLERANCES = {
     "angle": 1e-10,
     "angular_velocity": 1e-9,
     "supply_drop_1": 1e-2,
     "supply_drop_2": 1e-2,
-    "seen_angle": 1e-9,
-    "seen_pressure_1": 1e-2,
-    "seen_pressure_2": 1e-2,
+    "sensor_angle": 1e-9,
+    "sensor_pressure_1": 1e-2,
+    "sensor_pressure_2": 1e-2,
 }
 _MASS_TOLERANCE, _ENERGY_TOLERANCE, _VALVE_TOLERANCE = 1e-13, 1e-8, 1e-10
 
 
-def solve_rig(given: RigRun) -> RigSolution:
+def solve_rig(rig_run: RigRun) -> RigSolution:
     """Solve a run; SimulationError where the extra ``reference`` is not installed or the solver gives up."""
-    return _Rig(given).solve()
+    return _Rig(rig_run).solve()
 
 
 def make_solver(slopes: Any, tolerances: Floats, roots: Any) -> Any:
-    """Return CVODE for these slopes, with two root functions or none."""
+    """Return CVODE for these slopes with absolute tolerances [SI], and with two root functions or none.
+
+    SimulationError where the extra ``reference`` is not installed.
+    """
     try:
         from sksundae.cvode import CVODE
     except ImportError as error:
@@ -56,44 +57,44 @@ def make_solver(slopes: Any, tolerances: Floats, roots: Any) -> Any:
         atol=tolerances,
         eventsfn=roots,
         num_events=0 if roots is None else 2,
-        max_num_steps=MOST_STEPS,
+        max_num_steps=MAXIMUM_STEPS,
     )
 
 
 class _Rig:
     """State of one solution while it is being made."""
 
-    def __init__(self, given: RigRun) -> None:
-        self.given = given
-        self.run = given.run
-        self.plant = given.run.plant
-        self.is_free = given.run.program.angle is None
-        functions = compiled()
+    def __init__(self, rig_run: RigRun) -> None:
+        self.rig_run = rig_run
+        self.run = rig_run.run
+        self.plant = rig_run.run.plant
+        self.is_free = rig_run.run.program.angle is None
+        functions = load_rig_program()
         self.fill, self.show = functions.fill, functions.show
-        run = given.run
+        run = rig_run.run
         groups = (
             run.plant,
-            given.physics,
+            rig_run.physics,
             run.valve_orifice,
             run.leak_orifice,
-            given.line_orifice,
+            rig_run.line_orifice,
         )
         self.parameters = np.array([number for group in groups for number in numbers(group)])
-        self.y = np.array([*given.initial, *numbers(run.program.valve.initial())], dtype=np.float64)
-        self.seen, self.inputs = np.empty(SEEN), np.zeros(INPUTS)
+        self.y = np.array([*rig_run.initial, *numbers(run.program.valve.initial())], dtype=np.float64)
+        self.outputs, self.inputs = np.empty(OUTPUTS), np.zeros(INPUTS)
         self.valve_moves = True
         state = run.program.valve.initial()
         self.has_flat_valve = not any(isinstance(value, tuple) for value in state)
-        self.time, self.command, self.way = 0.0, 0.0, 0.0
+        self.time, self.command, self.direction = 0.0, 0.0, 0.0
         self.decided, self.spool = 0.0, 0.0
-        self.on_the_way: list[tuple[float, float]] = []
+        self.pending_commands: list[tuple[float, float]] = []
         self.controller_state = None if run.program.controller is None else run.program.controller.initial
         self.recorded = 0
-        count = given.sample_times.size
+        count = rig_run.sample_times.size
         self.result = RigSolution(np.empty((count, UNKNOWNS)), np.empty((count, 2)), np.zeros(count))
         self.solver = make_solver(self.slopes, self.tolerances(), self.root_function())
         if self.is_free:
-            self.way = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()
+            self.direction = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()
 
     def tolerances(self) -> Floats:
         """Absolute tolerances of all unknowns."""
@@ -106,7 +107,7 @@ class _Rig:
         """Right-hand side; the valve is asked anew only while it moves."""
         slopes[UNKNOWNS:] = self.ask_valve(y) if self.valve_moves else 0.0
         self.place_vane(t, y)
-        self.fill(y, slopes, self.parameters, self.inputs, self.way)
+        self.fill(y, slopes, self.parameters, self.inputs, self.direction)
 
     def ask_valve(self, y: Floats) -> list[float]:
         """Put the valve's openings into the inputs and return the slopes of its state."""
@@ -134,21 +135,21 @@ class _Rig:
 
     def roots(self, t: float, y: Floats) -> vane_mode.Roots:
         """Distance from breakaway, or from standstill and the stop ahead."""
-        if self.way != 0.0:
-            return vane_mode.roots_sliding(self.plant, float(y[0]), float(y[1]), self.way)
+        if self.direction != 0.0:
+            return vane_mode.roots_sliding(self.plant, float(y[0]), float(y[1]), self.direction)
         torque, limit = self.torque_and_limit(t, y)
         return vane_mode.roots_at_rest(self.plant._replace(static_torque=limit), float(y[0]), torque)
 
-    def look(self, t: float, y: Floats) -> Floats:
+    def observe(self, t: float, y: Floats) -> Floats:
         """Pressures, driving torque and static limit of a state."""
         self.place_vane(t, y)
-        self.show(y, self.seen, self.parameters, self.inputs, self.way)
-        return self.seen
+        self.show(y, self.outputs, self.parameters, self.inputs, self.direction)
+        return self.outputs
 
     def torque_and_limit(self, t: float, y: Floats) -> tuple[float, float]:
         """Driving torque and static limit of friction [N m]."""
-        seen = self.look(t, y)
-        return float(seen[2]), float(seen[3])
+        signals = self.observe(t, y)
+        return float(signals[2]), float(signals[3])
 
     def rest_mode(self) -> float:
         """Way in which a vane at rest sets off, 0 where it is held."""
@@ -160,12 +161,12 @@ class _Rig:
 
     def solve(self) -> RigSolution:
         """From sample to sample of the controller."""
-        end = float(self.given.sample_times[-1])
+        end = float(self.rig_run.sample_times[-1])
         sample = 0
         while self.time < end - SAME_TIME:
             self.decide(sample)
             sample += 1
-            self.advance_to(min(sample * self.given.control_period, end))
+            self.advance_to(min(sample * self.rig_run.control_period, end))
         self.record_until(end + 1.0, None)
         return self.result
 
@@ -174,32 +175,39 @@ class _Rig:
         run, controller = self.run, self.run.program.controller
         if controller is None:
             raise SimulationError("the virtual rig runs controllers of the catalogue only")
-        wanted = run.program.reference.value(run.reference, sample * self.given.control_period)[0]
+        requested = run.program.reference.value(run.reference, sample * self.rig_run.control_period)[0]
         self.decided, self.controller_state = controller.update(
-            run.controller, self.controller_state, wanted, self.measurement(), run.period
+            run.controller, self.controller_state, requested, self.measurement(), run.period
         )
-        self.spool = played(self.spool, self.decided, self.given.hysteresis)
-        self.on_the_way.append((self.time + self.given.command_delay, self.spool))
+        self.spool = spool_position(self.spool, self.decided, self.rig_run.hysteresis)
+        self.pending_commands.append((self.time + self.rig_run.command_delay, self.spool))
 
     def measurement(self) -> Measurement:
         """What the sensors read now; the noise is that of the last recorded sample's time."""
-        times, sensors = self.given.sample_times, self.given.sensors
+        times, sensors = self.rig_run.sample_times, self.rig_run.sensors
         index = max(0, int(np.searchsorted(times, self.time + SAME_TIME, side="right")) - 1)
-        seen = seen_signals(self.given, self.prescribe_angle(self.y, self.time), self.look(self.time, self.y)[:2])
+        signals = sensor_signals(
+            self.rig_run, self.prescribe_angle(self.y, self.time), self.observe(self.time, self.y)[:2]
+        )
         names = ("angle", "pressure_1", "pressure_2")
-        angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, seen, strict=True))
-        return Measurement(angle, first, second, actuator_torque(first, second, self.plant.torque_constant))
+        angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, signals, strict=True))
+        return Measurement(
+            angle=angle,
+            pressure_1=first,
+            pressure_2=second,
+            torque=actuator_torque(first, second, self.plant.torque_constant),
+        )
 
     def advance_to(self, end: float) -> None:
         """Integrate over all that happens on the way."""
         valve = self.run.program.valve
         while self.time < end - SAME_TIME:
-            while self.on_the_way and self.on_the_way[0][0] <= self.time + SAME_TIME:
-                self.command = self.on_the_way.pop(0)[1]
+            while self.pending_commands and self.pending_commands[0][0] <= self.time + SAME_TIME:
+                self.command = self.pending_commands.pop(0)[1]
             state = valve.settle(self.run.valve, self.valve_state(self.y), self.command, self.time)
             self.y[UNKNOWNS:] = numbers(state)
             event = max(valve.next_event(self.run.valve, state, self.command, self.time), self.time + 2 * SAME_TIME)
-            later = [moment for moment, _ in self.on_the_way if moment > self.time + SAME_TIME]
+            later = [moment for moment, _ in self.pending_commands if moment > self.time + SAME_TIME]
             self.integrate(min([end, event, *later]))
 
     def valve_state(self, y: Floats) -> Any:
@@ -209,14 +217,14 @@ class _Rig:
 
     def integrate(self, end: float) -> None:
         """Integrate to ``end`` or to the next event of the vane, and change the mode there."""
-        if self.is_free and self.way == 0.0:
-            self.way = self.rest_mode()
-            if self.way != 0.0:
+        if self.is_free and self.direction == 0.0:
+            self.direction = self.rest_mode()
+            if self.direction != 0.0:
                 self.result.breakaways.append(self.time)
         # A valve whose slopes are 0 stays where it is, because they depend on nothing but its state and the command.
         self.valve_moves = any(self.ask_valve(self.y))
-        wanted = self.given.sample_times[self.recorded :]
-        solution = solve_segment(self.solver, self.y, self.time, end, wanted, "the rig's solver")
+        times = self.rig_run.sample_times[self.recorded :]
+        solution = solve_segment(self.solver, self.y, self.time, end, times, "the rig's solver")
         self.record_until(float(solution.t[-1]) + SAME_TIME, solution)
         self.time = float(solution.t[-1])
         self.y = np.array(solution.y[-1])
@@ -227,12 +235,12 @@ class _Rig:
 
     def record_until(self, end: float, solution: Any) -> None:
         """Keep the states at the samples before ``end``."""
-        times = self.given.sample_times
+        times = self.rig_run.sample_times
         while self.recorded < times.size and times[self.recorded] < end - 2 * SAME_TIME:
             moment, index = float(times[self.recorded]), self.recorded
             state = self.y if solution is None else solution.y[np.argmin(np.abs(solution.t - moment))]
             self.result.states[index] = self.prescribe_angle(state, moment)
-            self.result.pressures[index] = self.look(moment, np.ascontiguousarray(state))[:2]
+            self.result.pressures[index] = self.observe(moment, np.ascontiguousarray(state))[:2]
             self.result.commands[index] = self.decided
             self.recorded += 1
 
@@ -246,15 +254,15 @@ class _Rig:
     def change_mode(self) -> None:
         """The vane breaks away, comes to rest, or meets a stop."""
         plant = self.plant
-        if self.way == 0.0:
-            self.way = 1.0 if self.torque_and_limit(self.time, self.y)[0] > 0.0 else -1.0
+        if self.direction == 0.0:
+            self.direction = 1.0 if self.torque_and_limit(self.time, self.y)[0] > 0.0 else -1.0
             self.result.breakaways.append(self.time)
             return
         roots = self.roots(self.time, self.y)
         if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
-            self.y[0] = plant.angle_max if self.way > 0.0 else plant.angle_min
+            self.y[0] = plant.angle_max if self.direction > 0.0 else plant.angle_min
             self.y[1] = vane_mode.after_stop(plant, float(self.y[1]))
         else:
             self.y[1] = 0.0
-        self.way = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()
+        self.direction = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()

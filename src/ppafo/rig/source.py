@@ -14,11 +14,11 @@ from ppafo.engine.reference.source import HEADER, INLINE
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector
 from ppafo.model.plant import Openings, PlantParameters
-from ppafo.rig.dynamics import look, rig_rates
+from ppafo.rig.dynamics import observables, rig_rates
 from ppafo.rig.rows import RigPhysics, RigState
 
 UNKNOWNS = len(RigState._fields)
-SEEN = 4
+OUTPUTS = 4
 """Numbers that ``show`` writes: both pressures [Pa], driving torque and static limit of friction [N m]."""
 
 ANGLE, RATE = 4, 5
@@ -39,14 +39,14 @@ _COMPILED = f'@njit(void({_READ}, float64[::1], float64[::1], float64[::1], floa
 
 
 class RigProgram(NamedTuple):
-    """``fill(y, slopes, parameters, inputs, way)`` and ``show(y, seen, parameters, inputs, way)``."""
+    """``fill(y, slopes, parameters, inputs, direction)`` and ``show(y, outputs, parameters, inputs, direction)``."""
 
     fill: Callable[..., None]
     show: Callable[..., None]
 
 
-def compiled() -> RigProgram:
-    """Return the compiled right-hand side and view of the rig."""
+def load_rig_program() -> RigProgram:
+    """Return the compiled right-hand side and observables of the rig."""
     module = load_generated("rig", rig_source())
     return RigProgram(module.fill, module.show)
 
@@ -65,16 +65,16 @@ def rig_source() -> str:
     rows = PARAMETER_GROUPS | {"state": RigState, "openings": Openings}
     given = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in rows.items()]
     orifices = "valve_orifice, leak_orifice, line_orifice"
-    moved = f"inputs[{ANGLE}], inputs[{RATE}], way"
-    fill = [f"rates = {add(rig_rates)}(plant, rig, {orifices}, openings, state, {moved})"]
+    motion = f"inputs[{ANGLE}], inputs[{RATE}], direction"
+    fill = [f"rates = {add(rig_rates)}(plant, rig, {orifices}, openings, state, {motion})"]
     fill += [f"slopes[{number}] = rates.{field}" for number, field in enumerate(RigState._fields)]
-    show = [f"now = {add(look)}(plant, rig, state, inputs[{ANGLE}])"]
-    seen = ("node_1.pressure", "node_2.pressure", "torque", "static_limit")
-    show += [f"seen[{number}] = now.{path}" for number, path in enumerate(seen)]
-    functions = [_function("fill", "slopes", given + fill), _function("show", "seen", given + show)]
+    show = [f"now = {add(observables)}(plant, rig, state, inputs[{ANGLE}])"]
+    outputs = ("node_1.pressure", "node_2.pressure", "torque", "static_limit")
+    show += [f"outputs[{number}] = now.{path}" for number, path in enumerate(outputs)]
+    functions = [_function("fill", "slopes", given + fill), _function("show", "outputs", given + show)]
     return "\n\n\n".join([HEADER, collector.text(), *functions])
 
 
 def _function(name: str, output: str, lines: list[str]) -> str:
     body = "\n".join(f"    {line}" for line in lines)
-    return f"{_COMPILED}\ndef {name}(y, {output}, parameters, inputs, way):\n{body}\n"
+    return f"{_COMPILED}\ndef {name}(y, {output}, parameters, inputs, direction):\n{body}\n"

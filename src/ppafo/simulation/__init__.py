@@ -1,1 +1,1 @@
-"""From a scenario to a result: what is to be run, the run itself, and what came out."""
+"""From a scenario to a result: the experiment, the run, and its outcome."""

@@ -1,16 +1,18 @@
-"""From the document of a scenario file to a Scenario in SI units."""
+"""From the document of a scenario file to a Scenario in SI units, and the values in it that no source gives."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ppafo.errors import ParameterError, nearest_name, one_line
+from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
+from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
+from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
-from ppafo.parameters.parameter_set import chosen_valve
-from ppafo.simulation.assumptions import Hardware, read_assumptions
-from ppafo.simulation.clock import MOST_STEPS_OF_DELAY, Clock, read_clock
+from ppafo.parameters.parameter_set import chosen_valve, entry_text
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
     AT_REST,
     INITIAL,
@@ -20,20 +22,22 @@ from ppafo.simulation.declaration import (
     TORQUE_LEVEL,
     controller_settings,
     kind_at,
+    quantities,
     value_at,
 )
 from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.motion import read_motion, read_profile
-from ppafo.simulation.overriding import Changed
-from ppafo.simulation.reading import Reading, written
-from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors
+from ppafo.simulation.overriding import OverriddenDocument, device_paths, scenario_paths, split_override
+from ppafo.simulation.reading import Reading, quantity_text
+from ppafo.simulation.scenario import Assumption, Control, Origin, ProfileChoice, Scenario, Sensors
 
+_SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
-    """What a scenario is made from.
+class ScenarioRequest:
+    """A scenario that is to be built.
 
     ``file`` is what messages call it, ``path`` the file itself if there is one, ``folder`` where relative paths begin,
     ``content`` the document as it was given. ``parameter_set`` takes the place of the set that the document names.
@@ -47,14 +51,25 @@ class Given:
     parameter_set: ParameterSet | None = None
 
 
-def build_scenario(given: Given, changed: Changed) -> Scenario:
-    """Return the scenario of a document that has the right keys, or refuse the first value that is not usable."""
+@dataclass(frozen=True, slots=True)
+class Hardware:
+    """The parameter set with all overrides in it and the name of its valve that is used."""
+
+    parameter_set: ParameterSet
+    valve: str
+
+
+def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
+    """Return the scenario of a document that has the right keys.
+
+    ScenarioError or ParameterError for the first value that cannot be used.
+    """
     document = changed.document
-    reading = Reading(given.file, document, changed.paths)
-    hardware = _hardware(reading, given, changed.device)
+    reading = Reading(request.file, document, changed.paths)
+    hardware = _hardware(reading, request, changed.device)
     device = _device(reading, hardware)
     clock = read_clock(reading)
-    before = Reading(given.file, given.content)
+    before = Reading(request.file, request.content)
     return Scenario(
         name=document["name"],
         description=document.get("description", ""),
@@ -68,19 +83,19 @@ def build_scenario(given: Given, changed: Changed) -> Scenario:
         control=_control(reading, clock.period),
         reference=read_profile(reading, "reference", TORQUE_LEVEL) if "reference" in document else _NOTHING_TO_FOLLOW,
         sensors=_sensors(reading, clock),
-        assumptions=(*read_assumptions(before, reading, hardware, given.overrides), *assumed_lines(reading)),
-        origin=Origin(given.path, document["device"]["set"], hardware.valve, given.overrides, given.content),
+        assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
+        origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         thermal=read_thermal(reading),
         supply_lines=read_supply_lines(reading, device),
     )
 
 
-def _hardware(reading: Reading, given: Given, overrides: tuple[str, ...]) -> Hardware:
+def _hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then those of the caller."""
     section = reading.document["device"]
     valve = section.get("valve")
     try:
-        parameter_set = given.parameter_set or load_parameter_set(set_name(section["set"], given.folder))
+        parameter_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
         name = chosen_valve(parameter_set, valve)
         parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
     except ParameterError as error:
@@ -130,9 +145,9 @@ def _sensors(reading: Reading, clock: Clock) -> Sensors:
     values = reading.section("sensors", SENSORS)
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
-    if values["delay"] / clock.step > MOST_STEPS_OF_DELAY:
-        most = written(MOST_STEPS_OF_DELAY * clock.step, "s")
-        raise reading.refusal("sensors.delay", f"must be at most {most}, {MOST_STEPS_OF_DELAY:.0e} steps")
+    if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
+        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
+        raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
     return Sensors(
         delay=values["delay"],
         angle_noise=values["angle_noise"],
@@ -142,4 +157,62 @@ def _sensors(reading: Reading, clock: Clock) -> Sensors:
         seed=int(reading.number("sensors.seed", SEED)),
         angle_bandwidth=values["angle_bandwidth"],
         pressure_bandwidth=values["pressure_bandwidth"],
+    )
+
+
+def read_assumptions(
+    before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[str]
+) -> tuple[Assumption, ...]:
+    """Return every assumption that still has a value; one that an override replaced says what it was ``before``.
+
+    ScenarioError for a path that has no value.
+    """
+    replaced = frozenset(split_override(text)[0] for text in overrides)
+    notes: Mapping[str, str] = reading.document.get(_SECTION, {})
+    assumptions = []
+    for path, note in notes.items():
+        value, earlier = _value(reading, hardware, path), _value(before, hardware, path)
+        if value is None and earlier is None:
+            raise _unknown(reading, path)
+        if value is not None:
+            assumptions.append(
+                Assumption(path, value, _note(before, path, note, earlier) if path in replaced else note)
+            )
+    return tuple(assumptions)
+
+
+def _note(before: Reading, path: str, note: str, earlier: str | None) -> str:
+    """Return the note of a value that an override has replaced."""
+    was = earlier if value_at(before.document, path) is not None else "another value"
+    return f"set by an override; the scenario has {was}: {note}"
+
+
+def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
+    """Return the value at a path as written in the file or, where it has none, the default; None without either."""
+    given = value_at(reading.document, path)
+    if path in scenario_paths(reading.document) and given is not None:
+        return str(given)
+    quantity = quantities(reading.document).get(path)
+    return _device_value(hardware, path) if quantity is None else _default(quantity)
+
+
+def _device_value(hardware: Hardware, path: str) -> str | None:
+    full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+    entry = hardware.parameter_set.entries().get(full)
+    quantity = hardware.parameter_set.declarations().get(full)
+    if entry is not None:
+        return entry_text(entry)
+    if path == RELIEVING_PATH:
+        return "false"
+    return None if quantity is None else _default(quantity)
+
+
+def _default(quantity: Quantity) -> str | None:
+    return None if quantity.default is None else quantity_text(quantity.default, quantity.unit)
+
+
+def _unknown(reading: Reading, path: str) -> ScenarioError:
+    hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
+    return ScenarioError(
+        f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
     )

@@ -1,6 +1,6 @@
 """Whether a run determines what it says: it runs again with less error, and with start and measurements moved a little.
 
-A loop with coarse sensors or repeated impacts may amplify a difference that nobody could measure into other results.
+A loop with coarse sensors or repeated impacts may amplify a difference that is too small to measure into other results.
 Then its metrics are those of one run among many, and a check says so.
 """
 
@@ -9,21 +9,21 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.answers.shown_metrics import metric_change, metric_level
-from ppafo.answers.text import aligned
+from ppafo.answers.text import align_columns
 from ppafo.simulation.document import plain
 
 MOVE = 1.0e-7
-"""How far a start or a measurement is moved, as a share of its range."""
+"""How far a start or a measurement is moved, as a fraction of its range."""
 ALLOWED_CHANGE = 1.0e-3
-"""Largest change of a metric that counts as none, as a share of its value or of the range of its quantity."""
+"""Largest change of a metric that counts as none, as a fraction of its value or of the range of its quantity."""
 
 HALF_ERROR, MOVED_START, MOVED_MEASUREMENT = "half the error", "start moved", "measurement moved"
 _MOVES = frozenset({MOVED_START, MOVED_MEASUREMENT})
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
-    """A number in SI units and what changed in each repeat by its name; inf where a repeat has no such number.
+class NumberCheck:
+    """A number in SI units and how much it changed in each repeat, by name; inf where a repeat has no such number.
 
     ``value`` is a metric, or the range of an angle or a pressure whose ``changes`` are the largest over time;
     ``allowed`` is the largest change that counts as none.
@@ -55,8 +55,8 @@ class Check:
     """
 
     scenario: str
-    metrics: tuple[Changed, ...]
-    courses: tuple[Changed, ...]
+    metrics: tuple[NumberCheck, ...]
+    courses: tuple[NumberCheck, ...]
     parts_at: float | None
     failed: tuple[str, ...]
 
@@ -79,13 +79,13 @@ class Check:
         causes = [
             (
                 by_move,
-                f"a {what} moved by {MOVE:.0e} of its range, which nobody could measure, gives other values. One run "
-                f"says nothing there; give the spread over many (ppafo montecarlo).",
+                f"a {what} moved by {MOVE:.0e} of its range, far less than anybody can measure, changes them. One run "
+                f"says nothing about them; give the spread over many (ppafo montecarlo).",
             ),
             (
                 by_error,
-                "half the error gives other values. Take a smaller run.step and check again; nothing determines what "
-                "still changes.",
+                "half the error changes them. Take a smaller run.step and check again; what still changes is not "
+                "determined.",
             ),
             (("how it ends",) if self.failed else (), f"the run with {' and that with '.join(self.failed)} diverged."),
         ]
@@ -99,7 +99,7 @@ class Check:
         rows = [_cells(row, names, metric_level) for row in self.metrics]
         rows += [_cells(row, names, metric_change) for row in self.courses]
         head = f"Check of '{self.scenario}': what changes in runs that should be the same"
-        return "\n".join([head, *aligned([["", "value", *names, ""], *rows]), "", self.sentence])
+        return "\n".join([head, *align_columns([["", "value", *names, ""], *rows]), "", self.sentence])
 
     def document(self) -> dict[str, Any]:
         """Return the check as data that JSON can hold, in SI units."""
@@ -112,7 +112,7 @@ class Check:
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document, **judged}
 
 
-def _cells(row: Changed, names: list[str], level: Callable[[float, str], tuple[float, str]]) -> list[str]:
+def _cells(row: NumberCheck, names: list[str], level: Callable[[float, str], tuple[float, str]]) -> list[str]:
     value, unit = level(row.value, row.unit)
     changes = [f"{metric_change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names]
     return [row.name, f"{value:.4g} {unit}".rstrip(), *changes, "" if row.is_determined else "not determined"]

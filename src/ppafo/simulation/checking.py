@@ -11,7 +11,7 @@ from ppafo.errors import SimulationError
 from ppafo.metrics.metric import Floats
 from ppafo.model.plant import chamber_volumes
 from ppafo.signals import Recording
-from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Changed, Check
+from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.result import Result
 from ppafo.simulation.simulate import results_of
@@ -19,7 +19,7 @@ from ppafo.simulation.simulate import results_of
 DRAWS = 4
 """Draws of what moves the measurements of sensors without noise."""
 ALLOWED_PARTING = 1.0e-2
-"""Largest difference of two runs over time that counts as none, as a share of the range."""
+"""Largest difference of two runs over time that counts as none, as a fraction of the range."""
 
 
 _COURSES = {"angle over time": ("angle",), "pressures over time": ("pressure_1", "pressure_2")}
@@ -29,7 +29,7 @@ def check_result(result: Result) -> Check:
     """Return what a completed run determines; SimulationError for one that diverged, or that is never the same."""
     scenario = result.scenario
     if not result.status.is_completed:
-        raise SimulationError(f"{scenario.name}: the run diverged, so that there is nothing to check")
+        raise SimulationError(f"{scenario.name}: the run diverged, so there is nothing to check")
     run = plan_run(scenario)
     _check_repeatable(result, run)
     pressures = _pressure_range(result)
@@ -41,20 +41,20 @@ def check_result(result: Result) -> Check:
         scenario=scenario.name,
         metrics=_metrics(result, found, pressures),
         courses=courses,
-        parts_at=_parting([repeated for _, repeated in found], result, courses),
+        parts_at=_time_of_parting([repeated for _, repeated in found], result, courses),
         failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
     )
 
 
 def _check_repeatable(result: Result, run: Run) -> None:
-    """Refuse a Python controller that gives another run each time: every change would be its own."""
+    """Refuse a Python controller that gives a different run each time: every change would be its own."""
     controller = result.scenario.control.custom
     if controller is None:
         return
     again = results_of(result.scenario, [run])[0].recording
     if not all(np.array_equal(again[name], result.recording[name]) for name in again.names):
         raise SimulationError(
-            f"{result.scenario.name}: {type(controller).__name__} gives another run each time, so that nothing can be "
+            f"{result.scenario.name}: {type(controller).__name__} gives a different run each time, so nothing can be "
             f"checked; its reset() must forget everything, and its random numbers need a fixed seed"
         )
 
@@ -80,8 +80,8 @@ def _start_moved(run: Run, move: float) -> Run:
     plant, start = run.plant, run.initial
     angle = start.angle
     if run.program.angle is None:
-        wanted = angle + move * (plant.angle_max - plant.angle_min)
-        angle = min(max(wanted, plant.angle_min), plant.angle_max)
+        shifted = angle + move * (plant.angle_max - plant.angle_min)
+        angle = min(max(shifted, plant.angle_min), plant.angle_max)
     before, after = chamber_volumes(plant, start.angle), chamber_volumes(plant, angle)
     mass_1, mass_2 = (
         mass * now / then * (1.0 + move)
@@ -119,7 +119,7 @@ def _pressure_range(result: Result) -> float:
     return float(np.ptp(values)) or supply.atmospheric_pressure
 
 
-def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float) -> tuple[Changed, ...]:
+def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float) -> tuple[NumberCheck, ...]:
     names = dict.fromkeys(name for one in (result, *(repeat for _, repeat in repeats)) for name in one.metrics)
     rows = []
     for name in names:
@@ -127,7 +127,7 @@ def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float
         value = _value(result, name)
         changes = _largest((repeat, _difference(_value(repeated, name), value)) for repeat, repeated in repeats)
         scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, kind.unit, pressures))
-        rows.append(Changed(name, kind.unit, value, ALLOWED_CHANGE * scale, changes))
+        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes))
     return tuple(rows)
 
 
@@ -175,27 +175,27 @@ def _metric_range(result: Result, name: str, unit: str, pressures: float) -> flo
     return abs(_value(result, name)) * max(parts[part] / value for part, value in values.items())
 
 
-def _apart(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
+def _largest_differences(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
     """Largest difference of some channels at each sample that both have."""
     count = min(len(one), len(other))
     return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))
 
 
-def _course(name: str, repeats: list[tuple[str, Result]], result: Result, pressures: float) -> Changed:
+def _course(name: str, repeats: list[tuple[str, Result]], result: Result, pressures: float) -> NumberCheck:
     actuator = result.scenario.device.actuator
     is_angle = name == "angle over time"
     span, unit = (actuator.angle_max - actuator.angle_min, "rad") if is_angle else (pressures, "Pa")
     changes = _largest(
-        (repeat, float(np.max(_apart(repeated.recording, result.recording, _COURSES[name]))))
+        (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
         for repeat, repeated in repeats
     )
-    return Changed(name, unit, span, ALLOWED_PARTING * span, changes)
+    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes)
 
 
-def _parting(repeats: list[Result], result: Result, courses: tuple[Changed, ...]) -> float | None:
+def _time_of_parting(repeats: list[Result], result: Result, courses: tuple[NumberCheck, ...]) -> float | None:
     times = [repeat.status.time for repeat in repeats if repeat.status.time is not None]
     for course in courses:
         for repeat in repeats:
-            beyond = _apart(repeat.recording, result.recording, _COURSES[course.name]) > course.allowed
+            beyond = _largest_differences(repeat.recording, result.recording, _COURSES[course.name]) > course.allowed
             times += [float(result.recording.time[np.argmax(beyond)])] if beyond.any() else []
     return min(times, default=None)

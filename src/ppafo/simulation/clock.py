@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from ppafo.errors import ScenarioError
 from ppafo.simulation.declaration import PERIOD, RATE, RUN, value_at
-from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.reading import Reading, quantity_text
 
-MOST_STEPS = 1.0e8
-MOST_OUTPUTS = 5.0e6
-MOST_STEPS_OF_DELAY = 1.0e5
+MAXIMUM_STEPS = 1.0e8
+MAXIMUM_OUTPUTS = 5.0e6
+MAXIMUM_STEPS_OF_DELAY = 1.0e5
 
 _RELATIVE = 1.0e-9
 _DURATION, _STEP, _OUTPUT = RUN
@@ -28,9 +28,10 @@ class Clock:
 
 
 def read_clock(reading: Reading) -> Clock:
-    """Return the times of a run; the step is the longest one, up to what is given, that divides the sample period.
+    """Return the times of a run [s]; the step is the largest one, up to what is given, that divides the sample period.
 
-    Without an output interval every step is recorded, or about every one where they do not divide the duration.
+    Without an output interval every step is recorded, or nearly every one where they do not divide the duration.
+    ScenarioError where the times contradict each other or make too many steps.
     """
     duration = reading.number(_DURATION_PATH, _DURATION)
     period = _read_period(reading)
@@ -44,17 +45,17 @@ def read_clock(reading: Reading) -> Clock:
 
 def _check_size(reading: Reading, clock: Clock) -> None:
     duration, used, output = clock.duration, clock.step, clock.output_interval
-    if duration / used > MOST_STEPS:
+    if duration / used > MAXIMUM_STEPS:
         raise reading.refusal(
             _DURATION_PATH,
-            f"with a step of {written(used, 's')} the run has {duration / used:.3g} steps, at most {MOST_STEPS:.0e} "
-            f"are allowed: shorten the run or take a larger {_STEP_PATH}",
+            f"with a step of {quantity_text(used, 's')} the run has {duration / used:.3g} steps, at most "
+            f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or take a larger {_STEP_PATH}",
         )
-    if duration / output > MOST_OUTPUTS:
+    if duration / output > MAXIMUM_OUTPUTS:
         raise reading.refusal(
             _DURATION_PATH,
-            f"recorded every {written(output, 's')} the run has {duration / output:.3g} samples, at most "
-            f"{MOST_OUTPUTS:.0e} are allowed: take a larger {_OUTPUT_PATH}",
+            f"recorded every {quantity_text(output, 's')} the run has {duration / output:.3g} samples, at most "
+            f"{MAXIMUM_OUTPUTS:.0e} are allowed: take a larger {_OUTPUT_PATH}",
         )
 
 
@@ -89,20 +90,20 @@ def _read_output(reading: Reading, duration: float, step: float) -> float | None
     if output < step * (1.0 - _RELATIVE):
         raise reading.refusal(
             _OUTPUT_PATH,
-            f"must not be below {_STEP_PATH} = {written(step, 's')}; take a smaller step or record less often",
+            f"must not be below {_STEP_PATH} = {quantity_text(step, 's')}; take a smaller step or record less often",
         )
     _not_above(reading, _OUTPUT_PATH, output, _DURATION_PATH, duration)
     count = duration / output
     if abs(count - round(count)) > _RELATIVE * count:
         raise reading.refusal(
-            _OUTPUT_PATH, f"must divide {_DURATION_PATH} = {written(duration, 's')}, it fits {count:.6g} times"
+            _OUTPUT_PATH, f"must divide {_DURATION_PATH} = {quantity_text(duration, 's')}, it fits {count:.6g} times"
         )
     return output
 
 
 def _not_above(reading: Reading, path: str, value: float, limit_path: str, limit: float) -> None:
     if value > limit * (1.0 + _RELATIVE):
-        raise reading.refusal(path, f"must not be above {written(limit, 's')}, which {limit_path} gives")
+        raise reading.refusal(path, f"must not be above {quantity_text(limit, 's')}, which {limit_path} gives")
 
 
 def _rate_or_period(reading: Reading) -> str:

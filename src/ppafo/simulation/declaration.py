@@ -43,8 +43,8 @@ AT_REST = "atmosphere"
 
 SENSORS = (
     Quantity("delay", "s", "age of a measurement when the controller uses it", 0.0, 0.0, 1.0e6),
-    Quantity("angle_bandwidth", "Hz", "up to which the angle sensor follows; 0: it follows at once", 0.0, 0.0, 1.0e6),
-    Quantity("pressure_bandwidth", "Hz", "up to which the pressure sensors follow; 0: at once", 0.0, 0.0, 1.0e6),
+    Quantity("angle_bandwidth", "Hz", "bandwidth of the angle sensor, 0 for an instant one", 0.0, 0.0, 1.0e6),
+    Quantity("pressure_bandwidth", "Hz", "bandwidth of the pressure sensors, 0 for instant ones", 0.0, 0.0, 1.0e6),
     Quantity("angle_noise", "rad", "standard deviation of the measured angle", 0.0, 0.0, 10.0),
     Quantity("pressure_noise", "Pa_d", "standard deviation of the measured pressures", 0.0, 0.0, 1.0e8),
     Quantity("angle_resolution", "rad", "step of the measured angle", 0.0, 0.0, 10.0),
@@ -66,7 +66,9 @@ SAMPLING = (RATE, PERIOD)
 TORQUE_LEVEL = Quantity("level", "N m", "", None, -1.0e4, 1.0e4)
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
-MOTIONS = ("free", "held", "led")
+MOTIONS = ("free", "held", "prescribed")
+OLD_PRESCRIBED = "led"
+"""What version 0.1 called a prescribed motion."""
 SECTIONS = (
     "device",
     "run",
@@ -98,7 +100,7 @@ def gas_settings(kind: str) -> tuple[Quantity, ...]:
 
 
 def motion_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of a kind of motion; a led one has a profile instead."""
+    """Return the settings of a kind of motion; a prescribed one has a profile instead."""
     return {"free": FREE, "held": (ANGLE,)}.get(kind, ())
 
 
@@ -108,7 +110,9 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     sections = {
         "run": RUN,
         "motion": motion_settings(motion),
-        "motion.profile": profile_settings(kind_at(document, "motion.profile"), ANGLE_LEVEL) if motion == "led" else (),
+        "motion.profile": profile_settings(kind_at(document, "motion.profile"), ANGLE_LEVEL)
+        if motion == "prescribed"
+        else (),
         "initial": INITIAL,
         "controller": SAMPLING + controller_settings(kind_at(document, "controller")),
         "reference": profile_settings(kind_at(document, "reference"), TORQUE_LEVEL),
@@ -122,21 +126,31 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
     kinds = ["motion.kind", "controller.kind", "reference.kind", "gas_model.kind"]
-    return (*TEXTS, *kinds, *(["motion.profile.kind"] if kind_at(document, "motion") == "led" else []))
+    return (*TEXTS, *kinds, *(["motion.profile.kind"] if kind_at(document, "motion") == "prescribed" else []))
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
-    """Load the kinds that a document names, where they are those of other packages; ``file`` is for the message."""
+    """Load the kinds that a document names, where they are those of other packages; ``file`` is for the message.
+
+    ScenarioError where one cannot be loaded or has an old name.
+    """
     sections: tuple[tuple[str, Kinds[Any]], ...] = (
         ("controller", CONTROLLERS),
         ("reference", PROFILES),
         ("motion.profile", PROFILES),
     )
+    check_motion_kind(kind_at(document, "motion"), f"{file}: motion.kind")
     for section, kinds in sections:
         try:
             kinds.get(kind_at(document, section))
         except KindError as error:
             raise ScenarioError(f"{file}: {section}.kind: {error}") from error
+
+
+def check_motion_kind(kind: object, place: str) -> None:
+    """Raise ScenarioError for the old name of a kind of motion; ``place`` is what the message calls it."""
+    if kind == OLD_PRESCRIBED:
+        raise ScenarioError(f"{place}: the kind of motion 'led' is now called 'prescribed'")
 
 
 def kind_at(document: Mapping[str, Any], section: str) -> str:

@@ -1,10 +1,10 @@
-"""What a scenario file and a walk file say of the gas alike: its energy balance, and the lines that feed the device."""
+"""Sections that scenario and walk files have in common: energy balance of the gas, and the lines of the supply."""
 
 from ppafo.errors import ScenarioError
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import THERMAL, THERMAL_GAS, kind_at, value_at
-from ppafo.simulation.reading import Reading, written
+from ppafo.simulation.reading import Reading, quantity_text
 from ppafo.simulation.scenario import Assumption, Thermal
 from ppafo.simulation.supply_line import LINES, SECTION, entries, line_quantities
 from ppafo.units import format_quantity
@@ -30,11 +30,11 @@ def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
     supply = device.supply
     if supply.dorsiflexion_pressure > supply.pressure:
         first, second = (
-            written(pressure, "Pa_a", supply.atmospheric_pressure)
+            quantity_text(pressure, "Pa_a", supply.atmospheric_pressure)
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
         raise ScenarioError(
-            f"{reading.file}: [{SECTION}]: its second regulator hangs behind the first, so "
+            f"{reading.file}: [{SECTION}]: its second regulator is fed by the first, so "
             f"supply.dorsiflexion_pressure, {second}, cannot be above supply.pressure, {first}"
         )
     first_line, second_line = (reading.section(f"{SECTION}.{line}", line_quantities(line)) for line in LINES)
@@ -50,7 +50,7 @@ def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
 
 
 def assumed_lines(reading: Reading) -> tuple[Assumption, ...]:
-    """Return the values of the lines that the file leaves to the package, with the reason for each."""
+    """Return the values of the lines that the file leaves to their defaults, with the reason for each."""
     if value_at(reading.document, SECTION) is None:
         return ()
     return tuple(

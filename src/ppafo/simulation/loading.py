@@ -13,7 +13,7 @@ from ppafo.documents.problems import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet
-from ppafo.simulation.building import Given, build_scenario
+from ppafo.simulation.building import ScenarioRequest, build_scenario
 from ppafo.simulation.declaration import find_kinds
 from ppafo.simulation.overriding import apply_overrides
 from ppafo.simulation.scenario import Scenario
@@ -34,42 +34,46 @@ def load_scenario(
 
     ``overrides`` are texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
     ``valve.area=12.6mm^2``. ``parameter_set`` takes the place of the set that the scenario names; what the scenario
-    changes in its device is changed in this one.
+    changes in its device is changed in this one. ScenarioError or ParameterError for anything that cannot be used.
     """
     document = _FILE.parse(_FILE.read(name_or_path), label(str(name_or_path)))
     folder, file = Path(name_or_path).parent, str(name_or_path)
-    return _scenario(Given(label(file), file, folder, document, tuple(overrides), parameter_set))
+    return _scenario(ScenarioRequest(label(file), file, folder, document, tuple(overrides), parameter_set))
 
 
 def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
-    """Return the scenario in the bytes of a TOML file; relative paths in it begin in ``folder``."""
+    """Return the scenario in the bytes of a TOML file; relative paths in it begin in ``folder``.
+
+    ScenarioError or ParameterError for anything that cannot be used.
+    """
     document = _FILE.parse(content, label(file))
-    return _scenario(Given(label(file), file, folder or Path(), document, tuple(overrides)))
+    return _scenario(ScenarioRequest(label(file), file, folder or Path(), document, tuple(overrides)))
 
 
 def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()) -> Scenario:
     """Return a scenario from nested dictionaries that are laid out as a scenario file is.
 
     Quantities are texts with their unit, ``{"angle": "75 deg"}``; relative paths begin in the working folder.
+    ScenarioError or ParameterError for anything that cannot be used.
     """
     if not isinstance(content, Mapping):
         raise ScenarioError(f"a scenario is a dictionary laid out as a scenario file, not a {type(content).__name__}")
     name = content.get("name")
     file = f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
     _FILE.check_depth(content, file)
-    return _scenario(Given(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides)))
+    return _scenario(ScenarioRequest(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides)))
 
 
-def _scenario(given: Given) -> Scenario:
+def _scenario(request: ScenarioRequest) -> Scenario:
     """Check the keys of the file itself, put the overrides in, and then ask for all that is needed."""
-    find_kinds(given.content, given.file)
-    if given.overrides:
-        wrong = [item for item in _problems(given.content) if not is_gap(item)]
-        _refuse(wrong, given.file)
-    changed = apply_overrides(given.content, given.overrides, given.file)
-    find_kinds(changed.document, given.file)
-    _refuse(_problems(changed.document), given.file)
-    return build_scenario(given, changed)
+    find_kinds(request.content, request.file)
+    if request.overrides:
+        wrong = [item for item in _problems(request.content) if not is_gap(item)]
+        _refuse(wrong, request.file)
+    changed = apply_overrides(request.content, request.overrides, request.file)
+    find_kinds(changed.document, request.file)
+    _refuse(_problems(changed.document), request.file)
+    return build_scenario(request, changed)
 
 
 def _problems(document: dict[str, Any]) -> list[ErrorDetails]:

@@ -8,28 +8,31 @@ from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import ANGLE, ANGLE_LEVEL, FREE, kind_at, profile_settings
-from ppafo.simulation.reading import Reading, written
-from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice
+from ppafo.simulation.reading import Reading, quantity_text
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice
 
-MOST_CHECKED_TIMES = 20_000
+MAXIMUM_CHECKED_TIMES = 20_000
 TOLERANCE = 1.0e-9
 _ANGLE_PATH = "motion.angle"
 
 
-def read_motion(reading: Reading, device: Device, duration: float, step: float) -> FreeMotion | LedMotion:
-    """Return the motion of the vane, which stays between the stops at every time that it prescribes."""
+def read_motion(reading: Reading, device: Device, duration: float, step: float) -> FreeMotion | PrescribedMotion:
+    """Return the motion of the vane; every angle [rad] that it prescribes lies between the stops of the device.
+
+    ScenarioError where one does not. ``duration`` and ``step`` are in seconds.
+    """
     kind = kind_at(reading.document, "motion")
-    if kind == "led":
+    if kind == "prescribed":
         profile = read_profile(reading, "motion.profile", ANGLE_LEVEL)
         problem = profile_problem(device.name, _stops(device), profile, duration, step)
         if problem:
             raise ScenarioError(f"{reading.file}: {problem}")
-        return LedMotion(profile)
+        return PrescribedMotion(profile)
     angle = reading.number(_ANGLE_PATH, ANGLE)
     if not _is_between_stops(device, angle):
-        raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_told(_stops(device))}")
+        raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_range_text(_stops(device))}")
     if kind == "held":
-        return LedMotion(ProfileChoice("constant", {"level": angle}))
+        return PrescribedMotion(ProfileChoice("constant", {"level": angle}))
     return FreeMotion(**reading.section("motion", FREE))
 
 
@@ -46,8 +49,8 @@ def profile_problem(
     for time, angle in _angles(profile, duration, step):
         if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
             return (
-                f"[motion.profile] leaves the stops of {device}, {_told(stops)}: it is at {written(angle, 'rad')} at "
-                f"{time:.6g} s"
+                f"[motion.profile] leaves the stops of {device}, {_range_text(stops)}: it is at "
+                f"{quantity_text(angle, 'rad')} at {time:.6g} s"
             )
     return ""
 
@@ -56,7 +59,7 @@ def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tu
     """Yield times and angles [rad]: those that the engine asks for, and the crests between them."""
     kind = PROFILES[profile.kind]
     parameters = rebuilt(kind.parameters, [profile.settings[item.name] for item in kind.quantities])
-    count = max(1, min(MOST_CHECKED_TIMES, round(duration / step)))
+    count = max(1, min(MAXIMUM_CHECKED_TIMES, round(duration / step)))
     for number in range(count + 1):
         time = duration * number / count
         angle, rate, acceleration = kind.value(parameters, time)
@@ -74,5 +77,5 @@ def _stops(device: Device) -> tuple[float, float]:
     return device.actuator.angle_min, device.actuator.angle_max
 
 
-def _told(stops: tuple[float, float]) -> str:
-    return f"{written(stops[0], 'rad')} to {written(stops[1], 'rad')}"
+def _range_text(stops: tuple[float, float]) -> str:
+    return f"{quantity_text(stops[0], 'rad')} to {quantity_text(stops[1], 'rad')}"

@@ -1,6 +1,6 @@
 """Numbers of a scenario and its device by dotted path: declared and replaced, in SI units.
 
-A number may be an array (runs,), one value for each run of an ensemble; the scenario then stands for all of them.
+A number may be an array (runs,), one value for each run of an ensemble; the scenario then represents all of them.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SECTIONS, SONIC_FOR
 from ppafo.parameters.device import Orifice, SonicOrifice
 from ppafo.parameters.parameter_set import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.simulation import declaration
-from ppafo.simulation.scenario import FreeMotion, LedMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.simulation.supply_line import LINES, SECTION
 
 HELD_ANGLE = "motion.angle"
@@ -58,9 +58,9 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
         if any(f"{section}.{name}" in chosen for name in form):
             new = {name: chosen.pop(f"{section}.{name}") for name in form}
             kind = SonicOrifice if "sonic_conductance" in form else Orifice
-            scenario = _replaced(scenario, place, kind(**new))
+            scenario = _replace_number(scenario, place, kind(**new))
     for path, number in chosen.items():
-        scenario = _replaced(scenario, _place(path, scenario), number)
+        scenario = _replace_number(scenario, _place(path, scenario), number)
     return scenario
 
 
@@ -82,8 +82,8 @@ def other_form(scenario: Scenario, section: str) -> tuple[str, ...]:
 def _kinds(scenario: Scenario) -> dict[str, Any]:
     """Return a document that names the kinds of the scenario and nothing else; a constant command has no reference."""
     motion: dict[str, Any] = {"kind": "free"}
-    if isinstance(scenario.motion, LedMotion):
-        motion = {"kind": "led", "profile": {"kind": scenario.motion.profile.kind}}
+    if isinstance(scenario.motion, PrescribedMotion):
+        motion = {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
     controller = {"kind": scenario.control.kind}
     gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
     gas |= {} if scenario.supply_lines is None else {SECTION: {}}
@@ -94,7 +94,7 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
 
 def _angle_of_held_vane(scenario: Scenario) -> dict[str, Quantity]:
     motion = scenario.motion
-    is_held = isinstance(motion, LedMotion) and motion.profile.kind == "constant"
+    is_held = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
     return {HELD_ANGLE: declaration.ANGLE} if is_held else {}
 
 
@@ -124,11 +124,11 @@ def _names(node: object) -> frozenset[str]:
     return frozenset(item.name for item in fields(node)) if is_dataclass(node) else frozenset()
 
 
-def _replaced(node: Any, parts: tuple[str, ...], number: Any) -> Any:
+def _replace_number(node: Any, parts: tuple[str, ...], number: Any) -> Any:
     inside = parts[1:]
     if isinstance(node, Mapping):
-        return {**node, parts[0]: _replaced(node[parts[0]], inside, number) if inside else number}
-    inner = _replaced(getattr(node, parts[0]), inside, number) if inside else number
+        return {**node, parts[0]: _replace_number(node[parts[0]], inside, number) if inside else number}
+    inner = _replace_number(getattr(node, parts[0]), inside, number) if inside else number
     if isinstance(node, SupplyLines):
         return node._replace(**{parts[0]: inner})
     return replace(node, **{parts[0]: inner})

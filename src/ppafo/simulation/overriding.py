@@ -19,7 +19,7 @@ _OWN_KEYS = {"controller": frozenset({"kind", "rate", "period"})}
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
+class OverriddenDocument:
     """A document with overrides in it: paths that were set, and the overrides that belong to the device."""
 
     document: dict[str, Any]
@@ -27,11 +27,12 @@ class Changed:
     device: tuple[str, ...]
 
 
-def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file: str) -> Changed:
+def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file: str) -> OverriddenDocument:
     """Return a changed copy of a document; ``file`` is what messages call it.
 
     Naming another kind of motion, controller or profile drops the settings that only the old kind has; giving a rate
-    drops the period, and the reverse. A gain on the torque may leave out its unit.
+    drops the period, and the reverse. A gain on the torque may leave out its unit. ScenarioError for a path that is
+    neither of the scenario nor of its device.
     """
     changed = copy.deepcopy(dict(document))
     paths: set[str] = set()
@@ -44,13 +45,15 @@ def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file:
         known = scenario_paths(changed)
         if path not in known:
             raise unknown_value(override, known, f"{file} has")
+        if path == "motion.kind":
+            declaration.check_motion_kind(text, f"override '{override}'")
         _set(changed, path, text, file)
         paths.add(path)
-    return Changed(changed, frozenset(paths), tuple(device))
+    return OverriddenDocument(changed, frozenset(paths), tuple(device))
 
 
 def split_override(override: str) -> tuple[str, str]:
-    """Return path and value of a text such as ``run.duration=1 s``."""
+    """Return path and value of a text such as ``run.duration=1 s``. ScenarioError for any other text."""
     on_one_line = one_line(override)
     path, separator, text = (part.strip() for part in on_one_line.partition("="))
     if not separator or not path or not text:

@@ -25,9 +25,9 @@ from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, LedMotion, ProfileChoice, Scenario, Thermal
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Thermal
 
-MOST_STEPS = 1.0e9
+MAXIMUM_STEPS = 1.0e9
 WHOLE = 1.0e-9
 
 Problem = tuple[Any, Callable[[int], str]]
@@ -35,7 +35,10 @@ Problem = tuple[Any, Callable[[int], str]]
 
 
 def plan_run(scenario: Scenario) -> Run:
-    """The run of a scenario; with a Python controller it records every step, because that controller needs the past."""
+    """The run of a scenario; with a Python controller it records every step, because that controller needs the past.
+
+    ScenarioError where it takes too many steps.
+    """
     run, problems = plan_runs(scenario)
     for is_bad, line in problems:
         if is_bad:
@@ -90,7 +93,7 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
     """
     settings = pieces.device.valve.settings
     delay = pieces.valve.command_delay(settings)
-    plant = fed_plant(plant, pieces.supply_lines)
+    plant = plant_behind_lines(plant, pieces.supply_lines)
     steps = rule(plant)
     program = Program(
         valve=pieces.valve,
@@ -114,7 +117,7 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
         valve_orifice=exact_orifice(pieces.device.valve.orifice, pieces.device),
         leak_orifice=exact_orifice(pieces.device.actuator.leak, pieces.device),
         initial=start(plant),
-        valve=prepared_valve(pieces.valve, settings),
+        valve=valve_parameters(pieces.valve, settings),
         controller=() if pieces.controller is None else controller_parameters(pieces.controller, pieces.settings),
         reference=profile_parameters(pieces.reference),
         path=() if pieces.path is None else profile_parameters(pieces.path),
@@ -127,7 +130,7 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
         command_delay=delay,
         needs_parts=steps.needs_parts,
         walk=walk,
-        lines=filled_lines(plant, pieces.supply_lines),
+        lines=initial_lines(plant, pieces.supply_lines),
         sensor_rates=pieces.sensor_rates,
     )
 
@@ -173,8 +176,8 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     )
 
 
-def prepared_valve(valve: ValveModel, settings: Mapping[str, float]) -> Any:
-    """Parameters of a valve; settings may be arrays (runs,)."""
+def valve_parameters(valve: ValveModel, settings: Mapping[str, float]) -> Any:
+    """Parameters of a valve from its settings in SI units, which may be arrays (runs,)."""
 
     def prepare(*values: float) -> Any:
         return valve.prepare(dict(zip(settings, values, strict=True)))
@@ -186,11 +189,11 @@ def _too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem
     def line(run: int) -> str:
         duration, length, count = (at(number, run) for number in (scenario.duration, step, step_count))
         return (
-            f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MOST_STEPS:.0e} are "
-            "allowed: shorten the run or take a larger run.step"
+            f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MAXIMUM_STEPS:.0e} "
+            "are allowed: shorten the run or take a larger run.step"
         )
 
-    return step_count > MOST_STEPS, line
+    return step_count > MAXIMUM_STEPS, line
 
 
 def thermal_parameters(walls: Thermal | None, device: Device) -> ThermalParameters | NoParameters:
@@ -206,12 +209,12 @@ def thermal_parameters(walls: Thermal | None, device: Device) -> ThermalParamete
     )
 
 
-def fed_plant(plant: PlantParameters, lines: SupplyLines | None) -> PlantParameters:
+def plant_behind_lines(plant: PlantParameters, lines: SupplyLines | None) -> PlantParameters:
     """The plant behind its lines: these take back what a chamber pushes out, whether or not their regulators do."""
     return plant if lines is None else plant._replace(relieving=1.0)
 
 
-def filled_lines(plant: PlantParameters, lines: SupplyLines | None) -> Lines | None:
+def initial_lines(plant: PlantParameters, lines: SupplyLines | None) -> Lines | None:
     """Both lines at the pressures that their regulators are set to, and nothing let through yet; None without lines."""
     if lines is None:
         return None
@@ -274,7 +277,7 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     """
     if scenario.supply_lines is not None:
         return True
-    if not isinstance(scenario.motion, LedMotion) or scenario.motion.profile.kind != "constant":
+    if not isinstance(scenario.motion, PrescribedMotion) or scenario.motion.profile.kind != "constant":
         return True
     lowest, highest = angle_range(scenario, plant)
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
@@ -297,7 +300,7 @@ def angle_range(scenario: Scenario, plant: PlantParameters) -> tuple[float, floa
 
 
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
-    """Lowest and highest value of a profile."""
+    """Lowest and highest value of a profile, N m or rad as its levels; arrays (runs,) where its settings are."""
     kind = PROFILES[choice.kind]
     numbers = [choice.settings[item.name] for item in kind.quantities]
     lowest, highest = over_runs(lambda *values: kind.bounds(rebuilt(kind.parameters, values)), *numbers)
@@ -329,7 +332,9 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
 
 def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifice:
     """An orifice for the reference solver, with the exact flow function."""
-    conductance = orifice_conductance(orifice, device.gas)
-    if isinstance(orifice, SonicOrifice):
-        return ExactOrifice(conductance, 1.0, orifice.critical_ratio, device.flow.linear_ratio)
-    return ExactOrifice(conductance, 0.0, device.gas.heat_capacity_ratio, device.flow.linear_ratio)
+    return ExactOrifice(
+        conductance=orifice_conductance(orifice, device.gas),
+        is_iso6358=float(isinstance(orifice, SonicOrifice)),
+        number=orifice.critical_ratio if isinstance(orifice, SonicOrifice) else device.gas.heat_capacity_ratio,
+        linear_ratio=device.flow.linear_ratio,
+    )

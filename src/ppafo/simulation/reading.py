@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.problems import shown
+from ppafo.documents.problems import quote
 from ppafo.errors import ScenarioError, UnitError, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import is_within
@@ -25,19 +25,22 @@ class Reading:
     document: Mapping[str, Any]
     overridden: frozenset[str] = frozenset()
 
-    def given(self, path: str) -> str:
-        """Return file, key and value as they were given."""
+    def quote(self, path: str) -> str:
+        """Return file, key and value, as they were given."""
         value = value_at(self.document, path)
         if path in self.overridden:
             return f"{self.file}: override {path}={one_line(value)}"
-        return f"{self.file}: {path} = {shown(value)}"
+        return f"{self.file}: {path} = {quote(value)}"
 
     def refusal(self, path: str, reason: str) -> ScenarioError:
         """Return the error that says why the value at a path is not usable."""
-        return ScenarioError(f"{self.given(path)}: {reason}")
+        return ScenarioError(f"{self.quote(path)}: {reason}")
 
     def number(self, path: str, quantity: Quantity, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-        """Return the value at a path in the quantity's SI unit; its default where nothing is given."""
+        """Return the value at a path in the quantity's SI unit; its default where nothing is given.
+
+        ScenarioError where it is no number, has another unit or is out of range.
+        """
         value = value_at(self.document, path)
         if value is None:
             return self._default(path, quantity)
@@ -71,15 +74,15 @@ class Reading:
         return number
 
 
-def written(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
-    """Return an SI value as a person would write it: angles in degrees, pressures in psi, no rounding dust."""
+def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
+    """Return an SI value in the unit in which people write it: degrees, psi; rounding errors are left out."""
     unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
     number = from_si(value, unit, si_unit, atmosphere)
     return format_quantity(round(number, 9) if abs(number) > _ROUND else number, unit)
 
 
-def rounded(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
-    """Return an SI value as in ``written`` with six digits, for a message."""
+def short_quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
+    """Return an SI value as ``quantity_text`` does, with six digits, for a message."""
     unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
     return f"{from_si(value, unit, si_unit, atmosphere):.6g} {unit}".rstrip()
 
@@ -92,7 +95,10 @@ def _form(quantity: Quantity, number: float) -> str:
 
 
 def limits(quantity: Quantity, atmosphere: float) -> str:
-    """Return what a value may be, as text: ``at least 0 deg and at most 180 deg``."""
+    """Return the range of a value as text, in the unit in which people write it: ``at least 0 deg``.
+
+    ``atmosphere`` [Pa absolute] is what gauge pressures are measured from.
+    """
     unit = WRITTEN_UNITS.get(quantity.unit, quantity.unit) if quantity.unit != "Pa_a" else "Pa_a"
     unit = "" if unit in PLAIN else unit
     lower, upper = (

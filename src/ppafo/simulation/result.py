@@ -1,4 +1,4 @@
-"""What a run gives back: the recording, its metrics, and how the run ended."""
+"""The result of a run: the recording, its metrics, and how the run ended."""
 
 import importlib
 from collections.abc import Mapping
@@ -63,7 +63,7 @@ class Result:
     def check(self) -> Check:
         """Return what this run determines: it runs again with half the error, and with start and measurements moved.
 
-        SimulationError for a run that diverged, and for a Python controller that gives another run each time.
+        SimulationError for a run that diverged, and for a Python controller that gives a different run each time.
         """
         # A check runs the scenario again, which makes results: a name here, an import there.
         checking = importlib.import_module("ppafo.simulation.checking")

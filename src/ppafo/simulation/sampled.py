@@ -23,15 +23,15 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     program, clock = batch.program, batch.clock
     block = LaneBlock(load_program(program), clock, batch.parameters, batch.states, len(program.traced))
     reference, step = _group(batch, "reference"), _group(batch, "timing").step
-    see = _sight(batch, block)
+    see = _measurement_source(batch, block)
     command_row = row_numbers(program.state_rows())["result.command"]
     controller.reset()
     for sample in range(math.ceil(clock.step_count / clock.steps_per_sample)):
         first_step = sample * clock.steps_per_sample
         time = first_step * step
-        wanted = program.reference.value(reference, time)[0]
-        command = controller.update(time, wanted, see(sample))
-        block.states[command_row] = _checked(command, controller, time)
+        requested = program.reference.value(reference, time)[0]
+        command = controller.update(time, requested, see(sample))
+        block.states[command_row] = _clip_command(command, controller, time)
         block.advance(min(clock.steps_per_sample, clock.step_count - first_step))
     return block.result()
 
@@ -58,7 +58,7 @@ def _group(batch: Batch, name: str) -> Any:
     return group_of(name, batch.program.parameter_rows(), values)
 
 
-def _checked(command: object, controller: PythonController, time: float) -> float:
+def _clip_command(command: object, controller: PythonController, time: float) -> float:
     """The command within -1 to 1."""
     name = type(controller).__name__
     if isinstance(command, bool) or not isinstance(command, int | float | np.floating) or not math.isfinite(command):
@@ -66,8 +66,8 @@ def _checked(command: object, controller: PythonController, time: float) -> floa
     return max(-1.0, min(1.0, float(command)))
 
 
-def _sight(batch: Batch, block: LaneBlock) -> Callable[[int], Measurement]:
-    """What the controller sees at a sample: the present, or what late sensors looked at."""
+def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measurement]:
+    """What the controller measures at a sample: the present state, or an earlier one where sensors are late."""
     program, per_sample = batch.program, batch.clock.steps_per_sample
     rows = row_numbers(program.state_rows())
     plant, sensors = _group(batch, "plant"), _group(batch, "sensors")
@@ -84,7 +84,10 @@ def _sight(batch: Batch, block: LaneBlock) -> Callable[[int], Measurement]:
             pressure_1, pressure_2 = chamber_pressures(plant, angle, *masses)
         if program.ideal_sensors:
             return Measurement(
-                angle, pressure_1, pressure_2, actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+                angle=angle,
+                pressure_1=pressure_1,
+                pressure_2=pressure_2,
+                torque=actuator_torque(pressure_1, pressure_2, plant.torque_constant),
             )
         return measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
 

@@ -1,4 +1,4 @@
-"""What is to be run: one device in one experiment, as frozen values in SI units.
+"""What is run: one device in one experiment, as frozen values in SI units.
 
 ``load_scenario`` makes one from a file; in Python, ``dataclasses.replace`` changes a value and ``controlled_by`` puts
 an object of your own in charge of the valve.
@@ -38,24 +38,24 @@ class FreeMotion:
     external_torque: float = 0.0
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
         """The motion in a few words."""
         return f"free, from {math.degrees(self.angle):.4g} deg"
 
 
 @dataclass(frozen=True, slots=True)
-class LedMotion:
-    """The vane is led along an angle in time [rad]; a held vane is led along the constant profile."""
+class PrescribedMotion:
+    """The angle of the vane [rad] is a given function of time; that of a held vane is a constant profile."""
 
     profile: ProfileChoice
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
         """The motion in a few words."""
         level = self.profile.settings.get("level", math.nan)
         if self.profile.kind == "constant":
             return f"held at {math.degrees(level):.4g} deg"
-        return f"led along the profile {self.profile.kind}"
+        return f"prescribed, along the profile {self.profile.kind}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class Sensors:
 
     @property
     def flaws(self) -> tuple[float, ...]:
-        """What makes these sensors worse than ideal ones, each 0 where it does not."""
+        """What makes these sensors worse than ideal ones [s, rad, Pa, rad, Pa, Hz, Hz]; each 0 where it does not."""
         noise, steps = (self.angle_noise, self.pressure_noise), (self.angle_quantum, self.pressure_quantum)
         return self.delay, *noise, *steps, self.angle_bandwidth, self.pressure_bandwidth
 
@@ -112,7 +112,7 @@ class Control:
     custom: PythonController | None = None
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
         """The controller in a few words."""
         name = self.kind if self.custom is None else f"{self.kind}, {type(self.custom).__name__}"
         return f"{name}, every {self.period:g} s"
@@ -154,7 +154,7 @@ class Scenario:
     duration: float
     time_step: float
     output_interval: float
-    motion: FreeMotion | LedMotion
+    motion: FreeMotion | PrescribedMotion
     initial_pressure_1: float
     initial_pressure_2: float
     control: Control
@@ -170,13 +170,16 @@ class Scenario:
         return (
             f"Scenario '{self.name}'\n"
             f"  device      {self.device.name}, valve {self.device.valve_name}\n"
-            f"  motion      {self.motion.told}\n"
-            f"  controller  {self.control.told}\n"
+            f"  motion      {self.motion.label}\n"
+            f"  controller  {self.control.label}\n"
             f"  duration    {self.duration:g} s, in steps of at most {self.time_step:g} s"
         )
 
     def controlled_by(self, controller: PythonController) -> "Scenario":
-        """Return the scenario with any object that has ``reset`` and ``update``, at the same sample period."""
+        """Return the scenario with any object that has ``reset`` and ``update``, at the same sample period.
+
+        ScenarioError for a class, or for an object without these methods.
+        """
         if isinstance(controller, type):
             name = controller.__name__
             raise ScenarioError(

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, WithJsonSchema
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.documents.models import NAME, one_of, optional, published_schema, table
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration, supply_line
 
@@ -28,7 +28,7 @@ def number_type(quantity: Quantity, words: tuple[str, ...] = ()) -> Any:
     return Annotated[Any, WithJsonSchema({"anyOf": forms} if len(forms) > 1 else forms[0])]
 
 
-def _described(quantity: Quantity) -> str:
+def _description(quantity: Quantity) -> str:
     default = "" if quantity.default is None else f"; {quantity.default:g} unless given"
     return f"{quantity.summary} [{quantity.unit or '-'}]{default}".lstrip()
 
@@ -39,7 +39,7 @@ def quantity_fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = (
     for item in quantities:
         kind = number_type(item, words)
         required = item.default is None and not words
-        text = _described(item)
+        text = _description(item)
         fields[item.name] = (kind, Field(description=text)) if required else optional(kind, text)
     return fields
 
@@ -49,7 +49,7 @@ def kind_field(kind: str, summary: str) -> dict[str, Any]:
     return {"kind": (Literal[kind], Field(description=summary))}
 
 
-def titled(name: str) -> str:
+def model_name(name: str) -> str:
     """Return a name as that of a model: ``ramp_hold`` as ``RampHold``."""
     return "".join(part.capitalize() for part in re.split(r"\W|_", name))
 
@@ -58,7 +58,7 @@ def _profile(prescribed: Quantity, purpose: str) -> Any:
     return one_of(
         [
             table(
-                f"{titled(name)}{purpose}",
+                f"{model_name(name)}{purpose}",
                 kind_field(name, kind.summary) | quantity_fields(declaration.profile_settings(name, prescribed)),
             )
             for name, kind in PROFILES.items()
@@ -67,7 +67,7 @@ def _profile(prescribed: Quantity, purpose: str) -> Any:
 
 
 def _motion() -> Any:
-    led = {"profile": (_profile(declaration.ANGLE_LEVEL, "Angle"), Field(description="angle in time"))}
+    prescribed = {"profile": (_profile(declaration.ANGLE_LEVEL, "Angle"), Field(description="angle in time"))}
     return one_of(
         [
             table(
@@ -77,17 +77,20 @@ def _motion() -> Any:
             table(
                 "HeldMotion", kind_field("held", "the vane stays at one angle") | quantity_fields((declaration.ANGLE,))
             ),
-            table("LedMotion", kind_field("led", "the vane is led along an angle in time") | led),
+            table(
+                "PrescribedMotion",
+                kind_field("prescribed", "the angle of the vane is a given function of time") | prescribed,
+            ),
         ]
     )
 
 
 def _controller() -> Any:
-    sampling = {item.name: optional(number_type(item), _described(item)) for item in declaration.SAMPLING}
+    sampling = {item.name: optional(number_type(item), _description(item)) for item in declaration.SAMPLING}
     return one_of(
         [
             table(
-                f"{titled(name)}Controller",
+                f"{model_name(name)}Controller",
                 kind_field(name, kind.summary) | sampling | quantity_fields(kind.quantities),
             )
             for name, kind in CONTROLLERS.items()
@@ -111,7 +114,9 @@ def gas_model_table() -> Any:
 def supply_line_table() -> Any:
     """Return the section of the regulators and lines that feed the device."""
     fields = {
-        line: optional(table(f"{titled(line)}Line", quantity_fields(supply_line.line_quantities(line))), f"{line} line")
+        line: optional(
+            table(f"{model_name(line)}Line", quantity_fields(supply_line.line_quantities(line))), f"{line} line"
+        )
         for line in supply_line.LINES
     }
     return table("SupplyLine", fields)
@@ -144,19 +149,22 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),
-        "description": (str, Field("", description="what is tried here, and why")),
+        "description": (str, Field("", description="what this file tries, and why")),
         "device": (table("Device", device_fields()), Field(description="the hardware")),
         "run": (table("Run", quantity_fields(declaration.RUN)), Field(description="times of the run")),
         "motion": (_motion(), Field(description="what the vane does")),
         "initial": optional(initial, "state of the gas at the start; atmosphere unless given"),
-        "controller": (_controller(), Field(description="what sets the valve")),
+        "controller": (_controller(), Field(description="what commands the valve")),
         "reference": optional(reference, "torque that the controller follows; 0 N m unless given"),
-        "sensors": optional(table("Sensors", _sensors()), "what the controller sees; ideal unless given"),
+        "sensors": optional(table("Sensors", _sensors()), "sensors of the controller; ideal unless given"),
         "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
         supply_line.SECTION: optional(
             supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
         ),
-        "assumed": (dict[str, str], Field(default_factory=dict, description="values that no source gives, and why")),
+        "assumed": (
+            dict[str, str],
+            Field(default_factory=dict, description="assumed values, which no source gives, and why these"),
+        ),
     }
     return table("ScenarioFile", fields)
 
@@ -165,4 +173,4 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file, with the controllers and profiles of all packages."""
     CONTROLLERS.load_all()
     PROFILES.load_all()
-    return published_schema(scenario_file(), "ppafo scenario")
+    return make_schema(scenario_file(), "ppafo scenario")

@@ -1,4 +1,4 @@
-"""Runs a scenario and gathers what came of it."""
+"""Runs a scenario and collects its results."""
 
 import platform
 from collections.abc import Iterable, Mapping, Sequence
@@ -7,28 +7,28 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
+from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.metrics.catalog import evaluate
-from ppafo.model.friction import sliding_friction
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.model.thermal import energy_per_content
-from ppafo.model.vane import gravity_torque
+from ppafo.model.vane import gravity_torque, sliding_friction
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.result import Result, Status
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
-from ppafo.simulation.scenario import LedMotion, Scenario
+from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.version import __version__
 
 OPEN_LOOP = "constant"
 """The controller that follows no reference: its recordings have none, so that no tracking error is made of it."""
 
 REMEDY = (
-    "the step may be too long for this device, or a value far from any real one: try a smaller run.step, "
-    "and look at the inertia, the volumes and the valve area (ppafo audit)"
+    "the step may be too long for this device, or a value unrealistic: try a smaller run.step, "
+    "and check the inertia, the volumes and the valve area (ppafo audit)"
 )
 
 
@@ -119,14 +119,14 @@ def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, F
 
 
 def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    """Return what a run records of its gas beside pressures, with units, from its rows (samples,) by path.
+    """Return what a run records of its gas beside pressures, in SI with the unit, from rows (samples,) by path.
 
-    Line pressures and what came through the bottle's regulator where there are lines; true masses, temperatures and
+    Line pressures and the gas through the bottle's regulator where there are lines; true masses, temperatures and
     energies where the gas has an energy balance.
     """
     found: dict[str, tuple[Floats, str]] = {}
     if run.lines is not None:
-        lines = LineState(*(rows[f"line_state.{name}"] for name in LineState._fields))  # type: ignore[arg-type]
+        lines = rebuilt(LineState, [rows[path] for path in leaf_paths(LineState, "line_state")])
         line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)
         found |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
         found["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")
@@ -148,9 +148,9 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
 def _external_torque(
     scenario: Scenario, run: Run, times: Floats, angle: Floats, rate: Floats, torque: Floats
 ) -> Floats:
-    """T_ex of equation (1) [N m]: what was prescribed, or what holds a led vane to its path."""
+    """T_ex of equation (1) [N m]: the constant of a free vane, or what keeps a prescribed one on its path."""
     plant = run.plant
-    if not isinstance(scenario.motion, LedMotion):
+    if not isinstance(scenario.motion, PrescribedMotion):
         return np.full(times.size, plant.external_torque)
     acceleration = profile_values(scenario.motion.profile, times)[2]
     friction = np.array([sliding_friction(float(value), plant.dynamic_torque) for value in rate])

@@ -1,4 +1,4 @@
-"""The regulators and lines that feed a device: what a file may say of them in SI units, and what stands in else."""
+"""The regulators and lines that feed a device: what a file may state, in SI units, and the defaults."""
 
 import functools
 import tomllib
@@ -11,7 +11,7 @@ from ppafo.units import to_si
 
 SECTION = "supply_line"
 LINES = ("plantarflexion", "dorsiflexion")
-"""Behind the bottle's regulator, and behind the second one on the device, which hangs on the first line."""
+"""Behind the bottle's regulator, and behind the second one on the device, which the first line feeds."""
 
 _REGULATED = (
     Quantity("droop", "Pa s/kg", "fall of the line pressure per mass flow", None, 1.0, 1.0e10),
@@ -22,7 +22,7 @@ _REGULATED = (
 
 @functools.cache
 def entries() -> dict[str, Entry]:
-    """Return what stands in for what ``[supply_line]`` does not give, by path such as ``dorsiflexion.droop``."""
+    """Return the defaults for what ``[supply_line]`` does not give, by path such as ``dorsiflexion.droop``."""
     document = tomllib.loads((resources.files("ppafo.simulation") / "supply_line.toml").read_text(encoding="utf-8"))
     return {
         f"{line}.{item.name}": Entry.model_validate(document[line][item.name]) for line in LINES for item in _REGULATED
@@ -31,7 +31,7 @@ def entries() -> dict[str, Entry]:
 
 @functools.cache
 def line_quantities(line: str) -> tuple[Quantity, ...]:
-    """Return what a file may say of one line, with defaults in SI."""
+    """Return what a file may state of one line, with defaults in SI."""
     found = ((item, entries()[f"{line}.{item.name}"]) for item in _REGULATED)
     return tuple(replace(item, default=to_si(entry.value, entry.unit, item.unit)) for item, entry in found)
 

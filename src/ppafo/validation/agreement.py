@@ -10,7 +10,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.inputs import SUPPLY, regular_interval
-from ppafo.simulation.recorded.scenario import fixed_volume
+from ppafo.simulation.recorded.scenario import with_fixed_volume
 from ppafo.validation.alignment import DEFAULT_LIMIT, Curve, Delay, estimate_delay
 from ppafo.validation.compared import (
     ANGLE,
@@ -72,14 +72,14 @@ class ChannelAgreement:
     limit: float
 
     @property
-    def share(self) -> float:
+    def fraction(self) -> float:
         """RMS error over the full range [-]."""
         return self.rms / self.full_range
 
     @property
     def passes(self) -> bool:
         """True where the RMS error is within its limit."""
-        return self.share <= self.limit
+        return self.fraction <= self.limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +161,7 @@ def _rms(error: Floats, weights: Floats) -> float:
 def compare_recording(measured: Measured, device: Device, settings: ReplaySettings) -> RecordingAgreement:
     """Return how far the model of a device is from one recording, on the inputs of that recording."""
     if settings.volume is not None:
-        device = fixed_volume(device, settings.volume)
+        device = with_fixed_volume(device, settings.volume)
         settings = replace(settings, motion="held", initial=initial_in_fixed_volume(device, settings.initial))
     _check_angle(measured, settings.motion)
     start = start_of(measured, device, settings.initial)
@@ -217,7 +217,7 @@ def _comparisons(measured: Measured, replayed: Replayed, device: Device, setting
         full_range = kind.full_range(device, gauge)
         model = replayed.recording
         curve = Curve(measured.recording.time, values, model.time, model[name], full_range)
-        items.append(Comparison(name, kind.unit, curve, settings.thresholds.limit(name).share_of(full_range)))
+        items.append(Comparison(name, kind.unit, curve, settings.thresholds.limit(name).fraction_of(full_range)))
     if not items:
         word = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
         raise DataError(f"{measured.file}: has nothing to compare; it needs {word}")

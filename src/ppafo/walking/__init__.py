@@ -1,4 +1,4 @@
-"""The device on a leg that walks: wearer, gait, sensors and event-based control put together, and what came of it."""
+"""The device on a walking leg: wearer, gait, sensors and event-based control, and the results."""
 
 from ppafo.walking.comparison import Comparison, compare_walks
 from ppafo.walking.configuration import Configuration

@@ -1,8 +1,8 @@
-"""How wearers differ: a person scaled in mass and length, and how much people do.
+"""How wearers differ: a person scaled in mass and length, and the variation between people.
 
-A segment keeps its share of the body mass, its share of the body's length, and where its mass lies in it (as in
+A segment keeps its fraction of the body mass, its fraction of the body's length, and where its mass lies in it (as in
 table 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009). So masses go with body mass,
-lengths with stature, and inertias with mass times length squared; the shares are those of the wearer that is scaled.
+lengths with stature, and inertias with mass times length squared; the fractions are those of the wearer that is scaled.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ et al. 2014, NATICK/TR-15/007)."""
 CORRELATION = 0.5
 """Between body mass and stature. Assumed: the survey's table of means does not give it."""
 
-MOST_DEVIATIONS = 2.5
+MAXIMUM_DEVIATIONS = 2.5
 """Draws further from the mean than this are taken at this distance."""
 
 _LENGTHS = ("shank_length", "shank_mass_centre", "foot_mass_centre", "heel_lever", "toe_lever")
@@ -36,9 +36,9 @@ class Build:
     stature: Floats
 
 
-def drawn_builds(count: int, generator: np.random.Generator) -> Build:
-    """Draw people; the first has the mass and stature of the wearer that is scaled."""
-    normal = bounded_normal(generator, (2, count))
+def draw_builds(count: int, generator: np.random.Generator) -> Build:
+    """Draw the build of ``count`` people; the first is the wearer that is scaled."""
+    normal = draw_bounded_normal(generator, (2, count))
     stature = normal[0]
     mass = CORRELATION * normal[0] + np.sqrt(1.0 - CORRELATION**2) * normal[1]
     scaled = 1.0 + MASS_VARIATION * mass, 1.0 + STATURE_VARIATION * stature
@@ -47,13 +47,13 @@ def drawn_builds(count: int, generator: np.random.Generator) -> Build:
     return Build(*scaled)
 
 
-def bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Draw from the normal distribution, held within ``MOST_DEVIATIONS``."""
-    return np.clip(generator.standard_normal(shape), -MOST_DEVIATIONS, MOST_DEVIATIONS)
+def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) -> Floats:
+    """Standard normal draws [-] of this shape, those beyond ``MAXIMUM_DEVIATIONS`` set to that limit."""
+    return np.clip(generator.standard_normal(shape), -MAXIMUM_DEVIATIONS, MAXIMUM_DEVIATIONS)
 
 
-def scaled_segments(wearer: Wearer, build: Build) -> dict[str, Floats]:
-    """Values of the leg (people,) by the field of ``LegParameters``, in SI units."""
+def segment_values(wearer: Wearer, build: Build) -> dict[str, Floats]:
+    """Values of the leg (people,) by field of ``LegParameters``, in SI units."""
     found = {name: getattr(wearer, name) * build.stature for name in _LENGTHS}
     found |= {name: getattr(wearer, name) * build.mass for name in _MASSES}
     found |= {name: getattr(wearer, name) * build.mass * build.stature**2 for name in _INERTIAS}

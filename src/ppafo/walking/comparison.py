@@ -1,12 +1,17 @@
-"""The same wearer with the device, with the device switched off, and as the healthy gait would have it."""
+"""The same wearer with the device, with the device switched off, and with a healthy ankle."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from ppafo.control.walking import off
 from ppafo.metrics import Metric
+from ppafo.model.leg import passive_torque
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.followed_gait import landing_phase
+from ppafo.walking.gait_series import landing_phase
+from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import Progress, WalkResult, silent, walk
 from ppafo.walking.walk_metrics import healthy_positive_work, healthy_toe_height, lowest_toes
 
@@ -28,33 +33,44 @@ class Comparison:
 
 
 def compare_walks(configuration: Configuration, minutes: float, progress: Progress = silent) -> Comparison:
-    """Walk some minutes with the device and as long with it switched off; ScenarioError for bad input."""
+    """Walk ``minutes`` [min] with the device and as long with it off; ScenarioError for bad input."""
     return Comparison(
         walk(configuration, minutes, progress=progress),
-        walk(switched_off(configuration), minutes, progress=progress),
+        walk(with_device_off(configuration), minutes, progress=progress),
         healthy_metrics(configuration),
     )
 
 
-def switched_off(configuration: Configuration) -> Configuration:
-    """The same wearer and device with both chambers vented; no gas flows, so it needs no lines."""
+def with_device_off(configuration: Configuration) -> Configuration:
+    """The same wearer and device with both chambers vented; no gas flows, so no supply lines are needed."""
     return replace(configuration, name=f"{configuration.name}-off", controller=off.KIND, settings={}, supply_lines=None)
 
 
 def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:
-    """What the numbers of a walk would be with a healthy ankle; without the moment there is no work."""
+    """The metrics of a walk with a healthy ankle, SI units; without a moment curve there is no work."""
     gait = configuration.gait
     found = {
         "slap_rate": Metric(_landing_rate(configuration), "rad/s", "rate of the measured foot as it comes down"),
-        "toe_clearance": Metric(0.0, "m", "the healthy gait is the measure"),
+        "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
         "lowest_toes": lowest_toes(configuration, healthy_toe_height(configuration)),
         "toe_landing": Metric(0.0, "-", "the heel comes first"),
-        "angle_difference": Metric(0.0, "rad", "the healthy gait is the measure"),
+        "angle_difference": Metric(0.0, "rad", "0 by definition: measured from the healthy gait"),
     }
     if gait.ankle_moment is not None:
         work = healthy_positive_work(configuration)
         found["push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
+        if configuration.wearer.keeps_gait >= 0.5:
+            found["dorsiflexor_moment"] = _dorsiflexor_moment(configuration)
     return found
+
+
+def _dorsiflexor_moment(configuration: Configuration) -> Metric:
+    """Moment of the muscles that lift the foot without any device, from the measured moment less tissue."""
+    gait, wearer = configuration.gait, configuration.wearer
+    torque: Any = passive_torque  # plain arithmetic, of arrays too
+    tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
+    moment = np.maximum(tissue - wearer.body_mass * gait.curve("ankle_moment").values_at(PHASES), 0.0)
+    return Metric(float(moment[:-1].mean()), "N m", "moment of the wearer's dorsiflexors, mean over the stride")
 
 
 def _landing_rate(configuration: Configuration) -> float:

@@ -1,10 +1,10 @@
-"""Settings of a walk that contradict each other: refused before anything runs, in one line that names both."""
+"""Settings of a walk that contradict each other: refused before the run, in one line that names both."""
 
 from collections.abc import Iterator, Mapping
 
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
-from ppafo.simulation.reading import Reading, rounded
+from ppafo.simulation.reading import Reading, short_quantity_text
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.planning import walking_valve
 
@@ -27,7 +27,7 @@ def _is_given(reading: Reading, path: str) -> bool:
 
 
 def _of_default(reading: Reading, path: str, reason: str) -> ScenarioError:
-    return ScenarioError(f"{reading.file}: {path}, which is not given and has its default: {reason}")
+    return ScenarioError(f"{reading.file}: {path}, which is not given and takes its default: {reason}")
 
 
 def _contradictions(configuration: Configuration) -> Iterator[tuple[str, str]]:
@@ -48,10 +48,10 @@ def _contradictions(configuration: Configuration) -> Iterator[tuple[str, str]]:
 def _segments(configuration: Configuration) -> Iterator[tuple[str, str]]:
     wearer = configuration.wearer
     if wearer.shank_mass_centre > wearer.shank_length:
-        length = rounded(wearer.shank_length, _METRE)
+        length = short_quantity_text(wearer.shank_length, _METRE)
         yield "wearer.shank_mass_centre", f"lies beyond the ankle: wearer.shank_length is {length}"
     if wearer.foot_mass_centre > wearer.toe_lever:
-        lever = rounded(wearer.toe_lever, _METRE)
+        lever = short_quantity_text(wearer.toe_lever, _METRE)
         yield "wearer.foot_mass_centre", f"lies beyond the toes: wearer.toe_lever is {lever}"
 
 
@@ -60,7 +60,7 @@ def _valve(configuration: Configuration) -> Iterator[tuple[str, str]]:
     if valve != "proportional" and not configuration.controller.only_switches:
         fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
         remedy = f"take device.valve 'proportional', or controller.kind {fitting}"
-        yield "controller.kind", f"opens its valve by degrees, which a {valve} valve cannot: {remedy}"
+        yield "controller.kind", f"opens its valve gradually, which a {valve} valve cannot: {remedy}"
 
 
 def _thresholds(configuration: Configuration) -> Iterator[tuple[str, str]]:
@@ -69,41 +69,47 @@ def _thresholds(configuration: Configuration) -> Iterator[tuple[str, str]]:
     if unload >= load:
         yield (
             "controller.unload_threshold",
-            f"must be below controller.load_threshold, which is {rounded(load, _NEWTON)}",
+            f"must be below controller.load_threshold, which is {short_quantity_text(load, _NEWTON)}",
         )
     if settings["largest_force"] <= load:
-        yield "controller.largest_force", f"must be above controller.load_threshold, which is {rounded(load, _NEWTON)}"
+        yield (
+            "controller.largest_force",
+            f"must be above controller.load_threshold, which is {short_quantity_text(load, _NEWTON)}",
+        )
 
 
 def _times(configuration: Configuration) -> Iterator[tuple[str, str]]:
     settings, stride = configuration.settings, configuration.gait.stride_time
     if not 0.5 * stride < settings["first_stride_time"] < 2.0 * stride:
-        wanted = rounded(round(stride, 4), _SECOND)
+        stride_text = short_quantity_text(round(stride, 4), _SECOND)
         yield (
             "controller.first_stride_time",
-            f"must be between half and twice the stride of the gait, which is {wanted}",
+            f"must be between half and twice the stride of the gait, which is {stride_text}",
         )
     if settings["flat_from"] >= settings["flat_to"]:
         yield "controller.flat_from", f"must be below controller.flat_to, which is {settings['flat_to']:g}"
     delay = walking_valve(configuration.device.valve).command_delay(configuration.device.valve.settings)
     for name in ("fill_time", "vent_time"):
         if settings[name] <= delay:
-            dead = rounded(delay, _SECOND)
+            dead = short_quantity_text(delay, _SECOND)
             yield f"controller.{name}", f"must be longer than the dead time of the valve, which is {dead}"
     if settings["frozen_time"] <= 2.0 * configuration.period:
-        sample = rounded(configuration.period, _SECOND)
-        yield "controller.frozen_time", f"must be longer than two samples of the controller, one is {sample}"
+        sample = short_quantity_text(configuration.period, _SECOND)
+        yield "controller.frozen_time", f"must be longer than two sample periods of the controller, {sample} each"
 
 
 def _angles(configuration: Configuration) -> Iterator[tuple[str, str]]:
     settings, actuator = configuration.settings, configuration.device.actuator
     low, high = settings["lowest_angle"], settings["highest_angle"]
     if low >= high:
-        yield "controller.lowest_angle", f"must be below controller.highest_angle, which is {rounded(high, _RADIAN)}"
+        yield (
+            "controller.lowest_angle",
+            f"must be below controller.highest_angle, which is {short_quantity_text(high, _RADIAN)}",
+        )
     low, high = max(low, actuator.angle_min), min(high, actuator.angle_max)
     if not low < settings["swing_angle"] < high:
-        reach = f"{rounded(low, _RADIAN)} to {rounded(high, _RADIAN)}"
-        yield "controller.swing_angle", f"lies outside of what sensor and device reach, {reach}"
+        reach = f"{short_quantity_text(low, _RADIAN)} to {short_quantity_text(high, _RADIAN)}"
+        yield "controller.swing_angle", f"lies outside the range of sensor and device, {reach}"
 
 
 def _gait(configuration: Configuration) -> Iterator[tuple[str, str]]:
@@ -118,18 +124,18 @@ def _gait(configuration: Configuration) -> Iterator[tuple[str, str]]:
 
 def _pressures(configuration: Configuration) -> Iterator[tuple[str, str]]:
     settings, supply = configuration.settings, configuration.device.supply
-    atmosphere = rounded(supply.atmospheric_pressure, _PASCAL)
+    atmosphere = short_quantity_text(supply.atmospheric_pressure, _PASCAL)
     lowest = min(supply.pressure, supply.dorsiflexion_pressure)
     highest = max(supply.pressure, supply.dorsiflexion_pressure)
     if settings["lowest_pressure"] >= supply.atmospheric_pressure:
         yield "controller.lowest_pressure", f"must be below the atmosphere, which is {atmosphere}"
     if not supply.atmospheric_pressure < settings["filled_pressure"] < lowest:
-        fed = rounded(lowest, _PASCAL)
+        fed = short_quantity_text(lowest, _PASCAL)
         yield "controller.filled_pressure", f"must be between atmosphere and supply, which are {atmosphere} and {fed}"
     compressed = highest * COMPRESSION
     if settings["highest_pressure"] <= compressed:
-        limit = rounded(compressed, _PASCAL)
-        yield "controller.highest_pressure", f"a moving foot compresses a chamber to above it; must be above {limit}"
+        limit = short_quantity_text(compressed, _PASCAL)
+        yield "controller.highest_pressure", f"must be above {limit}: a moving foot compresses the gas in a chamber"
 
 
 def _push_off(settings: Mapping[str, float]) -> Iterator[tuple[str, str]]:

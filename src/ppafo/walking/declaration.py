@@ -12,28 +12,28 @@ STEP = Quantity("step", "s", "largest step; 1 ms unless given", 1.0e-3, 1.0e-6, 
 
 WALK_SENSORS = (
     *(item for item in SENSORS if item.name != "delay"),
-    Quantity("force_bandwidth", "Hz", "up to which the force sensors follow", 30.0, 0.1, 1.0e4),
+    Quantity("force_bandwidth", "Hz", "bandwidth of the force sensors", 30.0, 0.1, 1.0e4),
     Quantity("force_noise", "N", "standard deviation of the measured forces", 0.0, 0.0, 1.0e4),
     Quantity("force_resolution", "N", "step of the measured forces", 0.0, 0.0, 1.0e3),
-    Quantity("lost_share", "1", "share of the force samples that are lost", 0.0, 0.0, 1.0),
-    Quantity("angle_lost_share", "1", "share of the angle samples that are lost", 0.0, 0.0, 1.0),
-    Quantity("pressure_lost_share", "1", "share of the pressure samples that are lost", 0.0, 0.0, 1.0),
+    Quantity("lost_share", "1", "fraction of the force samples that are lost", 0.0, 0.0, 1.0),
+    Quantity("angle_lost_share", "1", "fraction of the angle samples that are lost", 0.0, 0.0, 1.0),
+    Quantity("pressure_lost_share", "1", "fraction of the pressure samples that are lost", 0.0, 0.0, 1.0),
 )
-ANGLE_BANDWIDTH = Quantity("angle_bandwidth", "Hz", "up to which the angle sensor follows", None, 0.1, 1.0e6)
-PRESSURE_BANDWIDTH = Quantity("pressure_bandwidth", "Hz", "up to which the pressure sensors follow", None, 0.1, 1.0e6)
+ANGLE_BANDWIDTH = Quantity("angle_bandwidth", "Hz", "bandwidth of the angle sensor", None, 0.1, 1.0e6)
+PRESSURE_BANDWIDTH = Quantity("pressure_bandwidth", "Hz", "bandwidth of the pressure sensors", None, 0.1, 1.0e6)
 BANDWIDTHS = (ANGLE_BANDWIDTH, PRESSURE_BANDWIDTH)
 """Sensors that follow at once unless one is given."""
 
 FAULTY = ("heel", "toe", "angle", "pressure_1", "pressure_2")
 FAULT_TIME = Quantity("time", "s", "when the sensor fails", None, 0.0, 1.0e6)
 READINGS = {
-    "heel": Quantity("reading", "N", "what it shows from then on", 0.0, -1.0e6, 1.0e6),
-    "toe": Quantity("reading", "N", "what it shows from then on", 0.0, -1.0e6, 1.0e6),
-    "angle": Quantity("reading", "rad", "what it shows from then on", 0.0, -100.0, 100.0),
-    "pressure_1": Quantity("reading", "Pa_a", "what it shows from then on", 0.0, -1.0e9, 1.0e9),
-    "pressure_2": Quantity("reading", "Pa_a", "what it shows from then on", 0.0, -1.0e9, 1.0e9),
+    "heel": Quantity("reading", "N", "its reading from then on", 0.0, -1.0e6, 1.0e6),
+    "toe": Quantity("reading", "N", "its reading from then on", 0.0, -1.0e6, 1.0e6),
+    "angle": Quantity("reading", "rad", "its reading from then on", 0.0, -100.0, 100.0),
+    "pressure_1": Quantity("reading", "Pa_a", "its reading from then on", 0.0, -1.0e9, 1.0e9),
+    "pressure_2": Quantity("reading", "Pa_a", "its reading from then on", 0.0, -1.0e9, 1.0e9),
 }
-FAULT_KINDS = {"frozen": "shows its last value", "stuck": "shows one reading"}
+FAULT_KINDS = {"frozen": "keeps its last reading", "stuck": "gives one fixed reading"}
 
 
 def controller_settings(kind: str) -> tuple[Quantity, ...]:

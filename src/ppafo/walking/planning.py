@@ -24,7 +24,7 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import Pieces, Steps, compose_run
 from ppafo.simulation.scenario import ProfileChoice, Thermal
-from ppafo.walking.followed_gait import gait_series, gait_timing, heel_lever
+from ppafo.walking.gait_series import gait_series, gait_timing, heel_rocker
 from ppafo.walking.wearer import Wearer
 
 ANGLES = (math.radians(60.0), math.radians(115.0))
@@ -59,7 +59,8 @@ class WalkPlan:
 
 def plan_walk(plan: WalkPlan) -> Run:
     """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
-    leg = plan.wearer.leg()._replace(heel_lever=heel_lever(plan.gait, plan.wearer))
+    rocker = heel_rocker(plan.gait, plan.wearer)
+    leg = plan.wearer.leg()._replace(heel_lever=rocker.raised, flat_heel_lever=rocker.flat, heel_roll_angle=rocker.half)
     bare = plant_parameters(plan.device)
     walk = _walk(plan, leg, bare)
     pieces = Pieces(
@@ -78,7 +79,7 @@ def plan_walk(plan: WalkPlan) -> Run:
         pieces,
         with_leg(bare, leg),
         lambda plant: walk_steps(plan, plant),
-        lambda plant: vented(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
+        lambda plant: vented_state(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
         walk,
     )
 
@@ -145,7 +146,7 @@ def _parts(plan: WalkPlan, plant: PlantParameters, step: float) -> int:
 
 
 def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
-    """The plant with the inertia of the foot and the damping of the ankle in it; its own gravity goes to the leg."""
+    """The plant with the foot's inertia and the ankle's damping; its own gravity is accounted for in the leg."""
     return plant._replace(
         inertia=plant.inertia + foot_inertia_about_ankle(leg),
         viscous_damping=plant.viscous_damping + leg.ankle_damping,
@@ -159,8 +160,8 @@ def walking_valve(valve: Valve) -> ValveModel:
     return dump.choose(valve.settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(valve.settings)
 
 
-def vented(plant: PlantParameters, angle: float, angular_velocity: float) -> PlantState:
-    """State at an angle [rad] with both chambers at the atmosphere."""
+def vented_state(plant: PlantParameters, angle: float, angular_velocity: float) -> PlantState:
+    """State at an angle [rad] and its rate [rad/s] with both chambers at atmospheric pressure."""
     volumes = chamber_volumes(plant, angle)
     mass_1, mass_2 = (chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes)
     return PlantState(

@@ -10,15 +10,15 @@ from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.errors import ScenarioError
-from ppafo.walking.anthropometry import drawn_builds
+from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
-from ppafo.walking.varied_gait import varied_gaits
-from ppafo.walking.walk import REMEDY, Progress, checked_seconds, plan_of, silent
+from ppafo.walking.varied_gait import draw_gaits
+from ppafo.walking.walk import REMEDY, Progress, plan_of, silent, walk_duration
 from ppafo.walking.wearers_rows import batch_of_many
 
-MOST_WEARERS = 1_000_000
+MAXIMUM_WEARERS = 1_000_000
 
 STEPS_AT_ONCE = 1.0e8
 """Steps of all wearers of one group together, a few seconds."""
@@ -26,7 +26,7 @@ STEPS_AT_ONCE = 1.0e8
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """What is known of every wearer: unit and meaning."""
+    """A quantity of every wearer: unit and meaning."""
 
     unit: str
     summary: str
@@ -38,23 +38,23 @@ OUTCOMES: dict[str, Number] = {
     "slap_rate": Number(
         "rad/s", "rate of the toes as they come down after the heel, below 0; 0 where they always came first"
     ),
-    "toe_clearance": Number("m", "lowest toes in mid-swing against the wearer's healthy gait"),
-    "toe_landing": Number("-", "share of the strides in which the toes met the ground before the heel"),
+    "toe_clearance": Number("m", "lowest toe height in mid-swing, relative to the wearer's healthy gait"),
+    "toe_landing": Number("-", "fraction of the strides in which the toes met the ground before the heel"),
 }
 TRAITS: dict[str, Number] = {
     "body_mass": Number("kg", "mass of the body"),
     "shank_length": Number("m", "knee to ankle"),
     "stride_time": Number("s", "from one heel strike to the next"),
-    "stance_share": Number("-", "share of the stride until toe-off"),
+    "stance_share": Number("-", "fraction of the stride until toe-off"),
 }
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Population:
-    """Wearers and what came of their walks, each an array (wearers,) by name, in SI units.
+    """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
 
     ``diverged`` counts the wearers whose walk left what is possible; they are not in ``outcomes`` nor in ``traits``.
-    ``vented`` counts those whose controller stopped trusting its sensors and vented both chambers for good.
+    ``vented`` counts those whose controller stopped trusting its sensors and vented both chambers permanently.
     """
 
     configuration: Configuration
@@ -84,18 +84,18 @@ class Population:
 def walk_population(
     configuration: Configuration, minutes: float, wearers: int, seed: int = 1, progress: Progress = silent
 ) -> Population:
-    """Let many wearers walk; the first is that of the configuration. ScenarioError for bad input.
+    """Let many wearers walk for ``minutes`` [min]; the first is that of the configuration.
 
-    ``progress`` is told how many of how many wearers have walked.
+    ``progress`` gets the number of wearers that have walked and the number of all. ScenarioError for bad input.
     """
-    if not 1 <= wearers <= MOST_WEARERS:
-        raise ScenarioError(f"{wearers} wearers cannot walk; choose 1 to {MOST_WEARERS}")
-    run = plan_walk(plan_of(configuration, checked_seconds(configuration, minutes)))
+    if not 1 <= wearers <= MAXIMUM_WEARERS:
+        raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
+    run = plan_walk(plan_of(configuration, walk_duration(configuration, minutes)))
     generator = np.random.default_rng(seed)
-    build = drawn_builds(wearers, generator)
-    gaits = varied_gaits(configuration.gait, build.stature, generator)
+    build = draw_builds(wearers, generator)
+    gaits = draw_gaits(configuration.gait, build.stature, generator)
     batch = batch_of_many(configuration, run, build, gaits, generator)
-    states = _walked(batch, progress)
+    states = _run_in_groups(batch, progress)
     rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
     good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)
     outcomes = _outcomes(rows, run.step * run.step_count * gaits.timing["frequency"])
@@ -110,7 +110,7 @@ def walk_population(
     return Population(configuration, minutes, seed, kept[0], kept[1], int((~good).sum()), vented)
 
 
-def _walked(batch: Batch, progress: Progress) -> Floats:
+def _run_in_groups(batch: Batch, progress: Progress) -> Floats:
     """Final states, in groups small enough for an interrupt to be seen and for progress to be told."""
     count = batch.states.shape[1]
     group = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES

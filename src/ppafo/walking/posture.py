@@ -12,12 +12,12 @@ import numpy as np
 from ppafo.gait import Gait
 from ppafo.model.gait import GaitTiming
 from ppafo.signals.recording import Floats
-from ppafo.walking.followed_gait import followed
+from ppafo.walking.gait_series import truncate
 from ppafo.walking.wearer import Wearer
 
-ANKLE_HEIGHT_SHARE = 0.039 / 0.246
-"""Height of the ankle over the sole as a share of the shank's length: both as shares of the stature in figure 4.1 of
-Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
+ANKLE_HEIGHT_FRACTION = 0.039 / 0.246
+"""Height of the ankle over the sole as a fraction of the shank's length: both as fractions of the stature in figure
+4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
 
 MID_SWING_CLEARANCE = 0.015
 """Healthy toes over the ground in mid-swing [m]; 1 to 2 cm (Winter 1992, Phys Ther 72:45)."""
@@ -78,10 +78,10 @@ class AnklePath:
 
 
 def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
-    """The path of the ankle in a gait for the segments of a wearer."""
-    height = ANKLE_HEIGHT_SHARE * wearer.shank_length
-    shank, ankle = followed(gait.shank_angle), followed(gait.ankle_angle)
-    foot = shank.sampled(_GRID) - ankle.sampled(_GRID) + 0.5 * np.pi - timing.ground_angle
+    """The path of the ankle [m] over one stride of a gait, for the segments of a wearer."""
+    height = ANKLE_HEIGHT_FRACTION * wearer.shank_length
+    shank, ankle = truncate(gait.shank_angle), truncate(gait.ankle_angle)
+    foot = shank.values_at(_GRID) - ankle.values_at(_GRID) + 0.5 * np.pi - timing.ground_angle
     toes_down = height * np.cos(foot) - wearer.toe_lever * np.sin(foot)
     heel_down = height * np.cos(foot) + wearer.heel_lever * np.sin(foot)
     swing = np.clip((_GRID - timing.toe_off) / (1.0 - timing.toe_off), 0.0, 1.0)
@@ -109,7 +109,7 @@ def _forward(foot: Floats, wearer: Wearer, height: float, toe_off: float, length
     last = int(np.searchsorted(_GRID, toe_off)) - 1
     speed = (rolled[last] - rolled[last - 10]) / (_GRID[last] - _GRID[last - 10])
     way, span = rolled[0] + length - rolled[last], 1.0 - _GRID[last]
-    share = np.clip((_GRID - _GRID[last]) / span, 0.0, 1.0)
+    fraction = np.clip((_GRID - _GRID[last]) / span, 0.0, 1.0)
     start = speed * span
-    cubic = start * share + (3.0 * way - 2.0 * start) * share**2 + (start - 2.0 * way) * share**3
+    cubic = start * fraction + (3.0 * way - 2.0 * start) * fraction**2 + (start - 2.0 * way) * fraction**3
     return np.asarray(np.where(np.arange(_GRID.size) <= last, rolled, rolled[last] + cubic))

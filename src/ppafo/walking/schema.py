@@ -7,17 +7,17 @@ from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS, walking_controllers
-from ppafo.documents.models import NAME, one_of, optional, published_schema, table
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.simulation import supply_line
 from ppafo.simulation.declaration import SAMPLING
 from ppafo.simulation.schema import (
     device_fields,
     gas_model_table,
     kind_field,
+    model_name,
     number_type,
     quantity_fields,
     supply_line_table,
-    titled,
 )
 from ppafo.walking import declaration
 from ppafo.walking.wearer import WEARER
@@ -28,7 +28,7 @@ def _controller() -> Any:
     return one_of(
         [
             table(
-                f"{titled(name)}Walking",
+                f"{model_name(name)}Walking",
                 kind_field(name, kind.summary) | sampling | quantity_fields(kind.quantities),
             )
             for name, kind in walking_controllers().items()
@@ -41,8 +41,8 @@ def _fault(sensor: str) -> Any:
     reading = quantity_fields((declaration.READINGS[sensor],))
     return one_of(
         [
-            table(f"{titled(sensor)}Frozen", kind_field("frozen", declaration.FAULT_KINDS["frozen"]) | time),
-            table(f"{titled(sensor)}Stuck", kind_field("stuck", declaration.FAULT_KINDS["stuck"]) | time | reading),
+            table(f"{model_name(sensor)}Frozen", kind_field("frozen", declaration.FAULT_KINDS["frozen"]) | time),
+            table(f"{model_name(sensor)}Stuck", kind_field("stuck", declaration.FAULT_KINDS["stuck"]) | time | reading),
         ]
     )
 
@@ -62,19 +62,27 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=100)),
-        "description": (str, Field("", description="what is tried here, and why")),
-        "gait": optional(str, "name of a gait, or the path of a gait file; the built-in one unless given"),
+        "description": (str, Field("", description="what this file tries, and why")),
+        "gait": optional(
+            str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
+        ),
         "device": (table("WalkDevice", device_fields()), Field(description="the hardware")),
-        "controller": (_controller(), Field(description="what sets the valve")),
-        "wearer": optional(table("Wearer", quantity_fields(WEARER)), "who walks; the paper's subject unless given"),
-        "sensors": optional(table("WalkSensors", sensors), "what the controller sees; ideal unless given"),
+        "controller": (_controller(), Field(description="what commands the valve")),
+        "wearer": optional(
+            table("Wearer", quantity_fields(WEARER)),
+            "who walks; the subject of the gait that is named, else the paper's, unless given",
+        ),
+        "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
         "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
         "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
         supply_line.SECTION: optional(
             supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
         ),
         "run": optional(table("WalkRun", quantity_fields((declaration.STEP,))), "how it is computed"),
-        "assumed": (dict[str, str], Field(default_factory=dict, description="values that no source gives, and why")),
+        "assumed": (
+            dict[str, str],
+            Field(default_factory=dict, description="assumed values, which no source gives, and why these"),
+        ),
     }
     return table("WalkFile", fields)
 
@@ -83,4 +91,4 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a walk file."""
     WALKING_CONTROLLERS.load_all()
     CONTROLLERS.load_all()
-    return published_schema(walk_file(), "ppafo walk")
+    return make_schema(walk_file(), "ppafo walk")

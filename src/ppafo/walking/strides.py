@@ -19,7 +19,7 @@ SETTLING = 2
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What is known of every stride: unit, meaning, and the running total in the record that it is the gain of."""
+    """A quantity of every stride: unit, meaning, and the running total in the record whose gain it is."""
 
     unit: str
     summary: str
@@ -34,7 +34,7 @@ PER_STRIDE: dict[str, Quantity] = {
         "rate of the toes as they come down after the heel, below 0; 0 where they came first",
         "walk.slap_rates",
     ),
-    "toe_clearance": Quantity("m", "lowest toes in mid-swing against the healthy gait", "walk.clearances"),
+    "toe_clearance": Quantity("m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances"),
     "toe_landing": Quantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
 }
 
@@ -58,8 +58,8 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
     return {name: np.diff(totals[item.total][starts]) for name, item in PER_STRIDE.items()}
 
 
-def averaged(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Curves]:
-    """Mean and deviation over strides of every channel, each stride brought to the same phases; none without strides.
+def mean_curves(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Curves]:
+    """Mean and deviation of every channel over strides brought to the same phases, in its SI unit; {} without strides.
 
     Channels that hold their value between samples, such as the command, have no mean.
     """

@@ -1,4 +1,4 @@
-"""Gaits that differ from one by as much as its strides do: series coefficients, stride times and events of many."""
+"""Gaits that differ from one as much as its strides do: series coefficients, stride times and events of many people."""
 
 from dataclasses import dataclass
 
@@ -6,10 +6,10 @@ import numpy as np
 
 from ppafo.gait import Gait
 from ppafo.gait.gait import KNEE, Curve
-from ppafo.model.gait import GaitTiming
+from ppafo.model.fourier import HARMONICS
 from ppafo.signals.recording import Floats
-from ppafo.walking.anthropometry import bounded_normal
-from ppafo.walking.followed_gait import EVENT_PHASES, HARMONICS, gait_events
+from ppafo.walking.anthropometry import draw_bounded_normal
+from ppafo.walking.gait_series import EVENT_PHASES, gait_events
 
 SERIES = {
     "shank": "shank_angle",
@@ -21,9 +21,9 @@ SERIES = {
 }
 """Curves that vary, by their field of ``GaitSeries``."""
 
-SHARE_OF_LEVEL = 0.5
-"""Share of a curve's variance that moves it as a whole; the rest goes to the harmonics by their power. Assumed: a gait
-file has one deviation for a curve."""
+LEVEL_FRACTION = 0.5
+"""Fraction of a curve's variance that moves it as a whole; the rest goes to the harmonics by their power. Assumed: a
+gait file has one deviation for each curve."""
 
 _AT_ONCE = 1000
 
@@ -37,21 +37,21 @@ class SeriesOfMany:
     sines: Floats
 
     def at_heel_strike(self, frequency: Floats) -> tuple[Floats, Floats, Floats]:
-        """Value, rate and acceleration by time at phase 0, for strides per second."""
+        """Value, first and second time derivative at phase 0, for strides per second [1/s]."""
         order = 2.0 * np.pi * np.arange(1, HARMONICS + 1)
         value = self.mean + self.cosines.sum(axis=1)
         return value, frequency * (self.sines @ order), -(frequency**2) * (self.cosines @ order**2)
 
-    def scaled(self, factor: Floats) -> "SeriesOfMany":
-        """The curves times a factor each (people,)."""
+    def scale(self, factor: Floats) -> "SeriesOfMany":
+        """The curves, each times its factor [-] (people,)."""
         return SeriesOfMany(self.mean * factor, self.cosines * factor[:, None], self.sines * factor[:, None])
 
     def rows(self) -> dict[str, Floats]:
-        """Coefficients (people,) by the field of ``model.fourier.Series``."""
+        """Coefficients (people,) by path in ``model.fourier.Series``, in the SI unit of the curve."""
         found = {"mean": self.mean}
         for order in range(HARMONICS):
-            found[f"cosine_{order + 1}"] = self.cosines[:, order]
-            found[f"sine_{order + 1}"] = self.sines[:, order]
+            found[f"harmonics[{order}].cosine"] = self.cosines[:, order]
+            found[f"harmonics[{order}].sine"] = self.sines[:, order]
         return found
 
 
@@ -64,33 +64,33 @@ class VariedGaits:
     stride_time: Floats
 
 
-def varied_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> VariedGaits:
-    """Draw gaits for people of a stature over that of the first (people,); the first walks as ``gait`` says.
+def draw_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> VariedGaits:
+    """Draw gaits for people whose stature is a multiple [-] (people,) of the first one's, who has the gait itself.
 
-    A curve that nobody measured stays 0. The way of the knee is as long as people are tall and walked in their stride
+    A curve that was not measured stays 0. The motion of the knee scales with stature and takes the person's stride
     time, so its acceleration goes with stature over stride time squared.
     """
     count = stature.size
-    series = {field: _varied(gait.curves.get(name), count, generator) for field, name in SERIES.items()}
-    time = gait.stride_time + gait.stride_time_deviation * bounded_normal(generator, (count,))
-    share = gait.stance_share + gait.stance_share_deviation * bounded_normal(generator, (count,))
-    time[0], share[0] = gait.stride_time, gait.stance_share
+    series = {field: _draw_series(gait.curves.get(name), count, generator) for field, name in SERIES.items()}
+    time = gait.stride_time + gait.stride_time_deviation * draw_bounded_normal(generator, (count,))
+    fraction = gait.stance_share + gait.stance_share_deviation * draw_bounded_normal(generator, (count,))
+    time[0], fraction[0] = gait.stride_time, gait.stance_share
     hurry = stature * (gait.stride_time / time) ** 2
-    series |= {name: series[name].scaled(hurry) for name in KNEE}
-    timing = {"frequency": 1.0 / time, **_events(series["shank"], series["ankle"], share)}
+    series |= {name: series[name].scale(hurry) for name in KNEE}
+    timing = {"frequency": 1.0 / time, **_events(series["shank"], series["ankle"], fraction)}
     return VariedGaits(series, timing, time)
 
 
-def _varied(curve: Curve | None, count: int, generator: np.random.Generator) -> SeriesOfMany:
+def _draw_series(curve: Curve | None, count: int, generator: np.random.Generator) -> SeriesOfMany:
     if curve is None:
         return SeriesOfMany(np.zeros(count), np.zeros((count, HARMONICS)), np.zeros((count, HARMONICS)))
     missing = (0.0,) * HARMONICS
     cosines, sines = (np.array((*values, *missing)[:HARMONICS]) for values in (curve.cosines, curve.sines))
     power = 0.5 * (cosines**2 + sines**2)
-    share = power / max(float(power.sum()), 1.0e-30)
-    spread = curve.deviation * np.sqrt((1.0 - SHARE_OF_LEVEL) * share)
-    normal = bounded_normal(generator, (2, count, HARMONICS))
-    level = curve.deviation * np.sqrt(SHARE_OF_LEVEL) * bounded_normal(generator, (count,))
+    fraction = power / max(float(power.sum()), 1.0e-30)
+    spread = curve.deviation * np.sqrt((1.0 - LEVEL_FRACTION) * fraction)
+    normal = draw_bounded_normal(generator, (2, count, HARMONICS))
+    level = curve.deviation * np.sqrt(LEVEL_FRACTION) * draw_bounded_normal(generator, (count,))
     normal[:, 0], level[0] = 0.0, 0.0
     return SeriesOfMany(curve.mean + level, cosines + spread * normal[0], sines + spread * normal[1])
 
@@ -106,4 +106,4 @@ def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> d
         foot = (shank.cosines - ankle.cosines)[part] @ cosine + (shank.sines - ankle.sines)[part] @ sine
         foot += level[:, None]
         found.append(gait_events(foot, stance_share[part]))
-    return dict(zip(GaitTiming._fields[2:], np.concatenate(found, axis=1), strict=True))
+    return {name: np.concatenate([part[name] for part in found]) for name in found[0]}

@@ -1,4 +1,4 @@
-"""Runs a walk and gathers what came of it, stride by stride and on average."""
+"""Runs a walk and collects its results, stride by stride and on average."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, LaneB
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, batch_of
 from ppafo.errors import ScenarioError
+from ppafo.gait.opensim_names import opensim_recording
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.simulation.result import Status
@@ -20,8 +21,8 @@ from ppafo.storage.opensim import write_opensim
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import WalkPlan, plan_walk
-from ppafo.walking.recorded import recorded
-from ppafo.walking.strides import SETTLING, Curves, averaged, per_stride, stride_starts
+from ppafo.walking.recorded import recording_of_walk
+from ppafo.walking.strides import SETTLING, Curves, mean_curves, per_stride, stride_starts
 from ppafo.walking.walk_metrics import walk_metrics
 
 if TYPE_CHECKING:
@@ -32,14 +33,14 @@ LONGEST_MINUTES = 60.0
 RECORD_INTERVALS = ((61.0, 1.0e-3), (601.0, 5.0e-3), (60.0 * LONGEST_MINUTES, 2.0e-2))
 """Up to which length of a walk [s] the record has which interval [s]: an hour of milliseconds would not fit."""
 
-REMEDY = "the step may be too long, or a value far from any real one: try a smaller run.step, and look at the wearer"
+REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
 
 
 Progress = Callable[[float, float], None]
 
 
 def silent(done: float, total: float) -> None:  # both are there for those who listen
-    """Progress that nobody listens to."""
+    """Ignore the progress."""
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -72,8 +73,9 @@ class WalkResult:
         return walk_figure({self.configuration.name: self})
 
     def save_opensim(self, path: str | Path) -> Path:
-        """Write the recording as a ``.sto`` file that OpenSim reads; returns the path."""
-        return write_opensim(path, self.recording)
+        """Write the recording as a ``.sto`` file in OpenSim's names, zero and signs, right leg; returns the path."""
+        named, _ = opensim_recording(self.recording, body_mass=self.configuration.wearer.body_mass)
+        return write_opensim(path, named)
 
 
 def walk(
@@ -83,17 +85,17 @@ def walk(
     gait: str | Path | None = None,
     progress: Progress = silent,
 ) -> WalkResult:
-    """Walk for some minutes: a configuration, the name of a shipped one, or a file; overrides as on the command line.
+    """Walk for ``minutes`` [min]: a configuration, the name of a shipped one, or a file; overrides as for the command.
 
     A walk that diverges is a result with that status, up to the time of failure. ScenarioError or ParameterError for
-    bad input. ``progress`` is told after every part of the walk how many of how many minutes are done.
+    bad input. ``progress`` gets the minutes done and the minutes in all, part by part.
     """
-    given = isinstance(configuration, Configuration)
+    is_loaded = isinstance(configuration, Configuration)
     chosen = configuration if isinstance(configuration, Configuration) else load_walk(configuration, overrides, gait)
-    if given and (gait is not None or tuple(overrides)):
-        raise ScenarioError("overrides and a gait belong to a name or a file: give them to load_walk")
-    run = plan_walk(plan_of(chosen, checked_seconds(chosen, minutes)))
-    outcome = _stepped(batch_of(run), run.step, progress)
+    if is_loaded and (gait is not None or tuple(overrides)):
+        raise ScenarioError("overrides and a gait go with a name or a file; a Configuration takes them in load_walk")
+    run = plan_walk(plan_of(chosen, walk_duration(chosen, minutes)))
+    outcome = _run_in_parts(batch_of(run), run.step, progress)
     rows = state_row_numbers(run)
     record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
     failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
@@ -103,24 +105,24 @@ def walk(
         kept = time < status.time
         kept[0] = True
         time, record = time[kept], {name: values[kept] for name, values in record.items()}
-    recording = recorded(chosen, run, time, record)
+    recording = recording_of_walk(chosen, run, time, record)
     starts = stride_starts(record["walk.strides"])
-    return _gathered(chosen, recording, record, starts, status)
+    return _walk_result(chosen, recording, record, starts, status)
 
 
-def checked_seconds(configuration: Configuration, minutes: float) -> float:
-    """Length of a walk [s], refused where it is too short for whole strides or too long."""
+def walk_duration(configuration: Configuration, minutes: float) -> float:
+    """Length of a walk [s]; ScenarioError where it is too short for whole strides, or too long."""
     seconds = 60.0 * minutes
     shortest = SHORTEST_STRIDES * configuration.gait.stride_time
     if not shortest <= seconds <= 60.0 * LONGEST_MINUTES:
         raise ScenarioError(
-            f"a walk of {minutes:.6g} min: must be {shortest / 60.0:.2g} min ({SHORTEST_STRIDES} strides) or more and "
+            f"a walk of {minutes:.6g} min: must be {shortest / 60.0:.2g} min ({SHORTEST_STRIDES} strides) or more, and "
             f"at most {LONGEST_MINUTES:g} min"
         )
     return seconds
 
 
-def _stepped(batch: Batch, step: float, progress: Progress) -> BatchResult:
+def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
     """Run in parts short enough for an interrupt to be seen and for progress to be told."""
     block = LaneBlock(load_program(batch.program), batch.clock, batch.parameters, batch.states)
     count = batch.clock.step_count
@@ -131,7 +133,7 @@ def _stepped(batch: Batch, step: float, progress: Progress) -> BatchResult:
 
 
 def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
-    """The plan of a walk of some seconds."""
+    """The plan of a walk of this length [s]."""
     return WalkPlan(
         device=configuration.device,
         wearer=configuration.wearer,
@@ -150,7 +152,7 @@ def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
     )
 
 
-def _gathered(
+def _walk_result(
     configuration: Configuration,
     recording: Recording,
     record: Mapping[str, Floats],
@@ -159,7 +161,7 @@ def _gathered(
 ) -> WalkResult:
     strides = per_stride(record, starts)
     settled = starts[SETTLING:]
-    averages = averaged(recording, settled)
+    averages = mean_curves(recording, settled)
     metrics = walk_metrics(configuration, recording, strides, averages, settled)
     return WalkResult(configuration, recording, strides, averages, metrics, status, starts)
 

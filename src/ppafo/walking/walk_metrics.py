@@ -1,4 +1,4 @@
-"""What comes of a walk as numbers: means over the strides, what they are of a healthy ankle, tracking and safety."""
+"""Results of a walk as numbers: means over the strides, fractions of a healthy ankle, tracking and safety."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.followed_gait import gait_timing
+from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.posture import ankle_path
 from ppafo.walking.strides import PER_STRIDE, PHASES, SETTLING, Curves
 
@@ -22,7 +22,7 @@ def walk_metrics(
     averages: Mapping[str, Curves],
     starts: NDArray[np.intp],
 ) -> dict[str, Metric]:
-    """Metrics of a walk by name; ``starts`` are the samples right after each heel strike, the first ones left out."""
+    """Metrics of a walk by name, in SI; ``starts`` are the samples after each heel strike, the first ones left out."""
     return _of_strides(configuration, strides, averages) | _tracking(recording, starts) | _safety(recording)
 
 
@@ -42,10 +42,13 @@ def _of_strides(
     if healthy > 0.0:
         found["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
         if "push_off_work" in found:
-            share = found["push_off_work"].value / healthy
+            fraction = found["push_off_work"].value / healthy
             found["push_off_share"] = Metric(
-                share, "-", "work of T_ex in push-off over the healthy ankle's positive work"
+                fraction, "-", "work of T_ex in push-off over the healthy ankle's positive work"
             )
+    if "dorsiflexor_moment" in averages:
+        moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
+        found["dorsiflexor_moment"] = Metric(moment, "N m", "moment of the wearer's dorsiflexors, mean over the stride")
     if "toe_height" in averages:
         found["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
     if "angle" in averages:
@@ -60,7 +63,9 @@ def lowest_toes(configuration: Configuration, height: Floats) -> Metric:
     """Lowest toes in mid-swing, where they must clear the ground, from their height [m] at ``PHASES``."""
     timing = gait_timing(configuration.gait)
     first, last = np.searchsorted(PHASES, [timing.clearance_from, timing.clearance_to])
-    return Metric(float(height[first:last].min()), "m", "lowest toes over the ground in mid-swing in the mean stride")
+    return Metric(
+        float(height[first:last].min()), "m", "lowest toe height above ground in mid-swing of the mean stride"
+    )
 
 
 def _tracking(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Metric]:
@@ -73,7 +78,7 @@ def _tracking(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Metri
     if not error.size:
         return {}
     rms = float(np.sqrt(np.mean(error**2)))
-    return {"push_off_error": Metric(rms, "N m", "RMS of the torque wanted less the actuator torque in push-off")}
+    return {"push_off_error": Metric(rms, "N m", "RMS of requested torque less actuator torque in push-off")}
 
 
 def _safety(recording: Recording) -> dict[str, Metric]:
@@ -81,7 +86,7 @@ def _safety(recording: Recording) -> dict[str, Metric]:
     if "safe_state" not in recording or not recording["safe_state"].any():
         return {}
     time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
-    return {"safe_state_time": Metric(time, "s", "when the controller vented both chambers for good")}
+    return {"safe_state_time": Metric(time, "s", "time at which the controller vented both chambers permanently")}
 
 
 def healthy_positive_work(configuration: Configuration) -> float:
@@ -90,8 +95,8 @@ def healthy_positive_work(configuration: Configuration) -> float:
     if "ankle_moment" not in gait.curves:
         return 0.0
     phases = np.linspace(0.0, 1.0, 2001)
-    moment = configuration.wearer.body_mass * gait.curve("ankle_moment").sampled(phases)
-    angle = gait.ankle_angle.sampled(phases)
+    moment = configuration.wearer.body_mass * gait.curve("ankle_moment").values_at(phases)
+    angle = gait.ankle_angle.values_at(phases)
     power = np.maximum(moment * np.gradient(angle, phases), 0.0)
     return float(np.trapezoid(power, phases))
 
@@ -100,4 +105,4 @@ def healthy_toe_height(configuration: Configuration) -> Floats:
     """Toes of the healthy gait over the ground [m] at ``PHASES``."""
     gait = configuration.gait
     path = ankle_path(gait, gait_timing(gait), configuration.wearer)
-    return path.toe_height(PHASES % 1.0, gait.shank_angle.sampled(PHASES), gait.ankle_angle.sampled(PHASES))
+    return path.toe_height(PHASES % 1.0, gait.shank_angle.values_at(PHASES), gait.ankle_angle.values_at(PHASES))

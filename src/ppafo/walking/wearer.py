@@ -18,9 +18,19 @@ WEARER = (
     Quantity("heel_lever", "m", "ankle back to the heel; bounds the lever of the ground force", 0.05, 0.0, 0.2),
     Quantity("toe_lever", "m", "ankle forward to the toes", 0.18, 0.0, 0.5),
     Quantity("ankle_stiffness", "N m/rad", "stiffness of tissue at the ankle", 4.0, 0.0, 500.0),
-    Quantity("ankle_rest_angle", "rad", "angle at which tissue pulls neither way", 1.92, 0.5, 3.0),
+    Quantity("ankle_rest_angle", "rad", "angle at which passive tissue exerts no torque", 1.92, 0.5, 3.0),
     Quantity("ankle_damping", "N m s/rad", "damping of tissue at the ankle", 0.2, 0.0, 50.0),
-    Quantity("residual_share", "1", "share of the healthy ankle moment that the wearer still has", 0.0, 0.0, 1.0),
+    Quantity(
+        "residual_share", "1", "fraction of the healthy ankle moment that the wearer can still produce", 0.0, 0.0, 1.0
+    ),
+    Quantity(
+        "keeps_gait",
+        "1",
+        "1: nondisabled, muscles keep the measured ankle whatever the device does; 0: the ankle follows the torques",
+        0.0,
+        0.0,
+        1.0,
+    ),
 )
 """Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008."""
 
@@ -43,6 +53,7 @@ class Wearer:
     ankle_rest_angle: float
     ankle_damping: float
     residual_share: float
+    keeps_gait: float
 
     def leg(self) -> LegParameters:
         """The leg as the engine takes it."""
@@ -59,7 +70,10 @@ class Wearer:
             ankle_rest_angle=self.ankle_rest_angle,
             ankle_damping=self.ankle_damping,
             residual_share=self.residual_share,
+            keeps_gait=self.keeps_gait,
             heel_lever=self.heel_lever,
+            flat_heel_lever=self.heel_lever,
+            heel_roll_angle=1.0,
             toe_lever=self.toe_lever,
             gravity=STANDARD_GRAVITY,
         )

@@ -13,7 +13,7 @@ from ppafo.gait.gait import KNEE
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.plant import chamber_volumes
-from ppafo.walking.anthropometry import Build, bounded_normal, scaled_segments
+from ppafo.walking.anthropometry import Build, draw_bounded_normal, segment_values
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.declaration import LARGEST_SEED
 from ppafo.walking.varied_gait import VariedGaits
@@ -22,7 +22,7 @@ THRESHOLD_VARIATION = 0.15
 """Standard deviation of thresholds over their values: how a fitter sets them, and how a sensor sits. Assumed."""
 
 START_VARIATION = 0.03
-"""Standard deviation of the share of the stride at which the push-off begins. Assumed."""
+"""Standard deviation of the fraction of the stride at which the push-off begins. Assumed."""
 
 
 def batch_of_many(
@@ -32,7 +32,8 @@ def batch_of_many(
     single = batch_of(run)
     count = build.mass.size
     assert run.walk is not None, "a population walks"
-    segments = scaled_segments(replace(configuration.wearer, heel_lever=run.walk.leg.heel_lever), build)
+    segments = segment_values(replace(configuration.wearer, heel_lever=run.walk.leg.heel_lever), build)
+    segments["flat_heel_lever"] = run.walk.leg.flat_heel_lever * build.stature
     parameters, states = (np.repeat(column, count, axis=1) for column in (single.parameters, single.states))
     _overwrite(
         parameters, row_numbers(single.program.parameter_rows()), _parameter_rows(run, segments, gaits, generator)
@@ -70,8 +71,8 @@ def _thresholds(run: Run, count: int, generator: np.random.Generator) -> dict[st
     rules = getattr(run.controller, "phases", None)
     if rules is None:
         return {}
-    scale = 1.0 + THRESHOLD_VARIATION * bounded_normal(generator, (count,))
-    start = rules.push_off_start + START_VARIATION * bounded_normal(generator, (count,))
+    scale = 1.0 + THRESHOLD_VARIATION * draw_bounded_normal(generator, (count,))
+    start = rules.push_off_start + START_VARIATION * draw_bounded_normal(generator, (count,))
     scale[0], start[0] = 1.0, rules.push_off_start
     return {
         "controller.phases.load_threshold": rules.load_threshold * scale,
@@ -107,7 +108,8 @@ def _gait_at_heel_strike(run: Run, segments: Mapping[str, Floats], gaits: Varied
     knee = {name: gaits.series[name].at_heel_strike(frequency)[0] for name in KNEE}
     # A leg of arrays: the functions of the leg are plain arithmetic.
     own = {name: row for name, row in segments.items() if name in LegParameters._fields}
-    leg: Any = run.walk.leg._replace(**own)  # type: ignore[arg-type]
+    leg: Any = run.walk.leg
+    leg = leg._replace(**own)
     torque: Any = torque_of_shank
     foot = shank - ankle + 0.5 * np.pi
     directions = np.sin(shank), np.cos(shank), np.sin(foot), np.cos(foot)

@@ -36,7 +36,7 @@ def commands(tuning: Path) -> dict[str, list[str]]:
         "compare": ["compare", "--study", STUDY, "--baseline", "solenoid", "--draws", "64", *SHORT],
         "montecarlo": [
             *("montecarlo", STUDY, "--metric", "rms_error", "--configuration", "proportional"),
-            *("--width", "20 %", "--first", "64", "--maximum", "512", *SHORT),
+            *("--width", "20 %", "--first-draws", "64", "--draws", "512", *SHORT),
         ],
         "sensitivity": [
             *("sensitivity", STUDY, "--method", "morris", "--samples", "8", "--metric", "gas_supplied"),
@@ -120,7 +120,7 @@ effort = { starts = 1, generations = 1, candidates_per_gain = 4 }
 
 def test_an_interval_that_stays_too_wide_is_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["montecarlo", STUDY, "--metric", "rms_error", "--configuration", "proportional", *SHORT]
-    assert main([*words, "--width", "0.001 %", "--first", "32", "--maximum", "64"]) == 1
+    assert main([*words, "--width", "0.001 %", "--first-draws", "32", "--draws", "64"]) == 1
     assert "the target width was not reached with the maximum of 64 draws" in capsys.readouterr().out
 
 

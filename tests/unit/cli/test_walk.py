@@ -50,7 +50,7 @@ def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_walk_prints_its_table_and_where_the_files_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["walk", "--config", "proportional", *SHORT, "--out", str(tmp_path / "walk")]) == 0
+    assert main(["walk", "proportional", *SHORT, "--out", str(tmp_path / "walk")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "proportional: completed, 4 strides of falisse2019-subject1"
     assert lines[2].split() == ["with", "without", "healthy"]
@@ -118,7 +118,7 @@ def test_an_earlier_walk_is_replaced_and_other_folders_are_not(
     copy = tmp_path / "copy"
     copy.mkdir()
     (copy / "walk.json").write_bytes((walked / "walk.json").read_bytes())
-    assert main(["walk", "--config", "off", *SHORT, "--out", str(copy)]) == 0
+    assert main(["walk", "off", *SHORT, "--out", str(copy)]) == 0
     assert json.loads((copy / "walk.json").read_text())["configuration"]["name"] == "off"
 
 
@@ -144,13 +144,13 @@ def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[st
 
 
 MISTAKES = {
-    "--config solenoit": "there is no walk 'solenoit', did you mean 'solenoid'?",
+    "solenoit": "there is no walk 'solenoit', did you mean 'solenoid'?",
     "--gait nobody": "there is no gait 'nobody'",
     "--minutes 0.01": "must be 0.087 min (5 strides) or more",
     "--minutes nan": "a walk of nan min: must be",
-    "--minutes 1e9": "a walk of 1e+09 min: must be 0.087 min (5 strides) or more and at most 60 min",
+    "--minutes 1e9": "a walk of 1e+09 min: must be 0.087 min (5 strides) or more, and at most 60 min",
     "--minutes -1": "a walk of -1 min: must be",
-    "--minutes soon": "--minutes 'soon': a number of minutes, or a time such as '90 s'",
+    "--minutes soon": "--minutes 'soon': must be a number of minutes, or a time such as '90 s'",
     "--set controller.unload_threshold=80N": "must be below controller.load_threshold, which is 60 N",
     "--set controller.swing_angel=90deg": "did you mean 'controller.swing_angle'?",
     "--wearers many": "--wearers many: must be a whole number",
@@ -180,7 +180,8 @@ def test_a_failing_sensor_is_told_with_the_time_of_the_safe_state(
     told = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("safe state"))
     assert 3.3 <= float(told.split()[-2]) < 3.4
     assert (
-        "Safe state: when the controller vented both chambers for good" in (tmp_path / "walk/report.html").read_text()
+        "Safe state: time at which the controller vented both chambers permanently"
+        in (tmp_path / "walk/report.html").read_text()
     )
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())
     assert 3.3 <= document["metrics"]["safe_state_time"]["value"] < 3.4

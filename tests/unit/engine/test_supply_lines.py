@@ -11,18 +11,18 @@ from scipy.integrate import solve_ivp
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.engine.scheme.motion import with_gas
-from ppafo.engine.scheme.pneumatics import begin_moving_gas, end_moving_gas
-from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, fed_plant
+from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, begin_moving_gas, moving_change, second_moving_stage
+from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, plant_at_line_pressures
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
 from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.regulator import LineState, SupplyLines, line_pressures
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import filled_lines
+from ppafo.simulation.plan import initial_lines
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking import load_walk
-from ppafo.walking.planning import plan_walk, vented
+from ppafo.walking.planning import plan_walk, vented_state
 from ppafo.walking.walk import plan_of
 
 ANGLE = 1.7
@@ -46,7 +46,7 @@ class Filled(NamedTuple):
 
 def full_lines(plant: PlantParameters, lines: SupplyLines) -> LineState:
     """Both lines as a run begins with them."""
-    given = filled_lines(plant, lines)
+    given = initial_lines(plant, lines)
     assert given is not None
     return given.initial
 
@@ -57,14 +57,19 @@ def open_ports(plant: PlantParameters) -> tuple[SinglePort, SinglePort]:
     return port_1, SinglePort(plant.valve_conductance, plant.dorsiflexion_pressure, 1.0, 1.0)
 
 
+def end_of(plant: PlantParameters, begun: MovingGas, ports: tuple[SinglePort, SinglePort], step: float) -> GasChange:
+    """What a step [s] adds [kg], from its first stage."""
+    return moving_change(plant, begun.still, second_moving_stage(plant, begun, *ports, single_port_flow), step)
+
+
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     """Both chambers filled at once from full lines, the vane held."""
-    state, gas = vented(plant, ANGLE, 0.0), full_lines(plant, lines)
+    state, gas = vented_state(plant, ANGLE, 0.0), full_lines(plant, lines)
     for _ in range(round(DURATION / step)):
-        ports = open_ports(fed_plant(plant, lines, gas))
+        ports = open_ports(plant_at_line_pressures(plant, lines, gas))
         begun = begin_fed_gas(plant, lines, gas, state, ANGLE, *ports, step, single_port_flow_slopes)
-        ports = open_ports(fed_plant(plant, lines, begun.lines.after))
-        change = end_moving_gas(plant, begun.chambers, *ports, step, single_port_flow)
+        ports = open_ports(plant_at_line_pressures(plant, lines, begun.lines.after))
+        change = end_of(plant, begun.chambers, ports, step)
         gas = end_lines(plant, lines, gas, begun, change, ports[1], step, single_port_flow)
         state = with_gas(state, change)
     return Filled(state, gas)
@@ -92,7 +97,7 @@ def solved(dorsiflexion: float, lines: SupplyLines) -> tuple[float, ...]:
         second = regulator_flow(level, line_2, lines.droop_2, lines.largest_flow_2)
         return [fed_1 - leak, fed_2 + leak, bottle - second - fed_1, second - fed_2, bottle]
 
-    begin, gas = vented(plant, ANGLE, 0.0), full_lines(plant, lines)
+    begin, gas = vented_state(plant, ANGLE, 0.0), full_lines(plant, lines)
     start = [begin.mass_1, begin.mass_2, gas.mass_1, gas.mass_2, 0.0]
     solution = solve_ivp(rates, (0.0, DURATION), start, method="Radau", rtol=1e-10, atol=1e-15, max_step=1e-4)
     assert solution.success
@@ -129,7 +134,7 @@ def test_a_filling_with_largest_flows_comes_to_that_of_the_solver() -> None:
 @pytest.mark.parametrize("step", [1.0e-3, 1.0e-4])
 def test_what_came_through_is_in_lines_and_chambers(step: float) -> None:
     plant = device()
-    made, full, begin = filled(plant, LINES, step), full_lines(plant, LINES), vented(plant, ANGLE, 0.0)
+    made, full, begin = filled(plant, LINES, step), full_lines(plant, LINES), vented_state(plant, ANGLE, 0.0)
     gained = made.state.mass_1 - begin.mass_1 + made.state.mass_2 - begin.mass_2
     gained += made.lines.mass_1 - full.mass_1 + made.lines.mass_2 - full.mass_2
     assert made.lines.regulated_mass == pytest.approx(gained, rel=1e-12)
@@ -138,10 +143,10 @@ def test_what_came_through_is_in_lines_and_chambers(step: float) -> None:
 
 def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> None:
     plant, step = device(), 2.5e-4
-    ports, state = open_ports(plant), vented(plant, ANGLE, 0.0)
+    ports, state = open_ports(plant), vented_state(plant, ANGLE, 0.0)
     for _ in range(round(DURATION / step)):
         begun = begin_moving_gas(plant, state, ANGLE, *ports, step, single_port_flow_slopes)
-        state = with_gas(state, end_moving_gas(plant, begun, *ports, step, single_port_flow))
+        state = with_gas(state, end_of(plant, begun, ports, step))
     ideal = np.array(chamber_pressures(plant, ANGLE, state.mass_1, state.mass_2))
     away = []
     for droop in (1.0e7, 1.0e6, 1.0e5, 1.0):

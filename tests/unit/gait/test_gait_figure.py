@@ -24,8 +24,18 @@ def test_every_curve_has_a_panel_with_its_events() -> None:
     assert len(figure.axes) == len(gait.curves) == 6
     top = figure.axes[0]
     assert {text.get_text() for text in top.texts} == {"heel strike", "toe-off"}
-    assert np.degrees(gait.shank_angle.sampled([0.25]))[0] == pytest.approx(top.lines[-1].get_ydata()[25])
+    assert np.degrees(gait.shank_angle.values_at([0.25]))[0] == pytest.approx(top.lines[-1].get_ydata()[25])
     assert [text.get_text() for text in figure.texts] == ["falisse2019-subject1: 62 kg, 1.33 m/s, stride 1.04 s"]
+
+
+def test_the_ankle_angle_is_drawn_from_neutral_with_dorsiflexion_positive(imported: ImportedGait) -> None:
+    gait = load_gait()
+    flexion = 90.0 - np.degrees(gait.ankle_angle.values_at([0.45, 0.67]))
+    assert flexion[0] > 10.0, "the shank leans forward over the foot before push-off"
+    assert flexion[1] < -10.0, "the toes point down after push-off"
+    np.testing.assert_allclose(gait_figure(gait).axes[1].lines[-1].get_ydata()[[45, 67]], flexion)
+    drawn = gait_figure(imported.gait, imported).axes[1].lines
+    np.testing.assert_allclose(drawn[2].get_ydata(), 90.0 - np.degrees(imported.curves["ankle_angle"].curves[0]))
 
 
 def test_single_strides_and_their_mean_are_drawn_after_an_import(imported: ImportedGait) -> None:

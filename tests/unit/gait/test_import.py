@@ -35,13 +35,13 @@ PHASES = np.linspace(0.0, 1.0, 101)
 def largest_difference(gait: Gait, truth: Gait, name: str) -> float:
     """Largest distance of a curve from the true one, both begun at the same heel strike."""
     shift = gait_start(truth)
-    return float(np.max(np.abs(gait.curves[name].sampled(PHASES) - truth.curves[name].sampled(PHASES + shift))))
+    return float(np.max(np.abs(gait.curves[name].values_at(PHASES) - truth.curves[name].values_at(PHASES + shift))))
 
 
 def gait_start(truth: Gait) -> float:
     """Phase at which the true vertical force passes the threshold of a heel strike, 5 % of body weight."""
     phases = np.linspace(0.0, 0.05, 5001)
-    return float(phases[np.argmax(truth.curve("vertical_force").sampled(phases) > 0.05)])
+    return float(phases[np.argmax(truth.curve("vertical_force").values_at(phases) > 0.05)])
 
 
 LIMITS = {"shank_angle": 2e-3, "ankle_angle": 2e-3, "ankle_moment": 5e-3, "vertical_force": 5e-3}
@@ -214,7 +214,7 @@ def test_a_centre_of_pressure_is_bridged_over_swing(
     phase = (walk.time / normative.stride_time) % 1.0
     pressure = np.where(phase < normative.stance_share, -0.05 + 0.25 * phase / normative.stance_share, -9.0)
     found = import_gait([csv_of({**columns, "centre_of_pressure [m]": pressure})], ImportSettings(62.0))
-    curve = found.gait.curve("centre_of_pressure").sampled(PHASES)
+    curve = found.gait.curve("centre_of_pressure").values_at(PHASES)
     assert -0.1 < curve.min() < curve.max() < 0.25, "what the file shows in swing is not in it"
     middle = 0.5 * normative.stance_share
     assert found.gait.curve("centre_of_pressure").value(middle) == pytest.approx(0.075, abs=0.01)
@@ -227,7 +227,7 @@ def test_the_low_pass_takes_noise_away_and_leaves_the_curve(
     path = csv_of({**columns, "ankle_angle [rad]": columns["ankle_angle [rad]"] + noise})
     rough, smooth = (import_gait([path], ImportSettings(62.0, low_pass=cut)).curves for cut in (None, 10.0))
     assert smooth["ankle_angle"].spread < 0.5 * rough["ankle_angle"].spread
-    truth = normative.ankle_angle.sampled(PHASES + gait_start(normative))
+    truth = normative.ankle_angle.values_at(PHASES + gait_start(normative))
     assert np.sqrt(np.mean((smooth["ankle_angle"].mean - truth) ** 2)) < 0.012
 
 
@@ -297,7 +297,7 @@ def test_a_real_knee_taken_for_numbers_in_g_or_exchanged_is_refused(shared_data:
     gait = import_gait(files, ImportSettings(72.6, side, stature=1.8034)).gait
     assert gait.knee_forward is not None
     assert gait.knee_up is not None
-    in_g = {name: gait.curve(name).scaled(1.0 / 9.80665) for name in KNEE}
+    in_g = {name: gait.curve(name).scale(1.0 / 9.80665) for name in KNEE}
     with pytest.raises(DataError, match="knee_forward and knee_up are in units of g"):
         parse_gait(gait_toml(replace(gait, **in_g)).encode(), "g.toml")
     other = replace(gait, knee_forward=gait.knee_up, knee_up=gait.knee_forward)
@@ -317,7 +317,7 @@ def test_real_treadmill_walking_from_opensim(shared_data: Path) -> None:
         assert found.gait.stance_share == pytest.approx(0.632, abs=0.01)
         assert np.degrees(found.gait.shank_angle.value(0.0)) == pytest.approx(21.0, abs=3.0)
         assert found.gait.curve("vertical_force").mean == pytest.approx(0.5, abs=0.05)
-    difference = np.degrees(right.gait.shank_angle.sampled(PHASES) - left.gait.shank_angle.sampled(PHASES))
+    difference = np.degrees(right.gait.shank_angle.values_at(PHASES) - left.gait.shank_angle.values_at(PHASES))
     assert np.abs(difference).max() < 6.0, "both legs of a healthy walker move alike"
 
 

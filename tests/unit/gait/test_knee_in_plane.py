@@ -37,7 +37,7 @@ def test_the_plane_gives_the_accelerations_of_the_leg_in_space(normative: Gait, 
     phases = np.linspace(0.0, 1.0, lean.size)
     for axis, name in enumerate(("knee_forward", "knee_up")):
         shown = acceleration_of(plane[axis], 6, normative.stride_time)
-        np.testing.assert_allclose(shown, normative.curve(name).sampled(phases), atol=0.01)
+        np.testing.assert_allclose(shown, normative.curve(name).values_at(phases), atol=0.01)
         apart = shown - acceleration_of(space[:, axis], 6, normative.stride_time)
         assert np.sqrt(np.mean(apart**2)) < 0.75
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ppafo.metrics.catalog import METRICS, evaluate
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import Readings
-from ppafo.metrics.switching import UNDECIDED, Swing, count_of, reversals, swung
+from ppafo.metrics.switching import UNDECIDED, Swing, count_of, next_swing, reversals
 from ppafo.signals import Channel, Recording
-from ppafo.signals.meter import SAME_LEVEL, Course, MeterKind, Sample, followed
+from ppafo.signals.meter import SAME_LEVEL, Course, MeterKind, Sample, advance_course
 
 Floats = NDArray[np.float64]
 
@@ -29,10 +29,10 @@ def samples_of(recording: Recording) -> list[Sample]:
 
 
 def metered(meter: MeterKind, samples: Sequence[Sample], course: Course) -> tuple[Any, Course]:
-    course = followed(course, samples[0])
+    course = advance_course(course, samples[0])
     state = meter.start(course, samples[0])
     for sample in samples[1:]:
-        course = followed(course, sample)
+        course = advance_course(course, sample)
         state = meter.update(state, course, sample)
     return state, course
 
@@ -118,5 +118,5 @@ def test_the_swing_of_the_lanes_counts_what_reversals_counts(values: list[float]
     swing = round(swing, 1) + 0.00005  # so that rounding decides no case
     state = Swing(values[0], UNDECIDED, values[0])
     for value in values[1:]:
-        state = swung(state, value, swing)
+        state = next_swing(state, value, swing)
     assert count_of(np.array([state.turns]))[0] == reversals(np.array(values), swing)

@@ -17,7 +17,7 @@ def perfect() -> Preset:
     preset = load_preset("ideal-laboratory")
     for path in preset.values:
         if path.rpartition(".")[2] in {"noise", "offset", "quantum"}:
-            preset = preset.changed(path, 0.0, "a test")
+            preset = preset.with_value(path, 0.0, "a test")
     return preset
 
 

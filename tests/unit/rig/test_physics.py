@@ -11,7 +11,7 @@ from ppafo.rig import record
 from ppafo.rig.hardware import SECOND_VIRIAL
 from ppafo.rig.preset import Preset, load_preset
 from ppafo.rig.rows import RigState
-from ppafo.rig.run import RigRun, RigSolution, played
+from ppafo.rig.run import RigRun, RigSolution, spool_position
 from ppafo.rig.solution import solve_rig
 from ppafo.simulation.simulate import simulate
 
@@ -64,7 +64,7 @@ def test_less_heat_transfer_leads_further_from_the_model(perfect: Preset) -> Non
     model = simulate("step-response").recording
 
     def distance(coefficient: float) -> float:
-        preset = perfect.changed("gas.heat_transfer_coefficient", coefficient, "a test")
+        preset = perfect.with_value("gas.heat_transfer_coefficient", coefficient, "a test")
         return float(np.abs(record("step-response", preset).recording["pressure_1"] - model["pressure_1"]).mean())
 
     distances = [distance(coefficient) for coefficient in (1e7, 1e5, 1e3)]
@@ -128,16 +128,16 @@ def test_heat_through_the_walls_of_isothermal_chambers_is_work_less_what_flowing
 
 
 def test_friction_grows_with_pressure_where_the_preset_says_so(perfect: Preset) -> None:
-    gripping = perfect.changed("friction.static_per_pressure", 5e-6, "a test")
+    gripping = perfect.with_value("friction.static_per_pressure", 5e-6, "a test")
     free, held = (record("step-response", preset).truth["settings"]["breakaways"] for preset in (perfect, gripping))
     assert held[0] > free[0] + 1e-4
 
 
 def test_a_line_delays_and_slows_the_vane(perfect: Preset) -> None:
-    tight = perfect.changed("leak.conductance_factor", 0.0, "a test")
+    tight = perfect.with_value("leak.conductance_factor", 0.0, "a test")
     lines = tight
     for path, value in (("volume", 1.5e-6), ("area", 8e-6), ("discharge_coefficient", 0.6), ("delay", 3e-3)):
-        lines = lines.changed(f"line.{path}", value, "a test")
+        lines = lines.with_value(f"line.{path}", value, "a test")
     short, long = (record("step-response", preset).recording for preset in (tight, lines))
     first = [int(np.argmax(np.abs(item["pressure_1"] - 101325.0) > 1.0)) for item in (short, long)]
     assert first == [1, 4]
@@ -145,7 +145,7 @@ def test_a_line_delays_and_slows_the_vane(perfect: Preset) -> None:
 
 
 def test_a_supply_with_droop_falls_while_gas_flows_and_recovers(perfect: Preset) -> None:
-    soft = perfect.changed("supply.droop", 3e6, "a test").changed("supply.recovery_time", 0.01, "a test")
+    soft = perfect.with_value("supply.droop", 3e6, "a test").with_value("supply.recovery_time", 0.01, "a test")
     stiff, shown = (record("step-response", preset).recording["supply_pressure"] for preset in (perfect, soft))
     assert np.ptp(stiff) == 0.0
     # The choked flow at 55 psi_g is 4.8 g/s, which would let it fall by 14 kPa if it lasted.
@@ -155,7 +155,7 @@ def test_a_supply_with_droop_falls_while_gas_flows_and_recovers(perfect: Preset)
 
 
 def test_a_slow_sensor_shows_what_was_one_time_constant_ago_on_a_steady_ramp(perfect: Preset) -> None:
-    slow = perfect.changed("pressure_sensor.bandwidth", 100.0, "a test")
+    slow = perfect.with_value("pressure_sensor.bandwidth", 100.0, "a test")
     fast, late = (record("vane-leak", preset, overrides=["run.duration=2 s"]).recording for preset in (perfect, slow))
     lag = 1.0 / (2.0 * np.pi * 100.0)
     rate = np.gradient(fast["pressure_1"], fast.time)
@@ -167,7 +167,7 @@ def test_a_slow_sensor_shows_what_was_one_time_constant_ago_on_a_steady_ramp(per
 def test_play_swallows_small_reversals_and_still_reaches_full_opening(
     position: float, command: float, expected: float
 ) -> None:
-    assert played(position, command, 0.1) == pytest.approx(expected)
+    assert spool_position(position, command, 0.1) == pytest.approx(expected)
 
 
 def test_every_gas_has_a_second_virial_coefficient_of_a_likely_size() -> None:
@@ -176,6 +176,6 @@ def test_every_gas_has_a_second_virial_coefficient_of_a_likely_size() -> None:
 
 
 def test_a_real_gas_takes_two_percent_more_to_fill_a_chamber(perfect: Preset, on_the_rig: OnTheRig) -> None:
-    real = perfect.changed("gas.real_gas_share", 1.0, "a test")
+    real = perfect.with_value("gas.real_gas_share", 1.0, "a test")
     masses = [of(solve_rig(on_the_rig("step-response", preset)), "mass_1")[-1] for preset in (perfect, real)]
     assert masses[1] / masses[0] == pytest.approx(1.025, abs=0.002)

@@ -13,8 +13,7 @@ from ppafo.rig.bench.static_torque import on_scale
 from ppafo.rig.catalog import EXPERIMENTS
 from ppafo.rig.declaration import PATHS, SECTIONS
 from ppafo.rig.folder import write_rig_recording
-from ppafo.rig.preset import Preset
-from ppafo.rig.schema import json_schema
+from ppafo.rig.preset import Preset, json_schema
 from ppafo.rig.solution import make_solver
 from ppafo.signals.channels import CHANNELS
 from ppafo.storage import read_csv
@@ -70,7 +69,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(name: str) -
 
 
 def test_noise_has_the_size_of_the_preset_and_is_independent_between_channels(perfect: Preset) -> None:
-    noisy = perfect.changed("pressure_sensor.noise", 1000.0, "a test")
+    noisy = perfect.with_value("pressure_sensor.noise", 1000.0, "a test")
     plain, shown = (record("step-response", preset, 4).recording for preset in (perfect, noisy))
     first, second = (shown[name] - plain[name] for name in ("pressure_1", "pressure_2"))
     count = first.size
@@ -82,7 +81,7 @@ def test_noise_has_the_size_of_the_preset_and_is_independent_between_channels(pe
 
 
 def test_an_offset_is_drawn_once_and_told_in_the_truth(perfect: Preset) -> None:
-    moved = perfect.changed("angle_sensor.offset", 0.01, "a test")
+    moved = perfect.with_value("angle_sensor.offset", 0.01, "a test")
     plain, shown = (record("step-response", preset, 8) for preset in (perfect, moved))
     difference = shown.recording["angle"] - plain.recording["angle"]
     assert difference == pytest.approx(np.full(difference.size, shown.truth["sensor_offsets"]["angle"]))
@@ -98,7 +97,7 @@ def test_readings_are_whole_steps_of_the_sensor() -> None:
 
 
 def test_the_sampling_rate_is_that_of_the_preset(perfect: Preset) -> None:
-    slow = record("step-response", perfect.changed("sampling.rate", 200.0, "a test")).recording
+    slow = record("step-response", perfect.with_value("sampling.rate", 200.0, "a test")).recording
     assert np.diff(slow.time) == pytest.approx(np.full(len(slow) - 1, 5e-3))
 
 
@@ -241,7 +240,7 @@ def test_a_foreign_rig_file_is_not_overwritten(tmp_path: Path) -> None:
 def test_an_empty_preset_points_to_the_schema(tmp_path: Path) -> None:
     for text in ("", "# nothing yet\n"):
         (tmp_path / "mine.toml").write_text(text)
-        with pytest.raises(ParameterError, match="'ppafo schema rig' prints what belongs in it"):
+        with pytest.raises(ParameterError, match="'ppafo schema rig' prints its format"):
             load_preset(tmp_path / "mine.toml")
 
 
@@ -257,13 +256,13 @@ def test_the_published_schema_takes_every_preset_and_names_every_value() -> None
 
 
 def test_the_second_supply_sags_by_itself_and_leaves_the_noise_of_the_others_as_it_was(perfect: Preset) -> None:
-    sagging = perfect.changed("supply.droop", 3.0e6, "a test").changed("supply.recovery_time", 0.03, "a test")
+    sagging = perfect.with_value("supply.droop", 3.0e6, "a test").with_value("supply.recovery_time", 0.03, "a test")
     recording = record("step-response", sagging, 1).recording
     first, second = (recording[name] for name in ("supply_pressure", "dorsiflexion_pressure"))
     # The valve feeds chamber 1 only, so only that regulator gives way.
     assert np.ptp(first) > 5.0e3
     assert np.ptp(second) < 0.1 * np.ptp(first)
-    noisy = perfect.changed("pressure_sensor.noise", 1000.0, "a test")
+    noisy = perfect.with_value("pressure_sensor.noise", 1000.0, "a test")
     shown = record("step-response", noisy, 1).recording
     likeness = np.corrcoef(shown["supply_pressure"], shown["dorsiflexion_pressure"])[0, 1]
     assert abs(likeness) < 4.0 / np.sqrt(len(shown))

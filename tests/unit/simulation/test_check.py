@@ -12,7 +12,7 @@ from ppafo.answers.shown_metrics import metric_change
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement
-from ppafo.simulation.check import HALF_ERROR, MOVED_MEASUREMENT, MOVED_START, Changed, Check
+from ppafo.simulation.check import HALF_ERROR, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.result import Status
 from ppafo.simulation.scenario import Scenario
@@ -98,15 +98,15 @@ def test_the_same_kind_of_loop_with_another_sensor_and_a_fine_step_is_determined
 
 
 def test_what_only_the_error_changes_is_told_from_what_nobody_could_measure() -> None:
-    moved = Changed("switchings", "-", 7.0, 7e-3, {HALF_ERROR: 1.0, MOVED_START: -2.0})
-    inexact = Changed("rms_error", "N m", 1.0, 1e-3, {HALF_ERROR: -2e-3, MOVED_START: 1e-9})
-    firm = Changed("peak_error", "N m", 1.0, 1e-3, {HALF_ERROR: 1e-3, MOVED_START: 1e-9})
-    gone = Changed("gas_per_work", "kg/J", math.nan, 1e-3, {HALF_ERROR: 0.0, MOVED_START: math.inf})
+    moved = NumberCheck("switchings", "-", 7.0, 7e-3, {HALF_ERROR: 1.0, MOVED_START: -2.0})
+    inexact = NumberCheck("rms_error", "N m", 1.0, 1e-3, {HALF_ERROR: -2e-3, MOVED_START: 1e-9})
+    firm = NumberCheck("peak_error", "N m", 1.0, 1e-3, {HALF_ERROR: 1e-3, MOVED_START: 1e-9})
+    gone = NumberCheck("gas_per_work", "kg/J", math.nan, 1e-3, {HALF_ERROR: 0.0, MOVED_START: math.inf})
     assert (moved.changed_by, gone.changed_by) == ({HALF_ERROR, MOVED_START}, {MOVED_START})
     assert inexact.changed_by == {HALF_ERROR}
     sentence = Check("loop", (moved, inexact, firm), (), None, ()).sentence
     assert sentence.startswith("Not determined by this run: switchings: a start moved by 1e-07 of its range")
-    assert "Nor: rms_error: half the error gives other values. Take a smaller run.step" in sentence
+    assert "Nor: rms_error: half the error changes them. Take a smaller run.step" in sentence
     assert "peak_error" not in sentence
     assert Check("loop", (firm,), (), None, ()).is_determined
     diverged = Check("loop", (firm,), (), 0.1, (MOVED_START,))
@@ -159,7 +159,7 @@ def test_a_decision_by_a_hair_of_a_reading_is_found_where_the_start_does_not_mat
 def test_a_controller_that_gives_another_run_each_time_is_refused(torque_task: Callable[[str], Scenario]) -> None:
     scenario = dataclasses.replace(torque_task("proportional"), duration=0.05)
     result = simulate(scenario.controlled_by(Unforgetting(0.0)))
-    with pytest.raises(SimulationError, match=r"Unforgetting gives another run each time.* reset\(\) must forget"):
+    with pytest.raises(SimulationError, match=r"Unforgetting gives a different run each time.* reset\(\) must forget"):
         result.check()
 
 

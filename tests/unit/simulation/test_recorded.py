@@ -18,7 +18,7 @@ from ppafo.simulation.recorded.inputs import (
     step_inputs,
     supply_paths,
 )
-from ppafo.simulation.recorded.scenario import recorded_scenario, with_highest_supply
+from ppafo.simulation.recorded.scenario import replay_scenario, with_highest_supply
 from ppafo.simulation.recorded.start import Start, samples_at_rest
 
 
@@ -40,7 +40,7 @@ def test_inputs_begin_at_the_time_of_the_recording_that_is_zero_of_the_run() -> 
     time = np.arange(0.0, 0.1, 1e-3)
     given = recording(time, (time >= 0.0495).astype(float), 4.0e5 + 1.0e6 * time)
     device = load_device("ppafo2011")
-    run = plan_run(recorded_scenario(given, device, Start(0.5, 0.0, 2e5, 2e5), 0.05, "bench.csv"))
+    run = plan_run(replay_scenario(given, device, Start(0.5, 0.0, 2e5, 2e5), 0.05, "bench.csv"))
     inputs = step_inputs(RecordedInputs(given, ("command", "supply_pressure"), 0.04), device, run)
     assert inputs.command is not None
     first_open = int(np.argmax(inputs.command))

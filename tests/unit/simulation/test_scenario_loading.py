@@ -12,7 +12,7 @@ from ppafo.errors import ScenarioError
 from ppafo.model.sensors import Measurement
 from ppafo.parameters import load_device
 from ppafo.simulation.loading import list_scenarios, load_scenario, parse_scenario, scenario_from_dict
-from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice, Scenario, Sensors
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Sensors
 
 PSI = 6894.757293168361
 SMALL: dict[str, Any] = {
@@ -96,7 +96,7 @@ def test_what_is_left_out_has_its_declared_value() -> None:
 
 
 def test_a_held_vane_is_led_along_a_constant_angle() -> None:
-    assert small().motion == LedMotion(ProfileChoice("constant", {"level": math.radians(75.0)}))
+    assert small().motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(75.0)}))
 
 
 def test_words_stand_for_the_pressures_of_the_device() -> None:
@@ -193,7 +193,7 @@ def test_a_scenario_is_shown_in_a_few_lines() -> None:
 
 def test_the_motion_of_a_scenario_is_shown_in_words() -> None:
     assert "free, from 20 deg" in repr(load_scenario("step-response"))
-    assert "led along the profile sine" in repr(load_scenario("torque-task-moving-ankle"))
+    assert "prescribed, along the profile sine" in repr(load_scenario("torque-task-moving-ankle"))
 
 
 def test_an_assumption_carries_the_value_it_is_about() -> None:

@@ -175,7 +175,7 @@ def test_an_angle_on_a_stop_is_allowed(angle: str) -> None:
     assert parse_scenario(TEXT.replace("75 deg", angle).encode(), "task.toml")
 
 
-LED = 'kind = "led"\n[motion.profile]\n'
+PRESCRIBED = 'kind = "prescribed"\n[motion.profile]\n'
 
 
 @pytest.mark.parametrize(
@@ -188,20 +188,20 @@ LED = 'kind = "led"\n[motion.profile]\n'
         'kind = "constant"\nlevel = "140 deg"',
     ],
 )
-def test_a_led_vane_that_leaves_the_stops_is_refused_with_the_time(profile: str) -> None:
-    message = problem_after('kind = "held"\nangle = "75 deg"', LED + profile)
+def test_a_prescribed_vane_that_leaves_the_stops_is_refused_with_the_time(profile: str) -> None:
+    message = problem_after('kind = "held"\nangle = "75 deg"', PRESCRIBED + profile)
     assert "[motion.profile] leaves the stops of ppafo2011, 20 deg to 130 deg: it is at " in message
     assert message.endswith(" s")
 
 
-def test_a_led_vane_may_touch_the_stops() -> None:
+def test_a_prescribed_vane_may_touch_the_stops() -> None:
     profile = 'kind = "sine"\nlevel = "75 deg"\namplitude = "55 deg"\nfrequency = "0.7 Hz"'
-    assert parse_scenario(TEXT.replace('kind = "held"\nangle = "75 deg"', LED + profile).encode(), "task.toml")
+    assert parse_scenario(TEXT.replace('kind = "held"\nangle = "75 deg"', PRESCRIBED + profile).encode(), "task.toml")
 
 
 def test_a_ramp_that_would_leave_the_stops_after_the_run_is_allowed() -> None:
     profile = 'kind = "ramp_hold"\nstart_level = "75 deg"\nlevel = "131 deg"\nramp_time = "4 s"'
-    assert parse_scenario(TEXT.replace('kind = "held"\nangle = "75 deg"', LED + profile).encode(), "task.toml")
+    assert parse_scenario(TEXT.replace('kind = "held"\nangle = "75 deg"', PRESCRIBED + profile).encode(), "task.toml")
 
 
 @pytest.mark.parametrize(
@@ -311,3 +311,14 @@ def test_plain_values_of_a_wrong_type_are_clean_errors(change: dict[Any, Any]) -
         scenario_from_dict({**content, **change})
     assert str(caught.value).startswith("scenario ")
     assert "\n" not in str(caught.value)
+
+
+def test_the_old_name_of_a_prescribed_motion_is_refused_with_the_new_one() -> None:
+    message = problem_after(
+        'kind = "held"\nangle = "75 deg"', 'kind = "led"\n[motion.profile]\nkind = "constant"\nlevel = "75 deg"'
+    )
+    assert message == "task.toml: motion.kind: the kind of motion 'led' is now called 'prescribed'"
+    with pytest.raises(
+        ScenarioError, match=r"override 'motion\.kind=led': the kind of motion 'led' is now called 'prescribed'"
+    ):
+        load_scenario("step-response", ["motion.kind=led", "motion.profile.kind=sine"])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from ppafo.errors import ParameterError, PpafoError, ScenarioError
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overriding import device_paths, scenario_paths, split_override
-from ppafo.simulation.scenario import FreeMotion, LedMotion, ProfileChoice
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice
 
 TASK = "torque-task-proportional"
 
@@ -25,7 +25,7 @@ def test_values_of_scenario_and_device_are_changed_together() -> None:
     scenario = load_scenario(TASK, ["valve.area=12.6mm^2", "reference.level=5 N m", "motion.angle=80 deg"])
     assert scenario.device.valve.orifice.area == 12.6e-6  # type: ignore[union-attr]
     assert scenario.reference.settings["level"] == 5.0
-    assert scenario.motion == LedMotion(ProfileChoice("constant", {"level": math.radians(80.0)}))
+    assert scenario.motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(80.0)}))
 
 
 def test_the_overrides_stay_visible_and_the_file_is_kept_as_it_was() -> None:
@@ -59,9 +59,9 @@ def test_another_kind_of_motion_keeps_what_both_have() -> None:
 
 
 def test_a_profile_can_be_built_from_nothing() -> None:
-    overrides = ["motion.kind=led", "motion.profile.kind=sine", "motion.profile.level=75 deg"]
+    overrides = ["motion.kind=prescribed", "motion.profile.kind=sine", "motion.profile.level=75 deg"]
     motion = load_scenario(TASK, [*overrides, "motion.profile.amplitude=5 deg"]).motion
-    assert isinstance(motion, LedMotion)
+    assert isinstance(motion, PrescribedMotion)
     assert motion.profile.settings["amplitude"] == math.radians(5.0)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine import lane_step
-from ppafo.engine.lanes import written
+from ppafo.engine.lanes import write_source
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, SimulationError
@@ -22,7 +22,7 @@ from ppafo.simulation.ensemble import _result as ensemble_result
 from ppafo.simulation.ensemble.running import Outcome, Request
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import LedMotion, ProfileChoice, Scenario
+from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.simulate import REMEDY, simulate, simulate_many
 from ppafo.walking.walk import _status as walk_status
 
@@ -171,7 +171,7 @@ def test_led_vane_follows_its_path_and_reports_the_torque_that_it_takes(
     torque_task: Callable[[str], Scenario],
 ) -> None:
     sine = ProfileChoice("sine", {"level": 1.3, "amplitude": 0.2, "frequency": 1.0, "phase": 0.0})
-    result = simulate(dataclasses.replace(torque_task("proportional"), motion=LedMotion(sine)))
+    result = simulate(dataclasses.replace(torque_task("proportional"), motion=PrescribedMotion(sine)))
     time = result.recording.time
     assert result.recording["angle"] == pytest.approx(1.3 + 0.2 * np.sin(2 * np.pi * time), abs=1e-8)
     device = result.scenario.device
@@ -248,12 +248,12 @@ def test_a_step_that_is_not_done_in_the_most_parts_ends_the_run_with_time_and_re
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A coil that switches inside a step, after 10.3 ms, cuts it in two; here one part is the most."""
-    monkeypatch.setattr(lane_step, "MOST_PARTS", 1)
-    written.cache_clear()
+    monkeypatch.setattr(lane_step, "MAXIMUM_PARTS", 1)
+    write_source.cache_clear()
     try:
         result = simulate("torque-task-solenoid", ["run.duration=0.1 s", "valve.opening_delay=10.3 ms"])
     finally:
-        written.cache_clear()
+        write_source.cache_clear()
     assert result.status.kind == "diverged"
     assert result.status.time == pytest.approx(0.0103, rel=1e-9)
     assert result.status.message.startswith("diverged at t = 0.0103 s")

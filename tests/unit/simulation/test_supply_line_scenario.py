@@ -50,7 +50,7 @@ def test_a_scenario_takes_the_section_of_a_walk_file_and_lists_what_it_leaves_to
     [
         ("supply_line.knee.droop=3 Pa s/kg", "no value 'supply_line.knee.droop', did you mean"),
         ("supply_line.plantarflexion.droop=0 Pa s/kg", "must be at least 1 Pa s/kg"),
-        ("supply.dorsiflexion_pressure=60 psi_g", "its second regulator hangs behind the first"),
+        ("supply.dorsiflexion_pressure=60 psi_g", "its second regulator is fed by the first"),
     ],
 )
 def test_a_mistake_is_named_in_one_line(override: str, line: str) -> None:

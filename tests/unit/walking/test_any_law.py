@@ -47,7 +47,7 @@ def test_a_constant_command_does_not_walk_and_the_answer_names_what_does() -> No
 
 def test_the_law_of_the_paper_switches_solenoid_valves_and_a_pid_does_not() -> None:
     assert load_walk("solenoid", ["controller.kind=on_off"]).controller.name == "on_off"
-    with pytest.raises(ScenarioError, match="opens its valve by degrees, which a solenoid valve cannot"):
+    with pytest.raises(ScenarioError, match="opens its valve gradually, which a solenoid valve cannot"):
         load_walk("solenoid", ["controller.kind=pid"])
 
 

@@ -35,7 +35,7 @@ def walked() -> Callable[[str], WalkResult]:
 
 
 def test_every_law_that_wants_a_torque_is_walked_here() -> None:
-    wanting = {name for name, kind in WALKING_CONTROLLERS.items() if hasattr(kind.initial, "wish")}
+    wanting = {name for name, kind in WALKING_CONTROLLERS.items() if hasattr(kind.initial, "request")}
     assert wanting == set(LARGEST_ERROR)
 
 

@@ -12,7 +12,7 @@ from ppafo.questions.walk.answer import comparison_table
 from ppafo.questions.walk.wearers import wearers_answer
 from ppafo.walking import Comparison, compare_walks, load_walk, walk_population
 from ppafo.walking.figures.animation import animation
-from ppafo.walking.figures.legs import drags, frames_figure, legs_of, settled_turns
+from ppafo.walking.figures.legs import drags, frames_figure, last_phases, legs_of
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.phases import strip_figure
 from ppafo.walking.figures.wearers import population_figure
@@ -35,7 +35,7 @@ def texts(figure: Figure) -> list[str]:
 @pytest.mark.parametrize("name", CONFIGURATIONS)
 def test_a_drop_foot_is_seen_without_the_device_and_lifted_with_it(name: str) -> None:
     pair = compared(name)
-    turns = settled_turns(pair.with_device, 1, 100)
+    turns = last_phases(pair.with_device, 1, 100)
     late = np.flatnonzero(turns % 1.0 > 0.7)
     bare, worn = legs_of(pair.without_device, turns), legs_of(pair.with_device, turns)
     lowest = [legs.worn.toe[late, 1].min() for legs in (bare, worn)]
@@ -80,6 +80,8 @@ def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:
         "without",
         "healthy gait",
     ]
+    flexion = next(line for line in angle.lines if line.get_label() == "with the device").get_ydata()
+    np.testing.assert_allclose(flexion, 90.0 - np.degrees(pair.with_device.averages["angle"].mean))
     curve = next(line for line in torque.lines if line.get_label() == "with the device").get_ydata()
     np.testing.assert_array_equal(curve, pair.with_device.averages["external_torque"].mean)
     assert len([line for line in pressures.lines if len(np.asarray(line.get_xdata())) > 2]) == 2

@@ -16,13 +16,13 @@ from ppafo.walking.anthropometry import (
     MASS_VARIATION,
     STATURE_VARIATION,
     Build,
-    bounded_normal,
-    drawn_builds,
-    scaled_segments,
+    draw_bounded_normal,
+    draw_builds,
+    segment_values,
 )
-from ppafo.walking.followed_gait import gait_timing
+from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.varied_gait import SERIES, SeriesOfMany, varied_gaits
+from ppafo.walking.varied_gait import SERIES, SeriesOfMany, draw_gaits
 from ppafo.walking.walk import plan_of
 from ppafo.walking.wearer import paper_subject
 from ppafo.walking.wearers_rows import START_VARIATION, THRESHOLD_VARIATION, batch_of_many
@@ -54,14 +54,14 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
     configuration, index, count = load_walk("solenoid"), 3, 5
     people = walk_population(configuration, MINUTES, count, seed=3)
     generator = np.random.default_rng(3)
-    build = drawn_builds(count, generator)
-    gaits = varied_gaits(configuration.gait, build.stature, generator)
-    scale = 1.0 + THRESHOLD_VARIATION * bounded_normal(generator, (count,))[index]
-    start = START_VARIATION * bounded_normal(generator, (count,))[index]
+    build = draw_builds(count, generator)
+    gaits = draw_gaits(configuration.gait, build.stature, generator)
+    scale = 1.0 + THRESHOLD_VARIATION * draw_bounded_normal(generator, (count,))[index]
+    start = START_VARIATION * draw_bounded_normal(generator, (count,))[index]
     settings = dict(configuration.settings)
     settings |= {name: settings[name] * scale for name in ("load_threshold", "unload_threshold")}
     settings["push_off_start"] += start
-    segments = scaled_segments(configuration.wearer, build)
+    segments = segment_values(configuration.wearer, build)
     gait = replace(
         configuration.gait,
         stride_time=float(gaits.stride_time[index]),
@@ -100,12 +100,12 @@ def test_the_same_seed_gives_the_same_wearers_and_another_one_others() -> None:
 
 
 def test_builds_vary_as_stated_and_keep_the_shares_of_segments() -> None:
-    build = drawn_builds(20_000, np.random.default_rng(1))
+    build = draw_builds(20_000, np.random.default_rng(1))
     assert build.mass.std() == pytest.approx(MASS_VARIATION, rel=0.04)
     assert build.stature.std() == pytest.approx(STATURE_VARIATION, rel=0.04)
     assert np.corrcoef(build.mass, build.stature)[0, 1] == pytest.approx(0.5, abs=0.03)
     wearer = paper_subject()
-    leg = scaled_segments(wearer, Build(np.array([1.0, 2.0]), np.array([1.0, 1.5])))
+    leg = segment_values(wearer, Build(np.array([1.0, 2.0]), np.array([1.0, 1.5])))
     assert leg["shank_length"].tolist() == pytest.approx([0.46, 0.69])
     assert leg["foot_mass"].tolist() == pytest.approx([1.0, 2.0])
     assert leg["shank_inertia"].tolist() == pytest.approx([0.1, 0.1 * 2.0 * 2.25])
@@ -113,7 +113,7 @@ def test_builds_vary_as_stated_and_keep_the_shares_of_segments() -> None:
 
 def test_gaits_vary_by_the_deviation_of_each_curve() -> None:
     gait = load_gait()
-    gaits = varied_gaits(gait, np.ones(4000), np.random.default_rng(1))
+    gaits = draw_gaits(gait, np.ones(4000), np.random.default_rng(1))
     phases = 2.0 * np.pi * np.outer(np.arange(1, 9), np.linspace(0.0, 1.0, 200, endpoint=False))
     for field, curve in (("shank", gait.shank_angle), ("ankle", gait.ankle_angle)):
         series = gaits.series[field]
@@ -126,14 +126,14 @@ def test_gaits_vary_by_the_deviation_of_each_curve() -> None:
 def test_the_way_of_the_knee_is_as_long_as_people_are_tall() -> None:
     gait = load_gait()
     stature = np.linspace(1.0, 1.2, 50)
-    gaits = varied_gaits(gait, stature, np.random.default_rng(1))
+    gaits = draw_gaits(gait, stature, np.random.default_rng(1))
     for name in KNEE:
         curve, found = gait.curve(name), gaits.series[name]
         ways = found.cosines[:, : curve.harmonics] * (gaits.stride_time**2)[:, None]
         assert curve.deviation == 0.0
         np.testing.assert_allclose(ways, np.outer(stature, curve.cosines) * gait.stride_time**2, rtol=1e-12)
     noisy = replace(gait, knee_up=replace(gait.curve("knee_up"), deviation=0.4), stride_time_deviation=0.0)
-    people = varied_gaits(noisy, np.ones(4000), np.random.default_rng(1)).series["knee_up"]
+    people = draw_gaits(noisy, np.ones(4000), np.random.default_rng(1)).series["knee_up"]
     power = people.mean.var() + 0.5 * (people.cosines.var(axis=0) + people.sines.var(axis=0)).sum()
     assert np.sqrt(power) == pytest.approx(0.4, rel=0.06)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.gait import load_gait
-from ppafo.walking.followed_gait import gait_timing
+from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.posture import MID_SWING_CLEARANCE, AnklePath, ankle_path
 from ppafo.walking.wearer import paper_subject
 
@@ -19,7 +19,7 @@ def path() -> AnklePath:
 
 def angles() -> tuple[np.ndarray, np.ndarray]:
     gait = load_gait()
-    return gait.shank_angle.sampled(PHASES), gait.ankle_angle.sampled(PHASES)
+    return gait.shank_angle.values_at(PHASES), gait.ankle_angle.values_at(PHASES)
 
 
 def test_the_healthy_foot_touches_the_ground_in_stance_and_clears_it_in_the_swing(path: AnklePath) -> None:
@@ -37,7 +37,9 @@ def test_the_ankle_moves_smoothly_through_the_swing_and_sets_the_heel_down(path:
     phases = np.linspace(0.0, 1.0, 1001)
     swing = phases[:-2] > gait.stance_share + 0.01
     assert np.abs(np.diff(path.up, 2)[swing]).max() < 1e-4, "a kink would be 1.6 mm"
-    posture = path.posture(phases[:-1], gait.shank_angle.sampled(phases[:-1]), gait.ankle_angle.sampled(phases[:-1]))
+    posture = path.posture(
+        phases[:-1], gait.shank_angle.values_at(phases[:-1]), gait.ankle_angle.values_at(phases[:-1])
+    )
     assert abs(posture.heel[-1, 1]) < 1e-3
     late = phases[:-1] > 0.9
     assert posture.heel[late, 1].min() > -1e-3

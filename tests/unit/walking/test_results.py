@@ -11,8 +11,8 @@ import pytest
 from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk
-from ppafo.walking.followed_gait import NEARLY_FLAT, gait_timing
-from ppafo.walking.strides import PHASES, SETTLING, averaged, stride_starts
+from ppafo.walking.gait_series import NEARLY_FLAT, gait_timing
+from ppafo.walking.strides import PHASES, SETTLING, mean_curves, stride_starts
 
 MINUTES = 0.15
 
@@ -39,7 +39,7 @@ def test_the_mean_stride_is_the_mean_of_strides() -> None:
     time = np.linspace(0.0, 4.0, 4001)
     growing = np.floor(time) + np.sin(2.0 * np.pi * time)
     recording = Recording("strides", time, {"angle": Channel(growing, "rad"), "command": Channel(0.0 * time, "-")})
-    curves = averaged(recording, stride_starts(np.floor(time + 1.0e-9)))
+    curves = mean_curves(recording, stride_starts(np.floor(time + 1.0e-9)))
     assert set(curves) == {"angle"}, "a held channel has no mean"
     middle = np.abs(PHASES - 0.5) < 0.4
     np.testing.assert_allclose(curves["angle"].mean[middle], 2.0 + np.sin(2.0 * np.pi * PHASES[middle]), atol=1e-5)
@@ -48,7 +48,7 @@ def test_the_mean_stride_is_the_mean_of_strides() -> None:
 
 def test_two_strikes_are_needed_for_a_stride() -> None:
     recording = Recording("one", np.arange(3.0), {"angle": Channel(np.zeros(3), "rad")})
-    assert averaged(recording, np.array([1])) == {}
+    assert mean_curves(recording, np.array([1])) == {}
 
 
 def test_channels_of_a_walk_are_known_with_their_units() -> None:
@@ -80,7 +80,7 @@ def test_the_healthy_foot_is_judged_where_it_lands() -> None:
     gait = load_walk("solenoid").gait
     shank, ankle = gait.shank_angle, gait.ankle_angle
     phases = np.linspace(0.0, 0.15, 15001)
-    foot = shank.sampled(phases) - ankle.sampled(phases) + 0.5 * np.pi - gait_timing(gait).ground_angle
+    foot = shank.values_at(phases) - ankle.values_at(phases) + 0.5 * np.pi - gait_timing(gait).ground_angle
     landing = int(np.argmax(foot < NEARLY_FLAT))
     assert 0.05 < phases[landing] < 0.12
     rate = (foot[landing + 5] - foot[landing - 5]) / (phases[landing + 5] - phases[landing - 5]) / gait.stride_time
@@ -121,7 +121,7 @@ def test_a_walk_that_diverges_says_when_and_what_to_do() -> None:
     result = diverging()
     assert result.status.kind == "diverged"
     assert re.fullmatch(
-        r"diverged at t = [\d.e-]+ s; the step may be too long.*look at the wearer", result.status.message
+        r"diverged at t = [\d.e-]+ s; the step may be too long.*check the wearer", result.status.message
     )
     assert result.status.time is not None
     assert result.recording.time[-1] < MINUTES * 60.0
@@ -132,7 +132,10 @@ def test_a_walk_that_diverges_says_when_and_what_to_do() -> None:
 def test_a_walk_is_written_for_opensim(tmp_path: Path) -> None:
     result = compared("solenoid").with_device
     table = read_opensim(result.save_opensim(tmp_path / "walk.sto"))
-    np.testing.assert_array_equal(table.columns["angle"], result.recording["angle"])
+    np.testing.assert_array_equal(table.columns["ankle_angle_r"], 0.5 * np.pi - result.recording["angle"])
+    np.testing.assert_array_equal(table.columns["ankle_angle_r_device_moment"], -result.recording["external_torque"])
+    load = result.recording["heel_force"] + result.recording["toe_force"]
+    np.testing.assert_array_equal(table.columns["ground_force_r_vy"], load)
     assert table.in_degrees is False
 
 

@@ -10,7 +10,7 @@ from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.regulator import SupplyLines
 from ppafo.simulation.supply_line import entries
 from ppafo.walking import load_walk, walk, walk_population
-from ppafo.walking.comparison import switched_off
+from ppafo.walking.comparison import with_device_off
 
 REGULATED = ("solenoid-regulators", "proportional-regulators")
 
@@ -19,7 +19,7 @@ MISTAKES = {
     "supply_line.plantarflexion.droop=3 psi": "does not fit: a unit like 'Pa s/kg' is needed",
     "supply_line.dorsiflexion.volume=0.1 cm^3": r"must be at least 1e-06 m\^3",
     "supply_line.dorsiflexion.drop=3 Pa s/kg": "did you mean 'supply_line.dorsiflexion.droop'",
-    "supply.dorsiflexion_pressure=60 psi_g": "its second regulator hangs behind the first, so "
+    "supply.dorsiflexion_pressure=60 psi_g": "its second regulator is fed by the first, so "
     "supply.dorsiflexion_pressure, 60 psi_g, cannot be above supply.pressure, 50 psi_g",
 }
 
@@ -70,7 +70,7 @@ def test_the_recording_has_line_pressures_only_where_there_are_lines() -> None:
 
 
 def test_a_walk_without_the_device_needs_no_lines() -> None:
-    assert switched_off(load_walk("solenoid-regulators")).supply_lines is None
+    assert with_device_off(load_walk("solenoid-regulators")).supply_lines is None
 
 
 def test_a_tenfold_droop_costs_work_and_a_smaller_step_changes_little() -> None:

@@ -14,13 +14,13 @@ class ConstantParameters(NamedTuple):
 
 
 class ConstantState(NamedTuple):
-    """The law remembers nothing."""
+    """The law has no state."""
 
 
 def update(
     parameters: ConstantParameters, state: ConstantState, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, ConstantState]:
-    """Command: the one that was set."""
+    """Command from -1 to 1: the setting."""
     return parameters.command, state
 
 

@@ -46,17 +46,18 @@ def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> 
     """Command [-] of the table at a time since the start [s]: straight between knots, the last one held."""
     position = min(elapsed / parameters.knot_spacing, KNOTS - 1.0)
     before = min(int(position), KNOTS - 2)
-    share = position - before
+    fraction = position - before
     first = parameters.knots[before]
-    return first + share * (parameters.knots[before + 1] - first)
+    return first + fraction * (parameters.knots[before + 1] - first)
 
 
 def damped_command(
     gains: DampedGains, course: TorqueSlope, reference: float, torque: float, ahead: float, period: float
 ) -> tuple[float, TorqueSlope]:
-    """Command: gain times torque error [N m], less damping times the torque's own rate, plus what is given ahead [-].
+    """Command from -1 to 1: gain times torque error, less damping times the rate of the torque, plus ``ahead`` [-].
 
-    Damping acts on the rate of the torque, not of the error, so that a step of the reference gives no kick.
+    Reference and torque [N m], period [s]. Damping acts on the rate of the torque, not of the error, so that a step of
+    the reference gives no kick.
     """
     change = (torque - course.torque) * course.started
     slope = course.slope + (change - period * course.slope) / (period + gains.damping_filter)
@@ -71,7 +72,7 @@ def update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, DampedProportionalState]:
-    """Command of ``damped_command`` with what the table has learnt ahead of it."""
+    """Command from -1 to 1 by ``damped_command``, on top of the learnt command of the table."""
     gains = DampedGains(parameters.proportional_gain, parameters.damping, parameters.damping_filter)
     ahead = learnt_command(parameters, state.elapsed)
     command, course = damped_command(gains, state.course, reference, measurement.torque, ahead, period)

@@ -40,14 +40,16 @@ def update(
     rates = torque_rates(
         parameters.nominal, measurement.angle, velocity, measurement.pressure_1, measurement.pressure_2
     )
-    wanted = reference_rate + parameters.convergence_rate * (reference - measurement.torque)
-    return opening_for_rate(rates, wanted), FeedbackLinearisationState(reference, measurement.angle, velocity, 1.0)
+    requested = reference_rate + parameters.convergence_rate * (reference - measurement.torque)
+    return opening_for_rate(rates, requested), FeedbackLinearisationState(
+        reference=reference, angle=measurement.angle, angular_velocity=velocity, started=1.0
+    )
 
 
-def restart(state: FeedbackLinearisationState, wanted: float, goes_on: float) -> FeedbackLinearisationState:
-    """The state; where another task begins (``goes_on`` 0, else 1), the torque wanted [N m] has no rate yet."""
+def restart(state: FeedbackLinearisationState, requested: float, continues: float) -> FeedbackLinearisationState:
+    """The state; where another task begins (``continues`` 0, else 1), the requested torque [N m] has no rate yet."""
     return FeedbackLinearisationState(
-        reference=state.reference if goes_on > 0.5 else wanted,
+        reference=state.reference if continues > 0.5 else requested,
         angle=state.angle,
         angular_velocity=state.angular_velocity,
         started=state.started,
@@ -64,7 +66,7 @@ KIND = ControllerKind(
         *NOMINAL_QUANTITIES,
     ),
     parameters=FeedbackLinearisationParameters,
-    initial=FeedbackLinearisationState(0.0, 0.0, 0.0, 0.0),
+    initial=FeedbackLinearisationState(reference=0.0, angle=0.0, angular_velocity=0.0, started=0.0),
     update=update,
     restart=restart,
 )

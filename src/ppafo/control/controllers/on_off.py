@@ -14,7 +14,7 @@ class OnOffParameters(NamedTuple):
 
 
 class OnOffState(NamedTuple):
-    """The law remembers nothing."""
+    """The law has no state."""
 
 
 def update(

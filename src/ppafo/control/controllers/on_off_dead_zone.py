@@ -1,4 +1,4 @@
-"""On/off control with a dead zone and hysteresis: nothing is done about a small error."""
+"""On/off control with a dead zone and hysteresis: a small error is left alone."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ class OnOffDeadZoneParameters(NamedTuple):
 
 
 class OnOffDeadZoneState(NamedTuple):
-    """Which way the valve is open: 1, 0 or -1."""
+    """Direction in which the valve is open: 1, 0 or -1."""
 
     direction: float
 
@@ -41,9 +41,9 @@ def update(
     return direction * parameters.opening, OnOffDeadZoneState(direction)
 
 
-def restart(state: OnOffDeadZoneState, wanted: float, goes_on: float) -> OnOffDeadZoneState:
-    """The state, forgotten (``goes_on`` 0, else 1) where another task begins."""
-    return OnOffDeadZoneState(direction=state.direction * goes_on)
+def restart(state: OnOffDeadZoneState, requested: float, continues: float) -> OnOffDeadZoneState:
+    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    return OnOffDeadZoneState(direction=state.direction * continues)
 
 
 KIND = ControllerKind(

@@ -29,30 +29,30 @@ class PidState(NamedTuple):
 def pid_command(
     parameters: PidParameters, state: PidState, error: float, ahead: float, period: float
 ) -> tuple[float, PidState]:
-    """Command from -1 to 1 of a torque error [N m] on top of a command that is given ahead [-]. Equation (13)."""
+    """Command from -1 to 1 for a torque error [N m], added to the command ``ahead`` [-]. Equation (13)."""
     change = (error - state.error) * state.started
     slope = state.slope + (change - period * state.slope) / (period + parameters.derivative_filter)
     integral = state.integral + parameters.integral_gain * error * period
-    wanted = ahead + parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
-    command = max(-1.0, min(1.0, wanted))
-    integral = integral + parameters.anti_windup * period * (command - wanted)
-    return command, PidState(integral, error, slope, 1.0)
+    unlimited = ahead + parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
+    command = max(-1.0, min(1.0, unlimited))
+    integral = integral + parameters.anti_windup * period * (command - unlimited)
+    return command, PidState(integral=integral, error=error, slope=slope, started=1.0)
 
 
 def update(
     parameters: PidParameters, state: PidState, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, PidState]:
-    """Command from -1 to 1 of the torque error; integral by rectangles, slope by backward difference. Equation (13)."""
+    """Command from -1 to 1 from the torque error [N m]; rectangular integral, backward difference. Equation (13)."""
     return pid_command(parameters, state, reference - measurement.torque, 0.0, period)
 
 
-def restart(state: PidState, wanted: float, goes_on: float) -> PidState:
-    """The state, forgotten (``goes_on`` 0, else 1) where another task begins."""
+def restart(state: PidState, requested: float, continues: float) -> PidState:
+    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
     return PidState(
-        integral=state.integral * goes_on,
+        integral=state.integral * continues,
         error=state.error,
-        slope=state.slope * goes_on,
-        started=state.started * goes_on,
+        slope=state.slope * continues,
+        started=state.started * continues,
     )
 
 
@@ -70,7 +70,7 @@ KIND = ControllerKind(
         ),
     ),
     parameters=PidParameters,
-    initial=PidState(0.0, 0.0, 0.0, 0.0),
+    initial=PidState(integral=0.0, error=0.0, slope=0.0, started=0.0),
     update=update,
     restart=restart,
 )

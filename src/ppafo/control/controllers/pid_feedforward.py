@@ -16,7 +16,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 
 NEARLY_SUPPLY = 0.999
-"""Largest share of the supply pressure that the feed-forward plans for: above it no opening follows a demand."""
+"""Largest fraction of the supply pressure that the feed-forward plans for: above it no opening follows a demand."""
 
 
 class PidFeedforwardParameters(NamedTuple):
@@ -50,7 +50,7 @@ def update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, PidFeedforwardState]:
-    """Command: PID of the torque error, equation (13), and the opening that the reference's rate needs."""
+    """Command from -1 to 1: PID of the torque error [N m], equation (13), and the opening for the reference's rate."""
     rate = (reference - state.reference) / period * state.feedback.started
     rates = rates_on_reference(parameters.nominal, reference, measurement.angle)
     ahead = parameters.feedforward * opening_for_rate(rates, rate)
@@ -59,15 +59,15 @@ def update(
     return command, PidFeedforwardState(feedback, reference)
 
 
-def restart(state: PidFeedforwardState, wanted: float, goes_on: float) -> PidFeedforwardState:
-    """The state, forgotten (``goes_on`` 0, else 1) where another task begins; the reference then has no rate."""
-    feedback = pid.restart(state.feedback, wanted, goes_on)
+def restart(state: PidFeedforwardState, requested: float, continues: float) -> PidFeedforwardState:
+    """The state, reset where another task begins (``continues`` 0, else 1); the reference [N m] then has no rate."""
+    feedback = pid.restart(state.feedback, requested, continues)
     return PidFeedforwardState(feedback=feedback, reference=state.reference)
 
 
 KIND = ControllerKind(
     name="pid_feedforward",
-    summary="PID on the torque error, with the opening that a valve model asks for along the reference.",
+    summary="PID on the torque error, with feed-forward from a valve model along the reference.",
     source="the paper, equation (13), with the inverse of equations (2) to (9); Åström and Hägglund 2006, Advanced PID",
     quantities=(
         Quantity("proportional_gain", "1/(N m)", "k_p", 1.1, 0.0, 1.0e3),
@@ -79,7 +79,7 @@ KIND = ControllerKind(
         *NOMINAL_QUANTITIES,
     ),
     parameters=PidFeedforwardParameters,
-    initial=PidFeedforwardState(PidState(0.0, 0.0, 0.0, 0.0), 0.0),
+    initial=PidFeedforwardState(PidState(integral=0.0, error=0.0, slope=0.0, started=0.0), 0.0),
     update=update,
     restart=restart,
 )

@@ -36,13 +36,13 @@ def update(
     integral = state.integral + period * error
     surface = error + parameters.surface_slope * integral
     is_inside = abs(surface) < parameters.boundary_layer
-    share = max(-1.0, min(1.0, surface / parameters.boundary_layer))
-    return parameters.reaching_command * share, SlidingModeState(integral if is_inside else state.integral)
+    fraction = max(-1.0, min(1.0, surface / parameters.boundary_layer))
+    return parameters.reaching_command * fraction, SlidingModeState(integral if is_inside else state.integral)
 
 
-def restart(state: SlidingModeState, wanted: float, goes_on: float) -> SlidingModeState:
-    """The state, forgotten (``goes_on`` 0, else 1) where another task begins."""
-    return SlidingModeState(integral=state.integral * goes_on)
+def restart(state: SlidingModeState, requested: float, continues: float) -> SlidingModeState:
+    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    return SlidingModeState(integral=state.integral * continues)
 
 
 KIND = ControllerKind(

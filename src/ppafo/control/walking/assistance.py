@@ -1,4 +1,4 @@
-"""What torque a walking device wants in each phase of the gait, whatever law then follows it.
+"""What torque a walking device requests in each phase of the gait, whatever law then tracks it.
 
 Landing: a profile in dorsiflexion against the slap, about a spring and damper that hold the foot. Mid-stance: free.
 Push-off: a profile in plantarflexion. Swing: a profile in dorsiflexion about the same spring and damper.
@@ -34,21 +34,21 @@ class Assistance(NamedTuple):
     largest_torque: float
 
 
-class Wish(NamedTuple):
-    """Angle one sample ago [rad], 0 before the first, its filtered rate [rad/s], and the torque wanted [N m]."""
+class TorqueRequest(NamedTuple):
+    """Angle one sample ago [rad], 0 before the first, its filtered rate [rad/s], and the requested torque [N m]."""
 
     angle: float
     rate: float
     torque: float
 
 
-class Assisted(NamedTuple):
-    """A sample: phase, safety, wish; 1 where the task is that of the sample before; 1 where the device acts."""
+class Assessment(NamedTuple):
+    """One sample: phase, safety, request; 1 where the task is that of the sample before; 1 where the device acts."""
 
     phase: PhaseState
     safety: SafetyState
-    wish: Wish
-    goes_on: float
+    request: TorqueRequest
+    continues: float
     acts: float
 
 
@@ -57,7 +57,7 @@ class AssistingParameters(Protocol):
 
     @property
     def assistance(self) -> Assistance:
-        """What is wanted."""
+        """What torque is requested."""
 
     @property
     def phases(self) -> PhaseRules:
@@ -73,62 +73,72 @@ class AssistingState(Protocol):
 
     @property
     def phase(self) -> PhaseState:
-        """Where the wearer is."""
+        """The phase that the controller sees."""
 
     @property
     def safety(self) -> SafetyState:
-        """What safety has seen."""
+        """The state of the safety checks."""
 
     @property
-    def wish(self) -> Wish:
-        """What was wanted."""
+    def request(self) -> TorqueRequest:
+        """The torque requested last."""
 
 
-START = Wish(0.0, 0.0, 0.0)
+START = TorqueRequest(0.0, 0.0, 0.0)
 
 
-def wanted_torque(rules: Assistance, phase: PhaseState, angle: float, rate: float) -> float:
-    """Torque wanted [N m], above 0 in plantarflexion, at an angle [rad] and its rate [rad/s]; 0 in mid-stance."""
-    share = phase.since_strike / phase.stride_time
+def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: float) -> float:
+    """Requested torque [N m], above 0 in plantarflexion, at an angle [rad] and its rate [rad/s]; 0 in mid-stance."""
+    fraction = phase.since_strike / phase.stride_time
     hold = rules.hold
     held = hold.stiffness * (hold.swing_angle - angle) - hold.damping * rate
-    landing, swing = profile_torque(rules.landing, share), profile_torque(rules.swing, share)
+    landing, swing = profile_torque(rules.landing, fraction), profile_torque(rules.swing, fraction)
     lifted = held - (landing if phase.phase == phases.LANDING else swing)
-    pushed = profile_torque(rules.push_off, share) if phase.phase == phases.PUSH_OFF else 0.0
+    pushed = profile_torque(rules.push_off, fraction) if phase.phase == phases.PUSH_OFF else 0.0
     torque = lifted if phases.lifts(phase.phase) else pushed
     return max(-rules.largest_torque, min(rules.largest_torque, torque))
 
 
 def same_task(before: float, after: float) -> bool:
-    """True where two phases have the same task: landing and swing both hold the foot."""
+    """True where two phases (0 to 3) have the same task: landing and swing both hold the foot."""
     return phases.lifts(before) == phases.lifts(after) and (before == phases.PUSH_OFF) == (after == phases.PUSH_OFF)
 
 
-def followed(
+def assess(
     parameters: AssistingParameters, state: AssistingState, measurement: GaitMeasurement, period: float
-) -> Assisted:
-    """Phase, safety and the torque wanted after a sample."""
-    phase = phases.followed_phase(parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period)
-    watch = safety.watched(parameters.safety, state.safety, state.phase, phase, measurement, period)
-    last = state.wish
+) -> Assessment:
+    """Phase, safety and requested torque [N m] after a sample, taken every ``period`` [s]."""
+    phase = phases.next_phase_state(
+        parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period
+    )
+    watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
+    last = state.request
     turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
     rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
-    torque = wanted_torque(parameters.assistance, phase, measurement.angle, rate)
+    torque = requested_torque(parameters.assistance, phase, measurement.angle, rate)
     works = phases.lifts(phase.phase) or phase.phase == phases.PUSH_OFF
-    return Assisted(
-        phase,
-        watch,
-        Wish(measurement.angle, rate, torque),
-        1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
-        1.0 if works and watch.vented < 0.5 else 0.0,
+    return Assessment(
+        phase=phase,
+        safety=watch,
+        request=TorqueRequest(measurement.angle, rate, torque),
+        continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
+        acts=1.0 if works and watch.vented < 0.5 else 0.0,
     )
 
 
-def torque_seen(measurement: GaitMeasurement) -> Measurement:
-    """What a law of the torque task sees of it."""
-    return Measurement(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
+def torque_measurement(measurement: GaitMeasurement) -> Measurement:
+    """The part of a measurement that a torque law uses."""
+    return Measurement(
+        angle=measurement.angle,
+        pressure_1=measurement.pressure_1,
+        pressure_2=measurement.pressure_2,
+        torque=measurement.torque,
+    )
 
 
-def given(assisted: Assisted, command: float, period: float) -> tuple[float, SafetyState]:
-    """What goes to the valve, the law's command where the device acts and else ``VENT``, and what safety remembers."""
-    return safety.carried_out(assisted.safety, command if assisted.acts > 0.5 else VENT, period)
+def valve_command(assessment: Assessment, command: float, period: float) -> tuple[float, SafetyState]:
+    """Command to the valve [-], the law's where the device acts and otherwise ``VENT``, and the next safety state.
+
+    ``period`` [s] is the time until the next command.
+    """
+    return safety.safe_command(assessment.safety, command if assessment.acts > 0.5 else VENT, period)

@@ -2,7 +2,7 @@
 
 A torque law of ``control.catalog`` walks by its own name, with no line here; a line gives it gains for walking. A law
 with ideas of its own of the phases is a module of this folder with a KIND, listed here: its ``update`` watches the
-sensors with ``safety.watched`` and passes its command through ``safety.carried_out``.
+sensors with ``safety.monitor`` and passes its command through ``safety.safe_command``.
 """
 
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ LAWS = (
 
 
 def _event_based(item: Walking) -> ControllerKind:
-    summary = f"Event-based torque profiles for each phase, followed by {item.following}."
+    summary = f"Event-based torque profiles for each phase, tracked by {item.following}."
     return walking_law(item.law, f"event_{item.law.name}", summary, item.gains)
 
 
@@ -114,5 +114,5 @@ def law_that_walks(law: ControllerKind) -> ControllerKind:
     """Return any torque law as a controller of walking, with its gains for walking where the catalogue has some."""
     if law.name in _EVENT_BASED and CONTROLLERS.get(law.name) is law:
         return _EVENT_BASED[law.name]
-    summary = f"Torque profiles for each phase, followed by the law {law.name} with its own gains."
+    summary = f"Torque profiles for each phase, tracked by the law {law.name} with its own gains."
     return walking_law(law, law.name, summary, ())

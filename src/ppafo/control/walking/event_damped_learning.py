@@ -9,7 +9,7 @@ from ppafo.control.controllers import damped_proportional
 from ppafo.control.controllers.damped_proportional import DampedGains, TorqueSlope, damped_command
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, learnt_table, phases, safety
-from ppafo.control.walking.assistance import Assistance, Wish
+from ppafo.control.walking.assistance import Assistance, TorqueRequest
 from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
 from ppafo.control.walking.learnt_table import LearningRules, LearntTable
 from ppafo.control.walking.phases import PhaseRules, PhaseState
@@ -19,7 +19,7 @@ from ppafo.model.gait_sensors import GaitMeasurement
 
 
 class EventDampedLearningParameters(NamedTuple):
-    """Gains of the law and of learning, what is wanted, and the rules of phases and safety."""
+    """Gains of the law and of learning, what is requested, and the rules of phases and safety."""
 
     law: DampedGains
     learning: LearningRules
@@ -29,11 +29,11 @@ class EventDampedLearningParameters(NamedTuple):
 
 
 class EventDampedLearningState(NamedTuple):
-    """Phase, safety, the torque wanted, the torque's course, and what was learnt."""
+    """Phase, safety, the requested torque, the torque's course, and what was learnt."""
 
     phase: PhaseState
     safety: SafetyState
-    wish: Wish
+    request: TorqueRequest
     law: TorqueSlope
     table: LearntTable
 
@@ -46,24 +46,28 @@ def update(
     period: float,
 ) -> tuple[float, EventDampedLearningState]:
     """Command from -1 to 1, or ``VENT``; the reference is not used."""
-    assisted = assistance.followed(parameters, state, measurement, period)
-    phase, torque, profile = assisted.phase, measurement.torque, parameters.assistance.push_off
+    assessment = assistance.assess(parameters, state, measurement, period)
+    phase, torque, profile = assessment.phase, measurement.torque, parameters.assistance.push_off
     pushes = phase.phase == phases.PUSH_OFF
-    table = learnt_table.taught(
+    table = learnt_table.learn(
         parameters.learning,
         state.table,
         profile,
         phase.since_strike,
         phase.stride_time,
-        assisted.wish.torque - torque if pushes else 0.0,
-        period * assisted.acts if pushes else 0.0,
+        assessment.request.torque - torque if pushes else 0.0,
+        period * assessment.acts if pushes else 0.0,
     )
     place = learnt_table.place_in_table(profile, phase.since_strike, phase.stride_time)
-    ahead = learnt_table.learnt(table, place) if pushes else 0.0
-    law = TorqueSlope(state.law.torque, state.law.slope * assisted.goes_on, state.law.started * assisted.goes_on)
-    command, law = damped_command(parameters.law, law, assisted.wish.torque, torque, ahead, period)
-    command, watch = assistance.given(assisted, command, period)
-    return command, EventDampedLearningState(phase, watch, assisted.wish, law, table)
+    ahead = learnt_table.command_at(table, place) if pushes else 0.0
+    law = TorqueSlope(
+        state.law.torque, state.law.slope * assessment.continues, state.law.started * assessment.continues
+    )
+    command, law = damped_command(parameters.law, law, assessment.request.torque, torque, ahead, period)
+    command, watch = assistance.valve_command(assessment, command, period)
+    return command, EventDampedLearningState(
+        phase=phase, safety=watch, request=assessment.request, law=law, table=table
+    )
 
 
 TUNED = {
@@ -75,18 +79,22 @@ TUNED = {
 
 KIND = ControllerKind(
     name="event_damped_learning",
-    summary="Event-based torque profiles for each phase, followed by damped control that learns the push-off.",
+    summary="Event-based torque profiles for each phase, tracked by damped control that learns the push-off.",
     source=f"the paper, figure 1A (phases); {damped_proportional.KIND.source}",
     quantities=(
         *with_defaults(damped_proportional.GAIN_QUANTITIES, TUNED),
         Quantity("learning_gain", "1/(N m)", "command learnt per mean torque error of a stride", 0.67, 0.0, 1.0e3),
-        Quantity("forgetting", "1", "share of what was learnt that a stride forgets", 0.005, 0.0, 1.0),
-        Quantity("lead", "s", "how much earlier the table is read than it was learnt", 0.02, 0.0, 0.2),
+        Quantity("forgetting", "1", "fraction of what was learnt that a stride forgets", 0.005, 0.0, 1.0),
+        Quantity("lead", "s", "time by which the table is read ahead of where it was learnt", 0.02, 0.0, 0.2),
         *ASSISTING_QUANTITIES,
     ),
     parameters=EventDampedLearningParameters,
     initial=EventDampedLearningState(
-        phases.START, safety.START, assistance.START, TorqueSlope(0.0, 0.0, 0.0), learnt_table.EMPTY
+        phase=phases.START,
+        safety=safety.START,
+        request=assistance.START,
+        law=TorqueSlope(0.0, 0.0, 0.0),
+        table=learnt_table.EMPTY,
     ),
     update=update,
 )

@@ -42,9 +42,11 @@ def update(
     measurement: GaitMeasurement,
     period: float,
 ) -> tuple[float, EventOnOffState]:
-    """Command: 1 plantarflexion, -1 dorsiflexion, ``VENT`` free; the reference is not used."""
-    phase = phases.followed_phase(parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period)
-    watch = safety.watched(parameters.safety, state.safety, state.phase, phase, measurement, period)
+    """Command [-]: 1 plantarflexion, -1 dorsiflexion, ``VENT`` for free motion; the reference is not used."""
+    phase = phases.next_phase_state(
+        parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period
+    )
+    watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     above = measurement.angle > parameters.swing_angle + parameters.band
     below = measurement.angle < parameters.swing_angle - parameters.band
     lifting = 0.0 if below else (1.0 if above else state.lifting)
@@ -53,7 +55,7 @@ def update(
     command = command if held else VENT
     in_time = phase.since_strike < parameters.push_off_end * phase.stride_time
     command = 1.0 if phase.phase == phases.PUSH_OFF and in_time else command
-    command, watch = safety.carried_out(watch, command, period)
+    command, watch = safety.safe_command(watch, command, period)
     return command, EventOnOffState(phase, watch, lifting if held else 0.0)
 
 
@@ -66,7 +68,7 @@ KIND = ControllerKind(
         Quantity(
             "band", "rad", "the foot is lifted above the angle plus this, let go below it less this", 0.145, 0.0, 0.5
         ),
-        Quantity("push_off_end", "1", "share of the stride time at which the push-off is over", 0.565, 0.1, 1.0),
+        Quantity("push_off_end", "1", "fraction of the stride time at which the push-off is over", 0.565, 0.1, 1.0),
         *PHASE_QUANTITIES,
         *SAFETY_QUANTITIES,
     ),

@@ -18,7 +18,7 @@ KNOTS = 16
 
 
 class LearningRules(NamedTuple):
-    """Gain [1/(N m)], share of a knot that a stride forgets [-], lead [s]."""
+    """Gain [1/(N m)], fraction of a knot that a stride forgets [-], lead [s]."""
 
     learning_gain: float
     forgetting: float
@@ -35,11 +35,11 @@ EMPTY = LearntTable(knots=(0.0,) * KNOTS)
 
 
 def near(place: float, knot: float) -> float:
-    """Weight of a knot at a place, both counted in knots: 1 at the knot, 0 from its neighbours on."""
+    """Weight [-] of a knot at a place, both counted in knots: 1 at the knot, falling to 0 at its neighbours."""
     return max(0.0, 1.0 - abs(place - knot))
 
 
-def learnt(table: LearntTable, place: float) -> float:
+def command_at(table: LearntTable, place: float) -> float:
     """Command [-] at a place counted in knots: straight between knots, 0 outside of the table."""
     return (
         table.knots[0] * near(place, 0.0)
@@ -61,8 +61,8 @@ def learnt(table: LearntTable, place: float) -> float:
     )
 
 
-def moved(knot: float, weight: float, step: float, forgetting: float) -> float:
-    """Command of a knot after a sample of some weight: forgotten a little, moved by a step, from -1 to 1."""
+def next_knot(knot: float, weight: float, step: float, forgetting: float) -> float:
+    """Command [-] of a knot after a sample of some weight: forgotten a little, moved by a step, within -1 to 1."""
     return max(-1.0, min(1.0, knot + weight * (step - forgetting * knot)))
 
 
@@ -72,7 +72,7 @@ def place_in_table(profile: TorqueProfile, since_strike: float, stride_time: flo
     return begun / (profile.rise_time + profile.fall_time) * (KNOTS - 1.0)
 
 
-def taught(
+def learn(
     rules: LearningRules,
     table: LearntTable,
     profile: TorqueProfile,
@@ -81,34 +81,37 @@ def taught(
     error: float,
     duration: float,
 ) -> LearntTable:
-    """The table after a sample with a torque error [N m] that stood for some time [s], 0 where nothing is learnt.
+    """The table after a sample with a torque error [N m] that lasted ``duration`` [s], 0 where nothing is learnt.
 
     While a stride passes over a knot, the weights of its samples add up to 1.
     """
     knot_time = (profile.rise_time + profile.fall_time) * stride_time / (KNOTS - 1.0)
     place = place_in_table(profile, since_strike - rules.lead, stride_time)
-    return moved_table(table, place, duration / knot_time, rules.learning_gain * error, rules.forgetting)
+    return next_table(table, place, duration / knot_time, rules.learning_gain * error, rules.forgetting)
 
 
-def moved_table(table: LearntTable, place: float, weight: float, step: float, forgetting: float) -> LearntTable:
-    """The table with the two knots at a place moved in part: each by its share of the sample's ``weight``."""
+def next_table(table: LearntTable, place: float, weight: float, step: float, forgetting: float) -> LearntTable:
+    """The table after a sample at a place, counted in knots.
+
+    The two knots beside the place move, each by its part of the sample's ``weight`` [-] and of ``step`` [-].
+    """
     return LearntTable(
         knots=(
-            moved(table.knots[0], near(place, 0.0) * weight, step, forgetting),
-            moved(table.knots[1], near(place, 1.0) * weight, step, forgetting),
-            moved(table.knots[2], near(place, 2.0) * weight, step, forgetting),
-            moved(table.knots[3], near(place, 3.0) * weight, step, forgetting),
-            moved(table.knots[4], near(place, 4.0) * weight, step, forgetting),
-            moved(table.knots[5], near(place, 5.0) * weight, step, forgetting),
-            moved(table.knots[6], near(place, 6.0) * weight, step, forgetting),
-            moved(table.knots[7], near(place, 7.0) * weight, step, forgetting),
-            moved(table.knots[8], near(place, 8.0) * weight, step, forgetting),
-            moved(table.knots[9], near(place, 9.0) * weight, step, forgetting),
-            moved(table.knots[10], near(place, 10.0) * weight, step, forgetting),
-            moved(table.knots[11], near(place, 11.0) * weight, step, forgetting),
-            moved(table.knots[12], near(place, 12.0) * weight, step, forgetting),
-            moved(table.knots[13], near(place, 13.0) * weight, step, forgetting),
-            moved(table.knots[14], near(place, 14.0) * weight, step, forgetting),
-            moved(table.knots[15], near(place, 15.0) * weight, step, forgetting),
+            next_knot(table.knots[0], near(place, 0.0) * weight, step, forgetting),
+            next_knot(table.knots[1], near(place, 1.0) * weight, step, forgetting),
+            next_knot(table.knots[2], near(place, 2.0) * weight, step, forgetting),
+            next_knot(table.knots[3], near(place, 3.0) * weight, step, forgetting),
+            next_knot(table.knots[4], near(place, 4.0) * weight, step, forgetting),
+            next_knot(table.knots[5], near(place, 5.0) * weight, step, forgetting),
+            next_knot(table.knots[6], near(place, 6.0) * weight, step, forgetting),
+            next_knot(table.knots[7], near(place, 7.0) * weight, step, forgetting),
+            next_knot(table.knots[8], near(place, 8.0) * weight, step, forgetting),
+            next_knot(table.knots[9], near(place, 9.0) * weight, step, forgetting),
+            next_knot(table.knots[10], near(place, 10.0) * weight, step, forgetting),
+            next_knot(table.knots[11], near(place, 11.0) * weight, step, forgetting),
+            next_knot(table.knots[12], near(place, 12.0) * weight, step, forgetting),
+            next_knot(table.knots[13], near(place, 13.0) * weight, step, forgetting),
+            next_knot(table.knots[14], near(place, 14.0) * weight, step, forgetting),
+            next_knot(table.knots[15], near(place, 15.0) * weight, step, forgetting),
         )
     )

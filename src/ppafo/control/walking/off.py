@@ -18,7 +18,7 @@ class OffState(NamedTuple):
 def update(
     parameters: OffParameters, state: OffState, reference: float, measurement: GaitMeasurement, period: float
 ) -> tuple[float, OffState]:
-    """Always ``VENT``."""
+    """Command [-]: always ``VENT``."""
     return VENT, state
 
 

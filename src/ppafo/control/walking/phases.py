@@ -2,7 +2,7 @@
 
 Each sensor is loaded above one threshold and unloaded below another (hysteresis), and a change counts only when it has
 lasted (debounce). The time between two heel strikes is followed by a moving average, and the push-off begins at a
-share of it.
+fraction of it.
 """
 
 from typing import NamedTuple
@@ -43,25 +43,33 @@ class PhaseState(NamedTuple):
     strikes: float
 
 
-START = PhaseState(SWING, Switch(0.0, 0.0), Switch(0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
+START = PhaseState(
+    phase=SWING,
+    heel=Switch(0.0, 0.0),
+    toe=Switch(0.0, 0.0),
+    in_phase=0.0,
+    since_strike=0.0,
+    stride_time=0.0,
+    strikes=0.0,
+)
 
 
 def lifts(phase: float) -> bool:
-    """True in the swing and the landing, in which the foot is held up. Tasks 1 and 3 of the paper."""
+    """True in the swing (0) and the landing (1), in which the foot is held up. Tasks 1 and 3 of the paper."""
     return phase < 1.5
 
 
-def switched(rules: PhaseRules, switch: Switch, force: float, period: float) -> Switch:
-    """A switch after a sample of a force [N]."""
-    wanted = 0.0 if force < rules.unload_threshold else switch.loaded
-    wanted = 1.0 if force > rules.load_threshold else wanted
-    against = switch.contradicted + period if wanted != switch.loaded else 0.0
-    turns = against >= rules.debounce and wanted != switch.loaded
-    return Switch(wanted if turns else switch.loaded, 0.0 if turns else against)
+def next_switch(rules: PhaseRules, switch: Switch, force: float, period: float) -> Switch:
+    """The switch after a sample of its force [N]; ``period`` [s]."""
+    indicated = 0.0 if force < rules.unload_threshold else switch.loaded
+    indicated = 1.0 if force > rules.load_threshold else indicated
+    against = switch.contradicted + period if indicated != switch.loaded else 0.0
+    switches = against >= rules.debounce and indicated != switch.loaded
+    return Switch(indicated if switches else switch.loaded, 0.0 if switches else against)
 
 
 def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float) -> float:
-    """Phase from the present one and both switches (0 or 1); ``since_strike`` and ``stride_time`` as in ``state``."""
+    """Next phase [-] from the present one and both switches (0 or 1); times [s] as in ``state``."""
     on_heel = heel > 0.5
     on_toe = toe > 0.5
     late = state.since_strike >= rules.push_off_start * state.stride_time
@@ -76,26 +84,34 @@ def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float) ->
     return after_push_off if phase == PUSH_OFF else found
 
 
-def followed_phase(
+def next_phase_state(
     rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, period: float
 ) -> PhaseState:
     """State after a sample of both forces [N]; ``period`` [s]."""
-    heel = switched(rules, state.heel, heel_force, period)
-    toe = switched(rules, state.toe, toe_force, period)
+    heel = next_switch(rules, state.heel, heel_force, period)
+    toe = next_switch(rules, state.toe, toe_force, period)
     since = state.since_strike + period
     known = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
-    aged = PhaseState(state.phase, heel, toe, state.in_phase + period, since, known, state.strikes)
+    aged = PhaseState(
+        phase=state.phase,
+        heel=heel,
+        toe=toe,
+        in_phase=state.in_phase + period,
+        since_strike=since,
+        stride_time=known,
+        strikes=state.strikes,
+    )
     phase = next_phase(rules, aged, heel.loaded, toe.loaded)
     # A foot that comes down on its toes, or with a lost heel sensor, begins a stride too.
     strikes = state.phase == SWING and phase != SWING
     plausible = state.strikes > 0.5 and since > 0.5 * known and since < 2.0 * known
     learnt = known + rules.stride_weight * (since - known) if plausible else known
     return PhaseState(
-        phase,
-        heel,
-        toe,
-        0.0 if phase != state.phase else aged.in_phase,
-        0.0 if strikes else since,
-        learnt if strikes else known,
-        state.strikes + (1.0 if strikes else 0.0),
+        phase=phase,
+        heel=heel,
+        toe=toe,
+        in_phase=0.0 if phase != state.phase else aged.in_phase,
+        since_strike=0.0 if strikes else since,
+        stride_time=learnt if strikes else known,
+        strikes=state.strikes + (1.0 if strikes else 0.0),
     )

@@ -39,9 +39,9 @@ def update(
     return max(-1.0, min(1.0, proposed)), ProportionalState(integral)
 
 
-def restart(state: ProportionalState, wanted: float, goes_on: float) -> ProportionalState:
-    """The state, forgotten (``goes_on`` 0, else 1) where another task begins."""
-    return ProportionalState(integral=state.integral * goes_on)
+def restart(state: ProportionalState, requested: float, continues: float) -> ProportionalState:
+    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    return ProportionalState(integral=state.integral * continues)
 
 
 KIND = ControllerKind(

@@ -1,4 +1,4 @@
-"""A torque law that walks: the phases of the gait say which torque is wanted, safety watches, the law follows it.
+"""A torque law that walks: the phases of the gait say which torque is requested, safety watches, the law follows it.
 
 The frame is one for all laws. What differs is data: the law, its gains for walking, and what it remembers where another
 task of the gait begins.
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, phases, safety
-from ppafo.control.walking.assistance import Assistance, Wish
+from ppafo.control.walking.assistance import Assistance, TorqueRequest
 from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyRules, SafetyState
@@ -22,7 +22,7 @@ from ppafo.model.gait_sensors import GaitMeasurement
 
 
 class LawParameters(NamedTuple):
-    """The law, what is wanted, and the rules of phases and safety; ``row_with_law`` makes one for each law."""
+    """The law, what is requested, and the rules of phases and safety; ``row_with_law`` makes one for each law."""
 
     law: Any
     assistance: Assistance
@@ -31,21 +31,21 @@ class LawParameters(NamedTuple):
 
 
 class LawState(NamedTuple):
-    """Phase, safety, the torque wanted, and the state of the law; ``row_with_law`` makes one for each law."""
+    """Phase, safety, the requested torque, and the state of the law; ``row_with_law`` makes one for each law."""
 
     phase: PhaseState
     safety: SafetyState
-    wish: Wish
+    request: TorqueRequest
     law: Any
 
 
 def law_update(parameters: Any, state: Any, reference: float, measurement: Any, period: float) -> tuple[float, Any]:
-    """Stand for the law, which ``bound`` puts here: command and next state of a torque law."""
+    """Stand for the law, which ``bind`` puts here: command [-] and next state of a torque law."""
     raise NotImplementedError
 
 
-def law_restart(state: Any, wanted: float, goes_on: float) -> Any:
-    """Stand for what the law remembers, at a torque wanted [N m], where another task may begin (``goes_on`` 0)."""
+def law_restart(state: Any, requested: float, continues: float) -> Any:
+    """Stand for what the law remembers, at a requested torque [N m], where another task may begin (``continues`` 0)."""
     raise NotImplementedError
 
 
@@ -53,13 +53,13 @@ LAW_START = None
 """Stands for the start of the law's state."""
 
 
-def restart(state: Any, wanted: float, goes_on: float) -> Any:
-    """The state of a law that begins anew where another task begins (``goes_on`` 0, else 1)."""
-    return state if goes_on > 0.5 else LAW_START
+def restart(state: Any, requested: float, continues: float) -> Any:
+    """The state of a law that starts again where another task begins (``continues`` 0, else 1)."""
+    return state if continues > 0.5 else LAW_START
 
 
-def keep(state: Any, wanted: float, goes_on: float) -> Any:
-    """The state of a law that remembers nothing, and so has none to begin anew with."""
+def keep(state: Any, requested: float, continues: float) -> Any:
+    """The state of a law that has no memory, and so nothing to reset."""
     return state
 
 
@@ -67,16 +67,16 @@ def update(
     parameters: Any, state: LawState, reference: float, measurement: GaitMeasurement, period: float
 ) -> tuple[float, LawState]:
     """Command from -1 to 1, or ``VENT``; the reference is not used."""
-    assisted = assistance.followed(parameters, state, measurement, period)
-    wanted = assisted.wish.torque
-    law = law_restart(state.law, wanted, assisted.goes_on)
-    seen = assistance.torque_seen(measurement)
-    command, law = law_update(parameters.law, law, wanted, seen, period)
-    command, watch = assistance.given(assisted, command, period)
-    return command, LawState(phase=assisted.phase, safety=watch, wish=assisted.wish, law=law)
+    assessment = assistance.assess(parameters, state, measurement, period)
+    requested = assessment.request.torque
+    law = law_restart(state.law, requested, assessment.continues)
+    sample = assistance.torque_measurement(measurement)
+    command, law = law_update(parameters.law, law, requested, sample, period)
+    command, watch = assistance.valve_command(assessment, command, period)
+    return command, LawState(phase=assessment.phase, safety=watch, request=assessment.request, law=law)
 
 
-def bound(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Callable[..., Any]:
+def bind(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Callable[..., Any]:
     """Return the function of a frame with other pieces in the place of some names of this module.
 
     It is the same code: only what those names stand for differs, so that the engine compiles it as any other function.
@@ -91,7 +91,8 @@ def bound(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Ca
 
 def row_with_law(name: str, row: Any, law: type) -> Any:
     """Return a NamedTuple class as ``row`` is one, whose field ``law`` is of the class that one law has."""
-    made: Any = collections.namedtuple(name, row._fields, module=__name__)  # type: ignore[misc]
+    namedtuple: Any = collections.namedtuple
+    made = namedtuple(name, row._fields, module=__name__)
     made.__annotations__ = {**row.__annotations__, "law": law}
     return made
 
@@ -116,7 +117,7 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
     title = "".join(part.capitalize() for part in name.split("_"))
     parameters = row_with_law(f"{title}Parameters", LawParameters, law.parameters)
     state = row_with_law(f"{title}State", LawState, type(law.initial))
-    anew = bound(restart, f"restart_{name}", {"LAW_START": law.initial}) if len(law.initial) else keep
+    anew = bind(restart, f"restart_{name}", {"LAW_START": law.initial}) if len(law.initial) else keep
     pieces = {"law_update": law.update, "law_restart": law.restart or anew, "LawState": state}
     return replace(
         law,
@@ -125,7 +126,7 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
         source=f"the paper, figure 1A (phases); {law.source}",
         quantities=(*with_defaults(law.quantities, dict(gains)), *ASSISTING_QUANTITIES),
         parameters=parameters,
-        initial=state(phase=phases.START, safety=safety.START, wish=assistance.START, law=law.initial),
-        update=bound(update, f"update_{name}", pieces),
+        initial=state(phase=phases.START, safety=safety.START, request=assistance.START, law=law.initial),
+        update=bind(update, f"update_{name}", pieces),
         restart=None,
     )

@@ -15,14 +15,14 @@ class TorqueProfile(NamedTuple):
     fall_time: float
 
 
-def smooth(share: float) -> float:
-    """From 0 to 1 with level ends, for a share from 0 to 1."""
-    inside = max(0.0, min(1.0, share))
+def smooth(fraction: float) -> float:
+    """A cubic from 0 to 1 with level ends, at a fraction [-] from 0 to 1."""
+    inside = max(0.0, min(1.0, fraction))
     return inside * inside * (3.0 - 2.0 * inside)
 
 
 def profile_torque(profile: TorqueProfile, phase: float) -> float:
-    """Torque wanted [N m] at a phase in turns from the heel strike."""
+    """Requested torque [N m] at a phase in turns from the heel strike."""
     rise = smooth((phase - profile.peak_time + profile.rise_time) / profile.rise_time)
     fall = smooth((phase - profile.peak_time) / profile.fall_time)
     return profile.peak_torque * (rise - fall)

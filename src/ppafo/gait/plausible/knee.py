@@ -4,7 +4,7 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.gait import KNEE
-from ppafo.gait.plausible.checked import Checked
+from ppafo.gait.plausible.checked import MeanStride
 from ppafo.gait.plausible.turning import check_turning
 
 KNEE_TRAVEL = (0.5, 80.0)
@@ -14,8 +14,8 @@ _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.
 """Parts of the swing, from toe-off, in which the knee is driven on and up, and in which it is held back and falls."""
 
 
-def check_knee(walk: Checked) -> None:
-    """Refuse accelerations of the knee, where there are some, that no leg has."""
+def check_knee(walk: MeanStride) -> None:
+    """Raise DataError for knee accelerations, where there are some, that no leg has."""
     there = [name for name in KNEE if name in walk.curves]
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
@@ -26,7 +26,7 @@ def check_knee(walk: Checked) -> None:
         _check_sign(name, walk)
 
 
-def _check_size(name: str, walk: Checked) -> None:
+def _check_size(name: str, walk: MeanStride) -> None:
     values, place = walk.curves[name], f"{walk.file[name]}: {name}"
     travel, mean, (low, high) = float(np.ptp(values)), float(np.mean(values[:-1])), KNEE_TRAVEL
     if abs(mean) > KNEE_MEAN:
@@ -41,7 +41,7 @@ def _check_size(name: str, walk: Checked) -> None:
         )
 
 
-def _check_sign(name: str, walk: Checked) -> None:
+def _check_sign(name: str, walk: MeanStride) -> None:
     values, place = walk.curves[name], f"{walk.file[name]}: {name}"
     swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
     driven, held = (float(np.mean(values[(swung >= low) & (swung <= high)])) for low, high in _PARTS[name])

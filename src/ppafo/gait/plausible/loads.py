@@ -3,7 +3,7 @@
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.plausible.checked import Checked, Given, other_sign
+from ppafo.gait.plausible.checked import MeanStride, SignSource, other_sign
 from ppafo.signals.recording import Floats
 
 MOMENT_PEAK = (0.05, 3.5)
@@ -20,14 +20,14 @@ _FOOT_ALONE = 0.05
 """N m/kg that a swinging foot may need, however weak the push-off."""
 
 
-def check_force_scale(file: str, force: Floats, given: Given) -> None:
-    """Refuse a vertical force [body weights] in which no heel strike can be found, by its unit or its sign."""
+def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
+    """Raise DataError for a vertical force [body weights] whose unit or sign leaves no heel strike to find."""
     lowest, highest = (float(value) for value in np.percentile(force, (2.0, 98.0)))
     low, high = FORCE_PEAK
     if -lowest > highest:
         raise DataError(
             f"{file}: vertical_force is {lowest:.3g} body weights at its largest, downwards: its sign is reversed; "
-            f"{other_sign(given, 'vertical_force.positive')}"
+            f"{other_sign(signs_from, 'vertical_force.positive')}"
         )
     if not low <= highest <= high:
         raise DataError(
@@ -36,8 +36,8 @@ def check_force_scale(file: str, force: Floats, given: Given) -> None:
         )
 
 
-def check_moment(walk: Checked) -> None:
-    """Refuse an ankle moment, where there is one, that no leg has."""
+def check_moment(walk: MeanStride) -> None:
+    """Raise DataError for an ankle moment, where there is one, that no leg has."""
     if "ankle_moment" not in walk.curves:
         return
     moment = walk.curves["ankle_moment"]
@@ -56,32 +56,32 @@ def check_moment(walk: Checked) -> None:
     _check_moment_time(walk)
 
 
-def _check_moment_time(walk: Checked) -> None:
+def _check_moment_time(walk: MeanStride) -> None:
     """Refuse a moment that works while the foot is off the ground."""
-    moment, share = walk.curves["ankle_moment"], walk.stance_share
+    moment, fraction = walk.curves["ankle_moment"], walk.stance_share
     phase = np.linspace(0.0, 1.0, moment.size)
     peak, at = float(np.max(moment)), float(phase[np.argmax(moment)])
-    swing = float(np.max(moment[phase > share + _AFTER_TOE_OFF]))
-    if at < share and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
+    swing = float(np.max(moment[phase > fraction + _AFTER_TOE_OFF]))
+    if at < fraction and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
         return
     where = f"peaks at {100.0 * at:.0f} % of the stride" + (
-        "" if at >= share else f" and is {swing:.2g} N m/kg in swing"
+        "" if at >= fraction else f" and is {swing:.2g} N m/kg in swing"
     )
     raise DataError(
-        f"{walk.file['ankle_moment']}: ankle_moment {where}, but the foot is off the ground from {100.0 * share:.0f} % "
-        f"on; {_OTHER_TIME[walk.given]}"
+        f"{walk.file['ankle_moment']}: ankle_moment {where}, but the foot is off the ground "
+        f"from {100.0 * fraction:.0f} % on; {_OTHER_TIME[walk.signs_from]}"
     )
 
 
-_OTHER_TIME: dict[Given, str] = {
+_OTHER_TIME: dict[SignSource, str] = {
     "map": "it is of the other foot or on another clock: choose the other side, or the column of this foot",
     "columns": "it is of the other foot or on another clock: choose the other side, or the column of this foot",
     "gait_file": "write the moment of this foot, counted from its heel strike",
 }
 
 
-def check_force(walk: Checked) -> None:
-    """Refuse a vertical force, where there is one, that no walk has."""
+def check_force(walk: MeanStride) -> None:
+    """Raise DataError for a vertical force, where there is one, that no walk has."""
     if "vertical_force" not in walk.curves:
         return
     force = walk.curves["vertical_force"]
@@ -96,7 +96,7 @@ def check_force(walk: Checked) -> None:
 
 
 def force_remarks(force: Floats) -> list[str]:
-    """Return what is odd about the mean of a vertical force [body weights] over a stride, both ends counted."""
+    """Return what is unusual about the mean of a vertical force [body weights] over a stride, both ends counted."""
     mean, (low, high) = float(np.mean(force[:-1])), USUAL_FORCE_MEAN
     if low <= mean <= high:
         return []

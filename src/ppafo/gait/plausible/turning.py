@@ -8,7 +8,7 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.fourier import HARMONICS, fit_curve
 from ppafo.gait.gait import KNEE
-from ppafo.gait.plausible.checked import Checked, Given
+from ppafo.gait.plausible.checked import MeanStride, SignSource
 from ppafo.signals.recording import Floats
 
 FOOT_FLAT = slice(15, 43)
@@ -18,21 +18,21 @@ SHANK_LENGTHS = (0.25, 0.6)
 """Metres; within these the length is the one that fits best, since a gait does not say it."""
 
 _FITS = 0.6
-"""Share of what the turning asks for that may be missed, root mean square: true recordings miss 0.3 to 0.46 of it."""
+"""Largest misfit of the turning, relative and root mean square: true recordings have 0.3 to 0.46."""
 _CLEARLY = 0.7
-"""A mistake is named where without it less than this share of the misfit is left."""
+"""A mistake is named where correcting it leaves less than this fraction of the misfit."""
 
-Shares = tuple[float, float]
+Factors = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class _Mistake:
-    """What may have happened, the way back in words, and the mended curves as shares of the given (forward, up)."""
+    """What may have happened, the way back in words, and the mended curves as fractions of the given (forward, up)."""
 
     words: str
     remedy: str
-    forward: Shares
-    up: Shares
+    forward: Factors
+    up: Factors
 
 
 _G = STANDARD_GRAVITY
@@ -48,11 +48,11 @@ def _too_small(factor: float, words: str) -> tuple[_Mistake, ...]:
 
 def _too_large(factor: float) -> tuple[_Mistake, ...]:
     """Return numbers that are too large by a factor; one alone is first, since knee_up divided is as good as none."""
-    words, share = f"{factor:g} times too large", 1.0 / factor
+    words, fraction = f"{factor:g} times too large", 1.0 / factor
     return (
-        _Mistake(f"differ, knee_forward is {words}", f"divide it by {factor:g}", (share, 0.0), (0.0, 1.0)),
-        _Mistake(f"differ, knee_up is {words}", f"divide it by {factor:g}", (1.0, 0.0), (0.0, share)),
-        _Mistake(f"are {words}", f"divide both by {factor:g}", (share, 0.0), (0.0, share)),
+        _Mistake(f"differ, knee_forward is {words}", f"divide it by {factor:g}", (fraction, 0.0), (0.0, 1.0)),
+        _Mistake(f"differ, knee_up is {words}", f"divide it by {factor:g}", (1.0, 0.0), (0.0, fraction)),
+        _Mistake(f"are {words}", f"divide both by {factor:g}", (fraction, 0.0), (0.0, fraction)),
     )
 
 
@@ -72,29 +72,29 @@ _MISTAKES = (
 )
 """The first that fits is named. A sign alone is recognised in the swing."""
 
-_WHERE: dict[Given, str] = {
+_WHERE: dict[SignSource, str] = {
     "map": "in the gait map or the file",
     "columns": "in the file",
     "gait_file": "in every number of their tables",
 }
 
 
-def check_turning(walk: Checked) -> None:
-    """Refuse a knee that turns about the standing ankle only once a mistake is taken back; the message names it."""
+def check_turning(walk: MeanStride) -> None:
+    """Raise DataError where the knee turns about the standing ankle only with a mistake corrected, and name it."""
     if any(name not in walk.curves for name in KNEE):
         return
-    wanted = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
+    expected = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
     # Over a stride that repeats the mean is 0; gravity in it is refused elsewhere and must not hide a unit here.
     forward, up = (walk.curves[name] - np.mean(walk.curves[name][:-1]) for name in KNEE)
     given = np.stack([forward, up])[:, FOOT_FLAT]
-    missed = _misfit(given, wanted)
+    missed = _misfit(given, expected)
     for mistake in _MISTAKES:
-        left = _misfit(np.array([mistake.forward, mistake.up]) @ given, wanted)
+        left = _misfit(np.array([mistake.forward, mistake.up]) @ given, expected)
         if left < _FITS and left < _CLEARLY * missed:
             raise DataError(
                 f"{walk.file['knee_forward']}: knee_forward and knee_up {mistake.words}: while the foot is flat the "
                 f"knee turns about the resting ankle, which they miss by {100.0 * missed:.0f} %, and by "
-                f"{100.0 * left:.0f} % with that corrected; {mistake.remedy} {_WHERE[walk.given]}"
+                f"{100.0 * left:.0f} % with that corrected; {mistake.remedy} {_WHERE[walk.signs_from]}"
             )
 
 
@@ -106,17 +106,17 @@ def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
     curve, _ = fit_curve(shank, HARMONICS["shank_angle"])
     percent = np.linspace(0.0, 1.0, shank.size)[FOOT_FLAT]
     rates = curve.derivative(stride_time)
-    phi, rate, acceleration = (item.sampled(percent) for item in (curve, rates, rates.derivative(stride_time)))
+    phi, rate, acceleration = (item.values_at(percent) for item in (curve, rates, rates.derivative(stride_time)))
     sine, cosine = np.sin(phi), np.cos(phi)
     forward = sine * rate**2 - cosine * acceleration
     up = -cosine * rate**2 - sine * acceleration
     return np.stack([forward, up])
 
 
-def _misfit(given: Floats, wanted: Floats) -> float:
-    """Return what the best shank leaves, as a share of what its turning asks for; infinite for a shank at rest."""
-    square = float(np.sum(wanted**2))
+def _misfit(given: Floats, expected: Floats) -> float:
+    """Return what the best shank leaves, as a fraction of what its turning asks for; infinite for a shank at rest."""
+    square = float(np.sum(expected**2))
     if square == 0.0:
         return float("inf")
-    length = float(np.clip(np.sum(given * wanted) / square, *SHANK_LENGTHS))
-    return float(np.sqrt(np.sum((given - length * wanted) ** 2) / square)) / length
+    length = float(np.clip(np.sum(given * expected) / square, *SHANK_LENGTHS))
+    return float(np.sqrt(np.sum((given - length * expected) ** 2) / square)) / length

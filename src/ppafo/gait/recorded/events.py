@@ -20,7 +20,7 @@ _SMOOTH = 6.0
 _SHORTEST_STRIDE = 0.5
 """Seconds between two heel strikes of one foot."""
 _TOP = 0.35
-"""Share of the range of the shank angle, from above, in which heel strikes lie."""
+"""Fraction of the range of the shank angle, from above, in which heel strikes lie."""
 _DEEPEST = np.radians(-15.0)
 """Before the swing the shank leans back further than this."""
 
@@ -40,13 +40,13 @@ class Stride:
 
     @property
     def stance_share(self) -> float:
-        """Share of the stride until toe-off."""
+        """Fraction [-] of the stride until toe-off."""
         return (self.toe_off - self.start) / self.time
 
 
 def strides_from_force(force: Signal) -> list[Stride]:
     """Return the whole strides in a vertical force [body weights]; thresholds with hysteresis, interpolated in time."""
-    contacts = _contacts(force)
+    contacts = contacts_of(force)
     strides = []
     for (start, toe_off), (following, _) in pairwise(contacts):
         if start is not None and toe_off is not None and following is not None:
@@ -57,7 +57,7 @@ def strides_from_force(force: Signal) -> list[Stride]:
 Contact = tuple[float | None, float | None]
 
 
-def _contacts(force: Signal) -> list[Contact]:
+def contacts_of(force: Signal) -> list[Contact]:
     """Return heel strike and toe-off of every contact; None at an end of the record that cuts one."""
     loaded = _with_hysteresis(force.values)
     edges = [0, *(np.flatnonzero(np.diff(loaded.astype(int))) + 1).tolist(), loaded.size]
@@ -103,15 +103,16 @@ def _without_short(time: Floats, contacts: list[tuple[int, int]]) -> list[tuple[
 def _crossing(signal: Signal, index: int, level: float) -> float:
     """Return when a line between the samples before and at ``index`` passes a level [s]."""
     before, after = signal.values[index - 1], signal.values[index]
-    share = 0.5 if after == before else float(np.clip((level - before) / (after - before), 0.0, 1.0))
-    return float(signal.time[index - 1] + share * (signal.time[index] - signal.time[index - 1]))
+    fraction = 0.5 if after == before else float(np.clip((level - before) / (after - before), 0.0, 1.0))
+    return float(signal.time[index - 1] + fraction * (signal.time[index] - signal.time[index - 1]))
 
 
 def strides_from_shank(shank: Signal) -> list[Stride]:
     """Return the whole strides in a shank angle phi [rad], above 0 while the ankle is in front.
 
-    Heel strike is where the forward swing of the shank ends, its largest angle. Toe-off is where it leans back
-    fastest before the swing, after Aminian et al. 2002, J Biomech 35:689, who find both in a gyroscope on the shank.
+    Heel strike is where the forward swing of the shank ends, its largest angle. Toe-off is where it leans back fastest
+    before the swing, after Aminian et al. 2002, J Biomech 35:689, who find both in a gyroscope on the shank. DataError
+    where there is no toe-off.
     """
     smooth = low_pass(shank, _SMOOTH)
     peaks = _heel_strikes(smooth)

@@ -1,4 +1,4 @@
-"""The way or the acceleration of the knee in the sagittal plane, from recorded columns."""
+"""The position or the acceleration of the knee in the sagittal plane, from recorded columns."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -7,16 +7,16 @@ import numpy as np
 
 from ppafo.errors import DataError, UnitError
 from ppafo.gait.fourier import HARMONICS, fit_curve
-from ppafo.gait.plausible.checked import Given, other_sign
-from ppafo.gait.recorded.columns import Found, found_columns
+from ppafo.gait.plausible.checked import SignSource, other_sign
+from ppafo.gait.recorded.columns import CurveColumns, find_columns
 from ppafo.gait.recorded.mapping import KneeMap
 from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity
 
-THIGH_SHARE = 0.245
-"""Hip to knee as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
+THIGH_FRACTION = 0.245
+"""Hip to knee as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
 ed. 2009."""
 
 _LENGTHS = (0.2, 0.7)
@@ -29,15 +29,15 @@ def knee_signals(
 ) -> dict[str, Signal]:
     """Return ``knee_forward`` and ``knee_up``, each a position [m] or an acceleration [m/s^2].
 
-    With a thigh they are the way of the hip and that of the knee about it: in the plane, with the hip where the
-    columns of the map say it is.
+    With a thigh they are the way of the hip and that of the knee about it: in the plane, with the hip where the columns
+    of the map say it is. DataError where a column, unit or length is missing or does not fit.
     """
     if mapped.thigh is not None and mapped.thigh_length is None and stature is None:
         if is_default:
             return {}
         raise DataError("knee.thigh needs a length: give knee.thigh_length in the gait map, or the stature")
     thigh = mapped.thigh or ()
-    found = found_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, optional=is_default)
+    found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, optional=is_default)
     if found is None:
         return {}
     ends = len(mapped.forward), len(mapped.forward) + len(mapped.up)
@@ -59,7 +59,10 @@ def knee_signals(
 
 
 def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: float | None) -> list[str]:
-    """Return where the acceleration of the knee comes from, or why there is none."""
+    """Return where the acceleration of the knee comes from, or why there is none; ``stature`` [m].
+
+    DataError for a length of the thigh that is not plausible.
+    """
     if mapped is None:
         return []
     if "knee_forward" not in walk:
@@ -67,7 +70,9 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
         return [f"{what}knee.thigh_length"] if mapped.thigh is not None else []
     remarks = []
     if mapped.thigh is not None and mapped.thigh_length is None:
-        remarks.append(f"thigh of {_thigh_length(mapped, stature):.3f} m: {THIGH_SHARE:g} of the stature (Winter 2009)")
+        remarks.append(
+            f"thigh of {_thigh_length(mapped, stature):.3f} m: {THIGH_FRACTION:g} of the stature (Winter 2009)"
+        )
     if walk["knee_forward"].is_position:
         remarks.append(
             f"acceleration of the knee from a series of {HARMONICS['knee_forward']} harmonics of its position"
@@ -75,8 +80,8 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
     return remarks
 
 
-def check_way(walk: Mapping[str, Signal], given: Given) -> None:
-    """Refuse a knee that is carried backwards; on a treadmill it stays about where it is."""
+def check_way(walk: Mapping[str, Signal], signs_from: SignSource) -> None:
+    """Raise DataError for a knee that moves backwards; on a treadmill it stays about where it is."""
     knee = walk.get("knee_forward")
     if knee is None or not knee.is_position:
         return
@@ -85,7 +90,7 @@ def check_way(walk: Mapping[str, Signal], given: Given) -> None:
         raise DataError(
             f"{knee.file}: the knee goes back by {-speed:.2g} m/s: knee.forward points against the "
             "direction of walking; "
-            f"{other_sign(given, 'the sign of knee.forward')}"
+            f"{other_sign(signs_from, 'the sign of knee.forward')}"
         )
 
 
@@ -101,7 +106,7 @@ def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Flo
     """
     phase = np.linspace(0.0, 1.0, position.size)
     curve, _ = fit_curve(position - (position[-1] - position[0]) * phase, harmonics)
-    return curve.derivative(stride_time).derivative(stride_time).sampled(phase)
+    return curve.derivative(stride_time).derivative(stride_time).values_at(phase)
 
 
 def _check_hip_moves(mapped: KneeMap, file: str, forward: Floats, up: Floats) -> None:
@@ -114,13 +119,13 @@ def _check_hip_moves(mapped: KneeMap, file: str, forward: Floats, up: Floats) ->
             )
 
 
-def _part(found: Found, chosen: slice) -> Found:
+def _part(found: CurveColumns, chosen: slice) -> CurveColumns:
     return replace(found, terms=found.terms[chosen])
 
 
 def _thigh_length(mapped: KneeMap, stature: float | None) -> float:
     if mapped.thigh_length is None:
-        return THIGH_SHARE * (stature or 0.0)
+        return THIGH_FRACTION * (stature or 0.0)
     place, (low, high) = f"knee.thigh_length = {mapped.thigh_length!r}", _LENGTHS
     try:
         length = parse_quantity(mapped.thigh_length, "m")

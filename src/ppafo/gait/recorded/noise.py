@@ -1,4 +1,4 @@
-"""How much strides scatter and their series miss, against what the curve moves over."""
+"""How much strides scatter, and how far their series is off, relative to the range of the curve."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,17 +11,17 @@ from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.strides import CurveStatistics
 
 REMARKED_SPREAD, REFUSED_SPREAD = 0.1, 0.25
-"""Standard deviation between strides, shares of the range of the mean curve; steady walks have 0.004 to 0.06."""
+"""Standard deviation between strides, fractions of the range of the mean curve; steady walks have 0.004 to 0.06."""
 
 REMARKED_MISFIT, REFUSED_MISFIT = 0.03, 0.1
-"""What the series leaves, root mean square, shares of the same range; true curves have below 0.01."""
+"""What the series leaves, root mean square, fractions of the same range; true curves have below 0.01."""
 
 _REMEDY = "smooth the recording (--low-pass '6 Hz'), or give better or more strides"
 
 
 @dataclass(frozen=True, slots=True)
 class _Scatter:
-    """Spread and misfit of one curve as shares of its range."""
+    """Spread and misfit of one curve as fractions of its range."""
 
     name: str
     spread: float
@@ -31,7 +31,7 @@ class _Scatter:
 def check_scatter(
     curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError], walk: Mapping[str, Signal]
 ) -> None:
-    """Refuse curves whose mean says little: they scatter by a quarter of their range, or no series comes near them."""
+    """Raise DataError for curves that scatter by a quarter of their range, or that no series comes near."""
     for item in _scatters(curves, errors):
         if item.spread > REFUSED_SPREAD or item.misfit > REFUSED_MISFIT:
             raise DataError(

@@ -1,4 +1,4 @@
-"""Curves over the stride: each stride brought to the same phases, their mean and how much they differ."""
+"""Curves over the stride: each stride brought to the same phases, their mean and their standard deviation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,12 +32,12 @@ class CurveStatistics:
 
     @property
     def spread(self) -> float:
-        """Standard deviation between strides, root mean square over the phases."""
+        """Standard deviation between strides, root mean square over the phases, in the unit of the curve [SI]."""
         return float(np.sqrt(np.mean(self.deviation**2)))
 
 
 def phases() -> Floats:
-    """Return the phases of every normalised curve, 0 to 1."""
+    """Return the phases [strides] of every normalised curve, from 0 to 1."""
     return np.linspace(0.0, 1.0, SAMPLES)
 
 
@@ -62,9 +62,8 @@ def _over_strides(curves: Floats, strides: Sequence[Stride]) -> CurveStatistics:
     return CurveStatistics(curves, curves.mean(axis=0), deviation, tuple(strides))
 
 
-def mean_curve(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
-    """Return the curves of the strides that a signal covers; at least one has to be."""
-    inside = strides_within(signal, strides)
+def mean_curve(name: str, signal: Signal, strides: Sequence[Stride], inside: Sequence[Stride]) -> CurveStatistics:
+    """Return the curves of the strides ``inside``, which a signal covers; at least one of all ``strides`` has to be."""
     if not inside:
         raise DataError(
             f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no whole "
@@ -86,8 +85,8 @@ def _accelerations(result: CurveStatistics, harmonics: int) -> CurveStatistics:
 def _bridge_swing(result: CurveStatistics) -> CurveStatistics:
     """Return a centre of pressure with a straight line over swing, where it has no meaning."""
     percent = phases()
-    share = float(np.mean([item.stance_share for item in result.strides]))
-    inside = (percent > _UNLOADED_FORCE) & (percent < share - _UNLOADED_FORCE)
+    fraction = float(np.mean([item.stance_share for item in result.strides]))
+    inside = (percent > _UNLOADED_FORCE) & (percent < fraction - _UNLOADED_FORCE)
     at, first = percent[inside], float(result.mean[inside][0])
     mean = np.interp(percent, [*at, 1.0 + at[0]], [*result.mean[inside], first], period=None)
     deviation = np.where(inside, result.deviation, 0.0)
@@ -95,7 +94,7 @@ def _bridge_swing(result: CurveStatistics) -> CurveStatistics:
 
 
 def without_outliers(strides: Sequence[Stride], largest: float) -> tuple[list[Stride], list[Stride]]:
-    """Return the strides whose time is within a share of the median, and those that are not."""
+    """Return the strides whose time is within ``largest`` [-] of the median, relative to it, and the others."""
     if not strides:
         return [], []
     median = float(np.median([item.time for item in strides]))

@@ -17,7 +17,7 @@ from ppafo.simulation import numbers
 from ppafo.simulation.declaration import FREE, INITIAL
 from ppafo.simulation.recorded.checks import check_absolute, check_command, check_gaps
 from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, EXTERNAL_TORQUE, SUPPLY, between_stops
-from ppafo.simulation.recorded.scenario import recorded_control, with_highest_supply
+from ppafo.simulation.recorded.scenario import replay_control, with_highest_supply
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario, Sensors
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
@@ -55,7 +55,7 @@ class Experiment:
 
 
 def check_experiment(experiment: Experiment) -> None:
-    """Refuse an experiment that cannot be fitted; the message begins with its label."""
+    """Refuse an experiment that cannot be fitted; the message begins with its label. It is an IdentificationError."""
     said = f"experiment '{experiment.label}'"
     if len(experiment.recording) < 2:
         raise IdentificationError(f"{said}: {experiment.recording.label} has only one sample")
@@ -114,7 +114,7 @@ def scenario_of(experiment: Experiment) -> Scenario:
         scenario = replace(scenario, device=with_highest_supply(scenario.device, recording))
     if COMMAND in experiment.inputs:
         # Nobody measures for a controller that nobody asks.
-        scenario = replace(scenario, control=recorded_control(recording), sensors=Sensors())
+        scenario = replace(scenario, control=replay_control(recording), sensors=Sensors())
     if ANGLE in experiment.inputs:
         scenario = replace(scenario, motion=FreeMotion(_angle_at_start(experiment, scenario)))
     return scenario if experiment.initial_state == "scenario" else _with_initial_state(experiment, scenario)
@@ -194,7 +194,7 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 
 def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
-    """Return the scenario with numbers replaced, by paths of ``declared_numbers``; a time offset is none of it."""
+    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``; a time offset is none of it."""
     return numbers.with_numbers(scenario, {path: number for path, number in changed.items() if path != TIME_OFFSET})
 
 
@@ -202,7 +202,7 @@ def _orifice_form(orifice: object) -> tuple[Quantity, ...]:
     return AREA_FORM if isinstance(orifice, Orifice) else SONIC_FORM
 
 
-def broken_order(device: Device) -> str:
+def broken_rule(device: Device) -> str:
     """Return which rule of a device a set of numbers breaks, as a parameter set would say it; empty for none."""
     if device.friction.dynamic_torque > device.friction.static_torque:
         return "friction.dynamic_torque came out above friction.static_torque"

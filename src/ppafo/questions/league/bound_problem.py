@@ -16,7 +16,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import PlantParameters, chamber_volumes
 from ppafo.simulation.plan import plan_run, profile_values
-from ppafo.simulation.scenario import LedMotion, Scenario
+from ppafo.simulation.scenario import PrescribedMotion, Scenario
 
 Openings = Callable[..., tuple[Any, Any, Any, Any]]
 """From the fractions of time of a valve's ways, towards chamber 1 first, to source 1, vent 1, source 2 and vent 2."""
@@ -69,7 +69,7 @@ def smooth_flow(pressure_a: Any, pressure_b: Any, conductance: float, curve: Flo
     gap = (pressure_a - pressure_b) / upstream
     size = casadi.fabs(gap)
     polynomial: Any = 0.0
-    for coefficient in (curve.c6, curve.c5, curve.c4, curve.c3, curve.c2, curve.c1, curve.c0):
+    for coefficient in reversed(curve.coefficients):
         polynomial = polynomial * size + coefficient
     # Half the gap of the straight line: the flow near equal pressures is then hardly ever below the engine's, and a
     # bound may have too much flow but not too little.
@@ -212,7 +212,7 @@ def _volumes(scenario: Scenario, plant: PlantParameters, grid: Grid) -> Volumes:
     """Volumes at every point of a fixed or prescribed ankle, each as a row."""
     import casadi
 
-    if not isinstance(scenario.motion, LedMotion):
+    if not isinstance(scenario.motion, PrescribedMotion):
         raise TypeError("the bound is for a fixed or prescribed ankle")
     angle, velocity = profile_values(scenario.motion.profile, grid.times)[:2]
     rows = [casadi.DM(np.asarray(item)).T for item in chamber_volumes(plant, angle)]

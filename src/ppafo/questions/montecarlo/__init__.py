@@ -21,8 +21,10 @@ QUESTION = Question(
             metavar="WIDTH",
         ),
         Argument(("--configuration",), "configuration", "configuration of the study, needed if it has several", "NAME"),
-        Argument(("--first",), "first", "draws before the first estimate; default 256", "N", whole_number, 256),
-        Argument(("--maximum",), "maximum", "maximum number of draws; default 1,048,576", "N", whole_number, 2**20),
+        Argument(
+            ("--first-draws",), "first_draws", "draws before the first estimate; default 256", "N", whole_number, 256
+        ),
+        Argument(("--draws",), "draws", "maximum number of draws; default 1,048,576", "N", whole_number, 2**20),
         SET,
         SEED,
         THREADS,

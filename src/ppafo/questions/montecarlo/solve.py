@@ -26,8 +26,8 @@ def monte_carlo(
     configuration: str | None = None,
     overrides: Sequence[str] = (),
     seed: int | None = None,
-    first: int = 256,
-    maximum: int = 2**20,
+    first_draws: int = 256,
+    draws: int = 2**20,
     confidence: float = 0.95,
     maximum_failed: float = 0.01,
     threads: int | None = None,
@@ -47,7 +47,7 @@ def monte_carlo(
     check_metrics([metric], base.scenario)
     what = parse_statistic(statistic, metric)
     asked = width or (PROBABILITY_WIDTH if isinstance(what, Probability) else DEFAULT_WIDTH)
-    rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first, maximum, confidence, maximum_failed))
+    rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
     tally = Tally(rule.first, progress)
     model = scenario_model(base.scenario, [metric], threads, tally.add)
     return draw_until(model, uncertainty, metric, what, rule, chosen.sample.seed if seed is None else seed)

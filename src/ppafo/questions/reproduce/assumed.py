@@ -10,7 +10,7 @@ from ppafo.parameters.parameter_set import number_text
 from ppafo.parameters.provenance import Entry
 from ppafo.simulation.declaration import quantities
 from ppafo.simulation.overriding import apply_overrides
-from ppafo.simulation.scenario import LedMotion, Scenario
+from ppafo.simulation.scenario import PrescribedMotion, Scenario
 
 _NOT_OF_THE_PAPER = ("assumed", "derived")
 _ONLY_FOR_A_FREE_VANE = frozenset({"actuator.restitution", "foot_plate.gravity_torque"})
@@ -47,7 +47,7 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
     return tuple(merged.values())
 
 
-def used_by(values: Sequence[AssumedValue], *names: str) -> tuple[AssumedValue, ...]:
+def values_used_by(values: Sequence[AssumedValue], *names: str) -> tuple[AssumedValue, ...]:
     """Return the values that at least one of the named experiments uses."""
     return tuple(value for value in values if set(names) & set(value.used_by))
 
@@ -58,7 +58,7 @@ def _of_scenario(scenario: Scenario, name: str) -> list[AssumedValue]:
     of_file = _set_of_file(scenario)
     in_force = apply_to_set(of_file, changed.device, scenario.origin.valve)
     summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
-    summaries |= {path: quantity.summary for path, quantity in in_force.declared().items()}
+    summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
     own = [
         AssumedValue(item.path, summaries.get(item.path, ""), item.value, "assumed", item.note, "", (name,))
         for item in scenario.assumptions
@@ -88,7 +88,7 @@ def _without_effect(scenario: Scenario, parameter_set: ParameterSet) -> set[str]
     reported = {path for path in parameter_set.numbers if path.startswith("reported.")}
     valve = f"valves.{scenario.origin.valve}."
     others = {path for path in parameter_set.numbers if path.startswith("valves.") and not path.startswith(valve)}
-    return reported | others | (_ONLY_FOR_A_FREE_VANE if isinstance(scenario.motion, LedMotion) else frozenset())
+    return reported | others | (_ONLY_FOR_A_FREE_VANE if isinstance(scenario.motion, PrescribedMotion) else frozenset())
 
 
 def _reason(entry: Entry) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.answers.shown_units import quantity_text
+from ppafo.answers.display_units import quantity_text
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings
 from ppafo.parameters.device import Actuator
 from ppafo.parameters.parts import Part

@@ -6,10 +6,11 @@ QUESTION = Question(
     solve="ppafo.questions.walk.solve:walk_with_and_without",
     arguments=(
         Argument(
-            ("--config",),
+            ("WALK",),
             "configuration",
             "name of a walk configuration, or a .toml file; default solenoid",
-            metavar="NAME",
+            metavar="WALK",
+            nargs="?",
             default="solenoid",
         ),
         Argument(("--gait",), "gait", "name of a gait, or a gait file; default: the gait of the configuration", "GAIT"),

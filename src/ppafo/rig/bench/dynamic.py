@@ -14,7 +14,7 @@ from ppafo.parameters.declaration import SECTIONS
 from ppafo.rig.hardware import line_orifice, real_device, rig_physics, rig_plant
 from ppafo.rig.request import Outcome, Request
 from ppafo.rig.rows import RigPhysics, RigState
-from ppafo.rig.run import RigRun, RigSolution, seen_signals
+from ppafo.rig.run import RigRun, RigSolution, sensor_signals
 from ppafo.rig.sensors import Floats, sensor
 from ppafo.rig.solution import solve_rig
 from ppafo.signals.channels import CHANNELS
@@ -36,25 +36,25 @@ _CLOSED_VALVE = {"kind": "constant", "command": 0, "rate": "1 kHz"}
 def record_step_response(request: Request) -> Outcome:
     """Return the step response of figure 7: the valve opens fully and the vane turns from stop to stop."""
     scenario = _of_package("step-response", request)
-    given = rig_run(scenario, request, request.preset.values["sampling.rate"])
-    return _outcome("step-response", scenario, given, (*_IN_MOTION, "torque"))
+    bench_run = rig_run(scenario, request, request.preset.values["sampling.rate"])
+    return _outcome("step-response", scenario, bench_run, (*_IN_MOTION, "torque"))
 
 
 def record_torque_task(request: Request) -> Outcome:
     """Return the torque task of figure 8 with the controller that belongs to the kind of valve."""
     kind = load_device(request.parameter_set, request.valve).valve.kind
     scenario = _of_package(f"torque-task-{kind}", request)
-    given = rig_run(scenario, request, request.preset.values["sampling.rate"])
-    return _outcome("torque-task", scenario, given, (*_IN_MOTION, "reference", "torque"))
+    bench_run = rig_run(scenario, request, request.preset.values["sampling.rate"])
+    return _outcome("torque-task", scenario, bench_run, (*_IN_MOTION, "reference", "torque"))
 
 
 def record_free_decay(request: Request) -> Outcome:
     """Return the angle after an impulse, device on its side, both chambers open to the room."""
     motion = {"kind": "free", "angle": "25 deg", "angular_velocity": "380 deg/s", "external_torque": "0 N m"}
     scenario = _of_bench("free-decay", request, motion, {}, "2 s")
-    given = rig_run(scenario, request, request.preset.values["sampling.rate"])
-    run = replace(given.run, plant=given.run.plant._replace(gravity_torque=0.0))
-    opened = replace(given, run=run, physics=given.physics._replace(chambers_open=1.0))
+    bench_run = rig_run(scenario, request, request.preset.values["sampling.rate"])
+    run = replace(bench_run.run, plant=bench_run.run.plant._replace(gravity_torque=0.0))
+    opened = replace(bench_run, run=run, physics=bench_run.physics._replace(chambers_open=1.0))
     return _outcome("free-decay", scenario, opened, ("angle",))
 
 
@@ -64,8 +64,8 @@ def record_vane_leak(request: Request) -> Outcome:
     motion = {"kind": "held", "angle": f"{0.5 * (actuator.angle_min + actuator.angle_max)!r} rad"}
     initial = {"pressure_1": "supply", "pressure_2": "atmosphere"}
     scenario = _of_bench("vane-leak", request, motion, initial, "30 s")
-    given = rig_run(scenario, request, min(LEAK_RATE, request.preset.values["sampling.rate"]))
-    plugged = replace(given, physics=given.physics._replace(ports_open=0.0))
+    bench_run = rig_run(scenario, request, min(LEAK_RATE, request.preset.values["sampling.rate"]))
+    plugged = replace(bench_run, physics=bench_run.physics._replace(ports_open=0.0))
     return _outcome("vane-leak", scenario, plugged, ("pressure_1", "pressure_2"))
 
 
@@ -95,7 +95,7 @@ def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
 
 
 def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState:
-    """Return vane and gas at the start, everything as warm as the walls."""
+    """Return vane and gas at the start [SI], everything at the temperature of the walls."""
     angle, rate = run.initial.angle, run.initial.angular_velocity
     warm = physics.wall_temperature
     pressures = (scenario.initial_pressure_1, scenario.initial_pressure_2)
@@ -125,40 +125,40 @@ def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState
         enthalpy_in=0.0,
         work_done=0.0,
         heat_in=0.0,
-        seen_angle=angle,
-        seen_pressure_1=pressures[0],
-        seen_pressure_2=pressures[1],
+        sensor_angle=angle,
+        sensor_pressure_1=pressures[0],
+        sensor_pressure_2=pressures[1],
     )
 
 
-def _outcome(name: str, scenario: Scenario, given: RigRun, names: tuple[str, ...]) -> Outcome:
-    solution = solve_rig(given)
-    values = measured(scenario, given, solution)
+def _outcome(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str, ...]) -> Outcome:
+    solution = solve_rig(bench_run)
+    values = sensor_readings(scenario, bench_run, solution)
     channels = {item: Channel(values[item], CHANNELS[item].unit) for item in names}
-    recording = Recording(name, given.sample_times, channels, kind="synthetic")
-    offsets = {item: given.sensors[item].offset for item in names if item in given.sensors}
+    recording = Recording(name, bench_run.sample_times, channels, kind="synthetic")
+    offsets = {item: bench_run.sensors[item].offset for item in names if item in bench_run.sensors}
     settings = {
         "duration": scenario.duration,
-        "initial_angle": given.initial.angle,
-        "initial_angular_velocity": given.initial.angular_velocity,
+        "initial_angle": bench_run.initial.angle,
+        "initial_angular_velocity": bench_run.initial.angular_velocity,
         "impacts": solution.impacts,
         "breakaways": solution.breakaways,
     }
-    return Outcome(recording, given.device, offsets, settings)
+    return Outcome(recording, bench_run.device, offsets, settings)
 
 
-def measured(scenario: Scenario, given: RigRun, solution: RigSolution) -> dict[str, Floats]:
-    """Return what the sensors show at every sample; the torque is computed from the measured pressures."""
-    seen = [seen_signals(given, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
-    true = dict(zip(("angle", "pressure_1", "pressure_2"), np.array(seen).T, strict=True))
+def sensor_readings(scenario: Scenario, bench_run: RigRun, solution: RigSolution) -> dict[str, Floats]:
+    """Return what the sensors read at every sample [SI]; the torque is computed from the measured pressures."""
+    signals = [sensor_signals(bench_run, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
+    true = dict(zip(("angle", "pressure_1", "pressure_2"), np.array(signals).T, strict=True))
     for name, drop in _SUPPLIES.items():
-        regulated = getattr(given.run.plant, name)
+        regulated = getattr(bench_run.run.plant, name)
         true[name] = regulated - solution.states[:, RigState._fields.index(drop)]
-    shown = {name: given.sensors[name].readings(values) for name, values in true.items()}
-    shown["command"] = solution.commands
-    shown["torque"] = given.run.plant.torque_constant * (shown["pressure_1"] - shown["pressure_2"])
-    shown["reference"] = profile_values(scenario.reference, given.sample_times)[0]
-    return shown
+    readings = {name: bench_run.sensors[name].readings(values) for name, values in true.items()}
+    readings["command"] = solution.commands
+    readings["torque"] = bench_run.run.plant.torque_constant * (readings["pressure_1"] - readings["pressure_2"])
+    readings["reference"] = profile_values(scenario.reference, bench_run.sample_times)[0]
+    return readings
 
 
 def device_overrides(request: Request) -> tuple[str, ...]:

@@ -11,11 +11,11 @@ from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device, Valve
 from ppafo.rig.bench.readings import read_off
-from ppafo.rig.dynamics import ambient_node, leaked, passed
+from ppafo.rig.dynamics import ambient_node, leak_exchange, orifice_exchange
 from ppafo.rig.hardware import real_device, rig_physics
 from ppafo.rig.request import Outcome, Request
 from ppafo.rig.rows import Exchange, RigPhysics
-from ppafo.rig.run import played
+from ppafo.rig.run import spool_position
 from ppafo.simulation.plan import exact_orifice
 
 UPSTREAM_GAUGE = tuple(level * PASCALS_PER_PSI for level in (20.0, 35.0, 50.0, 65.0, 80.0))
@@ -25,7 +25,7 @@ COMMAND_STEPS = 100
 READING_INTERVAL = 2.0
 REPETITIONS = 2
 SMALL_METER = 0.1
-"""Range of the flow meter for the leak as a share [-] of that of the other."""
+"""Range of the flow meter for the leak as a fraction [-] of that of the other."""
 
 
 def record_open_valve(request: Request) -> Outcome:
@@ -59,7 +59,7 @@ def record_valve_map(request: Request) -> Outcome:
     commands = np.concatenate([rising, rising[-2::-1]])
     spool, flows, upstream = -1.0, [], []
     for command in commands:
-        spool = played(spool, float(command), request.preset.values["valve.hysteresis"])
+        spool = spool_position(spool, float(command), request.preset.values["valve.hysteresis"])
         openings = openings_of(spool)
         forward = _flow(physics, supply.pressure, supply.atmospheric_pressure, openings.source_1, orifice)
         backward = _flow(physics, supply.dorsiflexion_pressure, supply.atmospheric_pressure, openings.source_2, orifice)
@@ -77,7 +77,7 @@ def record_valve_map(request: Request) -> Outcome:
 
 
 def record_steady_leak(request: Request) -> Outcome:
-    """Return the mass flow [kg/s] that keeps up the pressure in chamber 1 while chamber 2 is open to the atmosphere."""
+    """Return the mass flow [kg/s] that maintains the pressure in chamber 1, with chamber 2 open to the atmosphere."""
     device, physics = _bench(request)
     ambient = device.supply.atmospheric_pressure
     levels = np.array(LEAK_GAUGE * REPETITIONS) + ambient
@@ -96,18 +96,18 @@ def _bench(request: Request) -> tuple[Device, RigPhysics]:
     return device, rig_physics(device, request.preset)
 
 
-def _flow(physics: RigPhysics, upstream: float, downstream: float, share: float, orifice: ExactOrifice) -> float:
+def _flow(physics: RigPhysics, upstream: float, downstream: float, fraction: float, orifice: ExactOrifice) -> float:
     """Mass flow [kg/s] of gas at the supply's temperature."""
     a = ambient_node(physics, float(upstream), physics.supply_temperature)
-    return passed(
-        physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), share, orifice, 1.0
+    return orifice_exchange(
+        physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), fraction, orifice, 1.0
     ).mass
 
 
 def _across(physics: RigPhysics, upstream: float, downstream: float, orifice: ExactOrifice) -> Exchange:
     """Leak of gas that has taken the temperature of the walls."""
     a = ambient_node(physics, float(upstream), physics.wall_temperature)
-    return leaked(physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), orifice)
+    return leak_exchange(physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), orifice)
 
 
 def _steady_openings(valve: Valve) -> Callable[[float], Openings]:

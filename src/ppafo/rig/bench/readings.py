@@ -18,13 +18,13 @@ def read_off(
     interval: float,
     true: Mapping[str, Floats],
     settings: Mapping[str, float],
-    share_of_flow_range: float = 1.0,
+    fraction_of_flow_range: float = 1.0,
 ) -> Outcome:
     """Return a reading every ``interval`` [s] of true values by channel [SI]; what no sensor reads is exact."""
     count = len(next(iter(true.values())))
-    shares = {"mass_flow": share_of_flow_range}
+    fractions = {"mass_flow": fraction_of_flow_range}
     sensors = {
-        channel: sensor(request.preset, channel, request.seed, count, shares.get(channel, 1.0))
+        channel: sensor(request.preset, channel, request.seed, count, fractions.get(channel, 1.0))
         for channel in true
         if channel in CHANNEL_SENSORS
     }

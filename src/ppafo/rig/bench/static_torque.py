@@ -26,7 +26,7 @@ def record(request: Request) -> Outcome:
     device = real_device(load_device(request.parameter_set, request.valve, request.overrides), request.preset)
     rising = np.arange(1, round(HIGHEST / STEP) + 1) * STEP
     once = np.concatenate([rising, rising[::-1]])
-    ways = np.repeat([1.0, -1.0], rising.size)
+    directions = np.repeat([1.0, -1.0], rising.size)
     values = request.preset.values
     scatter = values["friction.scatter"] * random_stream(request.seed, "friction").standard_normal(
         (REPETITIONS, once.size)
@@ -34,8 +34,8 @@ def record(request: Request) -> Outcome:
     torque = []
     for repetition in scatter:
         pressed = 0.0
-        for pressure, way, deviation in zip(once, ways, repetition, strict=True):
-            if way < 0.0 and pressure == once[rising.size]:
+        for pressure, direction, deviation in zip(once, directions, repetition, strict=True):
+            if direction < 0.0 and pressure == once[rising.size]:
                 pressed = device.actuator.torque_constant * (HIGHEST + TURN)
             limit = device.friction.static_torque + values["friction.static_per_pressure"] * pressure
             pressed = on_scale(pressed, device.actuator.torque_constant * pressure, limit * max(0.0, 1.0 + deviation))
@@ -43,7 +43,7 @@ def record(request: Request) -> Outcome:
     true = {
         "torque": np.array(torque),
         "pressure_difference": np.tile(once, REPETITIONS),
-        "direction": np.tile(ways, REPETITIONS),
+        "direction": np.tile(directions, REPETITIONS),
         "repetition": np.repeat(np.arange(1.0, REPETITIONS + 1.0), once.size),
     }
     return read_off("static-torque", request, device, READING_INTERVAL, true, {"turn_beyond": TURN})

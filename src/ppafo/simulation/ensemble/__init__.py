@@ -1,4 +1,4 @@
-"""Many variants of one scenario, with metrics worked out inside the lanes and no trajectory stored."""
+"""Many variants of one scenario, with metrics computed inside the lanes and no trajectory stored."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import MetricKind
-from ppafo.simulation.ensemble.columns import checked_columns
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, samples_of
 from ppafo.simulation.scenario import Scenario
@@ -24,7 +24,7 @@ COMPLETED, DIVERGED, REFUSED = 0, 1, 2
 
 @dataclass(frozen=True, slots=True)
 class EnsembleResult:
-    """What came of the runs of an ensemble, in the order of the columns.
+    """Results of the runs of an ensemble, in the order of the columns.
 
     ``status`` (runs,) is COMPLETED, DIVERGED or REFUSED; ``failure_time`` (runs,) [s] is nan where a run did not
     diverge; ``reasons`` has one line for each run, by its index, that diverged or was refused. ``metrics`` maps a name
@@ -68,7 +68,7 @@ def run_ensemble(
     interval = every or base.output_interval
     if not interval > 0.0:
         raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
-    checked = checked_columns(base, columns)
+    checked = check_columns(base, columns)
     plan = plan_ensemble(checked)
     times = _times(plan, interval if bands else 0.0)
     request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.control.custom)

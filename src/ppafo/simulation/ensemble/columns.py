@@ -1,4 +1,4 @@
-"""The columns of an ensemble: what may vary, checked as a whole, and the scenario that stands for all runs."""
+"""The columns of an ensemble: what may vary, checked as a whole, and the scenario that represents all runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -46,7 +46,7 @@ class Columns:
         return replace(self, values={path: column[kept] for path, column in self.values.items()})
 
 
-def checked_columns(base: Scenario, columns: Mapping[str, Any]) -> Columns:
+def check_columns(base: Scenario, columns: Mapping[str, Any]) -> Columns:
     """Return the columns with the chosen valve as ``valve``; ScenarioError for what no single run is to blame for."""
     if base.control.kind == PYTHON_CONTROLLER and base.control.custom is None:
         raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
@@ -71,7 +71,7 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
     if path in declared:
         return
     if path in _TEXTS:
-        raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; make an ensemble for each")
+        raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; run an ensemble for each value")
     if base.control.kind == PYTHON_CONTROLLER and path.startswith("controller."):
         raise ScenarioError(
             f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
@@ -99,8 +99,8 @@ def _check_together(base: Scenario, values: Mapping[str, Floats]) -> None:
             )
 
 
-def varied(columns: Columns, clock: Clock) -> Scenario:
-    """Return the scenario that stands for all runs; numbers of ``clock`` may be arrays too.
+def varied_scenario(columns: Columns, clock: Clock) -> Scenario:
+    """Return the scenario that represents all runs; numbers of ``clock`` may be arrays too.
 
     A pressure at the start that was given as a word follows the pressure that the word names.
     """
@@ -127,7 +127,7 @@ TimeTexts = Mapping[str, Mapping[str, Any]]
 
 
 def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock:
-    """Return the clock of a run with other times, read as overrides of the scenario ``name`` are.
+    """Return the clock [s] of a run with other times, which are read as overrides of the scenario ``name`` are.
 
     ScenarioError if they do not fit together.
     """

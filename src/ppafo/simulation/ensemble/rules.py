@@ -1,5 +1,6 @@
-"""What the numbers of a run must not be together: the rules of a single scenario, over columns."""
+"""Which numbers of a run contradict each other: the rules of a single scenario, over columns."""
 
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -8,15 +9,15 @@ import numpy as np
 from ppafo.engine.lanes import Floats
 from ppafo.model.columns import at
 from ppafo.parameters.building import consistency
-from ppafo.simulation.clock import MOST_STEPS_OF_DELAY
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY
 from ppafo.simulation.motion import TOLERANCE, profile_problem
 from ppafo.simulation.numbers import HELD_ANGLE
 from ppafo.simulation.plan import Problem, profile_bounds
-from ppafo.simulation.reading import written
+from ppafo.simulation.reading import quantity_text
 from ppafo.simulation.scenario import FreeMotion, ProfileChoice, Scenario
 
 Rule = Callable[[Scenario], tuple[Problem, ...]]
-"""What may be wrong with a scenario that stands for many runs."""
+"""What may be wrong with a scenario that represents many runs."""
 
 
 def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
@@ -32,7 +33,7 @@ def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
 
 
 def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
-    """A vane that begins, is held or is led beyond the stops."""
+    """A vane that begins, is held or is to move beyond the stops."""
     actuator, motion = scenario.device.actuator, scenario.motion
     profile = ProfileChoice("constant", {"level": motion.angle}) if isinstance(motion, FreeMotion) else motion.profile
     lowest, highest = profile_bounds(profile)
@@ -42,18 +43,18 @@ def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
         level = profile.settings["level"]
 
         def angle_line(run: int) -> str:
-            stops = f"{written(at(actuator.angle_min, run), 'rad')} to {written(at(actuator.angle_max, run), 'rad')}"
-            return f"{HELD_ANGLE} = {written(at(level, run), 'rad')}: must be between the stops, {stops}"
+            low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
+            return f"{HELD_ANGLE} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
 
         return ((outside, angle_line),)
-    # The bounds hold for all time; a run that may leave them is looked at in time.
-    found = {int(run): _led_beyond(scenario, profile, int(run)) for run in np.flatnonzero(outside)}
+    # The bounds hold for all time; a run that may leave them is checked at its own times.
+    found = {int(run): _stop_violation(scenario, profile, int(run)) for run in np.flatnonzero(outside)}
     for run, problem in found.items():
         outside[run] = bool(problem)
     return ((outside, lambda run: found[run]),)
 
 
-def _led_beyond(scenario: Scenario, profile: ProfileChoice, run: int) -> str:
+def _stop_violation(scenario: Scenario, profile: ProfileChoice, run: int) -> str:
     actuator = scenario.device.actuator
     settings = {name: at(value, run) for name, value in profile.settings.items()}
     stops = (at(actuator.angle_min, run), at(actuator.angle_max, run))
@@ -62,27 +63,25 @@ def _led_beyond(scenario: Scenario, profile: ProfileChoice, run: int) -> str:
 
 
 def _too_late(scenario: Scenario) -> tuple[Problem, ...]:
-    """Sensors that are slower than the run, or than can be remembered."""
+    """Sensors whose delay is longer than the run, or than can be stored."""
     delay, step = scenario.sensors.delay, scenario.time_step
 
     def long_line(run: int) -> str:
-        most = written(MOST_STEPS_OF_DELAY * at(step, run), "s")
-        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {most}, {MOST_STEPS_OF_DELAY:.0e} steps"
+        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
+        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
 
     return (
         (
             delay > scenario.duration,
             lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
         ),
-        (delay / step > MOST_STEPS_OF_DELAY, long_line),
+        (delay / step > MAXIMUM_STEPS_OF_DELAY, long_line),
     )
 
 
 def _number(scenario: Scenario, path: str) -> Floats | float:
-    node: Any = scenario.device
-    for part in path.split("."):
-        node = getattr(node, part)
-    return node  # type: ignore[no-any-return]
+    number: Floats | float = operator.attrgetter(path)(scenario.device)
+    return number
 
 
 def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]:
@@ -93,7 +92,7 @@ def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]
 
     def line(run: int) -> str:
         first, second = (
-            written(at(pressure, run), "Pa_a", at(supply.atmospheric_pressure, run))
+            quantity_text(at(pressure, run), "Pa_a", at(supply.atmospheric_pressure, run))
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
         return f"supply.dorsiflexion_pressure = {second}: with [supply_line] at most supply.pressure, {first}"

@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
-from ppafo.engine.metering import group_of, metered, meters_of
+from ppafo.engine.metering import add_meters, group_of, meters_of
 from ppafo.engine.program import Program
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
@@ -24,7 +24,7 @@ _SAME = 1.0e-6
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is wanted of every run: metrics by name, channels to trace and the times at which to keep them [s].
+    """What is requested of every run: metrics by name, channels to trace and the times at which to keep them [s].
 
     ``custom`` is the Python object that controls every run, one after the other; None where the lanes do.
     """
@@ -38,7 +38,7 @@ class Request:
 
 @final
 class Outcome:
-    """What came of all runs so far: arrays that batches write their columns into, nan where nothing was written."""
+    """Results of all runs so far: arrays that batches write their columns into, nan where nothing was written."""
 
     def __init__(self, runs: int, request: Request) -> None:
         self.request = request
@@ -52,41 +52,41 @@ class Outcome:
         """Return the programs that batches need, with their meters."""
         first = {batch.program: batch for batch in batches}
         alone = [Batch(item.program, item.clock, item.parameters[:, :1], item.states[:, :1]) for item in first.values()]
-        return [_asked(batch, self.request).batch.program for batch in alone] if len(alone) > 1 else []
+        return [_meter_batch(batch, self.request).batch.program for batch in alone] if len(alone) > 1 else []
 
     def run(self, plain: Batch, members: Members, threads: int | None) -> None:
         """Run a batch whose runs have these places in the ensemble."""
-        asked = _asked(plain, self.request)
-        batch = asked.batch
+        task = _meter_batch(plain, self.request)
+        batch = task.batch
         states = np.empty_like(batch.states)
-        looked_back = {name: np.full(members.size, np.nan) for name, kind in asked.metrics.items() if kind.traced}
+        read_from_traces = {name: np.full(members.size, np.nan) for name, kind in task.metrics.items() if kind.traced}
 
         def take(runs: slice, result: BatchResult) -> None:
             states[:, runs] = result.states
-            for name, values in looked_back.items():
-                values[runs] = _read(asked, name, asked.readings(result.states, runs, result.record))
+            for name, values in read_from_traces.items():
+                values[runs] = _read(task, name, task.readings(result.states, runs, result.record))
             for name in self.request.bands:
-                trace = result.record[:: asked.band_stride, batch.program.traced.index(name)]
+                trace = result.record[:: task.band_stride, batch.program.traced.index(name)]
                 self.traces[name][: len(trace), members[runs]] = trace
 
         if self.request.custom is None:
             run_blocks(batch, take, threads)
         else:
             run_in_turn(batch, self.request.custom, take)
-        self._judge(asked, members, states, plain.states.shape[0])
-        readings = asked.readings(states, slice(None), None)
-        for name in asked.metrics:
-            values = looked_back[name] if name in looked_back else _read(asked, name, readings)
+        self._judge(task, members, states, plain.states.shape[0])
+        readings = task.readings(states, slice(None), None)
+        for name in task.metrics:
+            values = read_from_traces[name] if name in read_from_traces else _read(task, name, readings)
             self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
 
-    def _judge(self, asked: "_Asked", members: Members, states: Floats, physical: int) -> None:
+    def _judge(self, task: "_MeteredBatch", members: Members, states: Floats, physical: int) -> None:
         """Which runs were completed, as in a single run: possible all the time, and finite at the end."""
-        result = group_of("result", asked.batch.program.state_rows(), states)
+        result = group_of("result", task.batch.program.state_rows(), states)
         failed = result.failure_time
         self.too_many_parts[members] = result.too_many_parts != 0.0
         completed = (failed >= NEVER_FAILED) & np.isfinite(states[:physical]).all(axis=0)
         self.is_completed[members] = completed
-        end = asked.interval * (asked.samples - 1)
+        end = task.interval * (task.samples - 1)
         time = np.where(failed < NEVER_FAILED, failed, end)
         self.failure_time[members] = np.where(completed, np.nan, time)
         lost = members[~completed]
@@ -95,8 +95,8 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
-    """What is asked of one batch: the batch with its meters, the metrics it can have, the interval of its samples."""
+class _MeteredBatch:
+    """A batch with its meters, the metrics that it can have, and the interval of its samples."""
 
     batch: Batch
     metrics: Mapping[str, MetricKind]
@@ -143,20 +143,20 @@ def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, F
     return totals
 
 
-def _asked(plain: Batch, request: Request) -> _Asked:
+def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     program = plain.program
-    there = {
+    available = {
         name: kind for name, kind in request.metrics.items() if program.has_reference or REFERENCE not in kind.channels
     }
     # In one order, so that the same metrics are one program in whatever order they are asked for.
-    meters = sorted({meter.name: meter for kind in there.values() for meter in kind.meters}.items())
-    looked_back = dict.fromkeys(channel for kind in there.values() for channel in kind.traced)
+    meters = sorted({meter.name: meter for kind in available.values() for meter in kind.meters}.items())
+    read_from_traces = dict.fromkeys(channel for kind in available.values() for channel in kind.traced)
     interval = intervals(plain)
     stride = _stride(interval, request) if request.bands else 1
-    traced = sorted({*looked_back, *request.bands})
-    trace_every = 0 if not traced else 1 if looked_back else stride
-    batch = metered(plain, [meter for _, meter in meters], traced, trace_every)
-    return _Asked(batch, there, interval, samples_of(plain), stride if looked_back else 1)
+    traced = sorted({*read_from_traces, *request.bands})
+    trace_every = 0 if not traced else 1 if read_from_traces else stride
+    batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every)
+    return _MeteredBatch(batch, available, interval, samples_of(plain), stride if read_from_traces else 1)
 
 
 def intervals(batch: Batch) -> Floats:
@@ -181,7 +181,7 @@ def _stride(interval: Floats, request: Request) -> int:
     return stride
 
 
-def _read(asked: _Asked, name: str, readings: Readings) -> Floats:
+def _read(task: _MeteredBatch, name: str, readings: Readings) -> Floats:
     """The values of a metric; runs that failed may have any."""
     with np.errstate(all="ignore"):
-        return np.asarray(asked.metrics[name].read(readings))
+        return np.asarray(task.metrics[name].read(readings))

@@ -15,7 +15,7 @@ LONGEST_GAP = 0.05
 
 _COMMAND_TOLERANCE = 1.0e-6
 _SMALLEST_ABSOLUTE = 0.3
-"""Share of the atmosphere; an absolute pressure below it is almost surely a gauge pressure under the wrong name."""
+"""Fraction of the atmosphere; an absolute pressure below it is almost surely a gauge pressure under the wrong name."""
 
 
 def usual_interval(time: Floats) -> float:
@@ -24,7 +24,7 @@ def usual_interval(time: Floats) -> float:
 
 
 def check_gaps(recording: Recording, file: str) -> None:
-    """Refuse a recording with a gap in which its inputs are not known."""
+    """Raise DataError for a recording with a gap in which its inputs are not known."""
     gap = longest_gap(recording.time)
     if gap is not None and gap.duration > LONGEST_GAP:
         raise DataError(
@@ -34,18 +34,18 @@ def check_gaps(recording: Recording, file: str) -> None:
 
 
 def check_command(recording: Recording, file: str) -> None:
-    """Refuse a command beyond -1 to 1."""
+    """Raise DataError for a command outside -1 to 1."""
     command = recording[COMMAND]
     worst = int(np.argmax(np.abs(command)))
     if abs(command[worst]) > 1.0 + _COMMAND_TOLERANCE:
         raise DataError(
             f"{file}: '{COMMAND}' is {command[worst]:.6g} at {recording.time[worst]:.6g} s (sample {worst + 1}); it "
-            "must be from -1 to 1, the share of full opening"
+            "must be from -1 to 1, the fraction of full opening"
         )
 
 
 def check_absolute(recording: Recording, atmosphere: float, file: str) -> None:
-    """Refuse pressures that cannot be absolute; ``atmosphere`` [Pa absolute]."""
+    """Raise DataError for pressures that cannot be absolute; ``atmosphere`` [Pa absolute]."""
     for name in (name for name in PRESSURES if name in recording):
         lowest = int(np.argmin(recording[name]))
         if recording[name][lowest] < _SMALLEST_ABSOLUTE * atmosphere:

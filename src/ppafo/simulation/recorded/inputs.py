@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.engine.replay import StepInputs, led_by_recording
+from ppafo.engine.replay import StepInputs, prescribe_recorded_angle
 from ppafo.engine.run import Run
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
@@ -14,7 +14,7 @@ from ppafo.signals.recording import Floats
 COMMAND, SUPPLY, EXTERNAL_TORQUE = "command", "supply_pressure", "external_torque"
 DORSIFLEXION_SUPPLY = "dorsiflexion_pressure"
 ANGLE = "angle"
-"""As an input, the vane is led along it, from sample to sample in straight lines."""
+"""As an input, the vane follows it, in straight lines from sample to sample."""
 
 LONGEST_STEP = 1.0e-3
 """Seconds over which a recorded pressure or torque is averaged, and the longest step of a replay."""
@@ -23,10 +23,10 @@ SHORTEST_SAMPLE = 1.0e-4
 """Seconds; irregular samples are placed on a grid no finer than this."""
 
 _BEYOND_STOPS = 0.05
-"""Share of the full range by which a measured angle may be beyond a stop before it is refused; then it is the stop."""
+"""Fraction of the range by which a measured angle may exceed a stop; up to there it is set to the stop."""
 
 _UNIFORM = 0.02
-"""Share of a sample by which a time may be off a regular grid; clocks write rounded times."""
+"""Fraction of a sample by which a time may be off a regular grid; clocks write rounded times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,16 +70,16 @@ def step_times(run: Run) -> Floats:
 def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     """Return what a run follows at each of its steps; ``device`` says which regulators follow the supply.
 
-    A run that follows the angle is one of ``led_along``.
+    A run that follows the angle is one of ``with_prescribed_angle``.
     """
-    command = held_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
+    command = last_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
     path = _path(inputs, device, run) if inputs.has(ANGLE) else {}
-    return StepInputs(command, {**followed_parameters(inputs, device, run), **path})
+    return StepInputs(command, {**recorded_parameters(inputs, device, run), **path})
 
 
-def led_along(run: Run, angle: float) -> Run:
-    """Return the run with the vane led along a recorded angle, which is ``angle`` [rad] at the start."""
-    return replace(run, program=led_by_recording(run.program), path=(0.0, angle, 0.0), needs_parts=True)
+def with_prescribed_angle(run: Run, angle: float) -> Run:
+    """Return the run with the vane on a recorded angle, which is ``angle`` [rad] at the start."""
+    return replace(run, program=prescribe_recorded_angle(run.program), path=(0.0, angle, 0.0), needs_parts=True)
 
 
 def _path(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
@@ -104,8 +104,8 @@ def between_stops(angles: Floats, device: Device, file: str) -> Floats:
     return np.clip(angles, lowest, highest)
 
 
-def followed_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
-    """Return the parameters that follow a recording, for every step; each keeps its mean over a millisecond."""
+def recorded_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
+    """Return the parameters that follow a recording [SI], for every step; each is a mean over a millisecond."""
     followed: dict[str, Floats] = {}
     if inputs.has(SUPPLY):
         followed |= dict.fromkeys(supply_paths(device), _between_samples(inputs, SUPPLY, run))
@@ -116,8 +116,8 @@ def followed_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dic
     return followed
 
 
-def held_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:
-    """Return the last value of a channel at each step; a change falls on the nearest step."""
+def last_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:
+    """Return the last recorded value of a channel [SI] at each step; a change falls on the nearest step."""
     own_times = inputs.recording.time - inputs.start
     index = np.searchsorted(own_times, step_times(run) + 0.5 * run.step, side="right") - 1
     return inputs.recording[name][np.maximum(index, 0)]

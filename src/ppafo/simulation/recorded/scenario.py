@@ -10,22 +10,22 @@ from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     Control,
     FreeMotion,
-    LedMotion,
     Origin,
+    PrescribedMotion,
     ProfileChoice,
     Scenario,
     Sensors,
 )
 
-Motion = FreeMotion | LedMotion
+Motion = FreeMotion | PrescribedMotion
 
 
-def held_at(angle: float) -> LedMotion:
+def held_vane(angle: float) -> PrescribedMotion:
     """Return the motion of a vane that is held at an angle [rad]: both chambers are fixed volumes."""
-    return LedMotion(ProfileChoice("constant", {"level": angle}))
+    return PrescribedMotion(ProfileChoice("constant", {"level": angle}))
 
 
-def fixed_volume(device: Device, volume: float) -> Device:
+def with_fixed_volume(device: Device, volume: float) -> Device:
     """Return the device with a fixed volume [m^3] in the place of chamber 1 and no vane: nothing leaks from it.
 
     It holds with the vane at the lower stop.
@@ -35,7 +35,7 @@ def fixed_volume(device: Device, volume: float) -> Device:
     return replace(device, actuator=replace(device.actuator, dead_volume_1=volume, leak=shut))
 
 
-def recorded_scenario(
+def replay_scenario(
     recording: Recording, device: Device, start: Start, duration: float, file: str, motion: Motion | None = None
 ) -> Scenario:
     """Return a run of ``duration`` [s] on the clock of a recording, whose command the caller sets step by step.
@@ -53,7 +53,7 @@ def recorded_scenario(
         motion=motion or FreeMotion(start.angle, start.angular_velocity),
         initial_pressure_1=start.pressure_1,
         initial_pressure_2=start.pressure_2,
-        control=recorded_control(recording),
+        control=replay_control(recording),
         reference=ProfileChoice("constant", {"level": 0.0}),
         sensors=Sensors(),
         assumptions=(),
@@ -61,8 +61,8 @@ def recorded_scenario(
     )
 
 
-def recorded_control(recording: Recording) -> Control:
-    """Return the control of a run whose command comes from a recording: nobody's, on the clock of the samples."""
+def replay_control(recording: Recording) -> Control:
+    """Return the control of a run whose command comes from a recording: no controller, the period of the samples."""
     return Control(PYTHON_CONTROLLER, {}, sample_period(recording.time))
 
 

@@ -10,7 +10,7 @@ from ppafo.answers.style import BLACK, CHAMBER_1, CHAMBER_2, GREY, house_style
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.command import VENTS_ABOVE
 from ppafo.walking.comparison import Comparison
-from ppafo.walking.figures.legs import DRAGS, GHOST, Legs, drags, draw_ground, leg_artists, legs_of, settled_turns
+from ppafo.walking.figures.legs import DRAGS, GHOST, Legs, drags, draw_ground, last_phases, leg_artists, legs_of
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.walk import WalkResult
 
@@ -61,7 +61,7 @@ def animation(comparison: Comparison) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     with house_style():
-        turns = settled_turns(comparison.with_device, _STRIDES, _PER_STRIDE)
+        turns = last_phases(comparison.with_device, _STRIDES, _PER_STRIDE)
         figure, scenes, cursor, lamp = _stage(comparison, turns)
         canvas: Any = FigureCanvasAgg(figure)
         canvas.draw()

@@ -9,7 +9,7 @@ from ppafo.answers.style import GREY, house_style, mark_kind
 from ppafo.signals.recording import Floats
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
-from ppafo.walking.followed_gait import gait_timing
+from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.posture import Posture, ankle_path
 from ppafo.walking.walk import WalkResult
 
@@ -52,8 +52,8 @@ def legs_of(result: WalkResult, turns: Floats) -> Legs:
     return Legs(turns, path.posture(turns, shank, angle), path.posture(turns, shank, healthy))
 
 
-def settled_turns(result: WalkResult, strides: int, per_stride: int) -> Floats:
-    """Return running phases of some strides near the end of a walk, an equal number in each."""
+def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
+    """Return running phases [strides] of some strides near the end of a walk, an equal number in each."""
     last = int(result.recording.time[-1] / result.configuration.gait.stride_time + 1.0e-6)
     count = min(strides, max(1, last - 1))
     return np.asarray(last - count + np.arange(count * per_stride) / per_stride)
@@ -81,7 +81,7 @@ class LegArtists:
 
 
 def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False) -> LegArtists:
-    """Add the lines of one leg to an axes, nowhere yet."""
+    """Add the lines of one leg to an axes, of a line width [points]; ``place`` puts them somewhere."""
     from matplotlib.patches import Polygon
 
     order = 2.0 if is_ghost else 3.0
@@ -101,13 +101,13 @@ def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False)
 
 
 def draw_ground(axes: "Axes", left: float, right: float) -> None:
-    """Draw the ground."""
+    """Draw the ground between two places [m]."""
     axes.plot([left, right], [0.0, 0.0], color=GREY, linewidth=1.0, zorder=1)
     axes.fill_between([left, right], [-0.25, -0.25], [0.0, 0.0], color="#f1f1f1", linewidth=0.0, zorder=0)
 
 
 def drags(legs: Legs, index: int) -> bool:
-    """Tell whether the toes are below the ground while the foot swings."""
+    """Return whether the toes are more than 1 cm below the ground."""
     return bool(legs.worn.toe[index, 1] < DRAG_LIMIT)
 
 
@@ -135,7 +135,7 @@ def frames_figure(comparison: Comparison) -> "Figure":
 
 
 def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
-    turns = settled_turns(result, 1, _FRAMES)
+    turns = last_phases(result, 1, _FRAMES)
     legs = legs_of(result, turns)
     draw_ground(axes, 0.0, _SLOT * turns.size)
     for index in range(turns.size):

@@ -9,6 +9,7 @@ import numpy as np
 from ppafo.answers.layout import Margins, figure_of_panels
 from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
+from ppafo.gait.gait import clinical_angle
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.walking.configuration import Configuration
@@ -29,7 +30,7 @@ _PERCENT = 100.0 * PHASES
 
 @dataclass(frozen=True, slots=True)
 class _Panel:
-    """One panel: channels drawn for every walk, and how SI becomes the unit of the title."""
+    """One panel: channels drawn for every walk, and what one SI unit is in that of the title; a level to mark."""
 
     title: str
     channels: tuple[str, ...]
@@ -39,11 +40,11 @@ class _Panel:
 
 _DEGREES = float(np.degrees(1.0))
 _PANELS = (
-    _Panel("Ankle angle (deg, 90 neutral, growing in plantarflexion)", ("angle",), _DEGREES, 90.0),
+    _Panel("Ankle angle (deg, 0 neutral, dorsiflexion positive)", ("angle",), _DEGREES, 0.0),
     _Panel("Torque on the wearer, $T_{ex}$ (N m)", ("external_torque",), 1.0, 0.0),
-    _Panel("Torque of the actuator (N m)", ("torque",), 1.0, 0.0),
-    _Panel("Chambers (psi, gauge; full: plantarflexion, dashed: dorsiflexion)", ("pressure_1", "pressure_2")),
-    _Panel("Toes over the ground (cm; they drag more than 1 cm below 0)", ("toe_height",), 100.0, 0.0),
+    _Panel("Actuator torque (N m)", ("torque",), 1.0, 0.0),
+    _Panel("Chamber pressures (psi gauge; solid: plantarflexion, dashed: dorsiflexion)", ("pressure_1", "pressure_2")),
+    _Panel("Toe height above ground (cm; the toes drag below -1)", ("toe_height",), 100.0, 0.0),
 )
 
 
@@ -86,8 +87,8 @@ def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
 
 
 def _background(axes: "Axes", result: Strides, panel: _Panel) -> None:
-    share = 100.0 * result.configuration.gait.stance_share
-    axes.axvspan(0.0, share, color=STANCE, zorder=0, linewidth=0.0)
+    fraction = 100.0 * result.configuration.gait.stance_share
+    axes.axvspan(0.0, fraction, color=STANCE, zorder=0, linewidth=0.0)
     if panel.level is not None:
         axes.axhline(panel.level, color=GREY, linewidth=0.8)
     axes.set_title(panel.title)
@@ -103,7 +104,8 @@ def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) 
     for channel, style in zip(panel.channels, ("-", (0, (4, 2))), strict=False):
         curves = result.averages[channel]
         factor, zero = (1.0 / PASCALS_PER_PSI, atmosphere) if pressures else (panel.factor, 0.0)
-        mean, band = factor * (curves.mean - zero), factor * curves.deviation
+        values = clinical_angle(curves.mean) if channel == "angle" else curves.mean - zero
+        mean, band = factor * values, factor * curves.deviation
         axes.fill_between(_PERCENT, mean - band, mean + band, color=colour, alpha=0.2, linewidth=0.0)
         axes.plot(_PERCENT, mean, color=colour, linestyle=style, label=name)
 
@@ -111,7 +113,7 @@ def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) 
 def _healthy(angle: "Axes", toes: "Axes", result: Strides) -> None:
     gait = result.configuration.gait
     look: dict[str, Any] = {"color": HEALTHY, "linewidth": 1.2, "linestyle": (0, (1, 1.2)), "label": "healthy gait"}
-    curve = _DEGREES * gait.ankle_angle.sampled(PHASES)
+    curve = _DEGREES * clinical_angle(gait.ankle_angle.values_at(PHASES))
     angle.plot(_PERCENT, curve, **look)
     band = _DEGREES * gait.ankle_angle.deviation
     angle.fill_between(_PERCENT, curve - band, curve + band, color=GREY, alpha=0.15, linewidth=0.0)

@@ -12,7 +12,7 @@ from ppafo.answers.style import CHAMBER_1, CHAMBER_2, GREY, house_style, mark_ki
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.command import VENTS_ABOVE
 from ppafo.signals.recording import Floats
-from ppafo.walking.figures.legs import GHOST, draw_ground, leg_artists, legs_of, settled_turns
+from ppafo.walking.figures.legs import GHOST, draw_ground, last_phases, leg_artists, legs_of
 from ppafo.walking.figures.mean_stride import WITH
 from ppafo.walking.strides import PHASES, SETTLING, times_of_phases
 from ppafo.walking.walk import WalkResult
@@ -77,7 +77,7 @@ _ROWS: Mapping[str, tuple[str, tuple[State, ...]]] = {
 
 
 def strip_figure(result: WalkResult) -> "Figure":
-    """Return the strip of gait phases of a walk; a share of strides where they differ."""
+    """Return the strip of gait phases of a walk; a fraction of strides where they differ."""
     with house_style():
         figure, grid = figure_of_panels(_SIZE, _MARGINS, len(_HEIGHTS), heights=_HEIGHTS)
         rows = [axes for (axes,) in grid]
@@ -90,14 +90,14 @@ def strip_figure(result: WalkResult) -> "Figure":
         width, height = _SIZE
         title = f"{result.configuration.name}: functional tasks of the paper's figure 1A over the stride"
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
-        remark = "height of a colour: share of the strides"
+        remark = "height of each colour: fraction of strides"
         figure.text(0.12 / width, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=8.5, color=GREY)
         mark_kind(figure, result.recording.kind)
         return figure
 
 
 def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floats:
-    """Share of the strides in each state at ``PHASES``, shape (states, phases); none where nothing is known."""
+    """Fraction of the strides in each state at ``PHASES``, shape (states, phases); none where nothing is known."""
     starts = result.starts[SETTLING:]
     if channel not in result.recording or starts.size < 2:
         return np.zeros((len(states), PHASES.size))
@@ -107,14 +107,14 @@ def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floa
     return np.array([np.mean(state.holds(values), axis=0) for state in states])
 
 
-def _band(axes: "Axes", label: str, shares: Floats, states: tuple[State, ...]) -> None:
+def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[State, ...]) -> None:
     below = np.zeros(PHASES.size)
-    for state, share in zip(states, shares, strict=True):
-        axes.fill_between(_PERCENT, below, below + share, color=state.colour, linewidth=0.0, step="mid")
-        _name_blocks(axes, state, share, below + 0.5 * share)
-        below = below + share
+    for state, fraction in zip(states, fractions, strict=True):
+        axes.fill_between(_PERCENT, below, below + fraction, color=state.colour, linewidth=0.0, step="mid")
+        _name_blocks(axes, state, fraction, below + 0.5 * fraction)
+        below = below + fraction
     if not below.any():
-        axes.text(50.0, 0.5, "none that follows phases", ha="center", va="center", fontsize=9.0, color=GREY)
+        axes.text(50.0, 0.5, "no gait phases in this controller", ha="center", va="center", fontsize=9.0, color=GREY)
     axes.set_ylim(0.0, 1.0)
     axes.set_yticks([])
     axes.grid(visible=False)
@@ -124,9 +124,9 @@ def _band(axes: "Axes", label: str, shares: Floats, states: tuple[State, ...]) -
     axes.yaxis.set_label_coords(-0.012, 0.5)
 
 
-def _name_blocks(axes: "Axes", state: State, share: Floats, middle: Floats) -> None:
+def _name_blocks(axes: "Axes", state: State, fraction: Floats, middle: Floats) -> None:
     """Write the name into every block that is wide enough and holds for most strides."""
-    inside = np.flatnonzero(np.diff(np.concatenate([[0], (share > 0.5).astype(int), [0]])))
+    inside = np.flatnonzero(np.diff(np.concatenate([[0], (fraction > 0.5).astype(int), [0]])))
     for first, last in zip(inside[::2], inside[1::2], strict=True):
         left, right = _PERCENT[first], _PERCENT[last - 1]
         if right - left >= _NARROWEST:
@@ -137,7 +137,7 @@ def _name_blocks(axes: "Axes", state: State, share: Floats, middle: Floats) -> N
 
 def _legs(axes: "Axes", result: WalkResult) -> None:
     """Stick figures over the strip, each over its instant, in an axes of metres that shares the percent below."""
-    turns = settled_turns(result, 1, _FRAMES) + 0.5 / _FRAMES
+    turns = last_phases(result, 1, _FRAMES) + 0.5 / _FRAMES
     legs = legs_of(result, turns)
     panel_width = _SIZE[0] - _MARGINS.left - _MARGINS.right
     panel_height = axes.get_position().height * _SIZE[1]

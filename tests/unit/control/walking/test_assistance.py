@@ -49,18 +49,18 @@ def test_a_profile_rises_from_zero_to_its_peak_and_falls_to_zero() -> None:
 
 def test_each_phase_wants_its_own_torque() -> None:
     angle = RULES.hold.swing_angle
-    assert assistance.wanted_torque(RULES, at(PUSH_OFF, 0.5), angle, 0.0) == pytest.approx(4.0)
-    assert assistance.wanted_torque(RULES, at(MID_STANCE, 0.5), angle, 9.0) == 0.0
-    assert assistance.wanted_torque(RULES, at(LANDING, 0.05), angle, 0.0) == pytest.approx(-1.0)
-    assert assistance.wanted_torque(RULES, at(SWING, 0.8), angle, 0.0) == pytest.approx(-2.0)
+    assert assistance.requested_torque(RULES, at(PUSH_OFF, 0.5), angle, 0.0) == pytest.approx(4.0)
+    assert assistance.requested_torque(RULES, at(MID_STANCE, 0.5), angle, 9.0) == 0.0
+    assert assistance.requested_torque(RULES, at(LANDING, 0.05), angle, 0.0) == pytest.approx(-1.0)
+    assert assistance.requested_torque(RULES, at(SWING, 0.8), angle, 0.0) == pytest.approx(-2.0)
 
 
 def test_a_lifted_foot_is_held_by_a_spring_and_a_damper_up_to_the_largest_torque() -> None:
     bare = RULES._replace(swing=PROFILE._replace(peak_torque=0.0))
-    assert assistance.wanted_torque(bare, at(SWING, 0.8), 1.6, 0.0) == pytest.approx(-1.0)
-    assert assistance.wanted_torque(bare, at(SWING, 0.8), 1.5, 2.0) == pytest.approx(-1.0)
-    assert assistance.wanted_torque(bare, at(SWING, 0.8), 3.0, 0.0) == -5.0
-    assert assistance.wanted_torque(bare, at(SWING, 0.8), 0.5, 0.0) == 5.0
+    assert assistance.requested_torque(bare, at(SWING, 0.8), 1.6, 0.0) == pytest.approx(-1.0)
+    assert assistance.requested_torque(bare, at(SWING, 0.8), 1.5, 2.0) == pytest.approx(-1.0)
+    assert assistance.requested_torque(bare, at(SWING, 0.8), 3.0, 0.0) == -5.0
+    assert assistance.requested_torque(bare, at(SWING, 0.8), 0.5, 0.0) == 5.0
 
 
 def test_landing_and_swing_are_one_task_and_the_others_are_not() -> None:
@@ -73,12 +73,12 @@ def test_landing_and_swing_are_one_task_and_the_others_are_not() -> None:
 def test_the_rate_of_the_angle_is_filtered_and_has_no_kick_at_the_start() -> None:
     kind = WALKING_CONTROLLERS["event_pid"]
     parameters, state = default_parameters("event_pid"), kind.initial
-    first = assistance.followed(parameters, state, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
-    assert first.wish.rate == 0.0
+    first = assistance.assess(parameters, state, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
+    assert first.request.rate == 0.0
     _, state = kind.update(parameters, state, 0.0, seen(1.6, 0.0, 0.0, 0.0), PERIOD)
-    second = assistance.followed(parameters, state, seen(1.601, 0.0, 0.0, 0.0), PERIOD)
+    second = assistance.assess(parameters, state, seen(1.601, 0.0, 0.0, 0.0), PERIOD)
     filter_time = parameters.assistance.hold.rate_filter
-    assert second.wish.rate == pytest.approx(0.001 / (PERIOD + filter_time))
+    assert second.request.rate == pytest.approx(0.001 / (PERIOD + filter_time))
 
 
 def one_stride() -> list[GaitMeasurement]:
@@ -115,7 +115,7 @@ def test_a_law_forgets_where_another_task_begins(name: str) -> None:
         command, state = kind.update(parameters, before, 0.0, measurement, PERIOD)
         if not assistance.same_task(before.phase.phase, state.phase.phase):
             changes += 1
-            fresh = kind.initial._replace(phase=before.phase, safety=before.safety, wish=before.wish)
+            fresh = kind.initial._replace(phase=before.phase, safety=before.safety, request=before.request)
             assert command == kind.update(parameters, fresh, 0.0, measurement, PERIOD)[0]
     assert changes == 3
 

@@ -8,10 +8,10 @@ from ppafo.control.walking.learnt_table import (
     KNOTS,
     LearningRules,
     LearntTable,
-    learnt,
-    moved_table,
+    command_at,
+    learn,
+    next_table,
     place_in_table,
-    taught,
 )
 from ppafo.control.walking.torque_profile import TorqueProfile
 
@@ -21,7 +21,7 @@ PLACES = np.linspace(-2.0, KNOTS + 1.0, 701)
 def test_the_table_is_straight_between_its_knots_and_zero_outside() -> None:
     knots = [0.01 * number * number - 0.3 for number in range(KNOTS)]
     expected = np.interp(PLACES, np.arange(-1, KNOTS + 1), [0.0, *knots, 0.0], left=0.0, right=0.0)
-    assert [learnt(LearntTable(tuple(knots)), float(place)) for place in PLACES] == pytest.approx(expected)
+    assert [command_at(LearntTable(tuple(knots)), float(place)) for place in PLACES] == pytest.approx(expected)
 
 
 def stride(table: LearntTable, step: float, forgetting: float, samples: int = 4000) -> LearntTable:
@@ -29,7 +29,7 @@ def stride(table: LearntTable, step: float, forgetting: float, samples: int = 40
     places = np.linspace(-1.0, KNOTS, samples, endpoint=False)
     weight = (KNOTS + 1.0) / samples
     for place in places:
-        table = moved_table(table, float(place), weight, step, forgetting)
+        table = next_table(table, float(place), weight, step, forgetting)
     return table
 
 
@@ -39,7 +39,7 @@ def test_a_stride_moves_a_knot_by_the_mean_step_less_what_is_forgotten() -> None
 
 
 def test_only_the_two_knots_at_a_place_learn_each_by_its_share() -> None:
-    table = moved_table(EMPTY, 3.25, weight=0.5, step=0.1, forgetting=0.0)
+    table = next_table(EMPTY, 3.25, weight=0.5, step=0.1, forgetting=0.0)
     assert table.knots[3] == pytest.approx(0.75 * 0.5 * 0.1)
     assert table.knots[4] == pytest.approx(0.25 * 0.5 * 0.1)
     assert sum(1 for knot in table.knots if knot != 0.0) == 2
@@ -59,6 +59,6 @@ def test_the_table_lies_over_the_profile_and_learns_a_lead_later_than_it_is_read
     rules = LearningRules(learning_gain=0.5, forgetting=0.0, lead=0.03)
     knot_time = 0.3 * 1.2 / (KNOTS - 1.0)
     since_strike = 0.3 * 1.2 + 6.0 * knot_time + rules.lead
-    table = taught(rules, EMPTY, profile, since_strike, 1.2, error=0.4, duration=0.1 * knot_time)
+    table = learn(rules, EMPTY, profile, since_strike, 1.2, error=0.4, duration=0.1 * knot_time)
     assert table.knots[6] == pytest.approx(0.1 * 0.5 * 0.4)
     assert sum(1 for knot in table.knots if abs(knot) > 1e-12) == 1

@@ -7,7 +7,7 @@ import pytest
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.declaration import SAFETY_QUANTITIES
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
-from ppafo.control.walking.safety import Followed, Ordered, SafetyRules, SafetyState
+from ppafo.control.walking.safety import SafetyRules, SafetyState, SlowPressures, ValveTimes
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -28,7 +28,7 @@ def vents(
     rules: SafetyRules = RULES,
 ) -> bool:
     after = now or phase(MID_STANCE, 0.1)
-    return safety.watched(rules, state, before or after, after, seen, PERIOD).vented > 0.5
+    return safety.monitor(rules, state, before or after, after, seen, PERIOD).vented > 0.5
 
 
 def test_the_rules_are_declared_in_their_order() -> None:
@@ -58,7 +58,7 @@ def still_for(seconds: float, seen: GaitMeasurement, now: PhaseState) -> bool:
     state = safety.START
     for sample in range(round(seconds / PERIOD)):
         moving = seen._replace(angle=seen.angle + 1.0e-9 * sample)
-        state = safety.watched(RULES, state, now, now, moving, PERIOD)
+        state = safety.monitor(RULES, state, now, now, moving, PERIOD)
     return state.vented > 0.5
 
 
@@ -73,8 +73,8 @@ def test_a_loaded_force_that_stays_the_same_is_frozen_and_an_unloaded_one_is_not
 @pytest.mark.parametrize(("name", "is_sign"), [(SWING, False), (LANDING, True), (MID_STANCE, True), (PUSH_OFF, True)])
 def test_an_angle_that_stays_the_same_is_a_sign_but_in_the_swing(name: float, is_sign: bool) -> None:
     now = phase(name, 0.5, heel=0.0, toe=0.0)
-    shown = safety.START.shown._replace(angle=GOOD.angle, angle_still=0.25)
-    assert vents(now=now, state=safety.START._replace(shown=shown)) is is_sign
+    shown = safety.START.readings._replace(angle=GOOD.angle, angle_unchanged=0.25)
+    assert vents(now=now, state=safety.START._replace(readings=shown)) is is_sign
 
 
 @pytest.mark.parametrize(("heel", "toe"), [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
@@ -91,16 +91,16 @@ def test_a_foot_that_must_stand_flat_loads_both_sensors(heel: float, toe: float)
 @pytest.mark.parametrize(("last", "steady"), [(0.95, 1.0), (1.05, 1.0), (0.88, 0.0), (1.12, 0.0)])
 def test_only_a_stride_that_took_about_the_stride_time_is_a_usual_one(last: float, steady: float) -> None:
     before, now = phase(SWING, last, 0.0, 0.0), phase(LANDING, 0.0, 1.0, 0.0)
-    assert safety.watched(RULES, safety.START, before, now, GOOD, PERIOD).steady == steady
+    assert safety.monitor(RULES, safety.START, before, now, GOOD, PERIOD).steady == steady
 
 
 def test_strides_that_begin_on_the_toes_are_counted_in_a_row() -> None:
     swing, on_toes, on_heel = phase(SWING, 1.3), phase(MID_STANCE, 0.0, 0.0, 1.0), phase(LANDING, 0.0)
-    once = safety.watched(RULES, safety.START, swing, on_toes, GOOD, PERIOD)
+    once = safety.monitor(RULES, safety.START, swing, on_toes, GOOD, PERIOD)
     assert (once.toe_strides, once.vented) == (1.0, 0.0)
     assert vents(now=on_toes, before=swing, state=once)
     assert not vents(now=on_heel, before=swing, state=once)
-    assert safety.watched(RULES, once, swing, on_heel, GOOD, PERIOD).toe_strides == 0.0
+    assert safety.monitor(RULES, once, swing, on_heel, GOOD, PERIOD).toe_strides == 0.0
     assert not vents(now=on_toes, before=swing, state=once, rules=RULES._replace(most_toe_strides=2.0))
 
 
@@ -113,7 +113,7 @@ def test_a_phase_without_end_and_a_stride_without_toes_vent() -> None:
 def after_commands(command: float, seconds: float) -> SafetyState:
     state = safety.START
     for _ in range(round(seconds / PERIOD)):
-        _, state = safety.carried_out(state, command, PERIOD)
+        _, state = safety.safe_command(state, command, PERIOD)
     return state
 
 
@@ -158,11 +158,11 @@ def stood(state: SafetyState, sample: int, **pressures: float) -> SafetyState:
     """State after a sample of a foot that stands flat and whose forces and angle change."""
     seen = GOOD._replace(angle=1.5 + 1.0e-9 * sample, heel_force=300.0 + sample, toe_force=200.0 + sample, **pressures)
     flat = phase(MID_STANCE, 0.1)
-    return safety.watched(RULES, state, flat, flat, seen, PERIOD)
+    return safety.monitor(RULES, state, flat, flat, seen, PERIOD)
 
 
 def test_a_pressure_that_freezes_while_the_chamber_vents_is_found_soon() -> None:
-    state = after_commands(VENT, 0.252)._replace(followed=Followed(2.2e5, GOOD.pressure_2))
+    state = after_commands(VENT, 0.252)._replace(slow_pressures=SlowPressures(2.2e5, GOOD.pressure_2))
     for sample in range(100):
         state = stood(state, sample, pressure_1=2.0e5 - 500.0 * sample)
     assert state.vented < 0.5
@@ -183,15 +183,15 @@ def test_no_single_reading_is_right_for_a_filled_and_a_vented_chamber(reading: f
 
 
 def test_once_vented_it_stays_so() -> None:
-    state = safety.watched(RULES, safety.START, phases.START, phases.START, GOOD._replace(angle=9.0), PERIOD)
+    state = safety.monitor(RULES, safety.START, phases.START, phases.START, GOOD._replace(angle=9.0), PERIOD)
     for command in (1.0, -0.3, 0.0):
-        state = safety.watched(RULES, state, phases.START, phases.START, GOOD, PERIOD)
-        given, state = safety.carried_out(state, command, PERIOD)
+        state = safety.monitor(RULES, state, phases.START, phases.START, GOOD, PERIOD)
+        given, state = safety.safe_command(state, command, PERIOD)
         assert given == VENT
-    assert state.ordered == Ordered(0.0, 0.0, pytest.approx(3.0 * PERIOD))
+    assert state.valve_times == ValveTimes(0.0, 0.0, pytest.approx(3.0 * PERIOD))
 
 
 def test_a_change_of_direction_begins_to_fill_anew() -> None:
     state = after_commands(1.0, 0.04)
-    _, state = safety.carried_out(state, -1.0, PERIOD)
-    assert state.ordered == Ordered(0.0, pytest.approx(PERIOD), 0.0)
+    _, state = safety.safe_command(state, -1.0, PERIOD)
+    assert state.valve_times == ValveTimes(0.0, pytest.approx(PERIOD), 0.0)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import PpafoError
-from ppafo.simulation.ensemble.columns import checked_columns
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import declared_numbers
@@ -44,7 +44,7 @@ def single_batch(name: str, texts: list[str]) -> Batch:
 def test_rows_of_an_ensemble_are_those_of_single_runs_bit_for_bit(draws: ModuleType, name: str, draw: int) -> None:
     base = load_scenario(name, ABSOLUTE)
     columns = draws.drawn_columns(base, np.random.default_rng([draw, *name.encode()]), 12)
-    plan = plan_ensemble(checked_columns(base, columns))
+    plan = plan_ensemble(check_columns(base, columns))
     found = places(plan)
     for run in range(12):
         texts = overrides(base, columns, run)

@@ -17,10 +17,10 @@ from ppafo.questions.league.standing import Robustness
 from ppafo.questions.league.walking.measures import Toes, course_of, last_strides, measures, toes_of
 from ppafo.questions.league.walking.task import WalkingTask
 from ppafo.studies.noise import other_noise
-from ppafo.walking.anthropometry import Build, drawn_builds
+from ppafo.walking.anthropometry import Build, draw_builds
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.planning import plan_walk, vented, with_leg
-from ppafo.walking.varied_gait import VariedGaits, varied_gaits
+from ppafo.walking.planning import plan_walk, vented_state, with_leg
+from ppafo.walking.varied_gait import VariedGaits, draw_gaits
 from ppafo.walking.walk import plan_of
 from ppafo.walking.wearers_rows import batch_of_many
 
@@ -52,8 +52,8 @@ class DrawnWearers:
 def draw_wearers(configuration: Configuration, run: Run, count: int, seed: int = SEED) -> DrawnWearers:
     """Wearers drawn around that of a configuration, who is the first; for every controller the same."""
     generator = np.random.default_rng(seed)
-    build = drawn_builds(count, generator)
-    gaits = varied_gaits(configuration.gait, build.stature, generator)
+    build = draw_builds(count, generator)
+    gaits = draw_gaits(configuration.gait, build.stature, generator)
     return DrawnWearers(build, gaits, batch_of_many(configuration, run, build, gaits, generator))
 
 
@@ -113,7 +113,7 @@ def _with_devices(run: Run, batch: Batch, plants: list[PlantParameters]) -> Batc
     damping = parameters[rows["plant.viscous_damping"]] - run.walk.leg.ankle_damping
     parameters[rows["share.viscous_damping"]] = damping
     for draw, plant in enumerate(plants):
-        begin = vented(plant, states[state_rows["state.angle"], draw], 0.0)
+        begin = vented_state(plant, states[state_rows["state.angle"], draw], 0.0)
         states[state_rows["state.mass_1"], draw], states[state_rows["state.mass_2"], draw] = begin.mass_1, begin.mass_2
     return Batch(batch.program, replace(batch.clock, record_every=run.record_every), parameters, states)
 

@@ -20,7 +20,7 @@ from ppafo.model.plant import PlantParameters, chamber_pressures
 from ppafo.questions.league.walking.stride import free_window, push_off_window
 from ppafo.questions.league.walking.task import WalkingTask
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.followed_gait import followed, gait_timing
+from ppafo.walking.gait_series import gait_timing, truncate
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.posture import AnklePath, ankle_path
 from ppafo.walking.recorded import SAFE_ROW
@@ -92,8 +92,8 @@ class Toes:
         The healthy toes are at the same fraction of the swing as high as those of the gait that is varied; ``angles``
         are the ankle's and the healthy one [rad].
         """
-        share = (phase - timing.toe_off) / (1.0 - timing.toe_off)
-        healthy = np.interp(self.toe_off + share * (1.0 - self.toe_off), _PHASES, self.healthy)
+        fraction = (phase - timing.toe_off) / (1.0 - timing.toe_off)
+        healthy = np.interp(self.toe_off + fraction * (1.0 - self.toe_off), _PHASES, self.healthy)
         path = replace(
             self.path,
             toe_lever=stature * self.path.toe_lever,
@@ -108,7 +108,7 @@ def toes_of(gait: Gait, wearer: Wearer) -> Toes:
     """The toes of a wearer with a gait."""
     timing = gait_timing(gait)
     path = ankle_path(gait, timing, wearer)
-    shank, ankle = followed(gait.shank_angle).sampled(_PHASES), followed(gait.ankle_angle).sampled(_PHASES)
+    shank, ankle = truncate(gait.shank_angle).values_at(_PHASES), truncate(gait.ankle_angle).values_at(_PHASES)
     # The path repeats: at its very end it is that of the next heel strike.
     return Toes(path, timing.toe_off, path.toe_height(np.minimum(_PHASES, 1.0 - 1.0e-9), shank, ankle))
 

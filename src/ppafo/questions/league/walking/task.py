@@ -12,7 +12,7 @@ from ppafo.simulation.declaration import PERIOD, RATE
 from ppafo.simulation.overriding import split_override
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
-from ppafo.walking.walk import checked_seconds
+from ppafo.walking.walk import walk_duration
 
 CONFIGURATION = "proportional"
 MINUTES = 0.2
@@ -20,7 +20,7 @@ SHORTEST, LONGEST = 0.1, 1.0
 """Minutes: enough strides to learn from, and few enough to record every sample of."""
 
 PROFILE_KIND, PROFILE_VALVE = "event_proportional", "proportional"
-"""The controller whose settings say what is desired, on the valve that suits it; every other is told the same."""
+"""The controller whose settings say what is desired, on the valve that suits it; every other gets the same."""
 SWING_ANGLE = "swing_angle"
 COMMON = (*PUSH_OFF_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES, RATE, PERIOD)
 SHORTEST_PUSH_OFF = 0.1
@@ -76,7 +76,7 @@ def walking_task(
     for override in overrides:
         _check(override)
     judged = load_walk(file, [f"controller.kind={PROFILE_KIND}", f"device.valve={PROFILE_VALVE}", *overrides], gait)
-    profile = TorqueProfile(*(judged.settings[name] for name in TorqueProfile._fields))
+    profile = TorqueProfile(**{name: judged.settings[name] for name in TorqueProfile._fields})
     if profile.peak_torque <= 0.0:
         raise ScenarioError("controller.peak_torque: a league needs a desired torque; give one above 0 N m")
     latest = judged.gait.stance_share - SHORTEST_PUSH_OFF
@@ -85,7 +85,7 @@ def walking_task(
             f"controller.peak_time: the torque begins at {profile.peak_time - profile.rise_time:g} of the stride, "
             f"too late for a push-off that ends at {judged.gait.stance_share:g}; at most {latest:g}"
         )
-    seconds = checked_seconds(judged, minutes)
+    seconds = walk_duration(judged, minutes)
     return WalkingTask(str(file), None if gait is None else str(gait), tuple(overrides), profile, seconds)
 
 

@@ -39,29 +39,29 @@ class Segment(NamedTuple):
     last: float
 
 
-def advanced(segment: Segment, place: float, time: float, value: float) -> Segment:
-    """The segment, or the next one, to the knot at ``time``, where the place [s] is not before its end."""
+def next_segment(segment: Segment, place: float, time: float, value: float) -> Segment:
+    """The segment, or the next one, to the knot at ``time`` [s], where ``place`` [s] has passed its end."""
     passed = place >= segment.end
     return Segment(
-        segment.end if passed else segment.start,
-        segment.last if passed else segment.first,
-        time if passed else segment.end,
-        value if passed else segment.last,
+        start=segment.end if passed else segment.start,
+        first=segment.last if passed else segment.first,
+        end=time if passed else segment.end,
+        last=value if passed else segment.last,
     )
 
 
 def segment_at(profile: Tabulated, place: float) -> Segment:
     """The segment in which a place [s] of a repetition lies; its end is later than the place."""
-    segment = Segment(0.0, profile.value_01, profile.knots[0].time, profile.knots[0].value)
+    segment = Segment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
     for knot in profile.knots[1:]:
-        segment = advanced(segment, place, knot.time, knot.value)
-    segment = advanced(segment, place, profile.period, profile.value_01)
+        segment = next_segment(segment, place, knot.time, knot.value)
+    segment = next_segment(segment, place, profile.period, profile.value_01)
     is_last = segment.end >= profile.period
     return Segment(
-        segment.start,
-        segment.first,
-        profile.period if is_last else segment.end,
-        profile.value_01 if is_last else segment.last,
+        start=segment.start,
+        first=segment.first,
+        end=profile.period if is_last else segment.end,
+        last=profile.value_01 if is_last else segment.last,
     )
 
 
@@ -80,7 +80,7 @@ def used_knots(profile: Tabulated) -> list[tuple[float, float]]:
 
 
 def bounds(profile: Tabulated) -> tuple[float, float]:
-    """The lowest and the highest value of the knots that are used, with the level."""
+    """The lowest and the highest value [N m or rad] of the knots that are used, with the level."""
     values = [value for _, value in used_knots(profile)]
     return profile.level + min(values), profile.level + max(values)
 
