@@ -46,11 +46,15 @@ def _run_with_shared(source: str, path: str, module: ModuleType) -> None:
     names = module.__dict__
     lines = source.split("\n")
     keys: dict[str, str] = {}
-    for node in ast.parse(source, path).body:
+    body = ast.parse(source, path).body
+    imports = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
+    for node in body:
         name = _shared_name(node)
         if not name:
             before = set(names)
-            exec(compile(ast.Module([node], []), path, "exec"), names)
+            # With its imports, as when the whole is compiled: calls through a module have other bytecode without them,
+            # and by the bytecode a kept program is found again.
+            exec(compile(ast.Module([*imports, node], []), path, "exec"), names)
             is_alike = isinstance(node, ast.Import | ast.ImportFrom | ast.Assign)
             keys |= dict.fromkeys(set(names) - before, ast.unparse(node) if is_alike else path)
             continue

@@ -38,14 +38,19 @@ print(float(result.recording["torque"][-1]))
 """
 
 
+def files_of(cache: Path) -> dict[Path, bytes]:
+    """All that is kept, byte by byte."""
+    return {path: path.read_bytes() for path in cache.rglob("*") if path.is_file()}
+
+
 def start(cache: Path, *arguments: str) -> tuple[float, bool]:
     """Last torque of a short run in a new process, and whether it compiled anything."""
     environment = {**os.environ, "PPAFO_CACHE_DIR": str(cache)}
-    before = set(cache.iterdir()) if cache.exists() else set()
+    before = files_of(cache)
     done = subprocess.run(
         [sys.executable, "-c", START, *arguments], env=environment, capture_output=True, text=True, check=True
     )
-    return float(done.stdout), set(cache.iterdir()) != before
+    return float(done.stdout), files_of(cache) != before
 
 
 def test_second_start_finds_the_compiled_model_and_changed_physics_does_not(tmp_path: Path) -> None:
