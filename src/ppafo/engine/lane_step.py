@@ -9,6 +9,7 @@ that are through wait, masked, and no lane sees another.
 from ppafo.engine.lane_control import sense_end
 from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
 from ppafo.engine.scheme import motion, parts, pneumatics, supply_lines, thermal_gas, walking
+from ppafo.model.course import gait_on_course, shown_toe_force
 from ppafo.model.gait import gait_at
 
 IMPOSSIBLE_RATE = 1.0e6
@@ -150,11 +151,22 @@ def lead_walk(rows: LaneRows) -> list[list[str]]:
     """Two phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
     if not rows.program.walks:
         return []
-    gait = f"{rows.add(gait_at)}(gait, gait_timing, leg, time + length)"
     foot = f"{rows.add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)"
     return [
-        [rows.load("gait"), f"next_gait = {gait}", *rows.keep("next_gait")],
+        [rows.load("gait"), *next_gait(rows)],
         [rows.load("next_gait"), f"begun = {foot}", *rows.keep("begun")],
+    ]
+
+
+def next_gait(rows: LaneRows) -> list[str]:
+    """Lines that make the gait at the end of the step: stride after stride, or on a course, which may scuff."""
+    if not rows.program.takes_course:
+        return [f"next_gait = {rows.add(gait_at)}(gait, gait_timing, leg, time + length)", *rows.keep("next_gait")]
+    given = "gait, walk_course, gait_timing, leg, time + length"
+    return [
+        rows.load("walk_course"),
+        f"next_gait, scuff = {rows.add(gait_on_course)}({given})",
+        *rows.keep("next_gait", "scuff"),
     ]
 
 
@@ -284,6 +296,7 @@ def end_motion(rows: LaneRows) -> list[str]:
         follow = rows.cells["gait_sensors.follow_rate"]
         given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, next_gait, length"
         lines = [rows.load("next_gait"), f"after, walk = {add(walking.end_walk)}({given})", *rows.store("walk")]
+        lines += scuffed(rows)
         if program.is_thermal:
             assumed = f"{add(walking.next_angle)}(plant, walk_before, begun)"
             lines.insert(1, "walk_before = walk")
@@ -297,6 +310,14 @@ def end_motion(rows: LaneRows) -> list[str]:
     if program.is_held:
         return ["after = fed", "error = 0.0"]
     return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]
+
+
+def scuffed(rows: LaneRows) -> list[str]:
+    """Lines that add a scuff to what the toe sensor shows, on a course."""
+    if not rows.program.takes_course:
+        return []
+    shown = f"{rows.add(shown_toe_force)}(walk.toe_force, scuff, {rows.cells['gait_sensors.follow_rate']}, length)"
+    return [rows.load("scuff"), f"{rows.cells['walk.toe_force']} = {shown}"]
 
 
 def store_all(rows: LaneRows, flag: str) -> list[str]:

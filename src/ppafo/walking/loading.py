@@ -25,6 +25,7 @@ from ppafo.simulation.overriding import device_paths, is_of_device, split_overri
 from ppafo.simulation.reading import Reading
 from ppafo.walking.configuration import NEVER, Configuration
 from ppafo.walking.contradictions import check_walk
+from ppafo.walking.course import WalkingCourse, load_course
 from ppafo.walking.declaration import (
     ANGLE_BANDWIDTH,
     FAULT_TIME,
@@ -37,12 +38,13 @@ from ppafo.walking.declaration import (
     controller_settings,
     quantities,
 )
+from ppafo.walking.planning import course_of_walk
 from ppafo.walking.schema import walk_file
 from ppafo.walking.wearer import WEARER, Wearer
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 _TURN = 2.0 * math.pi
-_TEXTS = ("gait", "device.valve", "controller.kind", "gas_model.kind", *(f"faults.{sensor}.kind" for sensor in FAULTY))
+_TEXTS = ("gait", "course", "device.valve", "controller.kind", "gas_model.kind", *(f"faults.{sensor}.kind" for sensor in FAULTY))
 DEFAULT_PERIOD = 1.0e-3
 
 
@@ -51,11 +53,16 @@ def list_walks() -> tuple[str, ...]:
     return FILE.names()
 
 
-def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str | Path | None = None) -> Configuration:
+def load_walk(
+    name_or_path: str | Path,
+    overrides: Iterable[str] = (),
+    gait: str | Path | None = None,
+    course: str | Path | None = None,
+) -> Configuration:
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
-    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` replaces the
-    gait of the file. ScenarioError, ParameterError or DataError for anything that cannot be used.
+    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` and
+    ``course`` replace those of the file. ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
@@ -88,8 +95,10 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
         overrides=given,
         supply_lines=read_supply_lines(reading, device),
         thermal=read_thermal(reading),
+        course=_course(course or document.get("course"), folder, course is None),
     )
     check_walk(configuration, reading)
+    course_of_walk(configuration)
     return configuration
 
 
@@ -131,6 +140,14 @@ def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device
         return build_device(apply_overrides(parameters, overrides, valve), valve)
     except ParameterError as error:
         raise ParameterError(f"{file}: [device]: {one_line(error)}") from error
+
+
+def _course(name: str | Path | None, folder: Path, relative: bool) -> WalkingCourse | None:
+    if name is None:
+        return None
+    path = Path(name)
+    is_path = path.suffix == ".toml"
+    return load_course(folder / path if is_path and relative and not path.is_absolute() else name)
 
 
 def _gait(name: str | Path, folder: Path, relative: bool) -> Gait:

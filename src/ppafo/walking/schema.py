@@ -64,6 +64,9 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "name": (str, Field(pattern=NAME, max_length=100)),
         "description": (str, Field("", description="what this file tries, and why")),
         "gait": optional(str, "name of a gait, or the path of a gait file; the built-in one unless given"),
+        "course": optional(
+            str, "name of a course, or the path of its file; stride after equal stride unless one is given"
+        ),
         "device": (table("WalkDevice", device_fields()), Field(description="the hardware")),
         "controller": (_controller(), Field(description="what commands the valve")),
         "wearer": optional(table("Wearer", quantity_fields(WEARER)), "who walks; the paper's subject unless given"),
