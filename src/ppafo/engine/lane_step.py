@@ -151,9 +151,10 @@ def lead_walk(rows: LaneRows) -> list[list[str]]:
     """Two phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
     if not rows.program.walks:
         return []
+    gait = next_gait(rows)
     foot = f"{rows.add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)"
     return [
-        [rows.load("gait"), *next_gait(rows)],
+        [rows.load("gait"), *gait],
         [rows.load("next_gait"), f"begun = {foot}", *rows.keep("begun")],
     ]
 

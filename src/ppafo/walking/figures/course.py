@@ -21,7 +21,7 @@ _TITLES = (
     "Walking speed (m/s)",
     "Ankle angle (deg, 0 neutral, dorsiflexion positive)",
     "Force under heel and toes (N)",
-    "Actuator torque (N m, plantarflexion positive)",
+    "Actuator torque (N m, plantarflexion positive); strip: controller",
     "Toe height above ground (cm)",
     "Gas taken (g)",
 )
@@ -69,11 +69,13 @@ def _background(axes: "Axes", worn: WalkResult) -> None:
 
 def _speed(axes: "Axes", worn: WalkResult) -> None:
     recording = worn.recording
-    if "walking_speed" in recording:
-        axes.plot(recording.time, recording["walking_speed"], color=BLACK)
-    else:
+    has_speed = "walking_speed" in recording
+    values = recording["walking_speed" if has_speed else "stride_frequency"]
+    axes.plot(recording.time, values, color=BLACK)
+    # Room above the curve for the names of the segments.
+    axes.set_ylim(-0.05 * float(values.max()), 1.9 * float(values.max()) + 0.01)
+    if not has_speed:
         axes.set_title("Strides per second (Hz)")
-        axes.plot(recording.time, recording["stride_frequency"], color=BLACK)
 
 
 def _both(axes: "Axes", worn: WalkResult, bare: WalkResult) -> None:
@@ -85,7 +87,7 @@ def _both(axes: "Axes", worn: WalkResult, bare: WalkResult) -> None:
 def _forces(axes: "Axes", worn: WalkResult) -> None:
     axes.plot(worn.recording.time, worn.recording["heel_force"], color=BLACK, linewidth=0.8, label="heel")
     axes.plot(worn.recording.time, worn.recording["toe_force"], color=GREY, linewidth=0.8, label="toes")
-    axes.legend(loc="upper right", ncols=2, fontsize=8)
+    _legend(axes, 2)
 
 
 def _toes(axes: "Axes", worn: WalkResult, bare: WalkResult) -> None:
@@ -95,7 +97,7 @@ def _toes(axes: "Axes", worn: WalkResult, bare: WalkResult) -> None:
 
 
 def _phases(axes: "Axes", worn: WalkResult) -> None:
-    """The phase that the controller sees, as a strip under the torque."""
+    """The phase that the controller sees, as a strip under the curve."""
     if "controller_phase" not in worn.recording:
         return
     time, seen = worn.recording.time, worn.recording["controller_phase"]
@@ -105,7 +107,13 @@ def _phases(axes: "Axes", worn: WalkResult) -> None:
         name = _PHASE_NAMES[phase]
         axes.fill_between(time, strip, low, where=seen == phase, color=colour, linewidth=0.0, step="post", label=name)
     axes.set_ylim(strip, high)
-    axes.legend(loc="upper right", ncols=4, fontsize=8, title="strip: phase that the controller sees", title_fontsize=8)
+    _legend(axes, 4)
+
+
+def _legend(axes: "Axes", columns: int) -> None:
+    """Beside the title of a panel, where no curve is."""
+    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.1}
+    axes.legend(ncols=columns, fontsize=8, handlelength=1.2, columnspacing=1.0, **place)
 
 
 def _segment_names(axes: "Axes", worn: WalkResult) -> None:
@@ -114,12 +122,12 @@ def _segment_names(axes: "Axes", worn: WalkResult) -> None:
         narrow = segment.end - segment.start < _NARROWEST * whole
         axes.text(
             0.5 * (segment.start + segment.end),
-            0.05,
+            0.96,
             segment.kind,
             transform=axes.get_xaxis_transform(),
             rotation=90.0 if narrow else 0.0,
             ha="center",
-            va="bottom",
+            va="top",
             fontsize=8,
             color=GREY,
         )
