@@ -28,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json_argument(_action(actions, "list", "list the gaits that come with the package"))
     showing = _action(actions, "show", "show and draw a gait")
     showing.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
-    showing.add_argument("--speed", metavar="SPEED", help="at another walking speed, such as '1.2 m/s'")
+    showing.add_argument("--speed", metavar="SPEED", help="walking speed to scale to, such as '1.2 m/s'")
     add_output_arguments(showing)
-    _add_import_arguments(_action(actions, "import", "make a gait of recorded files (.mot, .sto, .csv, .c3d)"))
+    _add_import_arguments(_action(actions, "import", "make a gait from recorded files (.mot, .sto, .csv, .c3d)"))
     recording = _action(actions, "record", "write some strides of a gait as a synthetic recording")
     recording.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
     recording.add_argument("--strides", metavar="N", default="10", help="number of strides; default 10")
@@ -57,17 +57,23 @@ def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
         "--speed", metavar="SPEED", help="walking speed, such as '1.2 m/s'; needed to scale the gait later"
     )
     parser.add_argument(
-        "--stature", metavar="LENGTH", help="of the wearer, such as '1.75 m'; gives the thigh that OpenSim files lack"
+        "--stature",
+        metavar="LENGTH",
+        help="stature of the wearer, such as '1.75 m'; gives the thigh length that OpenSim files lack",
     )
-    parser.add_argument("--low-pass", metavar="FREQUENCY", help="smooth the curves, such as '6 Hz'; not unless given")
-    parser.add_argument("--least-strides", metavar="N", default="2", help="refuse fewer whole strides; default 2")
+    parser.add_argument(
+        "--low-pass", metavar="FREQUENCY", help="cutoff of a low-pass filter, such as '6 Hz'; default: none"
+    )
+    parser.add_argument(
+        "--minimum-strides", metavar="N", default="2", help="minimum number of whole strides; default 2"
+    )
     parser.add_argument("--name", metavar="NAME", default="imported-gait", help="name of the gait and of its file")
     parser.add_argument("--title", metavar="TEXT", default="", help="one line: who walks, and how")
     add_output_arguments(parser)
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Do what was asked for."""
+    """Run the action that was given."""
     actions = {"list": _list, "show": _show, "import": _import, "record": _record, "export": _export}
     return actions[parsed.action](parsed)
 
@@ -107,14 +113,14 @@ def _settings(parsed: argparse.Namespace) -> "ImportSettings":
     from ppafo.gait.recorded.mapping import load_map
 
     if parsed.side not in _SIDES:
-        raise DataError(f"--side {parsed.side!r} is not known; it is right or left")
+        raise DataError(f"--side {parsed.side!r}: must be right or left")
     return ImportSettings(
         body_mass=_quantity("--body-mass", parsed.body_mass, "kg"),
         side=parsed.side,
         columns=None if parsed.map is None else load_map(parsed.map),
         walking_speed=None if parsed.speed is None else _quantity("--speed", parsed.speed, "m/s"),
         low_pass=None if parsed.low_pass is None else _quantity("--low-pass", parsed.low_pass, "Hz"),
-        least_strides=_whole("--least-strides", parsed.least_strides),
+        least_strides=_whole("--minimum-strides", parsed.minimum_strides),
         name=parsed.name,
         title=parsed.title,
         stature=None if parsed.stature is None else _quantity("--stature", parsed.stature, "m"),
@@ -123,7 +129,7 @@ def _settings(parsed: argparse.Namespace) -> "ImportSettings":
 
 def _whole(option: str, text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) < 7):
-        raise DataError(f"{option} {text!r} is not a whole number, such as 2")
+        raise DataError(f"{option} {text!r}: must be a whole number, such as 2")
     return int(text)
 
 
@@ -161,7 +167,7 @@ def _export(parsed: argparse.Namespace) -> int:
     from ppafo.storage.opensim import write_opensim
 
     if parsed.out.suffix.lower() != ".sto":
-        raise DataError(f"--out {parsed.out}: OpenSim's name for such a file ends in .sto")
+        raise DataError(f"--out {parsed.out}: the name must end in .sto")
     check_new_file(parsed.out)
     recording = read_recording(parsed.recording)
     write_opensim(parsed.out, recording)

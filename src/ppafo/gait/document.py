@@ -3,10 +3,9 @@
 import functools
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, optional, published_schema, table
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import NAME, make_schema, optional, table, validate
 from ppafo.errors import DataError, UnitError
 from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
 from ppafo.units import parse_quantity, to_si
@@ -96,10 +95,7 @@ def gait_of(document: dict[str, Any], file: str) -> Gait:
 
     DataError where it is not a gait.
     """
-    try:
-        gait_file().model_validate(document)
-    except ValidationError as error:
-        raise DataError(f"{file}: {first_problem(error.errors(include_url=False), gait_file())}") from error
+    validate(gait_file(), document, file, DataError)
     numbers = {path: _number(document, path, file) for path in _LIMITS}
     curves = {name: _curve(document[name], name, file) for name in CURVES if name in document}
     if numbers["stride.time"] is None or numbers["stride.stance_share"] is None or numbers["subject.body_mass"] is None:
@@ -163,4 +159,4 @@ def _curve(given: dict[str, Any], name: str, file: str) -> Curve:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a gait file."""
-    return published_schema(gait_file(), "ppafo gait")
+    return make_schema(gait_file(), "ppafo gait")

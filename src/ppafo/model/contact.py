@@ -38,7 +38,7 @@ class Landing(NamedTuple):
 
 
 def is_free(contact: float) -> bool:
-    """True where the foot moves by its own dynamics."""
+    """True where the foot moves by its own dynamics; ``contact`` [-] is one of the states above."""
     return contact < 1.5
 
 
@@ -48,7 +48,7 @@ def foot_angle(shank: float, ankle: float) -> float:
 
 
 def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float) -> Ankle:
-    """What the ground prescribes: a flat foot leaves the ankle to the shank, on the toes it is as measured."""
+    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, on the toes it is as measured."""
     flat = contact < 2.5
     return Ankle(
         now.shank + QUARTER_TURN - ground_angle if flat else now.ankle,
@@ -71,23 +71,29 @@ def landing(contact: float, timing: GaitTiming, now: GaitNow, angle: float, offs
     after = SWING if leaves else after
     difference = angle - flat_angle if slaps else offset
     difference = angle - now.ankle if rises else difference
-    return Landing(after, difference, 1.0 if strikes else 0.0, 1.0 if slaps else 0.0, 1.0 if leaves else 0.0)
+    return Landing(
+        contact=after,
+        offset=difference,
+        strikes=1.0 if strikes else 0.0,
+        slaps=1.0 if slaps else 0.0,
+        leaves=1.0 if leaves else 0.0,
+    )
 
 
 SETTLES = 3.0
 """A foot that came down with its toes stands on its heel after one part in so many of the time to the heel's rise."""
 
 
-def heel_share(contact: float, timing: GaitTiming, phase: float, toes_first: float) -> float:
-    """Share of the ground force under the heel: all while it rolls there, none on the toes, straight between.
+def heel_fraction(contact: float, timing: GaitTiming, phase: float, toes_first: float) -> float:
+    """Fraction [-] of the ground force under the heel: all while it rolls there, none on the toes, straight between.
 
     A foot that met the ground with its toes (``toes_first`` 1) has none under the heel at first.
     """
     passed = max(0.0, min(1.0, phase / timing.heel_off))
     flat = 1.0 - passed
     rolling = 1.0 if contact == HEEL else flat
-    share = flat * min(1.0, SETTLES * passed) if toes_first > 0.5 else rolling
-    return share if contact > 0.5 and contact < 2.5 else 0.0
+    fraction = flat * min(1.0, SETTLES * passed) if toes_first > 0.5 else rolling
+    return fraction if contact > 0.5 and contact < 2.5 else 0.0
 
 
 def heel_torque(contact: float, now: GaitNow, heel_lever: float) -> float:
@@ -103,5 +109,5 @@ def heel_torque(contact: float, now: GaitNow, heel_lever: float) -> float:
 def ground_forces(contact: float, timing: GaitTiming, now: GaitNow, toes_first: float) -> tuple[float, float]:
     """Forces [N] under heel and toes; none in the swing."""
     total = 0.0 if contact == SWING else now.force
-    share = heel_share(contact, timing, now.phase, toes_first)
-    return total * share, total * (1.0 - share)
+    fraction = heel_fraction(contact, timing, now.phase, toes_first)
+    return total * fraction, total * (1.0 - fraction)

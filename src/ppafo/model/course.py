@@ -11,7 +11,7 @@ A person stands at the phase in the middle between heel strike and heel rise, wh
 from typing import Annotated, NamedTuple
 
 from ppafo.model.contact import QUARTER_TURN
-from ppafo.model.fourier import Harmonics, Series, acceleration_at, harmonics, rate_at, value_at
+from ppafo.model.fourier import Harmonic, Series, acceleration_at, harmonics, rate_at, value_at
 from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.turns import TURN, sine_and_cosine
@@ -92,9 +92,9 @@ def blend(fraction: float) -> Blend:
     rest = 1.0 - fraction
     square = fraction * fraction
     return Blend(
-        square * fraction * (10.0 + fraction * (6.0 * fraction - 15.0)),
-        30.0 * square * rest * rest,
-        60.0 * fraction * rest * (1.0 - 2.0 * fraction),
+        value=square * fraction * (10.0 + fraction * (6.0 * fraction - 15.0)),
+        rate=30.0 * square * rest * rest,
+        acceleration=60.0 * fraction * rest * (1.0 - 2.0 * fraction),
     )
 
 
@@ -104,17 +104,17 @@ def part_at(course: Course, time: float) -> CoursePart:
     for part in course.parts[1:]:
         begun = time >= part.start
         found = CoursePart(
-            part.start if begun else found.start,
-            part.length if begun else found.length,
-            part.turns if begun else found.turns,
-            part.frequency if begun else found.frequency,
-            part.frequency_gain if begun else found.frequency_gain,
-            part.stride if begun else found.stride,
-            part.stride_gain if begun else found.stride_gain,
-            part.load if begun else found.load,
-            part.load_gain if begun else found.load_gain,
-            part.tilt if begun else found.tilt,
-            part.scuff if begun else found.scuff,
+            start=part.start if begun else found.start,
+            length=part.length if begun else found.length,
+            turns=part.turns if begun else found.turns,
+            frequency=part.frequency if begun else found.frequency,
+            frequency_gain=part.frequency_gain if begun else found.frequency_gain,
+            stride=part.stride if begun else found.stride,
+            stride_gain=part.stride_gain if begun else found.stride_gain,
+            load=part.load if begun else found.load,
+            load_gain=part.load_gain if begun else found.load_gain,
+            tilt=part.tilt if begun else found.tilt,
+            scuff=part.scuff if begun else found.scuff,
         )
     return found
 
@@ -127,15 +127,15 @@ def pace_in(part: CoursePart, time: float) -> Pace:
     square = fraction * fraction
     integral = square * square * (2.5 + fraction * (fraction - 3.0))
     return Pace(
-        part.turns + part.frequency * passed + part.frequency_gain * part.length * integral,
-        part.frequency + part.frequency_gain * shape.value,
-        part.frequency_gain * shape.rate / part.length,
-        part.stride + part.stride_gain * shape.value,
-        part.stride_gain * shape.rate / part.length,
-        part.stride_gain * shape.acceleration / (part.length * part.length),
-        part.load + part.load_gain * shape.value,
-        part.tilt,
-        part.scuff,
+        turns=part.turns + part.frequency * passed + part.frequency_gain * part.length * integral,
+        frequency=part.frequency + part.frequency_gain * shape.value,
+        frequency_rate=part.frequency_gain * shape.rate / part.length,
+        stride=part.stride + part.stride_gain * shape.value,
+        stride_rate=part.stride_gain * shape.rate / part.length,
+        stride_acceleration=part.stride_gain * shape.acceleration / (part.length * part.length),
+        load=part.load + part.load_gain * shape.value,
+        tilt=part.tilt,
+        scuff=part.scuff,
     )
 
 
@@ -147,15 +147,15 @@ class Motion(NamedTuple):
     acceleration: float
 
 
-def blended_angle(series: Series, at: Harmonics, pace: Pace, standing: float) -> Motion:
+def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing: float) -> Motion:
     """An angle between that of standing [rad] and that of the gait."""
     away = value_at(series, at) - standing
     rate = rate_at(series, at, pace.frequency)
     turning = acceleration_at(series, at, pace.frequency) + rate_at(series, at, pace.frequency_rate)
     return Motion(
-        standing + pace.stride * away,
-        pace.stride_rate * away + pace.stride * rate,
-        pace.stride_acceleration * away + 2.0 * pace.stride_rate * rate + pace.stride * turning,
+        angle=standing + pace.stride * away,
+        rate=pace.stride_rate * away + pace.stride * rate,
+        acceleration=pace.stride_acceleration * away + 2.0 * pace.stride_rate * rate + pace.stride * turning,
     )
 
 
@@ -170,9 +170,9 @@ def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> Motion:
     shape = blend(max(0.0, min(1.0, place)))
     rate = slope * pace.frequency
     return Motion(
-        pace.tilt * shape.value,
-        pace.tilt * shape.rate * rate,
-        pace.tilt * (shape.acceleration * rate * rate + shape.rate * slope * pace.frequency_rate),
+        angle=pace.tilt * shape.value,
+        rate=pace.tilt * shape.rate * rate,
+        acceleration=pace.tilt * (shape.acceleration * rate * rate + shape.rate * slope * pace.frequency_rate),
     )
 
 
@@ -180,7 +180,7 @@ def scuff_now(timing: GaitTiming, leg: LegParameters, phase: float, pace: Pace) 
     """Force of a scuff [N]; none in a part without one."""
     since = phase - timing.toe_off - SCUFF_AT * (1.0 - timing.toe_off)
     weight = SCUFF_FORCE * leg.body_mass * leg.gravity
-    return Scuff(weight if since >= 0.0 and since < pace.scuff * pace.frequency else 0.0)
+    return Scuff(force=weight if since >= 0.0 and since < pace.scuff * pace.frequency else 0.0)
 
 
 def gait_on_course(
@@ -212,21 +212,21 @@ def gait_on_course(
         leg, sine_shank, cosine_shank, sine_foot, cosine_foot, shank_rate, shank_acceleration, forward, up
     )
     now = GaitNow(
-        phase,
-        shank,
-        shank_rate,
-        shank_acceleration,
-        ankle.angle,
-        ankle.rate,
-        ankle.acceleration,
-        walks * leg.body_mass * value_at(gait.moment, at),
-        max(leg.body_mass * leg.gravity * carried, 0.0),
-        forward,
-        up,
-        sine_shank,
-        cosine_shank,
-        sine_foot,
-        torque + foot_inertia_about_ankle(leg) * ankle.acceleration + leg.ankle_damping * ankle.rate,
+        phase=phase,
+        shank=shank,
+        shank_rate=shank_rate,
+        shank_acceleration=shank_acceleration,
+        ankle=ankle.angle,
+        ankle_rate=ankle.rate,
+        ankle_acceleration=ankle.acceleration,
+        moment=walks * leg.body_mass * value_at(gait.moment, at),
+        force=max(leg.body_mass * leg.gravity * carried, 0.0),
+        knee_forward=forward,
+        knee_up=up,
+        sine_shank=sine_shank,
+        cosine_shank=cosine_shank,
+        sine_healthy_foot=sine_foot,
+        healthy_torque=torque + foot_inertia_about_ankle(leg) * ankle.acceleration + leg.ankle_damping * ankle.rate,
     )
     return now, scuff_now(timing, leg, phase, pace)
 

@@ -8,13 +8,10 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.gait import Gait
 from ppafo.gait.gait import Curve
-from ppafo.model.fourier import Series
+from ppafo.model.fourier import HARMONICS, Harmonic, Series
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.signals.recording import Floats
 from ppafo.walking.wearer import Wearer
-
-HARMONICS = 8
-"""Harmonics that the engine follows; those of the built-in gait above are below 0.04 deg and 0.4 % of body weight."""
 
 FLAT_FROM, FLAT_TO = 0.15, 0.35
 """Phases between which every foot stands flat; the angle of the foot is taken from there."""
@@ -31,18 +28,18 @@ EVENT_PHASES = np.linspace(0.0, 1.0, 1001)[150:]
 CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
 """Shares of the swing between which the toes must clear the ground."""
 
-ZERO = Series(**dict.fromkeys(Series._fields, 0.0))
+ZERO = Series(mean=0.0, harmonics=(Harmonic(0.0, 0.0),) * HARMONICS)
 
 
 def gait_series(gait: Gait) -> GaitSeries:
     """The curves of a gait for the engine; a moment, force or knee motion that was not measured is 0."""
     return GaitSeries(
-        _series(gait, "shank_angle"),
-        _series(gait, "ankle_angle"),
-        _series(gait, "ankle_moment"),
-        _series(gait, "vertical_force"),
-        _series(gait, "knee_forward"),
-        _series(gait, "knee_up"),
+        shank=_series(gait, "shank_angle"),
+        ankle=_series(gait, "ankle_angle"),
+        moment=_series(gait, "ankle_moment"),
+        force=_series(gait, "vertical_force"),
+        knee_forward=_series(gait, "knee_forward"),
+        knee_up=_series(gait, "knee_up"),
     )
 
 
@@ -52,7 +49,7 @@ def _series(gait: Gait, name: str) -> Series:
         return ZERO
     missing = (0.0,) * HARMONICS
     pairs = zip((*curve.cosines, *missing)[:HARMONICS], (*curve.sines, *missing)[:HARMONICS], strict=True)
-    return Series(curve.mean, *[number for pair in pairs for number in pair])
+    return Series(mean=curve.mean, harmonics=tuple(Harmonic(cosine, sine) for cosine, sine in pairs))
 
 
 def truncate(curve: Curve) -> Curve:
@@ -97,11 +94,13 @@ def gait_timing(gait: Gait) -> GaitTiming:
     """Frequency [Hz], events [strides] and the flat foot's angle [rad]; heel rise and angle come from the curves."""
     foot = _foot_angles(gait, EVENT_PHASES)
     events = gait_events(foot[None, :], np.array([gait.stance_share]))
-    return GaitTiming(1.0 / gait.stride_time, 0.0, *(float(values[0]) for values in events))
+    return GaitTiming(
+        frequency=1.0 / gait.stride_time, start=0.0, **{name: float(values[0]) for name, values in events.items()}
+    )
 
 
-def gait_events(foot: Floats, stance_share: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """The fields of ``GaitTiming`` after ``start``, for feet that stand at angles [rad] (people, phases).
+def gait_events(foot: Floats, stance_share: Floats) -> dict[str, Floats]:
+    """The fields (people,) of ``GaitTiming`` after ``start``, for feet that stand at angles [rad] (people, phases).
 
     ``foot`` is over the horizontal, at ``EVENT_PHASES``; ``stance_share`` is (people,).
     """
@@ -111,10 +110,10 @@ def gait_events(foot: Floats, stance_share: Floats) -> tuple[Floats, Floats, Flo
     usual = USUAL_HEEL_RISE * stance_share
     heel_off = np.where(steep.any(axis=1), EVENT_PHASES[np.argmax(steep, axis=1)], usual)
     swing = 1.0 - stance_share
-    return (
-        np.minimum(heel_off, LATEST_HEEL_RISE * stance_share),
-        stance_share,
-        stance_share + CLEARANCE_FROM * swing,
-        stance_share + CLEARANCE_TO * swing,
-        ground_angle,
-    )
+    return {
+        "heel_off": np.minimum(heel_off, LATEST_HEEL_RISE * stance_share),
+        "toe_off": stance_share,
+        "clearance_from": stance_share + CLEARANCE_FROM * swing,
+        "clearance_to": stance_share + CLEARANCE_TO * swing,
+        "ground_angle": ground_angle,
+    }

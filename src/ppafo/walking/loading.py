@@ -7,10 +7,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from ppafo.control.walking.catalog import load_walking_controller, walking_controllers
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.gait import NORMATIVE, Gait, load_gait
@@ -68,11 +66,7 @@ def load_walk(
     given = tuple(overrides)
     document = _apply_overrides(FILE.parse(FILE.read(name_or_path), file), given, file)
     load_walking_controller(kind_at(document, "controller"))
-    try:
-        walk_file().model_validate(document)
-    except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), walk_file())
-        raise ScenarioError(f"{file}: {problem}") from error
+    validate(walk_file(), document, file, ScenarioError)
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
     kind = walking_controllers()[kind_at(document, "controller")]

@@ -64,7 +64,7 @@ def recording_of_walk(configuration: Configuration, run: Run, time: Floats, reco
 
 
 def _course_channels(
-    configuration: Configuration, run: Run, path: AnklePath, time: Floats, record: Mapping[str, Floats]
+    configuration: Configuration, run: Run, path: AnklePath, time: Floats, record: Mapping[str, Any]
 ) -> dict[str, tuple[Any, str]]:
     """What a course has beside a walk of equal strides, and the toes over ground that may rise: stairs lift the ankle.
 
@@ -86,7 +86,7 @@ def _course_channels(
     return found
 
 
-def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
+def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Any]) -> Floats:
     """T_1 of equation (11) [N m] in the swing: what moves shank and foot as prescribed; 0 on the ground.
 
     There it would need the horizontal force of the ground, which a gait file does not have.
@@ -96,9 +96,9 @@ def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> F
     theta, phi = record["state.angle"], record["walk.now.shank"]
     alpha = phi - theta + 0.5 * np.pi
     ankle_acceleration = np.gradient(record["state.angular_velocity"], time)
-    matrix = mass_matrix(leg, np.cos(theta))  # type: ignore[arg-type]
-    turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])  # type: ignore[arg-type]
+    matrix = mass_matrix(leg, np.cos(theta))
+    turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])
     forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
-    weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)  # type: ignore[arg-type]
+    weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)
     inertial = matrix.shank * record["walk.now.shank_acceleration"] + matrix.coupling * ankle_acceleration
     return np.where(record["walk.contact"] == SWING, inertial + turning.knee + weight.knee, 0.0)

@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS, walking_controllers
-from ppafo.documents.models import NAME, one_of, optional, published_schema, table
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.simulation import supply_line
 from ppafo.simulation.declaration import SAMPLING
 from ppafo.simulation.schema import (
@@ -89,4 +89,4 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a walk file."""
     WALKING_CONTROLLERS.load_all()
     CONTROLLERS.load_all()
-    return published_schema(walk_file(), "ppafo walk")
+    return make_schema(walk_file(), "ppafo walk")

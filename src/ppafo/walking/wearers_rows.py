@@ -150,7 +150,8 @@ def _gait_at_heel_strike(run: Run, segments: Mapping[str, Floats], gaits: Varied
     knee = {name: gaits.series[name].at_heel_strike(frequency)[0] for name in KNEE}
     # A leg of arrays: the functions of the leg are plain arithmetic.
     own = {name: row for name, row in segments.items() if name in LegParameters._fields}
-    leg: Any = run.walk.leg._replace(**own)  # type: ignore[arg-type]
+    leg: Any = run.walk.leg
+    leg = leg._replace(**own)
     torque: Any = torque_of_shank
     foot = shank - ankle + 0.5 * np.pi
     directions = np.sin(shank), np.cos(shank), np.sin(foot), np.cos(foot)

@@ -28,7 +28,7 @@ def written(
 
     def write(points: dict[str, Floats] | None = None, plate: bool = False, walk_along: float = 1.0) -> Path:
         frames = np.arange(0.0, walk.duration, 0.01)
-        at = walk.resampled(frames)
+        at = walk.resample(frames)
         shank, nothing = at["shank_angle"], np.zeros(frames.size)
         forward, up = knee_way(frames)
         knee = np.array([walk_along * 1000.0 * forward, nothing, 1000.0 * up])

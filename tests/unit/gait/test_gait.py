@@ -5,6 +5,7 @@ import math
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import jsonschema
@@ -66,11 +67,11 @@ def test_a_gait_file_read_back_is_the_same_gait(normative: Gait) -> None:
 
 
 def test_the_shipped_gaits_fit_the_published_schema() -> None:
-    import tomllib
-
+    validator = jsonschema.Draft202012Validator(json_schema())
+    assert list_gaits()
     for name in list_gaits():
         text = (ROOT / "src" / "ppafo" / "gait" / "normative" / f"{name}.toml").read_text(encoding="utf-8")
-        jsonschema.validate(tomllib.loads(text), json_schema())
+        assert not list(validator.iter_errors(tomllib.loads(text)))
 
 
 @pytest.mark.parametrize(
@@ -224,7 +225,7 @@ def test_a_walk_repeats_the_stride_and_is_marked_synthetic(normative: Gait) -> N
     assert walk.kind == "synthetic"
     assert walk.duration == pytest.approx(3.0 * normative.stride_time)
     assert walk["shank_angle"][-1] == pytest.approx(walk["shank_angle"][0], abs=1e-9)
-    with pytest.raises(DataError, match="0 strides"):
+    with pytest.raises(DataError, match=r"from 1 to .*, not 0"):
         walk_recording(normative, 0)
 
 

@@ -80,7 +80,14 @@ class SafetyState(NamedTuple):
 
 
 START = SafetyState(
-    0.0, LastReadings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, ValveTimes(0.0, 0.0, 0.0), SlowPressures(0.0, 0.0)
+    vented=0.0,
+    readings=LastReadings(
+        heel_force=0.0, toe_force=0.0, angle=0.0, heel_unchanged=0.0, toe_unchanged=0.0, angle_unchanged=0.0
+    ),
+    toe_strides=0.0,
+    steady=0.0,
+    valve_times=ValveTimes(0.0, 0.0, 0.0),
+    slow_pressures=SlowPressures(0.0, 0.0),
 )
 
 STEADY = 0.1
@@ -104,12 +111,12 @@ def time_unchanged(last: float, reading: float, since: float, period: float) -> 
 def next_readings(last: LastReadings, measurement: GaitMeasurement, period: float) -> LastReadings:
     """The last readings after a sample, taken every ``period`` [s]."""
     return LastReadings(
-        measurement.heel_force,
-        measurement.toe_force,
-        measurement.angle,
-        time_unchanged(last.heel_force, measurement.heel_force, last.heel_unchanged, period),
-        time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, period),
-        time_unchanged(last.angle, measurement.angle, last.angle_unchanged, period),
+        heel_force=measurement.heel_force,
+        toe_force=measurement.toe_force,
+        angle=measurement.angle,
+        heel_unchanged=time_unchanged(last.heel_force, measurement.heel_force, last.heel_unchanged, period),
+        toe_unchanged=time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, period),
+        angle_unchanged=time_unchanged(last.angle, measurement.angle, last.angle_unchanged, period),
     )
 
 
@@ -200,7 +207,14 @@ def monitor(
     wrong = wrong | contradicts_gait(rules, before, phase, toe_strides, steady)
     slow_pressures = next_slow_pressures(state.slow_pressures, measurement, period)
     fails = wrong | contradicts_valve(rules, state.valve_times, slow_pressures, phase, measurement)
-    return SafetyState(1.0 if fails else state.vented, readings, toe_strides, steady, state.valve_times, slow_pressures)
+    return SafetyState(
+        vented=1.0 if fails else state.vented,
+        readings=readings,
+        toe_strides=toe_strides,
+        steady=steady,
+        valve_times=state.valve_times,
+        slow_pressures=slow_pressures,
+    )
 
 
 def feed_time(since: float, opening: float, period: float) -> float:
@@ -219,5 +233,10 @@ def safe_command(state: SafetyState, command: float, period: float) -> tuple[flo
         state.valve_times.venting + period if vents else 0.0,
     )
     return sent, SafetyState(
-        state.vented, state.readings, state.toe_strides, state.steady, valve_times, state.slow_pressures
+        vented=state.vented,
+        readings=state.readings,
+        toe_strides=state.toe_strides,
+        steady=state.steady,
+        valve_times=valve_times,
+        slow_pressures=state.slow_pressures,
     )

@@ -110,7 +110,7 @@ def _check_enough(strides: list[Stride], found: list[Stride], walk: Mapping[str,
     )
     raise DataError(
         f"{walk['shank_angle'].file}: has {count} within angles and events ({events}; {spans}), {least} are needed; "
-        "give a longer recording, or accept fewer with --least-strides"
+        "give a longer recording, or accept fewer with --minimum-strides"
     )
 
 

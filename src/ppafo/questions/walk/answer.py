@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import shown, titled
+from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.metrics import Metric
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.endurance.solve import Endurance
@@ -120,7 +120,7 @@ def comparison_table(comparison: Comparison) -> Table:
         healthy["push_off_share"] = Metric(1.0, "-", "")
     columns = (comparison.with_device.metrics, comparison.without_device.metrics, healthy)
     rows = [
-        (titled(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
+        (title_with_unit(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
         for name, title, quantity, digits in _ROWS
     ]
     return Table(tuple(map(Column, _HEAD)), tuple(rows))
@@ -130,7 +130,7 @@ def _cell(metric: Metric | None, quantity: str, digits: int) -> str | None:
     """Return a cell, without the sign of a number that is rounded to zero."""
     if metric is None:
         return None
-    text = f"{shown(metric.value, quantity):.{digits}f}"
+    text = f"{display_value(metric.value, quantity):.{digits}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import shown, titled
+from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.signals.recording import Floats
 from ppafo.simulation.document import UNITS, plain
 from ppafo.version import __version__
@@ -31,7 +31,7 @@ def wearers_answer(population: Population) -> Answer:
     tables = {**population.outcomes, **population.traits}
     head = (Column(""), *(Column(f"{100.0 * fraction:.0f} %") for fraction in QUANTILES))
     rows = [
-        (titled(title, quantity), *_cells(tables[name], quantity, digits))
+        (title_with_unit(title, quantity), *_cells(tables[name], quantity, digits))
         for name, (title, quantity, digits) in SHOWN.items()
     ]
     figure = Figure("wearers", _CAPTION, lambda: population_figure(population))
@@ -54,7 +54,7 @@ def wearers_answer(population: Population) -> Answer:
 
 
 def _cells(values: Floats, quantity: str, digits: int) -> list[str | None]:
-    texts = [f"{shown(value, quantity):.{digits}f}" for value in _values(values).tolist()]
+    texts = [f"{display_value(value, quantity):.{digits}f}" for value in _values(values).tolist()]
     return [text.removeprefix("-") if float(text) == 0.0 else text for text in texts] or [None] * len(QUANTILES)
 
 
