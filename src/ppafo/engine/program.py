@@ -64,10 +64,10 @@ class Program:
     the valve. ``is_thermal`` True gives the gas an energy balance instead of a constant temperature. ``walks`` True
     puts the device on a walking leg, whose foot is free or where the ground and a gait lead it (``angle`` is None then;
     its sensors are its own); ``takes_course`` True lets that leg stand, start, change its speed and stop instead of
-    walking stride after equal stride. ``has_lines`` True feeds the device from lines behind regulators instead of constant
-    pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded samples
-    lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names channels
-    that are kept at some of them.
+    walking stride after equal stride. ``has_lines`` True feeds the device from lines behind regulators instead of
+    constant pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded
+    samples lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names
+    channels that are kept at some of them.
     """
 
     valve: ValveModel

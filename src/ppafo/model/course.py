@@ -1,8 +1,8 @@
 """A course of walking: stands, starts, strides of any length, ramps and stops in time, and the gait on it.
 
-The course is a list of parts. Over each the strides per second and the length of the stride run from one value to another
-along a polynomial of fifth order, so that both have two continuous time derivatives, also from part to part. The phase
-is the integral of the strides per second, in closed form.
+The course is a list of parts. Over each the strides per second and the length of the stride run from one value to
+another along a polynomial of fifth order, so that both have two continuous time derivatives, also from part to part.
+The phase is the integral of the strides per second, in closed form.
 
 Between standing (shank vertical, foot flat) and the recorded gait the angles are ``stand + stride (gait - stand)``.
 A person stands at the phase in the middle between heel strike and heel rise, where the recorded foot is flat.
@@ -29,15 +29,16 @@ SCUFF_FORCE = 0.2
 """Force of a scuff under the toes in body weights. Assumed; twice what the shipped controllers take for a load."""
 
 WALKS_ABOVE = 0.5
-"""Strides per second over the recorded ones above which the foot carries as in walking; below, partly as in standing."""
+"""Strides per second over the recorded ones from which on the foot carries as in walking; below, partly as in
+standing."""
 
 
 class CoursePart(NamedTuple):
     """One part: start and length [s], phase at its start [turns], and what changes over it: first value and gain.
 
     Strides per second [Hz], ``stride`` (angles over the recorded ones) [-] and ``load`` [body weights] that the foot
-    carries in standing. ``tilt`` [rad] leans the shank forward at the strike, so that the toes come first; ``scuff`` [s]
-    is how long the toes touch the ground in the swing; both hold for the whole part.
+    carries in standing. ``tilt`` [rad] leans the shank forward at the strike, so that the toes come first; ``scuff``
+    [s] is how long the toes touch the ground in the swing; both hold for the whole part.
     """
 
     start: float
@@ -60,7 +61,7 @@ class Course(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """Phase [turns], strides per second [Hz] and stride [-] with their time derivatives; load, tilt, scuff as in a part."""
+    """Phase [turns], strides per second [Hz], stride [-] and their time derivatives; load, tilt, scuff as in a part."""
 
     turns: float
     frequency: float

@@ -30,7 +30,7 @@ class Comparison:
 def compare_walks(
     configuration: Configuration, minutes: float | None = None, progress: Progress = silent
 ) -> Comparison:
-    """Walk ``minutes`` [min], or a whole course, with the device and as long with it off; ScenarioError for bad input."""
+    """Walk ``minutes`` [min], or a whole course, with the device and with it off; ScenarioError for bad input."""
     return Comparison(
         walk(configuration, minutes, progress=progress),
         walk(with_device_off(configuration), minutes, progress=progress),

@@ -19,8 +19,8 @@ class Configuration:
     """One device on one wearer; ``settings`` of the controller in SI, ``period`` and ``step`` in seconds.
 
     ``supply_lines`` are the lines behind its regulators, None where the supply pressures are constant. ``thermal`` is
-    how the gas takes up heat, None where it keeps its temperature. ``course`` is what the wearer does one after the other,
-    None where stride follows equal stride.
+    how the gas takes up heat, None where it keeps its temperature. ``course`` is what the wearer does one after the
+    other, None where stride follows equal stride.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
 

@@ -1,16 +1,16 @@
 """A course of walking as values: from a name or a file to its segments, in SI units."""
 
 import functools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, one_of, optional, published_schema, table
-from ppafo.documents.problems import first_problem, shown
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
+from ppafo.documents.problems import quote
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.declaration import Quantity
@@ -54,7 +54,7 @@ _OPTIONAL = _PACE
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """One segment of a course; ``values`` in SI units by name, those that were not given and have no default left out."""
+    """One segment of a course; ``values`` in SI units by name, without those that were not given."""
 
     kind: str
     values: dict[str, float]
@@ -83,7 +83,7 @@ def load_course(name_or_path: str | Path) -> WalkingCourse:
     """Return a course by its name in the package or by the path of a TOML file; ScenarioError for a mistake in it."""
     file = label(str(name_or_path))
     document = FILE.parse(FILE.read(name_or_path), file)
-    _check(_outline(), document, file)
+    validate(_outline(), document, file, ScenarioError)
     segments = []
     for number, given in enumerate(document["segment"], start=1):
         kind = given.get("kind")
@@ -92,21 +92,14 @@ def load_course(name_or_path: str | Path) -> WalkingCourse:
             if kind is None:
                 raise ScenarioError(f"{file}: segment {number}: 'kind' is missing; {allowed}")
             hint = nearest_name(str(kind), KINDS)
-            raise ScenarioError(f"{file}: segment {number}: kind = {shown(kind)} is not known{hint}; {allowed}")
+            raise ScenarioError(f"{file}: segment {number}: kind = {quote(kind)} is not known{hint}; {allowed}")
         place = f"{file}: segment {number} ({kind})"
-        _check(_segment_table(kind), given, place)
+        validate(_segment_table(kind), given, place, ScenarioError)
         segments.append(_segment(Reading(place, given), kind))
     course = WalkingCourse(document["name"], document.get("description", ""), tuple(segments), file)
     for index, reason in _contradictions(course.segments):
         raise course.refusal(index, reason)
     return course
-
-
-def _check(model: type[BaseModel], document: Mapping[str, Any], place: str) -> None:
-    try:
-        model.model_validate(document)
-    except ValidationError as error:
-        raise ScenarioError(f"{place}: {first_problem(error.errors(include_url=False), model)}") from error
 
 
 def _segment(reading: Reading, kind: str) -> Segment:
@@ -166,4 +159,4 @@ def _outline() -> type[BaseModel]:
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a file of a course."""
     model = _course_table(one_of([_segment_table(kind) for kind in KINDS]), "CourseFile")
-    return published_schema(model, "ppafo walk --course")
+    return make_schema(model, "ppafo walk --course")

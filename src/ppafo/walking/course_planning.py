@@ -33,7 +33,7 @@ order in which toes and heel are loaded."""
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A segment in time: start and end [s], floats or arrays (wearers,), and the number of its strides."""
+    """A segment in time: its kind, a title for tables, start and end [s], floats or arrays (wearers,)."""
 
     kind: str
     title: str
@@ -67,7 +67,13 @@ class _Planner:
         self._add(length, 0.0, 0.0, 0.0, load, 0.0, 0.0)
 
     def go(
-        self, turns: Numbers, ratio: float, stride: float, load: float = STANDING_LOAD, tilt: Numbers = 0.0, scuff: float = 0.0
+        self,
+        turns: Numbers,
+        ratio: float,
+        stride: float,
+        load: float = STANDING_LOAD,
+        tilt: Numbers = 0.0,
+        scuff: float = 0.0,
     ) -> None:
         """Walk some strides, over which strides per second and stride go to these values over the recorded ones."""
         length = turns / (0.5 * (self.ratio + ratio) * self.frequency)
@@ -107,12 +113,12 @@ def plan_course(
     """
     resting = course.segments[0].kind == "rest"
     planner = _Planner(frequency, STANDS_AT * timing.heel_off, RESTING_LOAD if resting else STANDING_LOAD)
-    spans, steady = [], []
+    spans: list[Span] = []
+    steady: list[tuple[Numbers, Numbers]] = []
     for index, segment in enumerate(course.segments):
         start = planner.time
-        ratio = _ratio(course, index, gait, planner.ratio)
-        for part in _strides(planner, segment, ratio, strike_angle):
-            steady.append(part)
+        ratio = _ratio(course, index, gait)
+        steady += _strides(planner, segment, ratio, strike_angle)
         spans.append(Span(segment.kind, _title(segment), start, planner.time))
     duration = planner.time
     planner.stay(NEVER, planner.load) if planner.ratio == 0.0 else planner.go(NEVER, planner.ratio, planner.ratio)
@@ -184,7 +190,7 @@ def _count(planner: _Planner, values: dict[str, float], ratio: float, used: Numb
     return np.maximum(np.rint((values["duration"] - used) * ratio * planner.frequency), 1.0)
 
 
-def _ratio(course: WalkingCourse, index: int, gait: Gait, now: float) -> float:
+def _ratio(course: WalkingCourse, index: int, gait: Gait) -> float:
     """Strides per second over the recorded ones: the square root of the speed over the recorded one."""
     values, recorded = course.segments[index].values, gait.walking_speed
     if "speed" in values:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,9 @@ class SegmentResult:
 
     ``strides`` begin in it with a strike, ``helped`` are those of them in which the controller was not in its safe
     state up to the next strike, or to the end. ``gas`` [kg], ``push_off_work`` [J] of the strides that begin in it,
-    ``lowest_toes`` [m] over the ground in the middle of its swings, None without one. ``flat_push`` [N m] is the largest
-    torque in plantarflexion with a loaded heel, ``safe_time`` [s] when the controller vented, None where it did not.
+    ``lowest_toes`` [m] over the ground in the middle of its swings, None without one. ``flat_push`` [N m] is the
+    largest torque in plantarflexion with a loaded heel, ``safe_time`` [s] when the controller vented, None where it did
+    not.
     """
 
     kind: str
@@ -57,7 +59,7 @@ def segment_results(
     works: Floats,
     starts: NDArray[np.intp],
 ) -> tuple[SegmentResult, ...]:
-    """The segments that a recording reached; ``works`` [J] of its whole strides, from strike to strike at ``starts``."""
+    """The segments that a recording reached; ``works`` [J] of its whole strides, between strikes at ``starts``."""
     end = float(recording.time[-1])
     reached = [span for span in planned.spans if float(span.start) < end]
     return tuple(_segment(configuration, span, recording, works, starts) for span in reached)
@@ -105,7 +107,7 @@ def _lowest_toes(configuration: Configuration, recording: Recording, own: NDArra
     swing = recording["contact"] == SWING
     edges = np.flatnonzero(np.diff(swing.astype(np.int8))) + 1
     found = []
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in pairwise(edges.tolist()):
         if not (swing[first] and own[first]):
             continue
         span = 1.0 - timing.toe_off

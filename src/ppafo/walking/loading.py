@@ -42,7 +42,14 @@ from ppafo.walking.wearer import WEARER, Wearer
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 _TURN = 2.0 * math.pi
-_TEXTS = ("gait", "course", "device.valve", "controller.kind", "gas_model.kind", *(f"faults.{sensor}.kind" for sensor in FAULTY))
+_TEXTS = (
+    "gait",
+    "course",
+    "device.valve",
+    "controller.kind",
+    "gas_model.kind",
+    *(f"faults.{sensor}.kind" for sensor in FAULTY),
+)
 DEFAULT_PERIOD = 1.0e-3
 
 

@@ -12,9 +12,9 @@ from ppafo.engine.run import NEVER_FAILED
 from ppafo.errors import ScenarioError
 from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.course_planning import turns_walked
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
-from ppafo.walking.course_planning import turns_walked
 from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.walk import REMEDY, Progress, plan_of, silent, walk_duration
 from ppafo.walking.wearers_rows import batch_of_many, course_of_many

@@ -70,7 +70,8 @@ def _course_channels(
 
     The healthy toes are as high as those of the gait, times the stride over the recorded one.
     """
-    assert run.walk is not None and run.walk.course is not None, "a course"
+    assert run.walk is not None, "a walk has a leg"
+    assert run.walk.course is not None, "of a course"
     gait, pace = configuration.gait, pace_in_time(run.walk.course, time)
     phase, shank = record["walk.now.phase"], record["walk.now.shank"]
     healthy = path.toe_height(

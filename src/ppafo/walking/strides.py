@@ -63,7 +63,8 @@ def mean_curves(
 ) -> dict[str, Curves]:
     """Mean and deviation of every channel over strides brought to the same phases, in its SI unit; {} without strides.
 
-    Each stride ends where the next one starts, unless the samples of their ``ends`` are given. Channels that hold their value between samples, such as the command, have no mean.
+    Each stride ends where the next one starts, unless the samples of their ``ends`` are given. Channels that hold their
+    value between samples, such as the command, have no mean.
     """
     first, last = (starts[:-1], starts[1:]) if ends is None else (starts, ends)
     if first.size < 1:

@@ -89,13 +89,16 @@ def walk(
     progress: Progress = silent,
     course: str | Path | None = None,
 ) -> WalkResult:
-    """Walk for ``minutes`` [min], None for a whole course, else one: a configuration, the name of a shipped one, or a file; overrides as for the command.
+    """Walk for ``minutes`` [min]: a configuration, the name of a shipped one, or a file; overrides as for the command.
 
+    Unless ``minutes`` are given it is the whole course, or one minute where there is none.
     A walk that diverges is a result with that status, up to the time of failure. ScenarioError or ParameterError for
     bad input. ``progress`` gets the minutes done and the minutes in all, part by part.
     """
     is_loaded = isinstance(configuration, Configuration)
-    chosen = configuration if isinstance(configuration, Configuration) else load_walk(configuration, overrides, gait, course)
+    chosen = (
+        configuration if isinstance(configuration, Configuration) else load_walk(configuration, overrides, gait, course)
+    )
     if is_loaded and (gait is not None or course is not None or tuple(overrides)):
         raise ScenarioError(
             "overrides, a gait and a course go with a name or a file; a Configuration takes them in load_walk"

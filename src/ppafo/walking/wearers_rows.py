@@ -118,14 +118,18 @@ def _state_rows(
     volumes = chamber_volumes(plant, now["ankle"])
     masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
     foot = now["shank"] - now["ankle"] + 0.5 * np.pi
-    return {f"walk.now.{name}": values for name, values in now.items()} | shown | {
-        "walk.foot.sine": np.sin(foot),
-        "walk.foot.cosine": np.cos(foot),
-        "state.angle": now["ankle"],
-        "state.angular_velocity": now["ankle_rate"],
-        "state.mass_1": np.asarray(masses[0]),
-        "state.mass_2": np.asarray(masses[1]),
-    }
+    return (
+        {f"walk.now.{name}": values for name, values in now.items()}
+        | shown
+        | {
+            "walk.foot.sine": np.sin(foot),
+            "walk.foot.cosine": np.cos(foot),
+            "state.angle": now["ankle"],
+            "state.angular_velocity": now["ankle_rate"],
+            "state.mass_1": np.asarray(masses[0]),
+            "state.mass_2": np.asarray(masses[1]),
+        }
+    )
 
 
 def _gait_in_standing(

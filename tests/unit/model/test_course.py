@@ -1,5 +1,6 @@
 """The gait on a course: continuous at every knot, upright and flat in standing, that of the file at its own speed."""
 
+import itertools
 import math
 
 import numpy as np
@@ -45,7 +46,7 @@ def test_angles_rates_and_accelerations_are_continuous_at_every_knot(name: str) 
 def test_phase_and_strides_per_second_are_continuous_at_every_knot(name: str) -> None:
     course = planned_course(load_course(name), GAIT).course
     parts = [part for part in course.parts if part.start < 1.0e5]
-    for part, after in zip(parts, parts[1:], strict=False):
+    for part, after in itertools.pairwise(parts):
         ends, begins = pace_in(part, after.start), pace_in(after, after.start)
         assert begins[:6] == pytest.approx(ends[:6], abs=1.0e-9)
 
@@ -117,7 +118,9 @@ def test_a_scuff_loads_the_toes_for_its_time_in_one_swing() -> None:
 
 
 def test_a_stumble_takes_one_stride_of_its_time() -> None:
-    planned = course_of(("walk", {"strides": 2.0}), ("stumble", {"time": 0.75, "length": 0.6}), ("walk", {"strides": 2.0}))
+    planned = course_of(
+        ("walk", {"strides": 2.0}), ("stumble", {"time": 0.75, "length": 0.6}), ("walk", {"strides": 2.0})
+    )
     stumble = planned.spans[1]
     assert stumble.end - stumble.start == pytest.approx(0.75 * GAIT.stride_time)
     middle = pace_in_time(planned.course, np.array([stumble.start, 0.5 * (stumble.start + stumble.end), stumble.end]))

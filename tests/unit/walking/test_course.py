@@ -1,5 +1,6 @@
 """Courses: files and their mistakes, segments in time, and what the foot, the gas and many wearers do on them."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from ppafo.engine.lane_source import lane_source
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
+from ppafo.model.chambers import chamber_mass
 from ppafo.model.contact import FLAT
+from ppafo.model.plant import chamber_volumes
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.course import WalkingCourse, list_courses, load_course
 from ppafo.walking.planning import plan_walk, planned_course
@@ -45,7 +48,10 @@ MISTAKES = {
     "both speeds": (WALK + 'cadence = "100 1/min"\n', ("segment 1 (walk): give either speed or cadence, not both",)),
     "stop in standing": (STAND + '[[segment]]\nkind = "stop"\n', ("segment 2 (stop): the wearer stands there",)),
     "scuff in standing": ('[[segment]]\nkind = "scuff"\n', ("segment 1 (scuff): the wearer stands there",)),
-    "start in walking": (WALK + '[[segment]]\nkind = "start"\n', ("segment 2 (start): the wearer walks there already",)),
+    "start in walking": (
+        WALK + '[[segment]]\nkind = "start"\n',
+        ("segment 2 (start): the wearer walks there already",),
+    ),
     "ramp to nowhere": (WALK + '[[segment]]\nkind = "ramp"\nstrides = 3\n', ("segment 2 (ramp): give the speed",)),
     "no segments": ("segment = []\n", ("segment",)),
 }
@@ -155,9 +161,6 @@ def test_in_standing_the_foot_is_flat_and_both_sensors_are_loaded(corridor: Walk
 def test_gas_is_kept_on_a_course(corridor: WalkResult) -> None:
     run = plan_walk(plan_of(load_walk("solenoid", LENIENT, course="corridor"), 1.0))
     recording, plant = corridor.recording, run.plant
-    from ppafo.model.chambers import chamber_mass
-    from ppafo.model.plant import chamber_volumes
-
     volumes = chamber_volumes(plant, recording["angle"])  # type: ignore[arg-type]
     masses = [
         chamber_mass(recording[f"pressure_{side}"], volume, plant.gas_product)
@@ -185,8 +188,7 @@ def test_means_are_over_the_strides_at_an_even_speed_on_level_ground(corridor: W
     strikes = corridor.recording.time[corridor.starts]
     walked = [item for item in corridor.segments if item.kind == "walk"]
     inside = [
-        any(item.start <= first and last <= item.end for item in walked)
-        for first, last in zip(strikes[:-1], strikes[1:], strict=True)
+        any(item.start <= first and last <= item.end for item in walked) for first, last in itertools.pairwise(strikes)
     ]
     steady = int(corridor.metrics["steady_strides"].value)
     assert 0 < steady <= sum(inside)

@@ -11,8 +11,7 @@ from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.metrics import Metric
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.endurance.solve import Endurance
-from ppafo.questions.walk.course import course_data, course_files, course_pictures, course_sections
-from ppafo.questions.walk.course import trust_remark as _trust
+from ppafo.questions.walk.course import course_data, course_files, course_pictures, course_sections, trust_remark
 from ppafo.questions.walk.solve import WalkPair, Wearers
 from ppafo.questions.walk.wearers import wearers_answer
 from ppafo.signals.recording import Floats
@@ -73,7 +72,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
     worn, bare = comparison.with_device, comparison.without_device
     configuration = worn.configuration
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    remarks = [_bottle(pair.life), _safety(comparison), _trust(configuration)]
+    remarks = [_bottle(pair.life), _safety(comparison), trust_remark(configuration)]
     remarks += [
         f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
     ]
@@ -81,7 +80,9 @@ def _pair_answer(pair: WalkPair) -> Answer:
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        lead=(f"{configuration.name}: {worn.status.kind}, {strides} of {configuration.gait.name}{_along(configuration)}",),
+        lead=(
+            f"{configuration.name}: {worn.status.kind}, {strides} of {configuration.gait.name}{_along(configuration)}",
+        ),
         sections=(
             Section(paragraphs=_set_up(comparison), is_detail=True),
             *course_sections(comparison),

@@ -5,7 +5,7 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from ppafo.answers import Column, Figure, Section, Table
-from ppafo.answers.shown_units import shown
+from ppafo.answers.display_units import display_value
 from ppafo.errors import DataError
 from ppafo.gait.scaling import speed_range
 from ppafo.walking.comparison import Comparison
@@ -41,7 +41,10 @@ _EXPLAINED = (
     "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
     "of the stance stay those of the gait at every speed.",
 )
-_MEAN = "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a band."
+_MEAN = (
+    "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "
+    "band."
+)
 
 
 def course_sections(comparison: Comparison) -> tuple[Section, ...]:
@@ -102,7 +105,7 @@ def _text(value: float | None, quantity: str, digits: int) -> str | None:
     """Return a cell, without the sign of a number that is rounded to zero."""
     if value is None:
         return None
-    text = f"{shown(value, quantity):.{digits}f}"
+    text = f"{display_value(value, quantity):.{digits}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 

@@ -46,8 +46,9 @@ def walk_with_and_without(
     """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
-    that of its course unless given; ``gait`` and ``course`` stand in place of those of the configuration; ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError for
-    bad input; a walk that diverges is an answer that has not passed.
+    that of its course unless given; ``gait`` and ``course`` stand in place of those of the configuration; ``wearers``
+    the number of different wearers, drawn with ``seed``. ScenarioError for bad input; a walk that diverges is an answer
+    that has not passed.
     """
     chosen = configuration
     if not isinstance(chosen, Configuration):

@@ -112,8 +112,15 @@ def _phases(axes: "Axes", worn: WalkResult) -> None:
 
 def _legend(axes: "Axes", columns: int) -> None:
     """Beside the title of a panel, where no curve is."""
-    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.1}
-    axes.legend(ncols=columns, fontsize=8, handlelength=1.2, columnspacing=1.0, **place)
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.1,
+        ncols=columns,
+        fontsize=8,
+        handlelength=1.2,
+        columnspacing=1.0,
+    )
 
 
 def _segment_names(axes: "Axes", worn: WalkResult) -> None:
