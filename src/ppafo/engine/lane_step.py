@@ -8,9 +8,8 @@ that are through wait, masked, and no lane sees another.
 
 from ppafo.engine.lane_control import sense_end
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
+from ppafo.engine.lane_walk import lead_walk, mark_stride
 from ppafo.engine.scheme import motion, parts, pneumatics, supply_lines, thermal_gas, walking
-from ppafo.model.course import gait_on_course, shown_toe_force
-from ppafo.model.gait import gait_at
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -147,30 +146,6 @@ def connect(rows: LaneRows, line_state: str) -> str:
     return f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"
 
 
-def lead_walk(rows: LaneRows) -> list[list[str]]:
-    """Two phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
-    if not rows.program.walks:
-        return []
-    gait = next_gait(rows)
-    foot = f"{rows.add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)"
-    return [
-        [rows.load("gait"), *gait],
-        [rows.load("next_gait"), f"begun = {foot}", *rows.keep("begun")],
-    ]
-
-
-def next_gait(rows: LaneRows) -> list[str]:
-    """Lines that make the gait at the end of the step: stride after stride, or on a course, which may scuff."""
-    if not rows.program.takes_course:
-        return [f"next_gait = {rows.add(gait_at)}(gait, gait_timing, leg, time + length)", *rows.keep("next_gait")]
-    given = "gait, walk_course, gait_timing, leg, time + length"
-    return [
-        rows.load("walk_course"),
-        f"next_gait, scuff = {rows.add(gait_on_course)}({given})",
-        *rows.keep("next_gait", "scuff"),
-    ]
-
-
 def lead(rows: LaneRows) -> list[str]:
     """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
     program, add = rows.program, rows.add
@@ -297,7 +272,7 @@ def end_motion(rows: LaneRows) -> list[str]:
         follow = rows.cells["gait_sensors.follow_rate"]
         given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, next_gait, length"
         lines = [rows.load("next_gait"), f"after, walk = {add(walking.end_walk)}({given})", *rows.store("walk")]
-        lines += scuffed(rows)
+        lines += mark_stride(rows)
         if program.is_thermal:
             assumed = f"{add(walking.next_angle)}(plant, walk_before, begun)"
             lines.insert(1, "walk_before = walk")
@@ -311,14 +286,6 @@ def end_motion(rows: LaneRows) -> list[str]:
     if program.is_held:
         return ["after = fed", "error = 0.0"]
     return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]
-
-
-def scuffed(rows: LaneRows) -> list[str]:
-    """Lines that add a scuff to what the toe sensor shows, on a course."""
-    if not rows.program.takes_course:
-        return []
-    shown = f"{rows.add(shown_toe_force)}(walk.toe_force, scuff, {rows.cells['gait_sensors.follow_rate']}, length)"
-    return [rows.load("scuff"), f"{rows.cells['walk.toe_force']} = {shown}"]
 
 
 def store_all(rows: LaneRows, flag: str) -> list[str]:

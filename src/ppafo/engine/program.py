@@ -15,7 +15,7 @@ from ppafo.engine.scheme.thermal_flows import ThermalFlows
 from ppafo.engine.scheme.thermal_gas import ThermalGas
 from ppafo.engine.scheme.walking import WalkState, WalkStep
 from ppafo.model.course import Course as WalkCourse
-from ppafo.model.course import Scuff
+from ppafo.model.course import Marks
 from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
@@ -162,7 +162,7 @@ class Program:
         _, shown, _ = get_type_hints(self.valve.connect).values()
         return {
             **({"next_gait": GaitNow} if self.walks else {}),
-            **({"scuff": Scuff} if self.takes_course else {}),
+            **({"marks": Marks} if self.takes_course else {}),
             "begun": begun,
             "gas": gas,
             "shown": shown,

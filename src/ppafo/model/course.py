@@ -74,10 +74,11 @@ class Pace(NamedTuple):
     scuff: float
 
 
-class Scuff(NamedTuple):
-    """Force [N] of a scuff under the toes now."""
+class Marks(NamedTuple):
+    """What marks a stride now: force [N] of a scuff under the toes, and 1 where only the forefoot meets the ground."""
 
-    force: float
+    scuff_force: float
+    forefoot: float
 
 
 class Blend(NamedTuple):
@@ -177,17 +178,18 @@ def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> Motion:
     )
 
 
-def scuff_now(timing: GaitTiming, leg: LegParameters, phase: float, pace: Pace) -> Scuff:
-    """Force of a scuff [N]; none in a part without one."""
+def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: Pace) -> Marks:
+    """The marks at a phase; none in a part without a scuff and a tilt."""
     since = phase - timing.toe_off - SCUFF_AT * (1.0 - timing.toe_off)
     weight = SCUFF_FORCE * leg.body_mass * leg.gravity
-    return Scuff(force=weight if since >= 0.0 and since < pace.scuff * pace.frequency else 0.0)
+    scuffs = since >= 0.0 and since < pace.scuff * pace.frequency
+    return Marks(scuff_force=weight if scuffs else 0.0, forefoot=1.0 if pace.tilt > 0.0 else 0.0)
 
 
 def gait_on_course(
     gait: GaitSeries, course: Course, timing: GaitTiming, leg: LegParameters, time: float
-) -> tuple[GaitNow, Scuff]:
-    """The gait of a person with this leg at a time [s] of a course, and the force of a scuff.
+) -> tuple[GaitNow, Marks]:
+    """The gait of a person with this leg at a time [s] of a course, and what marks the stride.
 
     The ground force is that of the gait at any speed, and passes to the load of standing below ``WALKS_ABOVE``. The
     acceleration of the knee goes with stride and strides per second squared; that of the way of the body as its speed
@@ -229,9 +231,14 @@ def gait_on_course(
         sine_healthy_foot=sine_foot,
         healthy_torque=torque + foot_inertia_about_ankle(leg) * ankle.acceleration + leg.ankle_damping * ankle.rate,
     )
-    return now, scuff_now(timing, leg, phase, pace)
+    return now, marks_at(timing, leg, phase, pace)
 
 
-def shown_toe_force(toe_force: float, scuff: Scuff, follow_rate: float, step: float) -> float:
+def shown_toe_force(toe_force: float, marks: Marks, follow_rate: float, step: float) -> float:
     """Toe force [N] that the sensor shows at the end of a step [s], with a scuff; it follows at a rate [1/s]."""
-    return toe_force + scuff.force * follow_rate * step / (1.0 + follow_rate * step)
+    return toe_force + marks.scuff_force * follow_rate * step / (1.0 + follow_rate * step)
+
+
+def stands_on_toes(toes_first: float, marks: Marks) -> float:
+    """1 where the stride began with the toes, or where only the forefoot is on the ground: on the edge of a stair."""
+    return max(toes_first, marks.forefoot)

@@ -27,8 +27,8 @@ LOADING_TIME = 1.0
 """Time [s] in which the load changes between standing and sitting, or half the segment. Assumed."""
 
 TOES_DOWN = math.radians(10.0)
-"""Angle of the healthy foot below the flat one where it meets a stair. Assumed; 5 to 15 deg make no difference to the
-order in which toes and heel are loaded."""
+"""Angle of the healthy foot below the flat one where it meets a stair. Assumed. A device may hold the foot higher; only
+the forefoot is on the stair all the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,13 +121,16 @@ def plan_course(
         steady += _strides(planner, segment, ratio, strike_angle)
         spans.append(Span(segment.kind, _title(segment), start, planner.time))
     duration = planner.time
-    planner.stay(NEVER, planner.load) if planner.ratio == 0.0 else planner.go(NEVER, planner.ratio, planner.ratio)
+    if planner.ratio == 0.0:
+        planner.stay(NEVER, planner.load)
+    else:
+        planner.go(NEVER, planner.ratio, planner.ratio)
     if len(planner.parts) > PARTS:
         raise ScenarioError(
             f"{course.file}: takes {len(planner.parts)} parts, a change of speed counted apart, and {PARTS} is the "
             "most: leave segments out, or make it two courses"
         )
-    unused = CoursePart(*(NEVER, NEVER, *(0.0,) * (len(CoursePart._fields) - 2)))
+    unused = planner.parts[0]._replace(start=NEVER)
     parts = (*planner.parts, *(unused,) * (PARTS - len(planner.parts)))
     return PlannedCourse(Course(parts), tuple(spans), tuple(steady), duration)
 

@@ -109,7 +109,7 @@ def test_on_stairs_the_healthy_toes_are_down_at_the_strike_and_on_level_ground_t
 def test_a_scuff_loads_the_toes_for_its_time_in_one_swing() -> None:
     planned = course_of(("walk", {"strides": 2.0}), ("scuff", {"contact": 0.04}), ("walk", {"strides": 2.0}))
     time = np.arange(0.0, float(planned.duration), 1.0e-4)
-    force = np.array([gait_on_course(SERIES, planned.course, TIMING, LEG, moment)[1].force for moment in time])
+    force = np.array([gait_on_course(SERIES, planned.course, TIMING, LEG, moment)[1].scuff_force for moment in time])
     assert np.count_nonzero(force) * 1.0e-4 == pytest.approx(0.04, abs=2.0e-4)
     assert np.ptp(np.flatnonzero(force)) * 1.0e-4 < 0.041
     assert force.max() == SCUFF_FORCE * LEG.body_mass * LEG.gravity

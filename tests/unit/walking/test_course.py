@@ -181,7 +181,6 @@ def test_the_segments_add_up_to_the_course(corridor: WalkResult) -> None:
     assert metrics["course_lowest_toes"].value == min(lowest)
     assert 0 < metrics["helped_strides"].value <= metrics["course_strides"].value
     assert metrics["steady_strides"].value < metrics["strides"].value
-    assert metrics["course_length"].value == pytest.approx(46.0, abs=6.0)
 
 
 def test_means_are_over_the_strides_at_an_even_speed_on_level_ground(corridor: WalkResult) -> None:
@@ -201,21 +200,41 @@ def test_the_toe_sensor_shows_a_scuff_in_the_swing(corridor: WalkResult) -> None
     usual = within(corridor, "walk", 2.0)[1]
     swing = recording["contact"] == 0.0
     late = recording["toe_force"] > 100.0
-    settled = np.flatnonzero(scuff & swing & late)
-    assert 0.03 < settled.size * 1.0e-3 < 0.06
-    # The sensor follows the force at toe-off for a few milliseconds only.
-    assert np.count_nonzero(usual & swing & late) < 12 * corridor.segments[4].strides
+    interval = recording.time[1]
+    assert 0.03 < np.count_nonzero(scuff & swing & late) * interval < 0.05
+    assert np.count_nonzero(usual & swing & late) == 0
 
 
-def test_on_stairs_every_stride_begins_on_the_toes() -> None:
+def test_the_recording_has_the_speed_of_each_segment(corridor: WalkResult) -> None:
+    recording = corridor.recording
+    walked = [item for item in corridor.segments if item.kind == "walk"]
+    for item, speed in zip(walked, (1.2, 0.8, 0.8, 1.4, 1.4), strict=True):
+        late = (recording.time > item.end - 2.0) & (recording.time < item.end)
+        assert np.count_nonzero(late) > 300
+        assert recording["walking_speed"][late] == pytest.approx(speed, rel=1.0e-6)
+    assert recording["walking_speed"][within(corridor, "stand")[0]].max() == 0.0
+    way = np.diff(recording["walking_speed"][within(corridor, "walk", 2.5)[0]]).size * recording.time[1] * 1.2
+    assert way < corridor.metrics["course_length"].value < 1.4 * recording.time[-1]
+
+
+def first_loaded(result: WalkResult, start: float, end: float) -> list[str]:
+    """Which sensor shows a tenth of the body weight first after each strike."""
+    found = []
+    for first in result.starts:
+        if start <= result.recording.time[first] < end:
+            later = slice(first, first + 400)
+            heel, toe = (np.argmax(result.recording[f"{name}_force"][later] > 71.0) for name in ("heel", "toe"))
+            found.append("toe" if toe < heel else "heel")
+    return found
+
+
+def test_on_stairs_the_toes_are_loaded_first_also_with_a_device_that_lifts_them() -> None:
     result = walk("solenoid", overrides=LENIENT, course="stairs")
-    for item in (item for item in result.segments if item.kind == "stairs"):
-        begun = [
-            number
-            for number, start in enumerate(result.starts)
-            if item.start + 1.5 <= result.recording.time[start] < item.end
-        ]
-        assert result.strides["toe_landing"][begun[:-1]].all()
+    before, first, _, second, after, *_ = result.segments[1:]
+    for item in (first, second):
+        assert first_loaded(result, item.start, item.end) == ["toe"] * 6
+    for item in (before, after):
+        assert set(first_loaded(result, item.start + 2.0, item.end)) == {"heel"}
 
 
 def test_a_course_has_the_same_bits_alone_and_in_a_population() -> None:
