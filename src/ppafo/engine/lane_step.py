@@ -150,7 +150,7 @@ def lead(rows: LaneRows) -> list[str]:
     """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
     program, add = rows.program, rows.add
     if program.walks:
-        return [rows.load("begun"), f"next_angle = {add(walking.next_angle)}(plant, walk, begun)"]
+        return [rows.load("begun"), f"next_angle = {add(walking.next_angle)}(plant, leg, walk, begun)"]
     if program.angle is None:
         return [rows.load("begun"), "next_angle = begun.next_angle"]
     if program.is_held:
@@ -274,7 +274,7 @@ def end_motion(rows: LaneRows) -> list[str]:
         lines = [rows.load("next_gait"), f"after, walk = {add(walking.end_walk)}({given})", *rows.store("walk")]
         lines += mark_stride(rows)
         if program.is_thermal:
-            assumed = f"{add(walking.next_angle)}(plant, walk_before, begun)"
+            assumed = f"{add(walking.next_angle)}(plant, leg, walk_before, begun)"
             lines.insert(1, "walk_before = walk")
             lines.append(f"after = {add(thermal_gas.after_motion)}(plant, thermal, after, {assumed}, after.angle)")
         return lines

@@ -42,6 +42,7 @@ def _facts(gait: Gait) -> tuple[tuple[str, str], ...]:
     return (
         ("source", gait.source),
         ("body mass", f"{gait.body_mass:.4g} kg"),
+        ("stature", "not known" if gait.stature is None else f"{gait.stature:.4g} m"),
         ("speed", speed),
         ("stride time", f"{gait.stride_time:.4g} s{_plus_minus(gait.stride_time_deviation)}"),
         ("stance", stance),
@@ -78,6 +79,7 @@ def _data(gait: Gait, imported: ImportedGait | None) -> dict[str, Any]:
         "source": gait.source,
         "notes": gait.notes,
         "body_mass": gait.body_mass,
+        "stature": gait.stature,
         "walking_speed": gait.walking_speed,
         "recorded_speed": gait.recorded_speed,
         "stride_time": gait.stride_time,

@@ -22,6 +22,7 @@ _SUMMARIES = {
 }
 _LIMITS = {
     "subject.body_mass": ("kg", 1.0, 500.0),
+    "subject.stature": ("m", 0.5, 2.5),
     "subject.walking_speed": ("m/s", 0.05, 4.0),
     "subject.recorded_speed": ("m/s", 0.05, 4.0),
     "stride.time": ("s", 0.3, 5.0),
@@ -38,6 +39,7 @@ def gait_file() -> type[BaseModel]:
     text = Annotated[str, Field(pattern=r"^\s*[+-]?(\d|\.\d)")]
     subject = {
         "body_mass": (text, Field(description="mass of the wearer, such as '62 kg'")),
+        "stature": optional(text, "height of the wearer, such as '1.75 m', where it is known"),
         "walking_speed": optional(text, "speed of this gait, such as '1.33 m/s'"),
         "recorded_speed": optional(text, "speed at which the curves were recorded, where it is another one"),
     }
@@ -106,6 +108,7 @@ def gait_of(document: dict[str, Any], file: str) -> Gait:
         origin=document["origin"],
         source=document["source"],
         body_mass=numbers["subject.body_mass"],
+        stature=numbers["subject.stature"],
         walking_speed=numbers["subject.walking_speed"],
         recorded_speed=numbers["subject.recorded_speed"],
         stride_time=numbers["stride.time"],

@@ -8,6 +8,7 @@ hand-over fades, so that the ankle does not jump.
 from typing import NamedTuple
 
 from ppafo.model.gait import GaitNow, GaitTiming
+from ppafo.model.leg import LegParameters
 
 SWING = 0.0
 HEEL = 1.0
@@ -37,9 +38,9 @@ class Landing(NamedTuple):
     leaves: float
 
 
-def is_free(contact: float) -> bool:
-    """True where the foot moves by its own dynamics; ``contact`` [-] is one of the states above."""
-    return contact < 1.5
+def is_free(contact: float, keeps_gait: float) -> bool:
+    """True where the foot moves by its own dynamics; that of a wearer who keeps the gait (1) never does."""
+    return contact < 1.5 and keeps_gait < 0.5
 
 
 def foot_angle(shank: float, ankle: float) -> float:
@@ -48,8 +49,8 @@ def foot_angle(shank: float, ankle: float) -> float:
 
 
 def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float) -> Ankle:
-    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, on the toes it is as measured."""
-    flat = contact < 2.5
+    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, else it is as measured."""
+    flat = contact > 1.5 and contact < 2.5
     return Ankle(
         now.shank + QUARTER_TURN - ground_angle if flat else now.ankle,
         now.shank_rate if flat else now.ankle_rate,
@@ -96,14 +97,23 @@ def heel_fraction(contact: float, timing: GaitTiming, phase: float, toes_first: 
     return fraction if contact > 0.5 and contact < 2.5 else 0.0
 
 
-def heel_torque(contact: float, now: GaitNow, heel_lever: float) -> float:
+def ground_lever(leg: LegParameters, tilt: float) -> float:
+    """Lever [m] of the ground force behind the ankle, for a foot tilted up [rad]: it shrinks as the heel rolls down."""
+    raised = 0.5 * (tilt + abs(tilt))
+    return leg.flat_heel_lever + (leg.heel_lever - leg.flat_heel_lever) * raised / (raised + leg.heel_roll_angle)
+
+
+def heel_torque(contact: float, now: GaitNow, leg: LegParameters, ground_angle: float, angle: float) -> float:
     """Torque [N m] of the ground about the ankle while the foot rolls on its heel, positive in plantarflexion.
 
-    What the measured moment leaves to the ground of the torque that moves the healthy foot. A foot that is still on
-    its heel when the healthy one is flat is turned by the force on ``heel_lever`` [m].
+    What the measured moment leaves to the ground of the torque that moves the healthy foot or, once that is flat, the
+    force on the lever of a heel that is nearly so; and the same force on a longer lever where this foot, at an ankle
+    angle [rad], is tilted up further: the ground force has rolled less far forward, and a loaded foot comes down.
     """
-    torque = now.healthy_torque + max(-now.moment, now.force * heel_lever)
-    return torque if contact == HEEL else 0.0
+    lever = ground_lever(leg, foot_angle(now.shank, angle) - ground_angle)
+    healthy = ground_lever(leg, foot_angle(now.shank, now.ankle) - ground_angle)
+    measured = now.healthy_torque + max(-now.moment, now.force * leg.flat_heel_lever)
+    return measured + now.force * (lever - healthy) if contact == HEEL else 0.0
 
 
 def ground_forces(contact: float, timing: GaitTiming, now: GaitNow, toes_first: float) -> tuple[float, float]:

@@ -21,6 +21,7 @@ class Configuration:
     ``supply_lines`` are the lines behind its regulators, None where the supply pressures are constant. ``thermal`` is
     how the gas takes up heat, None where it keeps its temperature. ``course`` is what the wearer does one after the
     other, None where stride follows equal stride.
+    ``wearer_origin`` says in words whose body mass it is.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
 
@@ -41,6 +42,7 @@ class Configuration:
     supply_lines: SupplyLines | None = None
     thermal: Thermal | None = None
     course: WalkingCourse | None = None
+    wearer_origin: str = "the paper's subject"
 
     @property
     def has_ideal_sensors(self) -> bool:

@@ -36,9 +36,9 @@ from ppafo.walking.declaration import (
     controller_settings,
     quantities,
 )
+from ppafo.walking.gait_subject import read_wearer, wearer_origin
 from ppafo.walking.planning import course_of_walk
 from ppafo.walking.schema import walk_file
-from ppafo.walking.wearer import WEARER, Wearer
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 _TURN = 2.0 * math.pi
@@ -67,7 +67,8 @@ def load_walk(
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` and
-    ``course`` replace those of the file. ScenarioError, ParameterError or DataError for anything that cannot be used.
+    ``course`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its subject as the
+    default wearer. ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
@@ -78,12 +79,14 @@ def load_walk(
     folder = Path(name_or_path).parent
     kind = walking_controllers()[kind_at(document, "controller")]
     device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
+    walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
+    is_named = gait is not None or "gait" in document
     configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
-        gait=_gait(gait or document.get("gait", NORMATIVE), folder, gait is None),
-        wearer=Wearer(**reading.section("wearer", WEARER)),
+        gait=walked,
+        wearer=read_wearer(reading, walked, is_named),
         controller=kind,
         settings=reading.section("controller", kind.quantities),
         sensors=_sensors(reading),
@@ -97,6 +100,7 @@ def load_walk(
         supply_lines=read_supply_lines(reading, device),
         thermal=read_thermal(reading),
         course=_course(course or document.get("course"), folder, course is None),
+        wearer_origin=wearer_origin(reading, walked, is_named),
     )
     check_walk(configuration, reading)
     course_of_walk(configuration)

@@ -27,7 +27,7 @@ from ppafo.simulation.scenario import ProfileChoice, Thermal
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.course_planning import PlannedCourse, plan_course, standing_gait
-from ppafo.walking.gait_series import gait_series, gait_timing, heel_lever, strike_angle
+from ppafo.walking.gait_series import gait_series, gait_timing, heel_rocker, strike_angle
 from ppafo.walking.wearer import Wearer
 
 ANGLES = (math.radians(60.0), math.radians(115.0))
@@ -64,6 +64,9 @@ class WalkPlan:
 def plan_walk(plan: WalkPlan) -> Run:
     """The run of a walk with vented chambers, which begins at a heel strike, or on a course standing."""
     leg = plan.wearer.leg()._replace(heel_lever=heel_lever(plan.gait, plan.wearer))
+    """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
+    rocker = heel_rocker(plan.gait, plan.wearer)
+    leg = plan.wearer.leg()._replace(heel_lever=rocker.raised, flat_heel_lever=rocker.flat, heel_roll_angle=rocker.half)
     bare = plant_parameters(plan.device)
     walk = _walk(plan, leg, bare)
     pieces = Pieces(

@@ -8,7 +8,7 @@ import numpy as np
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.model.contact import SWING
-from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix
+from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.model.plant import chamber_pressures
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.simulate import gas_channels
@@ -51,6 +51,8 @@ def recording_of_walk(configuration: Configuration, run: Run, time: Floats, reco
         "supplied_mass": (record["state.supplied_mass"], "kg"),
         "vented_mass": (record["state.vented_mass"], "kg"),
     }
+    if run.walk.leg.keeps_gait >= 0.5:
+        channels["dorsiflexor_moment"] = (dorsiflexor_moment(run, record), "N m")
     channels |= gas_channels(configuration.device.gas, run, record)
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
@@ -85,6 +87,19 @@ def _course_channels(
     if gait.walking_speed is not None:
         found["walking_speed"] = (gait.walking_speed * pace.stride * pace.frequency * gait.stride_time, "m/s")
     return found
+
+
+def dorsiflexor_moment(run: Run, record: Mapping[str, Any]) -> Floats:
+    """Moment [N m] of the muscles that lift the foot, 0 or more, of a wearer who keeps the measured ankle.
+
+    What the healthy ankle needs, by its moment on the ground and by equation (11) in the swing, less tissue and T_ex.
+    The literature shows the activity of the tibialis anterior in its place.
+    """
+    assert run.walk is not None, "a walk has a leg"
+    in_swing = record["walk.contact"] == SWING
+    needed = np.where(in_swing, record["walk.now.healthy_torque"], record["walk.now.moment"])
+    tissue = passive_torque(run.walk.leg, record["walk.now.ankle"])
+    return np.asarray(np.maximum(tissue + record["walk.external_torque"] - needed, 0.0))
 
 
 def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Any]) -> Floats:

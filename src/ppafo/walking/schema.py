@@ -63,13 +63,18 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=100)),
         "description": (str, Field("", description="what this file tries, and why")),
-        "gait": optional(str, "name of a gait, or the path of a gait file; the built-in one unless given"),
+        "gait": optional(
+            str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
+        ),
         "course": optional(
             str, "name of a course, or the path of its file; stride after equal stride unless one is given"
         ),
         "device": (table("WalkDevice", device_fields()), Field(description="the hardware")),
         "controller": (_controller(), Field(description="what commands the valve")),
-        "wearer": optional(table("Wearer", quantity_fields(WEARER)), "who walks; the paper's subject unless given"),
+        "wearer": optional(
+            table("Wearer", quantity_fields(WEARER)),
+            "who walks; the subject of the gait that is named, else the paper's, unless given",
+        ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
         "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
         "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),

@@ -43,6 +43,7 @@ def batch_of_many(
     count = build.mass.size
     assert run.walk is not None, "a population walks"
     segments = segment_values(replace(configuration.wearer, heel_lever=run.walk.leg.heel_lever), build)
+    segments["flat_heel_lever"] = run.walk.leg.flat_heel_lever * build.stature
     parameters, states = (np.repeat(column, count, axis=1) for column in (single.parameters, single.states))
     _overwrite(
         parameters, row_numbers(single.program.parameter_rows()), _parameter_rows(run, segments, gaits, generator)

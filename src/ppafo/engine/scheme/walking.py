@@ -64,7 +64,7 @@ def begin_walk(
     step: float,
 ) -> WalkStep:
     """Where one step [s] leads the foot, by its own dynamics and by the ground."""
-    torque = leg_torque(leg, share, walk.contact, walk.now, state.angle, walk.foot)
+    torque = leg_torque(leg, share, walk.contact, walk.now, timing.ground_angle, state.angle, walk.foot)
     free = begin_free(plant, state, torque, step)
     offset = walk.offset / (1.0 + step / ground.FADING_TIME)
     prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle)
@@ -76,9 +76,10 @@ def begin_walk(
     return WalkStep(free, led, offset)
 
 
-def next_angle(plant: PlantParameters, walk: WalkState, begun: WalkStep) -> float:
+def next_angle(plant: PlantParameters, leg: LegParameters, walk: WalkState, begun: WalkStep) -> float:
     """Angle [rad] to which the volumes run."""
-    return clamp_angle(plant, begun.free.free_angle) if ground.is_free(walk.contact) else begun.led.angle
+    is_free = ground.is_free(walk.contact, leg.keeps_gait)
+    return clamp_angle(plant, begun.free.free_angle) if is_free else begun.led.angle
 
 
 def external_torque(
@@ -120,11 +121,11 @@ def end_walk(
     step: float,
 ) -> tuple[PlantState, WalkState]:
     """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin; ``now`` is then."""
-    free = ground.is_free(walk.contact)
+    free = ground.is_free(walk.contact, leg.keeps_gait)
     predicted = clamp_angle(plant, begun.free.free_angle)
     # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
     foot = foot_direction(now.shank, predicted if free else begun.led.angle)
-    torque = leg_torque(leg, share, walk.contact, now, predicted, foot)
+    torque = leg_torque(leg, share, walk.contact, now, timing.ground_angle, predicted, foot)
     moved = end_free(plant, state, begun.free, torque, step)
     after = with_motion(
         state,

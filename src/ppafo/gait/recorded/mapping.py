@@ -1,6 +1,7 @@
 """Gait maps: which columns of recorded files make the curves of a gait, in which unit and with which sign.
 
-A map is a TOML file or one of ``CONVENTIONS``. A term is the name of a column; ``-`` before it takes it away.
+A map is a TOML file, or what ``conventions`` finds for files without one. A term is the name of a column; ``-`` before
+it takes it away.
 """
 
 from importlib import resources
@@ -19,6 +20,7 @@ _Terms = Annotated[
     tuple[Text, ...], Field(strict=False, min_length=1, description="columns to add; '-' before one subtracts it")
 ]
 _Unit = Annotated[Text | None, Field(description="unit of the columns, where the file does not state it")]
+_Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 _Flexion = Literal["plantarflexion", "dorsiflexion"]
 
 
@@ -34,7 +36,7 @@ class ShankMap(BaseModel):
     )
     knee: Annotated[Text | None, Field(description="marker at the knee, instead of terms")] = None
     ankle: Annotated[Text | None, Field(description="marker at the ankle")] = None
-    forward: Annotated[Literal["x", "y", "z", "-x", "-y", "-z"], Field(description="axis along the walk")] = "x"
+    forward: Annotated[_Axis, Field(description="axis along the walk")] = "x"
     vertical: Annotated[Literal["x", "y", "z"], Field(description="axis upwards")] = "z"
 
     @model_validator(mode="after")
@@ -45,16 +47,29 @@ class ShankMap(BaseModel):
 
 
 class AngleMap(BaseModel):
-    """Ankle angle."""
+    """Ankle angle: a sum of columns, or two markers of the foot, whose line turns against the shank.
+
+    With markers the zero is the foot that stands flat, and ``neutral`` is added to it.
+    """
 
     model_config = STRICT
 
-    terms: _Terms
+    terms: _Terms | None = None
+    heel: Annotated[Text | None, Field(description="marker at the heel, instead of terms")] = None
+    toe: Annotated[Text | None, Field(description="marker at the toes")] = None
+    forward: Annotated[_Axis, Field(description="axis along the walk, with markers")] = "x"
+    vertical: Annotated[Literal["x", "y", "z"], Field(description="axis upwards, with markers")] = "z"
     unit: _Unit = None
     positive: Annotated[_Flexion, Field(description="which motion is positive")]
     neutral: Annotated[
         Text, Field(description="the reading of the file when the foot is perpendicular to the shank")
     ] = "0 deg"
+
+    @model_validator(mode="after")
+    def _one_way(self) -> "AngleMap":
+        if (self.terms is None) == (self.heel is None) or (self.heel is None) != (self.toe is None):
+            raise ValueError("give either terms, or both heel and toe")
+        return self
 
 
 class MomentMap(BaseModel):
@@ -155,22 +170,6 @@ def opensim_map(side: Side) -> GaitMap:
         vertical_force=ForceMap(terms=(force,)),
         knee=KneeMap(forward=("pelvis_tx",), up=("pelvis_ty",), thigh=("pelvis_tilt", f"hip_flexion_{foot}")),
     )
-
-
-def plug_in_gait_map(side: Side) -> GaitMap:
-    """Return the map of C3D files with the markers and outputs of the Plug-in Gait model; the walk goes along x."""
-    foot = side[0].upper()
-    return GaitMap(
-        shank_angle=ShankMap(knee=f"{foot}KNE", ankle=f"{foot}ANK"),
-        ankle_angle=AngleMap(terms=(f"{foot}AnkleAngles.x",), positive="dorsiflexion", unit="deg"),
-        ankle_moment=MomentMap(terms=(f"{foot}AnkleMoment.x",), positive="plantarflexion", unit="N mm/kg"),
-        vertical_force=ForceMap(terms=(f"{foot}GroundReactionForce.z",), unit="N/kg"),
-        knee=KneeMap(forward=(f"{foot}KNE.x",), up=(f"{foot}KNE.z",)),
-    )
-
-
-CONVENTIONS = {"csv": package_map, "opensim": opensim_map, "c3d": plug_in_gait_map}
-"""The map of each form of file, for a side; taken where none is given."""
 
 
 def load_map(path: str | Path) -> GaitMap:

@@ -25,18 +25,21 @@ from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.phases import strip_figure
+from ppafo.walking.gait_subject import person_remarks
 from ppafo.walking.strides import PER_STRIDE, PHASES
 from ppafo.walking.walk import WalkResult
 
 SCHEMA_VERSION = 1
 _HEAD = ("", "with", "without", "healthy")
 _ROWS = (
+    ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
     ("push_off_work", "Work on the wearer in push-off", "energy", 2),
     ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
     ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
     ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
+    ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
     ("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
 )
 """Metric, title, kind of quantity and digits behind the point of each row."""
@@ -72,7 +75,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
     worn, bare = comparison.with_device, comparison.without_device
     configuration = worn.configuration
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    remarks = [_bottle(pair.life), _safety(comparison), trust_remark(configuration)]
+    remarks = [*person_remarks(configuration), _bottle(pair.life), _safety(comparison), trust_remark(configuration)]
     remarks += [
         f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
     ]
@@ -119,10 +122,15 @@ def comparison_table(comparison: Comparison) -> Table:
     healthy = dict(comparison.healthy)
     if "push_off_work" in healthy:
         healthy["push_off_share"] = Metric(1.0, "-", "")
-    columns = (comparison.with_device.metrics, comparison.without_device.metrics, healthy)
+    person = {"body_mass": Metric(comparison.with_device.configuration.wearer.body_mass, "kg", "who walks")}
+    columns = tuple(
+        person | dict(metrics)
+        for metrics in (comparison.with_device.metrics, comparison.without_device.metrics, healthy)
+    )
     rows = [
         (title_with_unit(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
         for name, title, quantity, digits in _ROWS
+        if any(name in metrics for metrics in columns)
     ]
     return Table(tuple(map(Column, _HEAD)), tuple(rows))
 

@@ -13,6 +13,7 @@ from ppafo.simulation.document import UNITS, plain
 from ppafo.version import __version__
 from ppafo.walking.anthropometry import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 from ppafo.walking.figures.wearers import SHOWN, population_figure
+from ppafo.walking.gait_subject import person_remarks
 from ppafo.walking.population import OUTCOMES, TRAITS, Number, Population
 from ppafo.walking.wearers_rows import START_VARIATION, THRESHOLD_VARIATION
 
@@ -36,7 +37,11 @@ def wearers_answer(population: Population) -> Answer:
     ]
     figure = Figure("wearers", _CAPTION, lambda: population_figure(population))
     safe = f"safe state: the controllers of {population.vented} wearers vented both chambers permanently"
-    remarks = [safe] * bool(population.vented) + [population.message] * bool(population.diverged)
+    remarks = (
+        person_remarks(configuration)
+        + [safe] * bool(population.vented)
+        + [population.message] * bool(population.diverged)
+    )
     return Answer(
         name="wearers",
         kicker="Walks of many wearers",

@@ -173,7 +173,8 @@ def _accelerations(
         angle, rate, now = unknowns.angle[place], unknowns.rate[place], stride.now[place]
         standing = foot_angle(now.shank, angle)
         foot = Direction(casadi.sin(standing), casadi.cos(standing))
-        added = leg_torque(walk.leg, walk.share, stride.contacts[place], now, angle, foot)
+        level = walk.timing.ground_angle
+        added = leg_torque(walk.leg, walk.share, stride.contacts[place], now, level, angle, foot)
         largest = plant.dynamic_torque + breakaway * casadi.exp(-((rate / STICKING_SPEED) ** 2))
         slowed = unknowns.friction[place] * largest + plant.viscous_damping * rate
         found.append((torque[place] + added - slowed) / plant.inertia)
