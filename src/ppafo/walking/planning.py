@@ -63,8 +63,6 @@ class WalkPlan:
 
 def plan_walk(plan: WalkPlan) -> Run:
     """The run of a walk with vented chambers, which begins at a heel strike, or on a course standing."""
-    leg = plan.wearer.leg()._replace(heel_lever=heel_lever(plan.gait, plan.wearer))
-    """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
     rocker = heel_rocker(plan.gait, plan.wearer)
     leg = plan.wearer.leg()._replace(heel_lever=rocker.raised, flat_heel_lever=rocker.flat, heel_roll_angle=rocker.half)
     bare = plant_parameters(plan.device)
