@@ -27,7 +27,8 @@ from ppafo.simulation.scenario import ProfileChoice, Thermal
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.course_planning import PlannedCourse, plan_course, standing_gait
-from ppafo.walking.gait_series import gait_series, gait_timing, heel_rocker, strike_angle
+from ppafo.walking.gait_series import gait_series, gait_timing, strike_angle
+from ppafo.walking.heel_rocker import heel_rocker
 from ppafo.walking.wearer import Wearer
 
 ANGLES = (math.radians(60.0), math.radians(115.0))
