@@ -45,6 +45,7 @@ _TURN = 2.0 * math.pi
 _TEXTS = (
     "gait",
     "course",
+    "device.set",
     "device.valve",
     "controller.kind",
     "gas_model.kind",

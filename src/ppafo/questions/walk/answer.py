@@ -13,6 +13,7 @@ from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.endurance.solve import Endurance
 from ppafo.questions.walk.course import course_data, course_files, course_pictures, course_sections, trust_remark
 from ppafo.questions.walk.solve import WalkPair, Wearers
+from ppafo.questions.walk.volumes import volumes_data, volumes_sections
 from ppafo.questions.walk.wearers import wearers_answer
 from ppafo.signals.recording import Floats
 from ppafo.simulation.document import UNITS, plain
@@ -90,11 +91,12 @@ def _pair_answer(pair: WalkPair) -> Answer:
             Section(paragraphs=_set_up(comparison), is_detail=True),
             *course_sections(comparison),
             Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
+            *volumes_sections(pair.volumes),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
             *(course_pictures(comparison) if configuration.course is not None else _pictures(comparison)),
             *_assumptions_section(configuration.assumed),
         ),
-        data=_data(comparison, pair.life),
+        data=_data(comparison, pair.life) | {"volumes": volumes_data(pair.volumes)},
         passed=comparison.is_completed,
         files={
             "recording.nc": lambda: netcdf_bytes(worn.recording, None),

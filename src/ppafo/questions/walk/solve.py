@@ -8,6 +8,7 @@ from typing import Any
 from ppafo.answers import Solved
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
+from ppafo.questions.walk.volumes import VolumeReading, walks_by_volume
 from ppafo.walking import course as courses
 from ppafo.walking.comparison import Comparison, compare_walks
 from ppafo.walking.configuration import Configuration
@@ -20,10 +21,14 @@ _LONG = 12.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkPair(Solved):
-    """A walk with the device and without it; ``life`` is how long one bottle lasts, None where no gas was taken."""
+    """A walk with the device and without it; ``life`` is how long one bottle lasts, None where no gas was taken.
+
+    ``volumes`` has the walk and the same with the other readings of the paper's chambers; none for chambers of its own.
+    """
 
     comparison: Comparison
     life: Endurance | None
+    volumes: tuple[VolumeReading, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +65,8 @@ def walk_with_and_without(
     comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
     # A bottle is asked how often it can give the same: a course is not made of equal strides.
     life = endurance_of_walk(comparison.with_device) if chosen.course is None else None
-    return WalkPair(comparison, life)
+    volumes = walks_by_volume(comparison.with_device, life) if chosen.course is None else ()
+    return WalkPair(comparison, life, volumes)
 
 
 def list_files() -> list[dict[str, Any]]:
