@@ -29,6 +29,7 @@ from ppafo.storage.column_map import load_column_map
 from ppafo.storage.recordings import read_recording
 from ppafo.storage.result_folder import read_document
 from ppafo.studies.loading import load_study
+from ppafo.walking.course import load_course
 from ppafo.walking.loading import load_walk
 
 LOADERS: dict[str, Callable[[str], Any]] = {
@@ -40,6 +41,7 @@ LOADERS: dict[str, Callable[[str], Any]] = {
     "design": read_design_file,
     "size": read_sizing_file,
     "walk": load_walk,
+    "course": load_course,
     "identification": load_problem,
     "columns": load_column_map,
     "rig": load_preset,

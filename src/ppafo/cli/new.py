@@ -47,6 +47,12 @@ KINDS: dict[str, _NewFile] = {
         "ppafo.walking.loading:load_walk",
         "ppafo walk FILE --minutes 0.2 --out out/NAME",
     ),
+    "course": _NewFile(
+        "course",
+        "walking/courses",
+        "ppafo.walking.course:load_course",
+        "ppafo walk solenoid --course FILE --out out/NAME",
+    ),
     "gait-map": _NewFile(
         "gait map",
         "gait/recorded",

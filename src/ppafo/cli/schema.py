@@ -15,6 +15,7 @@ FORMATS: dict[str, str] = {
     "design": "ppafo.questions.design.file",
     "size": "ppafo.questions.size.file",
     "walk": "ppafo.walking.schema",
+    "course": "ppafo.walking.course",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.column_map",
     "rig": "ppafo.rig.preset",

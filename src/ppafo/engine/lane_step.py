@@ -8,8 +8,8 @@ that are through wait, masked, and no lane sees another.
 
 from ppafo.engine.lane_control import sense_end
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
+from ppafo.engine.lane_walk import lead_walk, mark_stride
 from ppafo.engine.scheme import motion, parts, pneumatics, supply_lines, thermal_gas, walking
-from ppafo.model.gait import gait_at
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -146,18 +146,6 @@ def connect(rows: LaneRows, line_state: str) -> str:
     return f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"
 
 
-def lead_walk(rows: LaneRows) -> list[list[str]]:
-    """Two phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
-    if not rows.program.walks:
-        return []
-    gait = f"{rows.add(gait_at)}(gait, gait_timing, leg, time + length)"
-    foot = f"{rows.add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)"
-    return [
-        [rows.load("gait"), f"next_gait = {gait}", *rows.keep("next_gait")],
-        [rows.load("next_gait"), f"begun = {foot}", *rows.keep("begun")],
-    ]
-
-
 def lead(rows: LaneRows) -> list[str]:
     """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
     program, add = rows.program, rows.add
@@ -284,6 +272,7 @@ def end_motion(rows: LaneRows) -> list[str]:
         follow = rows.cells["gait_sensors.follow_rate"]
         given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, next_gait, length"
         lines = [rows.load("next_gait"), f"after, walk = {add(walking.end_walk)}({given})", *rows.store("walk")]
+        lines += mark_stride(rows)
         if program.is_thermal:
             assumed = f"{add(walking.next_angle)}(plant, leg, walk_before, begun)"
             lines.insert(1, "walk_before = walk")

@@ -14,6 +14,8 @@ from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
 from ppafo.engine.scheme.thermal_flows import ThermalFlows
 from ppafo.engine.scheme.thermal_gas import ThermalGas
 from ppafo.engine.scheme.walking import WalkState, WalkStep
+from ppafo.model.course import Course as WalkCourse
+from ppafo.model.course import Marks
 from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
@@ -61,10 +63,11 @@ class Program:
     ``slow_sensors`` True a bandwidth and ``late_signals`` True a delay. ``late_commands`` True adds a dead time before
     the valve. ``is_thermal`` True gives the gas an energy balance instead of a constant temperature. ``walks`` True
     puts the device on a walking leg, whose foot is free or where the ground and a gait lead it (``angle`` is None then;
-    its sensors are its own). ``has_lines`` True feeds the device from lines behind regulators instead of constant
-    pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded samples
-    lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names channels
-    that are kept at some of them.
+    its sensors are its own); ``takes_course`` True lets that leg stand, start, change its speed and stop instead of
+    walking stride after equal stride. ``has_lines`` True feeds the device from lines behind regulators instead of
+    constant pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded
+    samples lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names
+    channels that are kept at some of them.
     """
 
     valve: ValveModel
@@ -76,6 +79,7 @@ class Program:
     late_signals: bool = False
     is_thermal: bool = False
     walks: bool = False
+    takes_course: bool = False
     has_lines: bool = False
     slow_sensors: bool = False
     is_adaptive: bool = False
@@ -96,6 +100,7 @@ class Program:
             "sensors": SensorParameters,
             **({"leg": LegParameters, "share": DeviceShare, "gait": GaitSeries} if self.walks else {}),
             **({"gait_timing": GaitTiming, "gait_sensors": GaitSensors} if self.walks else {}),
+            **({"walk_course": WalkCourse} if self.takes_course else {}),
             **({"lines": SupplyLines} if self.has_lines else {}),
             **({"sensor_rates": SensorRates} if self.slow_sensors else {}),
         }
@@ -157,6 +162,7 @@ class Program:
         _, shown, _ = get_type_hints(self.valve.connect).values()
         return {
             **({"next_gait": GaitNow} if self.walks else {}),
+            **({"marks": Marks} if self.takes_course else {}),
             "begun": begun,
             "gas": gas,
             "shown": shown,

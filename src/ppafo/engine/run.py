@@ -16,6 +16,7 @@ from ppafo.engine.scheme.ankle_torque import DeviceShare
 from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.scheme.walking import WalkState
 from ppafo.model.columns import larger, whole
+from ppafo.model.course import Course
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import NOTHING_SEEN, GaitSensors
 from ppafo.model.leg import LegParameters
@@ -37,7 +38,7 @@ WHOLE = 1.0e-9
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """What a walking leg adds to a run."""
+    """What a walking leg adds to a run; ``course`` None where it walks stride after equal stride."""
 
     leg: LegParameters
     share: DeviceShare
@@ -45,6 +46,7 @@ class Walk:
     timing: GaitTiming
     sensors: GaitSensors
     initial: WalkState
+    course: Course | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,6 +203,7 @@ def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:
     if walk is None:
         return [], []
     parameters = [walk.leg, walk.share, walk.gait, walk.timing, walk.sensors]
+    parameters += [] if walk.course is None else [walk.course]
     return parameters, [walk.initial, NOTHING_SEEN]
 
 

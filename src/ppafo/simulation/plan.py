@@ -105,6 +105,7 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
         late_signals=first(pieces.signal_delay) > 0.0,
         is_thermal=pieces.thermal is not None,
         walks=walk is not None,
+        takes_course=walk is not None and walk.course is not None,
         has_lines=pieces.supply_lines is not None,
         slow_sensors=isinstance(pieces.sensor_rates, SensorRates),
         is_adaptive=bool(first(steps.needs_parts)),

@@ -32,8 +32,10 @@ class Comparison:
         return self.with_device.status.is_completed and self.without_device.status.is_completed
 
 
-def compare_walks(configuration: Configuration, minutes: float, progress: Progress = silent) -> Comparison:
-    """Walk ``minutes`` [min] with the device and as long with it off; ScenarioError for bad input."""
+def compare_walks(
+    configuration: Configuration, minutes: float | None = None, progress: Progress = silent
+) -> Comparison:
+    """Walk ``minutes`` [min], or a whole course, with the device and with it off; ScenarioError for bad input."""
     return Comparison(
         walk(configuration, minutes, progress=progress),
         walk(with_device_off(configuration), minutes, progress=progress),

@@ -10,6 +10,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.device import Device
 from ppafo.simulation.scenario import Thermal
+from ppafo.walking.course import WalkingCourse
 from ppafo.walking.wearer import Wearer
 
 
@@ -18,7 +19,8 @@ class Configuration:
     """One device on one wearer; ``settings`` of the controller in SI, ``period`` and ``step`` in seconds.
 
     ``supply_lines`` are the lines behind its regulators, None where the supply pressures are constant. ``thermal`` is
-    how the gas takes up heat, None where it keeps its temperature.
+    how the gas takes up heat, None where it keeps its temperature. ``course`` is what the wearer does one after the
+    other, None where stride follows equal stride.
     ``wearer_origin`` says in words whose body mass it is.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
@@ -39,6 +41,7 @@ class Configuration:
     overrides: tuple[str, ...]
     supply_lines: SupplyLines | None = None
     thermal: Thermal | None = None
+    course: WalkingCourse | None = None
     wearer_origin: str = "the paper's subject"
 
     @property

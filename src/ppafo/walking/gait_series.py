@@ -71,6 +71,11 @@ def foot_angles(gait: Gait, phases: Floats) -> Floats:
     return shank.values_at(phases) - ankle.values_at(phases) + 0.5 * math.pi
 
 
+def strike_angle(gait: Gait) -> float:
+    """Angle [rad] of the measured foot over the flat one at the heel strike."""
+    return float(foot_angles(gait, np.zeros(1))[0]) - gait_timing(gait).ground_angle
+
+
 def gait_timing(gait: Gait) -> GaitTiming:
     """Frequency [Hz], events [strides] and the flat foot's angle [rad]; heel rise and angle come from the curves."""
     foot = foot_angles(gait, EVENT_PHASES)

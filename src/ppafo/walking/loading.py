@@ -23,6 +23,7 @@ from ppafo.simulation.overriding import device_paths, is_of_device, split_overri
 from ppafo.simulation.reading import Reading
 from ppafo.walking.configuration import NEVER, Configuration
 from ppafo.walking.contradictions import check_walk
+from ppafo.walking.course import WalkingCourse, load_course
 from ppafo.walking.declaration import (
     ANGLE_BANDWIDTH,
     FAULT_TIME,
@@ -36,12 +37,14 @@ from ppafo.walking.declaration import (
     quantities,
 )
 from ppafo.walking.gait_subject import read_wearer, wearer_origin
+from ppafo.walking.planning import course_of_walk
 from ppafo.walking.schema import walk_file
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 _TURN = 2.0 * math.pi
 _TEXTS = (
     "gait",
+    "course",
     "device.set",
     "device.valve",
     "controller.kind",
@@ -56,12 +59,17 @@ def list_walks() -> tuple[str, ...]:
     return FILE.names()
 
 
-def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str | Path | None = None) -> Configuration:
+def load_walk(
+    name_or_path: str | Path,
+    overrides: Iterable[str] = (),
+    gait: str | Path | None = None,
+    course: str | Path | None = None,
+) -> Configuration:
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
-    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` replaces the
-    gait of the file. A gait that is named, by the file or by ``gait``, brings its subject as the default wearer.
-    ScenarioError, ParameterError or DataError for anything that cannot be used.
+    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` and
+    ``course`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its subject as the
+    default wearer. ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
@@ -92,9 +100,11 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
         overrides=given,
         supply_lines=read_supply_lines(reading, device),
         thermal=read_thermal(reading),
+        course=_course(course or document.get("course"), folder, course is None),
         wearer_origin=wearer_origin(reading, walked, is_named),
     )
     check_walk(configuration, reading)
+    course_of_walk(configuration)
     return configuration
 
 
@@ -136,6 +146,14 @@ def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device
         return build_device(apply_overrides(parameters, overrides, valve), valve)
     except ParameterError as error:
         raise ParameterError(f"{file}: [device]: {one_line(error)}") from error
+
+
+def _course(name: str | Path | None, folder: Path, relative: bool) -> WalkingCourse | None:
+    if name is None:
+        return None
+    path = Path(name)
+    is_path = path.suffix == ".toml"
+    return load_course(folder / path if is_path and relative and not path.is_absolute() else name)
 
 
 def _gait(name: str | Path, folder: Path, relative: bool) -> Gait:

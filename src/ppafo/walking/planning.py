@@ -10,7 +10,7 @@ from ppafo.engine.scheme.ankle_torque import DeviceShare, foot_direction
 from ppafo.engine.scheme.walking import NO_CLEARANCE, WalkState
 from ppafo.gait import Gait
 from ppafo.model.chambers import chamber_mass
-from ppafo.model.contact import HEEL
+from ppafo.model.contact import FLAT, HEEL
 from ppafo.model.gait import gait_at
 from ppafo.model.gait_sensors import GaitSensors
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle
@@ -24,7 +24,10 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import Pieces, Steps, compose_run
 from ppafo.simulation.scenario import ProfileChoice, Thermal
-from ppafo.walking.gait_series import gait_series, gait_timing
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.course import WalkingCourse
+from ppafo.walking.course_planning import PlannedCourse, plan_course, standing_gait
+from ppafo.walking.gait_series import gait_series, gait_timing, strike_angle
 from ppafo.walking.heel_rocker import heel_rocker
 from ppafo.walking.wearer import Wearer
 
@@ -56,10 +59,11 @@ class WalkPlan:
     record_interval: float = 1.0e-3
     supply_lines: SupplyLines | None = None
     thermal: Thermal | None = None
+    course: WalkingCourse | None = None
 
 
 def plan_walk(plan: WalkPlan) -> Run:
-    """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
+    """The run of a walk with vented chambers, which begins at a heel strike, or on a course standing."""
     rocker = heel_rocker(plan.gait, plan.wearer)
     leg = plan.wearer.leg()._replace(heel_lever=rocker.raised, flat_heel_lever=rocker.flat, heel_roll_angle=rocker.half)
     bare = plant_parameters(plan.device)
@@ -101,9 +105,10 @@ def walk_steps(plan: WalkPlan, plant: PlantParameters) -> Steps:
 
 
 def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
-    """The leg of a walk, at its first heel strike; ``bare`` is the device without it."""
+    """The leg of a walk, at its first heel strike or standing; ``bare`` is the device without it."""
     gait, timing = gait_series(plan.gait), gait_timing(plan.gait)
-    start = gait_at(gait, timing, leg, 0.0)
+    course = None if plan.course is None else planned_course(plan.course, plan.gait).course
+    start = gait_at(gait, timing, leg, 0.0) if course is None else standing_gait(leg, timing, course)
     foot = foot_direction(start.shank, start.ankle)
     return Walk(
         leg=leg,
@@ -116,13 +121,13 @@ def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
         timing=timing,
         sensors=plan.gait_sensors,
         initial=WalkState(
-            contact=HEEL,
+            contact=HEEL if course is None else FLAT,
             offset=0.0,
             now=start,
             foot=foot,
             external_torque=0.0,
-            heel_force=0.0,
-            toe_force=0.0,
+            heel_force=0.0 if course is None else 0.5 * start.force,
+            toe_force=0.0 if course is None else 0.5 * start.force,
             toes_first=0.0,
             slap_rate=0.0,
             clearance=NO_CLEARANCE,
@@ -133,7 +138,19 @@ def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
             clearances=0.0,
             push_off_work=0.0,
         ),
+        course=course,
     )
+
+
+def planned_course(course: WalkingCourse, gait: Gait) -> PlannedCourse:
+    """A course in time, walked by the person of a gait; ScenarioError for what this gait does not allow."""
+    timing = gait_timing(gait)
+    return plan_course(course, gait, timing.frequency, timing, strike_angle(gait))
+
+
+def course_of_walk(configuration: Configuration) -> PlannedCourse | None:
+    """The course of a walk in time, None where it has none; ScenarioError for what its gait does not allow."""
+    return None if configuration.course is None else planned_course(configuration.course, configuration.gait)
 
 
 def _parts(plan: WalkPlan, plant: PlantParameters, step: float) -> int:

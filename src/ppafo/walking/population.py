@@ -12,11 +12,12 @@ from ppafo.engine.run import NEVER_FAILED
 from ppafo.errors import ScenarioError
 from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.course_planning import turns_walked
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.walk import REMEDY, Progress, plan_of, silent, walk_duration
-from ppafo.walking.wearers_rows import batch_of_many
+from ppafo.walking.wearers_rows import batch_of_many, course_of_many
 
 MAXIMUM_WEARERS = 1_000_000
 
@@ -82,23 +83,34 @@ class Population:
 
 
 def walk_population(
-    configuration: Configuration, minutes: float, wearers: int, seed: int = 1, progress: Progress = silent
+    configuration: Configuration,
+    minutes: float | None,
+    wearers: int,
+    seed: int = 1,
+    progress: Progress = silent,
 ) -> Population:
-    """Let many wearers walk for ``minutes`` [min]; the first is that of the configuration.
+    """Let many wearers walk for ``minutes`` [min], or all of a course; the first is that of the configuration.
 
     ``progress`` gets the number of wearers that have walked and the number of all. ScenarioError for bad input.
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
         raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
-    run = plan_walk(plan_of(configuration, walk_duration(configuration, minutes)))
     generator = np.random.default_rng(seed)
     build = draw_builds(wearers, generator)
     gaits = draw_gaits(configuration.gait, build.stature, generator)
-    batch = batch_of_many(configuration, run, build, gaits, generator)
+    planned = course_of_many(configuration, gaits)
+    if minutes is None and planned is not None:
+        minutes = float(np.max(planned.duration)) / 60.0
+    seconds = walk_duration(configuration, minutes)
+    run = plan_walk(plan_of(configuration, seconds))
+    batch = batch_of_many(configuration, run, build, gaits, generator, planned)
     states = _run_in_groups(batch, progress)
     rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
     good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)
-    outcomes = _outcomes(rows, run.step * run.step_count * gaits.timing["frequency"])
+    walked = run.step * run.step_count
+    outcomes = _outcomes(
+        rows, walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
+    )
     traits = {
         "body_mass": configuration.wearer.body_mass * build.mass,
         "shank_length": configuration.wearer.shank_length * build.stature,
@@ -107,7 +119,7 @@ def walk_population(
     }
     kept = [{name: values[good] for name, values in table.items()} for table in (traits, outcomes)]
     vented = int((rows[SAFE_ROW][good] > 0.5).sum()) if SAFE_ROW in rows else 0
-    return Population(configuration, minutes, seed, kept[0], kept[1], int((~good).sum()), vented)
+    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], int((~good).sum()), vented)
 
 
 def _run_in_groups(batch: Batch, progress: Progress) -> Floats:

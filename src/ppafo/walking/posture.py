@@ -68,9 +68,12 @@ class AnklePath:
 
     def toe_height(self, phase: Floats, shank: Floats, ankle: Floats) -> Floats:
         """Toes over the ground [m] at phases from 0 to 1; below 0 they would drag."""
+        return np.asarray(np.interp(phase % 1.0, _GRID, self.up) + self.toes_over_ankle(shank, ankle))
+
+    def toes_over_ankle(self, shank: Floats, ankle: Floats) -> Floats:
+        """Height of the toes over the ankle [m], below 0 with a flat foot."""
         tilt = shank - ankle + 0.5 * np.pi - self.ground_angle
-        up = self.toe_lever * np.sin(tilt) - self.height * np.cos(tilt)
-        return np.asarray(np.interp(phase % 1.0, _GRID, self.up) + up)
+        return np.asarray(self.toe_lever * np.sin(tilt) - self.height * np.cos(tilt))
 
     def _sole(self, tilt: Floats, lever: float) -> Floats:
         along, up = np.cos(tilt), np.sin(tilt)

@@ -13,7 +13,9 @@ from ppafo.model.plant import chamber_pressures
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.simulate import gas_channels
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.posture import ankle_path
+from ppafo.walking.course_planning import pace_in_time
+from ppafo.walking.gait_series import truncate
+from ppafo.walking.posture import AnklePath, ankle_path
 
 PHASE_ROW = "controller_state.phase.phase"
 SAFE_ROW = "controller_state.safety.vented"
@@ -57,8 +59,34 @@ def recording_of_walk(configuration: Configuration, run: Run, time: Floats, reco
         channels["safe_state"] = (record[SAFE_ROW], "-")
     if REQUEST_ROW in record:
         channels["reference"] = (record[REQUEST_ROW], "N m")
+    if run.walk.course is not None:
+        channels |= _course_channels(configuration, run, path, time, record)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
+
+
+def _course_channels(
+    configuration: Configuration, run: Run, path: AnklePath, time: Floats, record: Mapping[str, Any]
+) -> dict[str, tuple[Any, str]]:
+    """What a course has beside a walk of equal strides, and the toes over ground that may rise: stairs lift the ankle.
+
+    The healthy toes are as high as those of the gait, times the stride over the recorded one.
+    """
+    assert run.walk is not None, "a walk has a leg"
+    assert run.walk.course is not None, "of a course"
+    gait, pace = configuration.gait, pace_in_time(run.walk.course, time)
+    phase, shank = record["walk.now.phase"], record["walk.now.shank"]
+    healthy = path.toe_height(
+        phase, truncate(gait.shank_angle).values_at(phase), truncate(gait.ankle_angle).values_at(phase)
+    )
+    above = path.toes_over_ankle(shank, record["state.angle"]) - path.toes_over_ankle(shank, record["walk.now.ankle"])
+    found: dict[str, tuple[Any, str]] = {
+        "toe_height": (pace.stride * healthy + above, "m"),
+        "stride_frequency": (pace.frequency, "Hz"),
+    }
+    if gait.walking_speed is not None:
+        found["walking_speed"] = (gait.walking_speed * pace.stride * pace.frequency * gait.stride_time, "m/s")
+    return found
 
 
 def dorsiflexor_moment(run: Run, record: Mapping[str, Any]) -> Floats:

@@ -66,6 +66,9 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "gait": optional(
             str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
         ),
+        "course": optional(
+            str, "name of a course, or the path of its file; stride after equal stride unless one is given"
+        ),
         "device": (table("WalkDevice", device_fields()), Field(description="the hardware")),
         "controller": (_controller(), Field(description="what commands the valve")),
         "wearer": optional(

@@ -58,21 +58,28 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
     return {name: np.diff(totals[item.total][starts]) for name, item in PER_STRIDE.items()}
 
 
-def mean_curves(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Curves]:
+def mean_curves(
+    recording: Recording, starts: NDArray[np.intp], ends: NDArray[np.intp] | None = None
+) -> dict[str, Curves]:
     """Mean and deviation of every channel over strides brought to the same phases, in its SI unit; {} without strides.
 
-    Channels that hold their value between samples, such as the command, have no mean.
+    Each stride ends where the next one starts, unless the samples of their ``ends`` are given. Channels that hold their
+    value between samples, such as the command, have no mean.
     """
-    if starts.size < 2:
+    first, last = (starts[:-1], starts[1:]) if ends is None else (starts, ends)
+    if first.size < 1:
         return {}
-    times = times_of_phases(recording.time, starts)
+    times = _times_between(recording.time[first], recording.time[last])
     names = [name for name in recording.names if not (name in CHANNELS and CHANNELS[name].is_held)]
     return {name: _curves(np.interp(times, recording.time, recording[name]), recording.unit(name)) for name in names}
 
 
 def times_of_phases(time: Floats, starts: NDArray[np.intp]) -> Floats:
     """Times [s] of ``PHASES`` in each stride, shape (strides, phases)."""
-    first, last = time[starts[:-1]], time[starts[1:]]
+    return _times_between(time[starts[:-1]], time[starts[1:]])
+
+
+def _times_between(first: Floats, last: Floats) -> Floats:
     return np.asarray(first[:, None] + PHASES * (last - first)[:, None])
 
 

@@ -19,8 +19,10 @@ from ppafo.simulation.result import Status
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.storage.opensim import write_opensim
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.course_planning import PlannedCourse
+from ppafo.walking.course_segments import SegmentResult, course_metrics, segment_results, steady_strides
 from ppafo.walking.loading import load_walk
-from ppafo.walking.planning import WalkPlan, plan_walk
+from ppafo.walking.planning import WalkPlan, course_of_walk, plan_walk
 from ppafo.walking.recorded import recording_of_walk
 from ppafo.walking.strides import SETTLING, Curves, mean_curves, per_stride, stride_starts
 from ppafo.walking.walk_metrics import walk_metrics
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHORTEST_STRIDES = 5
+SHORTEST_COURSE = 1.0
+DEFAULT_MINUTES = 1.0
 LONGEST_MINUTES = 60.0
 RECORD_INTERVALS = ((61.0, 1.0e-3), (601.0, 5.0e-3), (60.0 * LONGEST_MINUTES, 2.0e-2))
 """Up to which length of a walk [s] the record has which interval [s]: an hour of milliseconds would not fit."""
@@ -48,7 +52,7 @@ class WalkResult:
     """A finished walk: recording, numbers of each stride (strides,), curves over the stride, and numbers of the whole.
 
     ``averages`` and ``metrics`` leave out the first strides, in which the controller learns. ``starts`` are the samples
-    of the recording right after each heel strike.
+    of the recording right after each heel strike. ``segments`` are those of a course, none without one.
     """
 
     configuration: Configuration
@@ -58,6 +62,7 @@ class WalkResult:
     metrics: Mapping[str, Metric]
     status: Status
     starts: NDArray[np.intp]
+    segments: tuple[SegmentResult, ...] = ()
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
@@ -80,20 +85,26 @@ class WalkResult:
 
 def walk(
     configuration: Configuration | str | Path,
-    minutes: float,
+    minutes: float | None = None,
     overrides: Iterable[str] = (),
     gait: str | Path | None = None,
     progress: Progress = silent,
+    course: str | Path | None = None,
 ) -> WalkResult:
     """Walk for ``minutes`` [min]: a configuration, the name of a shipped one, or a file; overrides as for the command.
 
+    Unless ``minutes`` are given it is the whole course, or one minute where there is none.
     A walk that diverges is a result with that status, up to the time of failure. ScenarioError or ParameterError for
     bad input. ``progress`` gets the minutes done and the minutes in all, part by part.
     """
     is_loaded = isinstance(configuration, Configuration)
-    chosen = configuration if isinstance(configuration, Configuration) else load_walk(configuration, overrides, gait)
-    if is_loaded and (gait is not None or tuple(overrides)):
-        raise ScenarioError("overrides and a gait go with a name or a file; a Configuration takes them in load_walk")
+    chosen = (
+        configuration if isinstance(configuration, Configuration) else load_walk(configuration, overrides, gait, course)
+    )
+    if is_loaded and (gait is not None or course is not None or tuple(overrides)):
+        raise ScenarioError(
+            "overrides, a gait and a course go with a name or a file; a Configuration takes them in load_walk"
+        )
     run = plan_walk(plan_of(chosen, walk_duration(chosen, minutes)))
     outcome = _run_in_parts(batch_of(run), run.step, progress)
     rows = state_row_numbers(run)
@@ -110,13 +121,18 @@ def walk(
     return _walk_result(chosen, recording, record, starts, status)
 
 
-def walk_duration(configuration: Configuration, minutes: float) -> float:
-    """Length of a walk [s]; ScenarioError where it is too short for whole strides, or too long."""
+def walk_duration(configuration: Configuration, minutes: float | None = None) -> float:
+    """Length of a walk [s], that of its course or a minute unless given; ScenarioError if too short or too long."""
+    course = course_of_walk(configuration)
+    if minutes is None and course is not None:
+        minutes = float(course.duration) / 60.0
+    minutes = DEFAULT_MINUTES if minutes is None else minutes
     seconds = 60.0 * minutes
-    shortest = SHORTEST_STRIDES * configuration.gait.stride_time
+    shortest = SHORTEST_STRIDES * configuration.gait.stride_time if course is None else SHORTEST_COURSE
     if not shortest <= seconds <= 60.0 * LONGEST_MINUTES:
         raise ScenarioError(
-            f"a walk of {minutes:.6g} min: must be {shortest / 60.0:.2g} min ({SHORTEST_STRIDES} strides) or more, and "
+            f"a walk of {minutes:.6g} min: must be {shortest / 60.0:.2g} min "
+            f"({f'{SHORTEST_STRIDES} strides' if course is None else 'a second of a course'}) or more, and "
             f"at most {LONGEST_MINUTES:g} min"
         )
     return seconds
@@ -149,6 +165,7 @@ def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
         record_interval=next(interval for longest, interval in RECORD_INTERVALS if seconds <= longest),
         supply_lines=configuration.supply_lines,
         thermal=configuration.thermal,
+        course=configuration.course,
     )
 
 
@@ -160,10 +177,30 @@ def _walk_result(
     status: Status,
 ) -> WalkResult:
     strides = per_stride(record, starts)
+    planned = course_of_walk(configuration)
+    if planned is not None:
+        return _course_result(configuration, planned, recording, strides, starts, status)
     settled = starts[SETTLING:]
     averages = mean_curves(recording, settled)
     metrics = walk_metrics(configuration, recording, strides, averages, settled)
     return WalkResult(configuration, recording, strides, averages, metrics, status, starts)
+
+
+def _course_result(
+    configuration: Configuration,
+    planned: PlannedCourse,
+    recording: Recording,
+    strides: Mapping[str, Floats],
+    starts: NDArray[np.intp],
+    status: Status,
+) -> WalkResult:
+    """The result of a course: means are over its strides at an even speed on level ground, the rest over all of it."""
+    kept = steady_strides(planned, recording.time[starts])
+    averages = mean_curves(recording, starts[:-1][kept], starts[1:][kept])
+    metrics = walk_metrics(configuration, recording, strides, averages, starts, kept)
+    segments = segment_results(configuration, planned, recording, strides["push_off_work"], starts)
+    metrics |= course_metrics(segments, recording, kept.size)
+    return WalkResult(configuration, recording, strides, averages, metrics, status, starts, segments)
 
 
 def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:

@@ -21,22 +21,30 @@ def walk_metrics(
     strides: Mapping[str, Floats],
     averages: Mapping[str, Curves],
     starts: NDArray[np.intp],
+    kept: slice | NDArray[np.intp] = slice(SETTLING, None),
 ) -> dict[str, Metric]:
-    """Metrics of a walk by name, in SI; ``starts`` are the samples after each heel strike, the first ones left out."""
-    return _of_strides(configuration, strides, averages) | _tracking(recording, starts) | _safety(recording)
+    """Metrics of a walk by name, in SI; ``starts`` are the samples after each heel strike, the first ones left out.
+
+    ``kept`` are the strides that the means are over.
+    """
+    return _of_strides(configuration, strides, averages, kept) | _tracking(recording, starts) | _safety(recording)
 
 
 def _of_strides(
-    configuration: Configuration, strides: Mapping[str, Floats], averages: Mapping[str, Curves]
+    configuration: Configuration,
+    strides: Mapping[str, Floats],
+    averages: Mapping[str, Curves],
+    kept: slice | NDArray[np.intp],
 ) -> dict[str, Metric]:
-    """Means over the strides after the first ones, and what they are of a healthy ankle."""
+    """Means over some strides, and what they are of a healthy ankle."""
     found = {}
+    over = "" if configuration.course is None else " over the strides at an even speed on level ground"
     for name, item in PER_STRIDE.items():
-        values = strides[name][SETTLING:]
+        values = strides[name][kept]
         if name == "slap_rate":
             values = values[values < 0.0]
         if values.size:
-            found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean")
+            found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean{over}")
     found["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")
     healthy = healthy_positive_work(configuration)
     if healthy > 0.0:

@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.lanes import Batch, Floats
-from ppafo.engine.rows import row_numbers
+from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.gait.gait import KNEE
 from ppafo.model.chambers import chamber_mass
+from ppafo.model.gait import GaitTiming
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.plant import chamber_volumes
 from ppafo.walking.anthropometry import Build, draw_bounded_normal, segment_values
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.course_planning import PlannedCourse, plan_course, standing_gait
 from ppafo.walking.declaration import LARGEST_SEED
 from ppafo.walking.varied_gait import VariedGaits
 
@@ -26,9 +28,17 @@ START_VARIATION = 0.03
 
 
 def batch_of_many(
-    configuration: Configuration, run: Run, build: Build, gaits: VariedGaits, generator: np.random.Generator
+    configuration: Configuration,
+    run: Run,
+    build: Build,
+    gaits: VariedGaits,
+    generator: np.random.Generator,
+    planned: PlannedCourse | None = None,
 ) -> Batch:
-    """The run's column for every wearer, with what differs written over it; nothing is recorded on the way."""
+    """The run's column for every wearer, with what differs written over it; nothing is recorded on the way.
+
+    ``planned`` is the course of each, where they walk one.
+    """
     single = batch_of(run)
     count = build.mass.size
     assert run.walk is not None, "a population walks"
@@ -39,9 +49,26 @@ def batch_of_many(
     _overwrite(
         parameters, row_numbers(single.program.parameter_rows()), _parameter_rows(run, segments, gaits, generator)
     )
-    _overwrite(states, row_numbers(single.program.state_rows()), _state_rows(run, segments, gaits))
+    _overwrite(states, row_numbers(single.program.state_rows()), _state_rows(run, segments, gaits, planned))
+    if planned is not None:
+        _overwrite(parameters, row_numbers(single.program.parameter_rows()), _course_rows(planned))
     still = replace(single.clock, record_every=0)
     return Batch(single.program, still, parameters, states)
+
+
+def course_of_many(configuration: Configuration, gaits: VariedGaits) -> PlannedCourse | None:
+    """The course of each wearer, with strides of his or her own time; None where they walk none."""
+    if configuration.course is None:
+        return None
+    timing: Any = GaitTiming(start=0.0, **gaits.timing)  # type: ignore[arg-type]
+    foot = gaits.series["shank"].at_heel_strike(timing.frequency)[0]
+    foot = foot - gaits.series["ankle"].at_heel_strike(timing.frequency)[0] + 0.5 * np.pi
+    return plan_course(configuration.course, configuration.gait, timing.frequency, timing, foot - timing.ground_angle)
+
+
+def _course_rows(planned: PlannedCourse) -> dict[str, Floats]:
+    paths = leaf_paths(type(planned.course), "walk_course")
+    return dict(zip(paths, leaves(planned.course), strict=True))
 
 
 def _overwrite(table: Floats, rows: Mapping[str, int], values: Mapping[str, Floats]) -> None:
@@ -82,21 +109,41 @@ def _thresholds(run: Run, count: int, generator: np.random.Generator) -> dict[st
     }
 
 
-def _state_rows(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits) -> dict[str, Floats]:
-    """The start at a heel strike with the wearer's own angles and vented chambers."""
-    now = _gait_at_heel_strike(run, segments, gaits)
+def _state_rows(
+    run: Run, segments: Mapping[str, Floats], gaits: VariedGaits, planned: PlannedCourse | None
+) -> dict[str, Floats]:
+    """The start at a heel strike, or standing, with the wearer's own angles and vented chambers."""
+    standing = planned is not None
+    now = _gait_in_standing(run, segments, gaits, planned) if planned else _gait_at_heel_strike(run, segments, gaits)
+    shown = {f"walk.{name}_force": 0.5 * now["force"] for name in ("heel", "toe")} if standing else {}
     plant = run.plant
     volumes = chamber_volumes(plant, now["ankle"])
     masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
     foot = now["shank"] - now["ankle"] + 0.5 * np.pi
-    return {f"walk.now.{name}": values for name, values in now.items()} | {
-        "walk.foot.sine": np.sin(foot),
-        "walk.foot.cosine": np.cos(foot),
-        "state.angle": now["ankle"],
-        "state.angular_velocity": now["ankle_rate"],
-        "state.mass_1": np.asarray(masses[0]),
-        "state.mass_2": np.asarray(masses[1]),
-    }
+    return (
+        {f"walk.now.{name}": values for name, values in now.items()}
+        | shown
+        | {
+            "walk.foot.sine": np.sin(foot),
+            "walk.foot.cosine": np.cos(foot),
+            "state.angle": now["ankle"],
+            "state.angular_velocity": now["ankle_rate"],
+            "state.mass_1": np.asarray(masses[0]),
+            "state.mass_2": np.asarray(masses[1]),
+        }
+    )
+
+
+def _gait_in_standing(
+    run: Run, segments: Mapping[str, Floats], gaits: VariedGaits, planned: PlannedCourse
+) -> dict[str, Floats]:
+    """The fields of ``GaitNow`` (wearers,) where a course begins."""
+    assert run.walk is not None, "a population walks"
+    own = {name: row for name, row in segments.items() if name in LegParameters._fields}
+    leg: Any = run.walk.leg._replace(**own)  # type: ignore[arg-type]
+    timing: Any = run.walk.timing._replace(ground_angle=gaits.timing["ground_angle"])  # type: ignore[arg-type]
+    now = standing_gait(leg, timing, planned.course)
+    return {name: np.asarray(value, dtype=np.float64) for name, value in now._asdict().items()}
 
 
 def _gait_at_heel_strike(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits) -> dict[str, Floats]:

@@ -129,13 +129,40 @@ def test_json_is_the_only_thing_printed(tmp_path: Path, capsys: pytest.CaptureFi
     assert document["folder"] == str(tmp_path / "walk")
 
 
-def test_the_list_names_every_walk(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_list_names_every_walk_and_every_course(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["walk", "--list"]) == 0
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
     learning, regulators = "proportional-learning", "proportional-regulators"
-    assert names == ["off", "proportional", learning, regulators, "solenoid", "solenoid-regulators"]
+    assert names[:6] == ["off", "proportional", learning, regulators, "solenoid", "solenoid-regulators"]
+    assert names[6:] == ["corridor", "first-steps", "six-minutes", "stairs"]
     assert main(["walk", "--list", "--json"]) == 0
-    assert len(json.loads(capsys.readouterr().out)["walks"]) == 6
+    listed = json.loads(capsys.readouterr().out)["walks"]
+    assert [item["kind"] for item in listed] == ["walk"] * 6 + ["course"] * 4
+
+
+def test_a_course_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "along"
+    assert main(["walk", "solenoid", "--course", "stairs", "--minutes", "0.3", "--out", str(folder)]) == 0
+    out = capsys.readouterr().out
+    assert "stairs, 0.6 m/s" in out
+    assert "whole course" in out
+    assert "is scaled to 0.6, 0.8 m/s: beyond 1.06 to 1.6 m/s" in out
+    assert {"course.png", "course.svg", "segments.csv", "segments-off.csv"} <= set(names(folder))
+    assert "legs.png" not in names(folder)
+    document = json.loads((folder / "walk.json").read_text())
+    assert document["course"] == "stairs"
+    assert [item["kind"] for item in document["segments"]] == ["stand", "walk", "stairs"]
+    lines = (folder / "segments.csv").read_text().splitlines()
+    assert lines[1].startswith("kind,start [s],end [s],strides [-],helped [-],gas [kg]")
+    assert len(lines) == 5
+
+
+def test_a_bottle_is_not_asked_about_a_course(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "along"
+    assert main(["walk", "solenoid", "--course", "stairs", "--minutes", "0.1", "--out", str(folder)]) == 0
+    capsys.readouterr()
+    assert main(["endurance", str(folder)]) == 2
+    assert "the walk was on course 'stairs', whose strides differ" in capsys.readouterr().err
 
 
 def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[str]) -> None:
@@ -146,6 +173,7 @@ def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[st
 MISTAKES = {
     "solenoit": "there is no walk 'solenoit', did you mean 'solenoid'?",
     "--gait nobody": "there is no gait 'nobody'",
+    "solenoid --course corider": "there is no course 'corider', did you mean 'corridor'?",
     "--minutes 0.01": "must be 0.087 min (5 strides) or more",
     "--minutes nan": "a walk of nan min: must be",
     "--minutes 1e9": "a walk of 1e+09 min: must be 0.087 min (5 strides) or more, and at most 60 min",

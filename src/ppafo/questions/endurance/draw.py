@@ -189,6 +189,12 @@ def read_walk_gas(folder: Path) -> WalkGas:
         *(_number(document, f"configuration.device.actuator.{name}", path) for name in ("angle_min", "angle_max")),
         *(_number(document, f"configuration.device.actuator.{name}", path, 0.0) for name in _VOLUMES),
     )
+    course = _table(document, "configuration", path).get("course")
+    if course is not None:
+        name = _table({"course": course}, "course", path).get("name", "")
+        raise DataError(
+            f"{path}: the walk was on course '{name}', whose strides differ; give --gas-per-step, or a walk without one"
+        )
     has_gas = "gas" in _table(document, "metrics", path)
     gas = _number(document, "metrics.gas.value", path, -_LEAST) if has_gas else 0.0
     stride_time = _number(document, "configuration.gait.stride_time", path, 0.0)

@@ -14,7 +14,13 @@ QUESTION = Question(
             default="solenoid",
         ),
         Argument(("--gait",), "gait", "name of a gait, or a gait file; default: the gait of the configuration", "GAIT"),
-        Argument(("--minutes",), "minutes", "time to walk; default 1", "N", minutes, 1.0),
+        Argument(
+            ("--course",),
+            "course",
+            "what the wearer does one after the other: a name or a .toml file; 'ppafo walk --list' has the names",
+            "COURSE",
+        ),
+        Argument(("--minutes",), "minutes", "time to walk; default 1, or a whole course", "N", minutes),
         Argument(
             ("--wearers",), "wearers", "number of different wearers to simulate instead of one", "N", counting_number
         ),
@@ -22,5 +28,6 @@ QUESTION = Question(
         SET,
     ),
     library="ppafo.walking.loading:FILE",
+    listing="ppafo.questions.walk.solve:list_files",
     default_folder="ppafo.questions.walk.solve:default_folder",
 )

@@ -11,6 +11,7 @@ from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.metrics import Metric
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.endurance.solve import Endurance
+from ppafo.questions.walk.course import course_data, course_files, course_pictures, course_sections, trust_remark
 from ppafo.questions.walk.solve import WalkPair, Wearers
 from ppafo.questions.walk.volumes import volumes_data, volumes_sections
 from ppafo.questions.walk.wearers import wearers_answer
@@ -20,6 +21,7 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.version import __version__
 from ppafo.walking.comparison import Comparison
+from ppafo.walking.configuration import Configuration
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
@@ -74,7 +76,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
     worn, bare = comparison.with_device, comparison.without_device
     configuration = worn.configuration
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    remarks = [*person_remarks(configuration), _bottle(pair.life), _safety(comparison)]
+    remarks = [*person_remarks(configuration), _bottle(pair.life), _safety(comparison), trust_remark(configuration)]
     remarks += [
         f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
     ]
@@ -82,13 +84,16 @@ def _pair_answer(pair: WalkPair) -> Answer:
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        lead=(f"{configuration.name}: {worn.status.kind}, {strides} of {configuration.gait.name}",),
+        lead=(
+            f"{configuration.name}: {worn.status.kind}, {strides} of {configuration.gait.name}{_along(configuration)}",
+        ),
         sections=(
             Section(paragraphs=_set_up(comparison), is_detail=True),
+            *course_sections(comparison),
             Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
             *volumes_sections(pair.volumes),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
-            *(_pictures(comparison) if worn.averages and bare.averages else ()),
+            *(course_pictures(comparison) if configuration.course is not None else _pictures(comparison)),
             *_assumptions_section(configuration.assumed),
         ),
         data=_data(comparison, pair.life) | {"volumes": volumes_data(pair.volumes)},
@@ -101,6 +106,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
             "strides-off.csv": lambda: strides_csv(bare),
             "mean-stride.csv": lambda: mean_stride_csv(worn),
             "mean-stride-off.csv": lambda: mean_stride_csv(bare),
+            **course_files(comparison),
         },
     )
 
@@ -139,7 +145,13 @@ def _cell(metric: Metric | None, quantity: str, digits: int) -> str | None:
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
+def _along(configuration: Configuration) -> str:
+    return "" if configuration.course is None else f", course {configuration.course.name}"
+
+
 def _pictures(comparison: Comparison) -> tuple[Section, ...]:
+    if not (comparison.with_device.averages and comparison.without_device.averages):
+        return ()
     legs = Figure("legs", _LEGS, lambda: frames_figure(comparison))
     moving = Figure("legs-moving", _MOVING, lambda: animation(comparison))
     phases = Figure("gait-phases", _PHASES, lambda: strip_figure(comparison.with_device))
@@ -205,6 +217,7 @@ def _data(comparison: Comparison, life: Endurance | None) -> dict[str, Any]:
         "minutes": float(comparison.with_device.recording.time[-1]) / 60.0,
         "metrics": plain(dict(comparison.with_device.metrics)),
         "bottle": _bottle_data(life),
+        **course_data(comparison),
         "metrics_off": plain(dict(comparison.without_device.metrics)),
         "healthy": plain(dict(comparison.healthy)),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},

@@ -9,9 +9,10 @@ from ppafo.answers import Solved
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
 from ppafo.questions.walk.volumes import VolumeReading, walks_by_volume
+from ppafo.walking import course as courses
 from ppafo.walking.comparison import Comparison, compare_walks
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.loading import load_walk
+from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.population import Population, walk_population
 
 _LONG = 12.0
@@ -39,8 +40,9 @@ class Wearers(Solved):
 
 def walk_with_and_without(
     configuration: Configuration | str | Path,
-    minutes: float = 1.0,
+    minutes: float | None = None,
     gait: str | Path | None = None,
+    course: str | Path | None = None,
     wearers: int | None = None,
     seed: int = 1,
     overrides: Sequence[str] = (),
@@ -48,26 +50,42 @@ def walk_with_and_without(
 ) -> WalkPair | Wearers:
     """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
 
-    ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min]; ``gait`` one
-    in place of the configuration's; ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError for
-    bad input; a walk that diverges is an answer that has not passed.
+    ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
+    that of its course unless given; ``gait`` and ``course`` stand in place of those of the configuration; ``wearers``
+    the number of different wearers, drawn with ``seed``. ScenarioError for bad input; a walk that diverges is an answer
+    that has not passed.
     """
     chosen = configuration
     if not isinstance(chosen, Configuration):
-        chosen = load_walk(chosen, overrides, gait)
+        chosen = load_walk(chosen, overrides, gait, course)
     report = progress or report_nothing
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
         return Wearers(walk_population(chosen, minutes, wearers, seed, advance))
     comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
-    life = endurance_of_walk(comparison.with_device)
-    return WalkPair(comparison, life, walks_by_volume(comparison.with_device, life))
+    # A bottle is asked how often it can give the same: a course is not made of equal strides.
+    life = endurance_of_walk(comparison.with_device) if chosen.course is None else None
+    volumes = walks_by_volume(comparison.with_device, life) if chosen.course is None else ()
+    return WalkPair(comparison, life, volumes)
+
+
+def list_files() -> list[dict[str, Any]]:
+    """Return the walks and the courses that come with the package: name, what it is, description."""
+    found = []
+    for library in (FILE, courses.FILE):
+        files = {name: library.parse(library.read(name), name) for name in library.names()}
+        found += [
+            {"name": name, "kind": library.noun, "description": str(file.get("description", ""))}
+            for name, file in files.items()
+        ]
+    return found
 
 
 def default_folder(values: Mapping[str, Any]) -> Path:
     """Return where the command writes by default: by the name of the configuration."""
-    configuration = load_walk(values["configuration"], values["overrides"], values["gait"])
-    return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}"
+    configuration = load_walk(values["configuration"], values["overrides"], values["gait"], values["course"])
+    along = "" if configuration.course is None else f"-{configuration.course.name}"
+    return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
 
 
 def _reporter(report: Report, activity: str, noun: str, above: float) -> "Any":

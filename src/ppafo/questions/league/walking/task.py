@@ -76,6 +76,8 @@ def walking_task(
     for override in overrides:
         _check(override)
     judged = load_walk(file, [f"controller.kind={PROFILE_KIND}", f"device.valve={PROFILE_VALVE}", *overrides], gait)
+    if judged.course is not None:
+        raise ScenarioError(f"{file}: course: a league compares equal strides; leave the course away")
     profile = TorqueProfile(**{name: judged.settings[name] for name in TorqueProfile._fields})
     if profile.peak_torque <= 0.0:
         raise ScenarioError("controller.peak_torque: a league needs a desired torque; give one above 0 N m")

@@ -1,0 +1,244 @@
+"""A course of walking: stands, starts, strides of any length, ramps and stops in time, and the gait on it.
+
+The course is a list of parts. Over each the strides per second and the length of the stride run from one value to
+another along a polynomial of fifth order, so that both have two continuous time derivatives, also from part to part.
+The phase is the integral of the strides per second, in closed form.
+
+Between standing (shank vertical, foot flat) and the recorded gait the angles are ``stand + stride (gait - stand)``.
+A person stands at the phase in the middle between heel strike and heel rise, where the recorded foot is flat.
+"""
+
+from typing import Annotated, NamedTuple
+
+from ppafo.model.contact import QUARTER_TURN
+from ppafo.model.fourier import Harmonic, Series, acceleration_at, harmonics, rate_at, value_at
+from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
+from ppafo.model.turns import TURN, sine_and_cosine
+
+PARTS = 32
+NEVER = 1.0e6
+"""Time [s] of a part that is not used, and length of one that does not end."""
+
+STANDS_AT = 0.5
+"""Phase of standing as a fraction of that at which the heel rises: half of the weight is under the heel there."""
+
+SCUFF_AT = 0.5
+"""Place of a scuff as a fraction of the swing."""
+SCUFF_FORCE = 0.2
+"""Force of a scuff under the toes in body weights. Assumed; twice what the shipped controllers take for a load."""
+
+WALKS_ABOVE = 0.5
+"""Strides per second over the recorded ones from which on the foot carries as in walking; below, partly as in
+standing."""
+
+
+class CoursePart(NamedTuple):
+    """One part: start and length [s], phase at its start [turns], and what changes over it: first value and gain.
+
+    Strides per second [Hz], ``stride`` (angles over the recorded ones) [-] and ``load`` [body weights] that the foot
+    carries in standing. ``tilt`` [rad] leans the shank forward at the strike, so that the toes come first; ``scuff``
+    [s] is how long the toes touch the ground in the swing; both hold for the whole part.
+    """
+
+    start: float
+    length: float
+    turns: float
+    frequency: float
+    frequency_gain: float
+    stride: float
+    stride_gain: float
+    load: float
+    load_gain: float
+    tilt: float
+    scuff: float
+
+
+class Course(NamedTuple):
+    """Parts in the order of their starts; those that are not used start at ``NEVER``."""
+
+    parts: Annotated[tuple[CoursePart, ...], PARTS]
+
+
+class Pace(NamedTuple):
+    """Phase [turns], strides per second [Hz], stride [-] and their time derivatives; load, tilt, scuff as in a part."""
+
+    turns: float
+    frequency: float
+    frequency_rate: float
+    stride: float
+    stride_rate: float
+    stride_acceleration: float
+    load: float
+    tilt: float
+    scuff: float
+
+
+class Marks(NamedTuple):
+    """What marks a stride now: force [N] of a scuff under the toes, and 1 where only the forefoot meets the ground."""
+
+    scuff_force: float
+    forefoot: float
+
+
+class Blend(NamedTuple):
+    """A value that goes from 0 to 1, and its first and second derivative."""
+
+    value: float
+    rate: float
+    acceleration: float
+
+
+def blend(fraction: float) -> Blend:
+    """From 0 to 1 over a fraction from 0 to 1, with both derivatives 0 at both ends."""
+    rest = 1.0 - fraction
+    square = fraction * fraction
+    return Blend(
+        value=square * fraction * (10.0 + fraction * (6.0 * fraction - 15.0)),
+        rate=30.0 * square * rest * rest,
+        acceleration=60.0 * fraction * rest * (1.0 - 2.0 * fraction),
+    )
+
+
+def part_at(course: Course, time: float) -> CoursePart:
+    """The part in force at a time [s] from 0 on."""
+    found = course.parts[0]
+    for part in course.parts[1:]:
+        begun = time >= part.start
+        found = CoursePart(
+            start=part.start if begun else found.start,
+            length=part.length if begun else found.length,
+            turns=part.turns if begun else found.turns,
+            frequency=part.frequency if begun else found.frequency,
+            frequency_gain=part.frequency_gain if begun else found.frequency_gain,
+            stride=part.stride if begun else found.stride,
+            stride_gain=part.stride_gain if begun else found.stride_gain,
+            load=part.load if begun else found.load,
+            load_gain=part.load_gain if begun else found.load_gain,
+            tilt=part.tilt if begun else found.tilt,
+            scuff=part.scuff if begun else found.scuff,
+        )
+    return found
+
+
+def pace_in(part: CoursePart, time: float) -> Pace:
+    """Phase, strides per second and stride in a part at a time [s] within it."""
+    passed = time - part.start
+    fraction = min(passed / part.length, 1.0)
+    shape = blend(fraction)
+    square = fraction * fraction
+    integral = square * square * (2.5 + fraction * (fraction - 3.0))
+    return Pace(
+        turns=part.turns + part.frequency * passed + part.frequency_gain * part.length * integral,
+        frequency=part.frequency + part.frequency_gain * shape.value,
+        frequency_rate=part.frequency_gain * shape.rate / part.length,
+        stride=part.stride + part.stride_gain * shape.value,
+        stride_rate=part.stride_gain * shape.rate / part.length,
+        stride_acceleration=part.stride_gain * shape.acceleration / (part.length * part.length),
+        load=part.load + part.load_gain * shape.value,
+        tilt=part.tilt,
+        scuff=part.scuff,
+    )
+
+
+class Motion(NamedTuple):
+    """An angle [rad] with its rate [rad/s] and acceleration [rad/s^2]."""
+
+    angle: float
+    rate: float
+    acceleration: float
+
+
+def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing: float) -> Motion:
+    """An angle between that of standing [rad] and that of the gait."""
+    away = value_at(series, at) - standing
+    rate = rate_at(series, at, pace.frequency)
+    turning = acceleration_at(series, at, pace.frequency) + rate_at(series, at, pace.frequency_rate)
+    return Motion(
+        angle=standing + pace.stride * away,
+        rate=pace.stride_rate * away + pace.stride * rate,
+        acceleration=pace.stride_acceleration * away + 2.0 * pace.stride_rate * rate + pace.stride * turning,
+    )
+
+
+def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> Motion:
+    """How far the shank leans forward for a strike with the toes: most at the strike, none at toe-off and standing."""
+    standing = STANDS_AT * timing.heel_off
+    since = phase - standing if phase >= standing else phase - standing + 1.0
+    strike, lifted = 1.0 - standing, timing.toe_off - standing
+    rises = since < strike
+    slope = 1.0 / (strike - lifted) if rises else -1.0 / standing
+    place = (since - lifted) * slope if rises else 1.0 + (since - strike) * slope
+    shape = blend(max(0.0, min(1.0, place)))
+    rate = slope * pace.frequency
+    return Motion(
+        angle=pace.tilt * shape.value,
+        rate=pace.tilt * shape.rate * rate,
+        acceleration=pace.tilt * (shape.acceleration * rate * rate + shape.rate * slope * pace.frequency_rate),
+    )
+
+
+def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: Pace) -> Marks:
+    """The marks at a phase; none in a part without a scuff and a tilt."""
+    since = phase - timing.toe_off - SCUFF_AT * (1.0 - timing.toe_off)
+    weight = SCUFF_FORCE * leg.body_mass * leg.gravity
+    scuffs = since >= 0.0 and since < pace.scuff * pace.frequency
+    return Marks(scuff_force=weight if scuffs else 0.0, forefoot=1.0 if pace.tilt > 0.0 else 0.0)
+
+
+def gait_on_course(
+    gait: GaitSeries, course: Course, timing: GaitTiming, leg: LegParameters, time: float
+) -> tuple[GaitNow, Marks]:
+    """The gait of a person with this leg at a time [s] of a course, and what marks the stride.
+
+    The ground force is that of the gait at any speed, and passes to the load of standing below ``WALKS_ABOVE``. The
+    acceleration of the knee goes with stride and strides per second squared; that of the way of the body as its speed
+    changes is left out: at most 1 m/s^2 beside 10 to 20.
+    """
+    pace = pace_in(part_at(course, time), time)
+    phase = pace.turns - float(int(pace.turns))
+    at = harmonics(phase)
+    tilt = tilt_of_shank(timing, phase, pace)
+    upright = blended_angle(gait.shank, at, pace, 0.0)
+    ankle = blended_angle(gait.ankle, at, pace, QUARTER_TURN - timing.ground_angle)
+    shank = upright.angle - tilt.angle
+    shank_rate = upright.rate - tilt.rate
+    shank_acceleration = upright.acceleration - tilt.acceleration
+    hurry = pace.frequency / timing.frequency
+    forward = pace.stride * hurry * hurry * value_at(gait.knee_forward, at)
+    up = pace.stride * hurry * hurry * value_at(gait.knee_up, at)
+    walks = blend(min(hurry / WALKS_ABOVE, 1.0)).value
+    carried = pace.load + walks * (value_at(gait.force, at) - pace.load)
+    sine_shank, cosine_shank = sine_and_cosine(shank / TURN)
+    sine_foot, cosine_foot = sine_and_cosine((shank - ankle.angle) / TURN + 0.25)
+    torque = torque_of_shank(
+        leg, sine_shank, cosine_shank, sine_foot, cosine_foot, shank_rate, shank_acceleration, forward, up
+    )
+    now = GaitNow(
+        phase=phase,
+        shank=shank,
+        shank_rate=shank_rate,
+        shank_acceleration=shank_acceleration,
+        ankle=ankle.angle,
+        ankle_rate=ankle.rate,
+        ankle_acceleration=ankle.acceleration,
+        moment=walks * leg.body_mass * value_at(gait.moment, at),
+        force=max(leg.body_mass * leg.gravity * carried, 0.0),
+        knee_forward=forward,
+        knee_up=up,
+        sine_shank=sine_shank,
+        cosine_shank=cosine_shank,
+        sine_healthy_foot=sine_foot,
+        healthy_torque=torque + foot_inertia_about_ankle(leg) * ankle.acceleration + leg.ankle_damping * ankle.rate,
+    )
+    return now, marks_at(timing, leg, phase, pace)
+
+
+def shown_toe_force(toe_force: float, marks: Marks, follow_rate: float, step: float) -> float:
+    """Toe force [N] that the sensor shows at the end of a step [s], with a scuff; it follows at a rate [1/s]."""
+    return toe_force + marks.scuff_force * follow_rate * step / (1.0 + follow_rate * step)
+
+
+def stands_on_toes(toes_first: float, marks: Marks) -> float:
+    """1 where the stride began with the toes, or where only the forefoot is on the ground: on the edge of a stair."""
+    return max(toes_first, marks.forefoot)

@@ -1,0 +1,190 @@
+"""What the answer of a walk says of a course: a table of its segments, its figure and its numbers."""
+
+from collections.abc import Callable
+from dataclasses import asdict, fields
+from typing import Any
+
+from ppafo.answers import Column, Figure, Section, Table
+from ppafo.answers.display_units import display_value
+from ppafo.errors import DataError
+from ppafo.gait.scaling import speed_range
+from ppafo.walking.comparison import Comparison
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.course_segments import SegmentResult
+from ppafo.walking.figures.course import course_figure
+from ppafo.walking.figures.mean_stride import walk_figure
+
+_HEAD = (
+    Column("Segment"),
+    Column("from (s)"),
+    Column("to (s)"),
+    Column("strides"),
+    Column("helped"),
+    Column("gas (g)"),
+    Column("work (J)"),
+    Column("lowest toes (cm)"),
+    Column("... without (cm)"),
+    Column("push, heel loaded (N m)"),
+    Column("safe state at (s)"),
+)
+_WHOLE = "whole course"
+_COURSE = (
+    "The course over time. Grey: every other segment. 'Without' is the same course with the same device and both "
+    "chambers vented."
+)
+_EXPLAINED = (
+    "A stride counts for the segment in which its foot strikes; it is helped where the controller does not go into its "
+    "safe state before the next strike. Work is that on the wearer while the foot rolls over the toes. Lowest toes are "
+    "over the ground, in the middle part of a swing. A push with the heel loaded is torque in plantarflexion while the "
+    "heel carries more than a tenth of the body weight.",
+    "Angles go with the length of the stride, which goes with the square root of the speed, as the strides per second "
+    "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
+    "of the stance stay those of the gait at every speed.",
+)
+_MEAN = (
+    "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "
+    "band."
+)
+
+
+def course_sections(comparison: Comparison) -> tuple[Section, ...]:
+    """Return the table of the segments, and how to read it; nothing for a walk without a course."""
+    worn, bare = comparison.with_device, comparison.without_device
+    if worn.configuration.course is None:
+        return ()
+    without = {segment.start: segment for segment in bare.segments}
+    rows = [_row(segment, without.get(segment.start)) for segment in worn.segments]
+    table = Table(_HEAD, (*rows, _whole(comparison)), marked=(len(rows),))
+    means = (
+        f"The numbers below are means over the {worn.metrics['steady_strides'].value:.0f} of "
+        f"{worn.metrics['course_strides'].value:.0f} strides that are at an even speed on level ground."
+    )
+    return (
+        Section(table=table),
+        Section("How to read the course", _EXPLAINED, is_detail=True),
+        Section(paragraphs=(means,)),
+    )
+
+
+def _row(segment: SegmentResult, bare: SegmentResult | None) -> tuple[str | None, ...]:
+    return (
+        segment.title,
+        f"{segment.start:.1f}",
+        f"{segment.end:.1f}",
+        f"{segment.strides}",
+        f"{segment.helped}",
+        _text(segment.gas, "gas mass", 2),
+        _text(segment.push_off_work, "energy", 1),
+        _text(segment.lowest_toes, "body length", 1),
+        _text(None if bare is None else bare.lowest_toes, "body length", 1),
+        _text(segment.flat_push, "torque", 1),
+        _text(segment.safe_time, "time", 2),
+    )
+
+
+def _whole(comparison: Comparison) -> tuple[str | None, ...]:
+    worn, bare = comparison.with_device, comparison.without_device
+    numbers = {name: item.value for name, item in worn.metrics.items()}
+    toes = bare.metrics.get("course_lowest_toes")
+    return (
+        _WHOLE,
+        "0.0",
+        f"{numbers['course_time']:.1f}",
+        f"{numbers['course_strides']:.0f}",
+        f"{numbers['helped_strides']:.0f}",
+        _text(numbers["course_gas"], "gas mass", 2),
+        _text(numbers["course_work"], "energy", 1),
+        _text(numbers.get("course_lowest_toes"), "body length", 1),
+        _text(None if toes is None else toes.value, "body length", 1),
+        _text(numbers["course_flat_push"], "torque", 1),
+        _text(numbers.get("safe_state_time"), "time", 2),
+    )
+
+
+def _text(value: float | None, quantity: str, digits: int) -> str | None:
+    """Return a cell, without the sign of a number that is rounded to zero."""
+    if value is None:
+        return None
+    text = f"{display_value(value, quantity):.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def course_pictures(comparison: Comparison) -> tuple[Section, ...]:
+    """Return the course over time, and the mean of its even strides where there are any."""
+    worn, bare = comparison.with_device, comparison.without_device
+    over_time = Figure("course", _COURSE, lambda: course_figure(worn, bare))
+    walks = {"with the device": worn, "without": bare}
+    mean = Figure("mean-stride", _MEAN, lambda: walk_figure(walks))
+    has_mean = worn.averages and bare.averages
+    return (
+        Section("The course", figure=over_time, is_detail=True),
+        *((Section("The mean stride", figure=mean, is_detail=True),) if has_mean else ()),
+    )
+
+
+def course_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
+    """Return the files of a course: its segments with and without the device."""
+    if comparison.with_device.configuration.course is None:
+        return {}
+    return {
+        "segments.csv": lambda: segments_csv(comparison.with_device.segments),
+        "segments-off.csv": lambda: segments_csv(comparison.without_device.segments),
+    }
+
+
+_UNITS = {
+    "start": "s",
+    "end": "s",
+    "strides": "-",
+    "helped": "-",
+    "gas": "kg",
+    "push_off_work": "J",
+    "lowest_toes": "m",
+    "flat_push": "N m",
+    "safe_time": "s",
+}
+
+
+def segments_csv(segments: tuple[SegmentResult, ...]) -> bytes:
+    """Return one line for each segment, in SI units; a cell is empty where there is nothing to say."""
+    names = [field.name for field in fields(SegmentResult) if field.name != "title"]
+    lines = ["# simulated: a model's own output, not measured"]
+    lines.append(",".join(f"{name} [{_UNITS[name]}]" if name in _UNITS else name for name in names))
+    for segment in segments:
+        cells = (getattr(segment, name) for name in names)
+        lines.append(",".join("" if cell is None else cell if isinstance(cell, str) else repr(cell) for cell in cells))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def course_data(comparison: Comparison) -> dict[str, Any]:
+    """Return the segments as data, in SI units; nothing for a walk without a course."""
+    worn, bare = comparison.with_device, comparison.without_device
+    if worn.configuration.course is None:
+        return {}
+    return {
+        "course": worn.configuration.course.name,
+        "segments": [asdict(segment) for segment in worn.segments],
+        "segments_off": [asdict(segment) for segment in bare.segments],
+    }
+
+
+def trust_remark(configuration: Configuration) -> str:
+    """Return which segments go beyond the speeds for which scaling the gait can be trusted; empty where none does."""
+    course, gait = configuration.course, configuration.gait
+    if course is None:
+        return ""
+    try:
+        low, high = speed_range(gait)
+    except DataError:
+        return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
+    given = [item.values["speed"] for item in course.segments if "speed" in item.values]
+    recorded = gait.walking_speed or 0.0
+    ratios = [0.5 * item.values["cadence"] * gait.stride_time for item in course.segments if "cadence" in item.values]
+    speeds = [*given, *(recorded * ratio * ratio for ratio in ratios)]
+    far = sorted({f"{speed:.2g}" for speed in speeds if not low - 1.0e-9 <= speed <= high + 1.0e-9})
+    if not far:
+        return ""
+    return (
+        f"gait '{gait.name}' is scaled to {', '.join(far)} m/s: beyond {low:.3g} to {high:.3g} m/s, where its angles "
+        "and forces are assumed and not measured"
+    )

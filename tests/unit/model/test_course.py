@@ -1,0 +1,139 @@
+"""The gait on a course: continuous at every knot, upright and flat in standing, that of the file at its own speed."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from ppafo.gait import load_gait
+from ppafo.model.contact import foot_angle
+from ppafo.model.course import SCUFF_FORCE, STANDS_AT, Course, gait_on_course, pace_in, part_at
+from ppafo.model.gait import GaitNow, gait_at
+from ppafo.walking.course import Segment, WalkingCourse, list_courses, load_course
+from ppafo.walking.course_planning import PlannedCourse, pace_in_time, turns_walked
+from ppafo.walking.gait_series import gait_series, gait_timing
+from ppafo.walking.planning import planned_course
+from ppafo.walking.wearer import paper_subject
+
+GAIT = load_gait("falisse2019-subject1")
+SERIES, TIMING, LEG = gait_series(GAIT), gait_timing(GAIT), paper_subject().leg()
+ANGLES = ("shank", "ankle")
+MOVING = [f"{name}{of}" for name in ANGLES for of in ("", "_rate", "_acceleration")]
+
+
+def course_of(*segments: tuple[str, dict[str, float]]) -> PlannedCourse:
+    listed = tuple(Segment(kind, values) for kind, values in segments)
+    return planned_course(WalkingCourse("tried", "", listed, "tried.toml"), GAIT)
+
+
+def at(course: Course, time: float) -> GaitNow:
+    return gait_on_course(SERIES, course, TIMING, LEG, time)[0]
+
+
+@pytest.mark.parametrize("name", list_courses())
+def test_angles_rates_and_accelerations_are_continuous_at_every_knot(name: str) -> None:
+    course = planned_course(load_course(name), GAIT).course
+    knots = [part.start for part in course.parts if 0.0 < part.start < 1.0e5]
+    assert len(knots) > 5
+    for knot in knots:
+        before, after = at(course, knot - 1.0e-9), at(course, knot)
+        for value in (*MOVING, "force", "healthy_torque"):
+            assert getattr(after, value) == pytest.approx(getattr(before, value), abs=2.0e-5), (knot, value)
+
+
+@pytest.mark.parametrize("name", list_courses())
+def test_phase_and_strides_per_second_are_continuous_at_every_knot(name: str) -> None:
+    course = planned_course(load_course(name), GAIT).course
+    parts = [part for part in course.parts if part.start < 1.0e5]
+    for part, after in itertools.pairwise(parts):
+        ends, begins = pace_in(part, after.start), pace_in(after, after.start)
+        assert begins[:6] == pytest.approx(ends[:6], abs=1.0e-9)
+
+
+@pytest.mark.parametrize("name", list_courses())
+def test_rates_and_accelerations_are_the_derivatives_of_the_angles(name: str) -> None:
+    course = planned_course(load_course(name), GAIT).course
+    time = np.arange(0.0, 45.0, 1.0e-3)
+    found = {value: np.array([getattr(at(course, moment), value) for moment in time]) for value in MOVING}
+    for angle in ANGLES:
+        rate, acceleration = (np.gradient(found[f"{angle}{of}"], time)[2:-2] for of in ("", "_rate"))
+        assert np.abs(rate - found[f"{angle}_rate"][2:-2]).max() < 2.0e-3
+        assert np.abs(acceleration - found[f"{angle}_acceleration"][2:-2]).max() < 0.2
+
+
+def test_a_person_stands_upright_with_a_flat_foot_and_half_of_the_weight_on_it() -> None:
+    course = course_of(("stand", {"duration": 2.0})).course
+    for time in (0.0, 1.0, 1.999):
+        now = at(course, time)
+        assert now.shank == 0.0
+        assert foot_angle(now.shank, now.ankle) == pytest.approx(TIMING.ground_angle, abs=1.0e-12)
+        assert (now.shank_rate, now.ankle_rate, now.shank_acceleration, now.ankle_acceleration) == (0.0, 0.0, 0.0, 0.0)
+        assert now.force == pytest.approx(0.5 * LEG.body_mass * LEG.gravity)
+        assert now.phase == pytest.approx(STANDS_AT * TIMING.heel_off)
+
+
+def test_at_the_speed_of_the_gait_it_is_the_gait() -> None:
+    planned = course_of(("walk", {"strides": 5.0}))
+    course = planned.course
+    for time in np.linspace(float(planned.steady[0][0]), float(planned.steady[0][1]), 50):
+        now = at(course, time)
+        plain = gait_at(SERIES, TIMING, LEG, now.phase / TIMING.frequency)
+        assert now[1:] == pytest.approx(plain[1:], rel=1.0e-6, abs=1.0e-6)
+
+
+def test_a_slower_walk_has_fewer_and_shorter_strides_by_the_same_factor() -> None:
+    planned = course_of(("walk", {"speed": 0.8, "strides": 4.0}))
+    ratio = math.sqrt(0.8 / 1.33)
+    start, end = planned.steady[0]
+    pace = pace_in(part_at(planned.course, 0.5 * (start + end)), 0.5 * (start + end))
+    assert pace.frequency == pytest.approx(ratio * TIMING.frequency)
+    assert pace.stride == pytest.approx(ratio)
+    time = np.linspace(start, end, 500)
+    swing = np.ptp([at(planned.course, moment).shank for moment in time])
+    usual = np.ptp([gait_at(SERIES, TIMING, LEG, moment).shank for moment in np.linspace(0.0, 1.1, 500)])
+    assert swing == pytest.approx(ratio * usual, rel=1.0e-3)
+
+
+def test_on_stairs_the_healthy_toes_are_down_at_the_strike_and_on_level_ground_they_are_up() -> None:
+    planned = course_of(("walk", {"strides": 3.0}), ("stairs", {"strides": 4.0}))
+    time = np.arange(0.0, float(planned.duration), 1.0e-3)
+    turns = pace_in_time(planned.course, time).turns
+    strikes = time[np.flatnonzero(np.diff(np.floor(turns))) + 1]
+    tilts = [foot_angle(now.shank, now.ankle) - TIMING.ground_angle for now in (at(planned.course, t) for t in strikes)]
+    assert len(tilts) == 7
+    assert min(tilts[1:3]) > math.radians(10.0)
+    assert max(tilts[4:]) < math.radians(-9.0)
+
+
+def test_a_scuff_loads_the_toes_for_its_time_in_one_swing() -> None:
+    planned = course_of(("walk", {"strides": 2.0}), ("scuff", {"contact": 0.04}), ("walk", {"strides": 2.0}))
+    time = np.arange(0.0, float(planned.duration), 1.0e-4)
+    force = np.array([gait_on_course(SERIES, planned.course, TIMING, LEG, moment)[1].scuff_force for moment in time])
+    assert np.count_nonzero(force) * 1.0e-4 == pytest.approx(0.04, abs=2.0e-4)
+    assert np.ptp(np.flatnonzero(force)) * 1.0e-4 < 0.041
+    assert force.max() == SCUFF_FORCE * LEG.body_mass * LEG.gravity
+    scuffed = at(planned.course, float(time[np.argmax(force)]))
+    assert TIMING.clearance_from < scuffed.phase < TIMING.clearance_to
+
+
+def test_a_stumble_takes_one_stride_of_its_time() -> None:
+    planned = course_of(
+        ("walk", {"strides": 2.0}), ("stumble", {"time": 0.75, "length": 0.6}), ("walk", {"strides": 2.0})
+    )
+    stumble = planned.spans[1]
+    assert stumble.end - stumble.start == pytest.approx(0.75 * GAIT.stride_time)
+    middle = pace_in_time(planned.course, np.array([stumble.start, 0.5 * (stumble.start + stumble.end), stumble.end]))
+    assert middle.stride == pytest.approx([1.0, 0.6, 1.0])
+
+
+@pytest.mark.parametrize("name", list_courses())
+def test_arrays_of_times_and_single_times_agree(name: str) -> None:
+    course = planned_course(load_course(name), GAIT).course
+    time = np.linspace(0.0, 60.0, 301)
+    pace = pace_in_time(course, time)
+    single = [pace_in(part_at(course, moment), moment) for moment in time]
+    assert pace.turns == pytest.approx([item.turns for item in single], abs=1.0e-9)
+    assert pace.stride == pytest.approx([item.stride for item in single], abs=1.0e-12)
+    walked = [turns_walked(course, float(moment)) for moment in time]
+    assert pace.turns - course.parts[0].turns == pytest.approx(walked, abs=1.0e-9)

@@ -1,0 +1,258 @@
+"""Courses: files and their mistakes, segments in time, and what the foot, the gas and many wearers do on them."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.engine.lane_source import lane_source
+from ppafo.errors import ScenarioError
+from ppafo.gait import load_gait
+from ppafo.model.chambers import chamber_mass
+from ppafo.model.contact import FLAT
+from ppafo.model.plant import chamber_volumes
+from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking.course import WalkingCourse, list_courses, load_course
+from ppafo.walking.planning import plan_walk, planned_course
+from ppafo.walking.walk import WalkResult, plan_of
+
+HEAD = 'schema_version = 1\nname = "tried"\n'
+STAND = '[[segment]]\nkind = "stand"\nduration = "1 s"\n'
+WALK = '[[segment]]\nkind = "walk"\nspeed = "1.2 m/s"\nstrides = 2\n'
+GAIT = load_gait("falisse2019-subject1")
+
+
+def written(folder: Path, *segments: str) -> Path:
+    path = folder / "tried.toml"
+    path.write_text(HEAD + "".join(segments))
+    return path
+
+
+def course_of(folder: Path, *segments: str) -> WalkingCourse:
+    return load_course(written(folder, *segments))
+
+
+MISTAKES = {
+    "unknown segment": ('[[segment]]\nkind = "wlk"\n', ("segment 1: kind = 'wlk' is not known", "'walk'")),
+    "no kind": ('[[segment]]\nduration = "1 s"\n', ("segment 1: 'kind' is missing", "allowed: stand")),
+    "unknown key": (WALK + "speeed = 1\n", ("segment 1 (walk): unknown key 'speeed'", "'speed'")),
+    "too fast": (WALK.replace("1.2", "3"), ("segment 1 (walk): speed = '3 m/s'", "at least 0.4 m/s", "1.6 m/s")),
+    "too slow": (WALK.replace("1.2", "0.1"), ("speed = '0.1 m/s'", "at least 0.4 m/s")),
+    "negative duration": (STAND.replace("1 s", "-1 s"), ("segment 1 (stand): duration = '-1 s'", "at least 0.5 s")),
+    "no unit": (WALK.replace('"1.2 m/s"', "1.2"), ("segment 1 (walk): speed = 1.2", "without a unit")),
+    "no duration": ('[[segment]]\nkind = "stand"\n', ("segment 1 (stand): 'duration' is missing",)),
+    "half a stride": (WALK.replace("= 2", "= 1.5"), ("segment 1 (walk): strides = 1.5", "whole number")),
+    "both lengths": (WALK + 'duration = "3 s"\n', ("segment 1 (walk): give either duration or strides, not both",)),
+    "no length": (WALK.replace("strides = 2\n", ""), ("segment 1 (walk): give either duration or strides",)),
+    "both speeds": (WALK + 'cadence = "100 1/min"\n', ("segment 1 (walk): give either speed or cadence, not both",)),
+    "stop in standing": (STAND + '[[segment]]\nkind = "stop"\n', ("segment 2 (stop): the wearer stands there",)),
+    "scuff in standing": ('[[segment]]\nkind = "scuff"\n', ("segment 1 (scuff): the wearer stands there",)),
+    "start in walking": (
+        WALK + '[[segment]]\nkind = "start"\n',
+        ("segment 2 (start): the wearer walks there already",),
+    ),
+    "ramp to nowhere": (WALK + '[[segment]]\nkind = "ramp"\nstrides = 3\n', ("segment 2 (ramp): give the speed",)),
+    "no segments": ("segment = []\n", ("segment",)),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line_that_names_the_segment(mistake: str, tmp_path: Path) -> None:
+    text, said = MISTAKES[mistake]
+    with pytest.raises(ScenarioError) as raised:
+        load_course(written(tmp_path, text))
+    message = str(raised.value)
+    assert "\n" not in message
+    assert message.startswith(f"{tmp_path / 'tried.toml'}: ")
+    for words in said:
+        assert words in message
+
+
+def test_a_cadence_beyond_the_speeds_of_a_course_is_refused(tmp_path: Path) -> None:
+    course = course_of(tmp_path, WALK.replace('speed = "1.2 m/s"', 'cadence = "150 1/min"'))
+    with pytest.raises(ScenarioError, match=r"segment 1 \(walk\): cadence: .* 0\.4 to 1\.6 m/s"):
+        planned_course(course, GAIT)
+
+
+def test_more_segments_than_a_course_has_room_for_are_refused(tmp_path: Path) -> None:
+    course = course_of(tmp_path, *([STAND, WALK] * 20))
+    with pytest.raises(ScenarioError, match="32 is the most"):
+        planned_course(course, GAIT)
+
+
+def test_an_unknown_course_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(ScenarioError, match="there is no course 'corider', did you mean 'corridor'"):
+        load_walk("solenoid", course="corider")
+
+
+def test_a_walk_file_names_its_course_by_a_path_beside_it(tmp_path: Path) -> None:
+    written(tmp_path, STAND, WALK)
+    (tmp_path / "own.toml").write_text(
+        'schema_version = 1\nname = "own"\ncourse = "tried.toml"\n[device]\nset = "ppafo2011"\nvalve = "solenoid"\n'
+        '[controller]\nkind = "event_on_off"\n'
+    )
+    course = load_walk(tmp_path / "own.toml").course
+    assert course is not None
+    assert [segment.kind for segment in course.segments] == ["stand", "walk"]
+    replaced = load_walk(tmp_path / "own.toml", course="stairs").course
+    assert replaced is not None
+    assert replaced.name == "stairs"
+
+
+@pytest.mark.parametrize("name", list_courses())
+def test_the_segments_of_a_course_follow_each_other_and_walk_whole_strides(name: str) -> None:
+    planned = planned_course(load_course(name), GAIT)
+    ends = [float(span.end) for span in planned.spans]
+    assert [float(span.start) for span in planned.spans] == [0.0, *ends[:-1]]
+    assert ends[-1] == planned.duration
+    turns = [float(part.turns) for part in planned.course.parts if part.start < 1.0e5]
+    whole = np.array(turns) - turns[0]
+    assert np.abs(2.0 * whole - np.round(2.0 * whole)).max() < 1.0e-9
+
+
+def test_a_walk_takes_the_nearest_whole_number_of_strides(tmp_path: Path) -> None:
+    given = '[[segment]]\nkind = "walk"\nspeed = "1.2 m/s"\nduration = "20 s"\n'
+    span = planned_course(course_of(tmp_path, STAND, given), GAIT).spans[1]
+    assert abs(span.end - span.start - 20.0) <= 0.5 * GAIT.stride_time * (1.33 / 1.2) ** 0.5
+
+
+def test_a_walk_without_a_course_is_composed_without_one() -> None:
+    text = lane_source(plan_walk(plan_of(load_walk("solenoid"), 60.0)).program)
+    assert "course_gait_on_course" not in text
+    assert "scuff" not in text
+    with_course = lane_source(plan_walk(plan_of(load_walk("solenoid", course="stairs"), 60.0)).program)
+    assert "course_gait_on_course" in with_course
+    assert "model_gait_gait_at" not in with_course
+
+
+LENIENT = (
+    "controller.frozen_time=5 s",
+    "controller.longest_phase=20",
+    "controller.most_toe_strides=1000",
+    "controller.flat_from=0.2",
+    "controller.flat_to=0.201",
+)
+"""Signs of faults that standing and stairs give too are put off, so that there is help on the whole course."""
+
+
+@pytest.fixture(scope="module")
+def corridor() -> WalkResult:
+    return walk("solenoid", overrides=LENIENT, course="corridor")
+
+
+def within(result: WalkResult, kind: str, margin: float = 0.0) -> list[np.ndarray]:
+    time = result.recording.time
+    return [
+        (time >= item.start + margin) & (time <= item.end - margin) for item in result.segments if item.kind == kind
+    ]
+
+
+def test_in_standing_the_foot_is_flat_and_both_sensors_are_loaded(corridor: WalkResult) -> None:
+    recording, weight = corridor.recording, 72.5 * 9.80665
+    first, second, _, last = within(corridor, "stand")
+    for standing in (first, second, last):
+        assert (recording["contact"][standing] == FLAT).all()
+        assert np.ptp(recording["angle"][standing]) < 1.0e-3
+        for sensor in ("heel_force", "toe_force"):
+            assert recording[sensor][standing] == pytest.approx(0.25 * weight, rel=0.05)
+
+
+def test_gas_is_kept_on_a_course(corridor: WalkResult) -> None:
+    run = plan_walk(plan_of(load_walk("solenoid", LENIENT, course="corridor"), 1.0))
+    recording, plant = corridor.recording, run.plant
+    volumes = chamber_volumes(plant, recording["angle"])  # type: ignore[arg-type]
+    masses = [
+        chamber_mass(recording[f"pressure_{side}"], volume, plant.gas_product)
+        for side, volume in zip((1, 2), volumes, strict=True)
+    ]
+    balance = masses[0] + masses[1] - recording["supplied_mass"] + recording["vented_mass"]
+    assert recording["supplied_mass"][-1] > 0.01
+    assert np.ptp(balance) < 1.0e-10
+
+
+def test_the_segments_add_up_to_the_course(corridor: WalkResult) -> None:
+    metrics, segments = corridor.metrics, corridor.segments
+    assert sum(item.gas for item in segments) == pytest.approx(metrics["course_gas"].value, rel=1.0e-9)
+    assert metrics["course_gas"].value == corridor.recording["supplied_mass"][-1]
+    assert sum(item.strides for item in segments) == corridor.starts.size
+    assert metrics["course_strides"].value == corridor.starts.size
+    lowest = [item.lowest_toes for item in segments if item.lowest_toes is not None]
+    assert metrics["course_lowest_toes"].value == min(lowest)
+    assert 0 < metrics["helped_strides"].value <= metrics["course_strides"].value
+    assert metrics["steady_strides"].value < metrics["strides"].value
+
+
+def test_means_are_over_the_strides_at_an_even_speed_on_level_ground(corridor: WalkResult) -> None:
+    strikes = corridor.recording.time[corridor.starts]
+    walked = [item for item in corridor.segments if item.kind == "walk"]
+    inside = [
+        any(item.start <= first and last <= item.end for item in walked) for first, last in itertools.pairwise(strikes)
+    ]
+    steady = int(corridor.metrics["steady_strides"].value)
+    assert 0 < steady <= sum(inside)
+    assert "even speed" in corridor.metrics["gas"].summary
+
+
+def test_the_toe_sensor_shows_a_scuff_in_the_swing(corridor: WalkResult) -> None:
+    recording = corridor.recording
+    (scuff,) = within(corridor, "scuff")
+    usual = within(corridor, "walk", 2.0)[1]
+    swing = recording["contact"] == 0.0
+    late = recording["toe_force"] > 100.0
+    interval = recording.time[1]
+    assert 0.03 < np.count_nonzero(scuff & swing & late) * interval < 0.05
+    assert np.count_nonzero(usual & swing & late) == 0
+
+
+def test_the_recording_has_the_speed_of_each_segment(corridor: WalkResult) -> None:
+    recording = corridor.recording
+    walked = [item for item in corridor.segments if item.kind == "walk"]
+    for item, speed in zip(walked, (1.2, 0.8, 0.8, 1.4, 1.4), strict=True):
+        late = (recording.time > item.end - 2.0) & (recording.time < item.end)
+        assert np.count_nonzero(late) > 300
+        assert recording["walking_speed"][late] == pytest.approx(speed, rel=1.0e-6)
+    assert recording["walking_speed"][within(corridor, "stand")[0]].max() == 0.0
+    way = np.diff(recording["walking_speed"][within(corridor, "walk", 2.5)[0]]).size * recording.time[1] * 1.2
+    assert way < corridor.metrics["course_length"].value < 1.4 * recording.time[-1]
+
+
+def first_loaded(result: WalkResult, start: float, end: float) -> list[str]:
+    """Which sensor shows a tenth of the body weight first after each strike."""
+    found = []
+    for first in result.starts:
+        if start <= result.recording.time[first] < end:
+            later = slice(first, first + 400)
+            heel, toe = (np.argmax(result.recording[f"{name}_force"][later] > 71.0) for name in ("heel", "toe"))
+            found.append("toe" if toe < heel else "heel")
+    return found
+
+
+def test_on_stairs_the_toes_are_loaded_first_also_with_a_device_that_lifts_them() -> None:
+    result = walk("solenoid", overrides=LENIENT, course="stairs")
+    before, first, _, second, after, *_ = result.segments[1:]
+    for item in (first, second):
+        assert first_loaded(result, item.start, item.end) == ["toe"] * 6
+    for item in (before, after):
+        assert set(first_loaded(result, item.start + 2.0, item.end)) == {"heel"}
+
+
+def test_a_course_has_the_same_bits_alone_and_in_a_population() -> None:
+    configuration = load_walk("solenoid", LENIENT, course="stairs")
+    people = walk_population(configuration, 0.3, 20, seed=2)
+    alone = walk_population(configuration, 0.3, 1, seed=2)
+    single = walk(configuration, 0.3)
+    for name, values in people.outcomes.items():
+        assert values[0] == alone.outcomes[name][0], name
+    assert people.outcomes["gas"].size == 20
+    assert np.ptp(people.outcomes["gas"]) > 0.0
+    strides = people.outcomes["gas"][0] ** -1 * single.recording["supplied_mass"][-1]
+    assert people.outcomes["gas"][0] * strides == single.recording["supplied_mass"][-1]
+    assert strides == pytest.approx(single.starts.size, abs=1.0)
+
+
+def test_a_population_walks_until_the_slowest_is_through() -> None:
+    configuration = load_walk("solenoid", course="first-steps")
+    people = walk_population(configuration, None, 12, seed=2)
+    assert people.diverged == 0
+    assert 60.0 * people.minutes > planned_course(load_course("first-steps"), GAIT).duration
