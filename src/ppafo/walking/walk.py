@@ -20,9 +20,10 @@ from ppafo.storage.opensim import write_opensim
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import WalkPlan, plan_walk
-from ppafo.walking.recorded import recording_of_walk
-from ppafo.walking.strides import SETTLING, Curves, mean_curves, per_stride, stride_starts
-from ppafo.walking.walk_metrics import walk_metrics
+from ppafo.walking.recorded import SAFE_ROW, recording_of_walk
+from ppafo.walking.safety_events import SafetyEvent, safety_events
+from ppafo.walking.strides import Curves, helped_strides, mean_curves, per_stride, stride_starts
+from ppafo.walking.walk_metrics import settled, stride_metrics, walk_metrics
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,8 +47,10 @@ def silent(done: float, total: float) -> None:  # both are there for those who l
 class WalkResult:
     """A finished walk: recording, numbers of each stride (strides,), curves over the stride, and numbers of the whole.
 
-    ``averages`` and ``metrics`` leave out the first strides, in which the controller learns. ``starts`` are the samples
-    of the recording right after each heel strike.
+    ``averages`` and ``metrics`` are those of the strides with help, without the first ones, in which the controller
+    learns; ``vented_metrics`` those of the strides in which it paused or had stopped, {} without such. ``starts`` are
+    the samples of the recording right after each heel strike, ``helped`` tells of each stride whether it had help
+    throughout, and ``events`` are the pauses, the stop and the returns of help.
     """
 
     configuration: Configuration
@@ -57,6 +60,14 @@ class WalkResult:
     metrics: Mapping[str, Metric]
     status: Status
     starts: NDArray[np.intp]
+    helped: NDArray[np.bool_]
+    vented_metrics: Mapping[str, Metric]
+    events: tuple[SafetyEvent, ...]
+
+    @property
+    def is_helped(self) -> bool:
+        """True where at least half of the whole strides had help."""
+        return 2 * int(self.helped.sum()) >= self.helped.size
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
@@ -158,10 +169,12 @@ def _walk_result(
     status: Status,
 ) -> WalkResult:
     strides = per_stride(record, starts)
-    settled = starts[SETTLING:]
-    averages = mean_curves(recording, settled)
-    metrics = walk_metrics(configuration, recording, strides, averages, settled)
-    return WalkResult(configuration, recording, strides, averages, metrics, status, starts)
+    helped = helped_strides(record.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
+    averages, vented = (mean_curves(recording, starts, settled(chosen)) for chosen in (helped, ~helped))
+    metrics = walk_metrics(configuration, recording, strides, averages, starts, helped)
+    apart = stride_metrics(configuration, strides, vented, settled(~helped)) if settled(~helped).any() else {}
+    events = safety_events(configuration, recording.time, record)
+    return WalkResult(configuration, recording, strides, averages, metrics, status, starts, helped, apart, events)
 
 
 def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:

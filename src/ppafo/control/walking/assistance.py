@@ -93,7 +93,10 @@ def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: f
     hold = rules.hold
     held = hold.stiffness * (hold.swing_angle - angle) - hold.damping * rate
     landing, swing = profile_torque(rules.landing, fraction), profile_torque(rules.swing, fraction)
-    lifted = held - (landing if phase.phase == phases.LANDING else swing)
+    lands = phase.phase == phases.LANDING
+    lifted = held - (landing if lands else swing)
+    # On the heel nothing is to press the toes down.
+    lifted = min(lifted, 0.0) if lands else lifted
     pushed = profile_torque(rules.push_off, fraction) if phase.phase == phases.PUSH_OFF else 0.0
     torque = lifted if phases.lifts(phase.phase) else pushed
     return max(-rules.largest_torque, min(rules.largest_torque, torque))
@@ -122,7 +125,7 @@ def assess(
         watch,
         TorqueRequest(measurement.angle, rate, torque),
         1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
-        1.0 if works and watch.vented < 0.5 else 0.0,
+        1.0 if works and watch.level < 0.5 else 0.0,
     )
 
 

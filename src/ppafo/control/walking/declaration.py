@@ -34,6 +34,7 @@ SAFETY_QUANTITIES = (
     Quantity(
         "vent_time", "s", "both chambers are vented when the valve has vented them for this long", 0.25, 1.0e-3, 10.0
     ),
+    Quantity("resume_strides", "1", "good strides in a row after which a pause ends", 2.0, 1.0, 1.0e3),
 )
 
 HOLD_QUANTITIES = (
