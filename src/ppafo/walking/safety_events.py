@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.signs import HELPS, PAUSED, SIGNS, STOPPED, Sign
 from ppafo.engine.lanes import Floats
-from ppafo.simulation.reading import short_quantity_text
+from ppafo.simulation.reading import PLAIN, WRITTEN_UNITS
+from ppafo.units import from_si
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.recorded import SAFE_ROW, VENTINGS_ROW
 
@@ -94,9 +96,10 @@ def _word(name: str) -> str:
     return name.replace("_force", "").replace("_", " ")
 
 
-def _text(value: float, unit: str) -> str:
-    rounded = float(f"{value:.3g}")
-    return short_quantity_text(rounded if unit not in {"rad", "Pa_a"} else value, unit)
+def _text(value: float, si_unit: str) -> str:
+    """Return a value in SI as people write it, with three digits."""
+    unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
+    return f"{from_si(value, unit, si_unit, STANDARD_ATMOSPHERE):.3g} {unit}".rstrip()
 
 
 def event_lines(events: Sequence[SafetyEvent]) -> list[str]:

@@ -86,6 +86,9 @@ class AssistingState(Protocol):
 
 START = TorqueRequest(0.0, 0.0, 0.0)
 
+LARGEST_PRESS = 0.7
+"""Largest torque in plantarflexion [N m] that is requested in the swing."""
+
 
 def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: float) -> float:
     """Requested torque [N m], above 0 in plantarflexion, at an angle [rad] and its rate [rad/s]; 0 in mid-stance."""
@@ -95,8 +98,8 @@ def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: f
     landing, swing = profile_torque(rules.landing, fraction), profile_torque(rules.swing, fraction)
     lands = phase.phase == phases.LANDING
     lifted = held - (landing if lands else swing)
-    # On the heel nothing is to press the toes down.
-    lifted = min(lifted, 0.0) if lands else lifted
+    # On the heel nothing presses the toes down, and in the air little: an angle that is read too low asks for it.
+    lifted = min(lifted, 0.0 if lands else LARGEST_PRESS)
     pushed = profile_torque(rules.push_off, fraction) if phase.phase == phases.PUSH_OFF else 0.0
     torque = lifted if phases.lifts(phase.phase) else pushed
     return max(-rules.largest_torque, min(rules.largest_torque, torque))

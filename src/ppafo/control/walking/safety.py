@@ -23,8 +23,9 @@ from ppafo.model.gait_sensors import GaitMeasurement
 class SafetyRules(NamedTuple):
     """What readings can be, and how long a contradiction may last; ``declaration.SAFETY_QUANTITIES`` says it of each.
 
-    Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``) or [s], strides, and
-    absolute pressures [Pa]. ``fill_time`` is that of a valve fully open; half open it takes twice as long.
+    Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``, ``shortest_swing``)
+    or [s], strides, and absolute pressures [Pa]. ``fill_time`` is that of a valve fully open; half open it takes twice
+    as long.
     """
 
     largest_force: float
@@ -40,6 +41,7 @@ class SafetyRules(NamedTuple):
     filled_pressure: float
     fill_time: float
     vent_time: float
+    shortest_swing: float
     resume_strides: float
 
 
@@ -70,7 +72,7 @@ class SlowPressures(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """The last sign that vented the chambers, and the readings then: forces [N], angle [rad], absolute pressures [Pa]."""
+    """The last sign that vented the chambers, and the readings then: forces [N], angle [rad], pressures [Pa]."""
 
     sign: float
     heel_force: float
@@ -177,11 +179,16 @@ def gait_sign(rules: SafetyRules, before: PhaseState, phase: PhaseState, toe_str
 
     ``toe_strides`` [strides] and ``steady`` (1 or 0) are those of the next state.
     """
-    endless = phase.in_phase > rules.longest_phase * phase.stride_time
+    # A heel that comes and goes begins phases anew, but no stance ends without a swing.
+    lasts = phase.in_phase if phase.phase == SWING else max(phase.in_phase, phase.since_strike)
+    endless = lasts > rules.longest_phase * phase.stride_time
     skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
     has_begun = phase.since_strike > rules.flat_from * phase.stride_time
     flat = has_begun & (phase.since_strike < rules.flat_to * phase.stride_time) & (steady > 0.5)
-    found = signs.NOT_FLAT if flat & (min(phase.heel.loaded, phase.toe.loaded) < 0.5) else NO_SIGN
+    enters = (before.phase == SWING) & (phase.phase != SWING)
+    short = enters & (steady > 0.5) & (before.in_phase < rules.shortest_swing * phase.stride_time)
+    found = signs.SHORT_SWING if short else NO_SIGN
+    found = signs.NOT_FLAT if flat & (min(phase.heel.loaded, phase.toe.loaded) < 0.5) else found
     found = signs.TOE_STRIDES if toe_strides > rules.most_toe_strides else found
     found = signs.NO_TOES if skips_toes else found
     return signs.ENDLESS_PHASE if endless else found
@@ -304,7 +311,7 @@ def feed_time(since: float, opening: float, period: float) -> float:
 
 
 def safe_command(state: SafetyState, command: float, period: float) -> tuple[float, SafetyState]:
-    """The command to the valve [-], ``VENT`` while paused or stopped, and the state that records it for ``period`` [s]."""
+    """The command to the valve [-], ``VENT`` in a pause or a stop, and the state that records it for ``period`` [s]."""
     sent = VENT if state.level > HELPS else command
     vents = sent > VENTS_ABOVE
     opening = 0.0 if vents else max(-1.0, min(1.0, sent))

@@ -26,6 +26,7 @@ ENDLESS_PHASE = 12.0
 NO_TOES = 13.0
 NOT_FLAT = 14.0
 TOE_STRIDES = 15.0
+SHORT_SWING = 16.0
 
 FORCES = ("heel_force", "toe_force")
 PRESSURES = ("pressure_1", "pressure_2")
@@ -73,6 +74,7 @@ SIGNS: dict[float, Sign] = {
     TOE_STRIDES: Sign(
         "toe_strides", "strides that begin on the toes, one after the other", FORCES, ("most_toe_strides",)
     ),
+    SHORT_SWING: Sign("short_swing", "a swing that is too short for its stride", FORCES, ("shortest_swing",)),
 }
 """Every sign by its number: those up to ``FROZEN_ANGLE`` stop, the others pause."""
 

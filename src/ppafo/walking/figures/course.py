@@ -1,5 +1,6 @@
 """A whole walk over time: gas, toes and phases, and where the controller helps, pauses and has stopped."""
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,7 +75,7 @@ def _levels(axes: "Axes", result: WalkResult, time: Floats) -> None:
     """Paint the strip of help, pause and stop, and name each stretch that is wide enough."""
     found = result.recording["safe_state"] if "safe_state" in result.recording else np.zeros(time.size)
     edges = np.flatnonzero(np.diff(found, prepend=-1.0, append=-1.0))
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in pairwise(edges.tolist()):
         name, colour = _LEVELS[float(found[first])]
         begin, end = time[first], time[min(last, time.size - 1)]
         axes.axvspan(begin, end, color=colour, linewidth=0.0)

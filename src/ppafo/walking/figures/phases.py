@@ -98,7 +98,7 @@ def strip_figure(result: WalkResult) -> "Figure":
 
 
 def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floats:
-    """Fraction of the strides with help in each state at ``PHASES``, shape (states, phases); none if nothing is known."""
+    """Fraction of the strides with help in each state at ``PHASES``, shape (states, phases); 0 if nothing is known."""
     chosen = settled(result.helped)
     if channel not in result.recording or not chosen.any():
         return np.zeros((len(states), PHASES.size))

@@ -57,8 +57,8 @@ def test_the_rules_are_declared_in_their_order() -> None:
         ({"toe_force": 3001.0}, signs.FORCE_RANGE),
         ({"angle": 0.29}, signs.ANGLE_RANGE),
         ({"angle": 2.41}, signs.ANGLE_RANGE),
-        ({"pressure_1": 2.9e4}, signs.PRESSURE_RANGE),
-        ({"pressure_2": 2.9e4}, signs.PRESSURE_RANGE),
+        ({"pressure_1": 5.9e4}, signs.PRESSURE_RANGE),
+        ({"pressure_2": 5.9e4}, signs.PRESSURE_RANGE),
         ({"pressure_1": 2.1e6}, signs.PRESSURE_RANGE),
         ({"pressure_2": 2.1e6}, signs.PRESSURE_RANGE),
     ],
@@ -164,8 +164,19 @@ def test_strides_that_begin_on_the_toes_are_counted_in_a_row() -> None:
 
 def test_a_phase_without_end_and_a_stride_without_toes_pause() -> None:
     assert found(now=phase(PUSH_OFF, 1.3, 0.0, in_phase=1.21)) == signs.ENDLESS_PHASE
+    assert found(now=phase(SWING, 2.0, 0.0, 0.0, in_phase=1.21)) == signs.ENDLESS_PHASE
+    assert not vents(now=phase(SWING, 2.0, 0.0, 0.0, in_phase=1.19))
+    assert found(now=phase(MID_STANCE, 1.21)) == signs.ENDLESS_PHASE, "a stance that the heel divides is one"
     assert found(now=phase(SWING, 0.4, 0.0, 0.0), before=phase(LANDING, 0.4)) == signs.NO_TOES
     assert not vents(now=phase(MID_STANCE, 0.1), before=phase(LANDING, 0.1))
+
+
+def test_a_swing_that_is_too_short_for_a_steady_stride_pauses() -> None:
+    lands = phase(LANDING, 0.0, 1.0, 0.0)
+    before = phase(SWING, 1.0, 0.0, 0.0, in_phase=0.24)
+    assert found(now=lands, before=before) == signs.SHORT_SWING
+    assert not vents(now=lands, before=before._replace(in_phase=0.26))
+    assert not vents(now=lands, before=before._replace(since_strike=0.85)), "a scuff ends a swing early"
 
 
 def after_commands(command: float, seconds: float) -> SafetyState:
