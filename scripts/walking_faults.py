@@ -92,7 +92,8 @@ def pressure_kinds(sensor: str) -> Iterator[tuple[str, Kind]]:
     faults = gauge | {
         "dead": stuck(0.0), "frozen": frozen(), "offset 5 psi": wrong(offset=5.0 * PSI),
         "offset -5 psi": wrong(offset=-5.0 * PSI), "offset 20 psi": wrong(offset=20.0 * PSI),
-        "gain 0.5": wrong(gain=0.5), "gain 1.5": wrong(gain=1.5), "drift 2 psi/s": wrong(drift=2.0 * PSI), "drift -2 psi/s": wrong(drift=-2.0 * PSI),
+        "gain 0.5": wrong(gain=0.5), "gain 1.5": wrong(gain=1.5), "drift 2 psi/s": wrong(drift=2.0 * PSI),
+        "drift -2 psi/s": wrong(drift=-2.0 * PSI),
         "lag 100 ms": wrong(lag=0.1), "99 % of the samples lost": wrong(lost_fraction=0.99),
         "crosstalk 0.3": wrong(crosstalk=0.3), "frozen and back every 0.3 s": frozen(0.3),
     }  # fmt: skip

@@ -181,12 +181,16 @@ def test_a_stop_is_told_with_its_sign_readings_settings_and_time(
     lines = capsys.readouterr().out.splitlines()
     told = next(line for line in lines if line.startswith("stopped"))
     assert told.startswith("stopped for good at 6.30 s: a force that no foot gives; heel ")
-    assert told.endswith(" N, toe 9e+03 N; largest_force 3e+03 N")
+    assert told.endswith(" N, toe 9e+03 N; lowest_force -40 N, largest_force 3e+03 N")
     assert "help in 5 of 7 strides" in lines
-    assert "Stopped for good at 6.30 s" in (tmp_path / "walk/report.html").read_text()
+    assert told.removeprefix("s") in (tmp_path / "walk/report.html").read_text()
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())
     (event,) = document["events"]
-    assert (event["kind"], event["sign"], event["settings"]) == ("stop", "force_range", {"largest_force": 3000.0})
+    assert (event["kind"], event["sign"], event["settings"]) == (
+        "stop",
+        "force_range",
+        {"lowest_force": -40.0, "largest_force": 3000.0},
+    )
     assert event["readings"]["toe_force"] == 9000.0
     assert event["time"] == pytest.approx(6.3)
     assert event["message"] == told

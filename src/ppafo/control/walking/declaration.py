@@ -15,6 +15,7 @@ PHASE_QUANTITIES = (
 )
 
 SAFETY_QUANTITIES = (
+    Quantity("lowest_force", "N", "a force below this is not a valid reading", -40.0, -1.0e5, 0.0),
     Quantity("largest_force", "N", "a force above this is not a valid reading", 3.0e3, 100.0, 1.0e5),
     Quantity("lowest_angle", "rad", "an angle below this is not a valid reading", 0.3, -10.0, 10.0),
     Quantity("highest_angle", "rad", "an angle above this is not a valid reading", 2.4, -10.0, 10.0),

@@ -28,6 +28,7 @@ class SafetyRules(NamedTuple):
     as long.
     """
 
+    lowest_force: float
     largest_force: float
     lowest_angle: float
     highest_angle: float
@@ -148,6 +149,7 @@ def next_readings(last: LastReadings, measurement: GaitMeasurement, period: floa
 def range_sign(rules: SafetyRules, measurement: GaitMeasurement) -> float:
     """The sign of a reading that no foot and no chamber gives."""
     force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
+    force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
     angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
     low, high = min(measurement.pressure_1, measurement.pressure_2), max(measurement.pressure_1, measurement.pressure_2)
     pressure = (low < rules.lowest_pressure) | (high > rules.highest_pressure)

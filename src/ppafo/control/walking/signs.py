@@ -43,7 +43,7 @@ class Sign:
 
 
 SIGNS: dict[float, Sign] = {
-    FORCE_RANGE: Sign("force_range", "a force that no foot gives", FORCES, ("largest_force",)),
+    FORCE_RANGE: Sign("force_range", "a force that no foot gives", FORCES, ("lowest_force", "largest_force")),
     ANGLE_RANGE: Sign("angle_range", "an angle that no ankle has", ("angle",), ("lowest_angle", "highest_angle")),
     PRESSURE_RANGE: Sign(
         "pressure_range", "a pressure that no chamber has", PRESSURES, ("lowest_pressure", "highest_pressure")

@@ -54,6 +54,8 @@ def test_the_rules_are_declared_in_their_order() -> None:
     ("change", "sign"),
     [
         ({"heel_force": 3001.0}, signs.FORCE_RANGE),
+        ({"heel_force": -41.0}, signs.FORCE_RANGE),
+        ({"toe_force": -41.0}, signs.FORCE_RANGE),
         ({"toe_force": 3001.0}, signs.FORCE_RANGE),
         ({"angle": 0.29}, signs.ANGLE_RANGE),
         ({"angle": 2.41}, signs.ANGLE_RANGE),
