@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.task import named_rows, volumes_of
 from ppafo.engine.lanes import Batch, Floats
 from ppafo.engine.scheme.pneumatics import GAMMA
+from ppafo.model.orifice import TERMS
 
 Array = Any
 
@@ -84,9 +85,6 @@ def flow_slopes(
     )
 
 
-FLOW_TERMS = ("c0", "c1", "c2", "c3", "c4", "c5", "c6")
-
-
 class Task(NamedTuple):
     """Parameters of the task: a number where all runs share it, an array over the runs where they differ."""
 
@@ -157,8 +155,11 @@ def _shared(row: Floats) -> Floats | float:
 
 
 def _curve(rows: dict[str, Floats], path: str) -> Curve:
-    ratios = [1.0 - float(rows[f"{path}.{name}"][0]) for name in ("critical_ratio", "linear_ratio")]
-    return Curve(ratios[0], ratios[1], tuple(float(rows[f"{path}.{term}"][0]) for term in FLOW_TERMS))
+    return Curve(
+        critical_gap=1.0 - float(rows[f"{path}.critical_ratio"][0]),
+        linear_gap=1.0 - float(rows[f"{path}.linear_ratio"][0]),
+        terms=tuple(float(rows[f"{path}.coefficients[{term}]"][0]) for term in range(TERMS)),
+    )
 
 
 def control(task: Task, state: State, time: Array) -> State:

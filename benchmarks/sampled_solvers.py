@@ -99,4 +99,4 @@ def measured(run: Run, unknowns: Floats) -> Measurement:
     angle = float(unknowns[0])
     pressure_1, pressure_2 = chamber_pressures(run.plant, angle, float(unknowns[2]), float(unknowns[3]))
     torque = actuator_torque(pressure_1, pressure_2, run.plant.torque_constant)
-    return Measurement(angle, pressure_1, pressure_2, torque)
+    return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)

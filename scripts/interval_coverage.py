@@ -18,7 +18,6 @@ if not __package__:
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.command import run_command
-from ppafo.cli.arguments import UsageError
 from ppafo.cli.main import EXIT_INTERRUPTED
 from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
@@ -30,7 +29,7 @@ from ppafo.cli.output import (
     write_files,
 )
 from ppafo.cli.quick_imports import load_compiler, load_drawing
-from ppafo.cli.whole_numbers import whole_number
+from ppafo.questions.question import counting_number, whole_number
 
 COMMAND = "coverage"
 """What the mark of a result folder calls it."""
@@ -40,14 +39,18 @@ FITS, FIGURE = "fits-{truths}-{seed}.jsonl", "ranks"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("--noise", metavar="KIND", action="append", help="kind of noise; default: all ten")
-    parser.add_argument("--draws", default="200", metavar="N", help="fits for each kind of noise; default 200")
+    parser.add_argument(
+        "--draws", type=whole_number, default=200, metavar="N", help="fits for each kind of noise; default 200"
+    )
     parser.add_argument(
         "--from-prior",
         action="store_true",
         help="draw the truth of each fit from the prior that it is given (simulation-based calibration)",
     )
-    parser.add_argument("--seed", default="2026", metavar="N", help="random seed of truths and noise; default 2026")
-    parser.add_argument("--threads", metavar="N", help="number of processes; default: all cores")
+    parser.add_argument(
+        "--seed", type=whole_number, default=2026, metavar="N", help="random seed of truths and noise; default 2026"
+    )
+    parser.add_argument("--threads", type=counting_number, metavar="N", help="number of processes; default: all cores")
     add_output_arguments(parser)
     parser.set_defaults(command=COMMAND)
 
@@ -66,10 +69,7 @@ def run(parsed: argparse.Namespace) -> int:
     from benchmarks.intervals.report import coverage_document, coverage_text, is_good, ranks_figure
     from ppafo.documents.json_text import json_text
 
-    draws, seed = whole_number(parsed.draws, "--draws") or 0, whole_number(parsed.seed, "--seed") or 0
-    processes = whole_number(parsed.threads, "--threads")
-    if processes == 0:
-        raise UsageError("--threads 0: must be 1 or more")
+    draws, seed, processes = parsed.draws, parsed.seed, parsed.threads
     fits = FITS.format(truths="drawn" if parsed.from_prior else "fixed", seed=seed)
     tasks = tasks_of(parsed.noise or tuple(NOISE_KINDS), draws, seed, parsed.from_prior)
     check_output(parsed)
@@ -85,9 +85,9 @@ def run(parsed: argparse.Namespace) -> int:
     text, document = coverage_text(lines, parsed.from_prior), coverage_document(lines, parsed.from_prior)
     if parsed.out is not None:
         load_drawing()
-        from ppafo.answers.style import rendered
+        from ppafo.answers.style import render_figure
 
-        figures = rendered(ranks_figure(lines), ("png", "svg"))
+        figures = render_figure(ranks_figure(lines), ("png", "svg"))
         contents = {f"{FIGURE}.{ending}": content for ending, content in figures.items()}
         contents |= {"coverage.txt": f"{text}\n".encode(), "coverage.json": f"{json_text(document)}\n".encode()}
         write_files(parsed, contents | _files_to_keep(parsed.out))

@@ -260,7 +260,7 @@ def find(kind: str, effort: Effort | None = None) -> tuple[dict[str, float], flo
         for value, first, last in zip(now, low, high, strict=True)
     ]
     best = search(costs, before, effort or (WALKING_EFFORT if kind in WALKING_CONTROLLERS else EFFORT))[0]
-    values = np.exp(low + np.array(best.shares) * (high - low)).tolist()
+    values = np.exp(low + np.array(best.fractions) * (high - low)).tolist()
     return dict(zip(ranges, values, strict=True)), best.cost
 
 

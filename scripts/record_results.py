@@ -36,14 +36,14 @@ LINES: dict[str, str] = {
     "compare": "compare torque-task-solenoid torque-task-proportional --study torque-task-uncertainty --draws 256",
     "sensitivity": "sensitivity torque-task-uncertainty --samples 256",
     "sensitivity-morris": "sensitivity torque-task-uncertainty --samples 32 --method morris",
-    "montecarlo": "montecarlo torque-task-uncertainty --metric rms_error --most 2048",
+    "montecarlo": "montecarlo torque-task-uncertainty --metric rms_error --draws 2048",
     "endurance": "endurance --gas-per-step '0.3 g'",
     "size": "size",
     "tune": "tune pid-gains",
     "league": "league --draws 8",
     "league-walk": "league --walk --minutes 0.1 --draws 8",
     "unreported": "unreported --draws 8192",
-    "sweep": "sweep torque-task-uncertainty --runs 256 --out {out}",
+    "sweep": "sweep torque-task-uncertainty --draws 256 --out {out}",
     "reproduce": "reproduce --out {out}",
 }
 

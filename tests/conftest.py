@@ -24,7 +24,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Let no model be compiled where the tests are to be quick, and none be watched by coverage while it is."""
     cache._run = _unwatched(cache._run)
     if config.getoption("--quick"):
-        cache._imported = _skip_test
+        cache._import_program = _skip_test
 
 
 def _unwatched(run: Callable[..., ModuleType]) -> Callable[..., ModuleType]:

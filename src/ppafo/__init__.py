@@ -204,7 +204,7 @@ _RENAMED = {"run_design": "design", "run_sizing": "size", "run_study": "sweep"}
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its module the first time it is asked for."""
+    """Load a public name from its module the first time it is used."""
     if name in _RENAMED:
         raise AttributeError(f"ppafo.{name} is now called ppafo.{_RENAMED[name]}")
     if name not in _HOME_OF:

@@ -41,7 +41,7 @@ class StudyError(PpafoError):
 
 
 class IdentificationError(PpafoError):
-    """A recording does not allow the estimate that was asked for."""
+    """A recording does not allow the requested estimate."""
 
 
 def nearest_name(name: str, allowed: Iterable[str]) -> str:

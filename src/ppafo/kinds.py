@@ -1,7 +1,7 @@
-"""Catalogues of kinds: those of this package, and those that other packages offer, found when they are asked for.
+"""Catalogues of kinds: those of this package, and those that other packages offer, found when they are requested.
 
 Another package offers a kind as an entry point of the catalogue's group; a module that is no package is named with its
-object, ``my_module:KIND``. Nothing is looked for before a name is asked for that is not here.
+object, ``my_module:KIND``. Nothing is looked for before a name is requested that is not here.
 """
 
 import importlib
@@ -51,7 +51,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
     def __getitem__(self, name: str) -> Kind:
         """Return a kind; KeyError where there is none, KindError where it is there and cannot be used."""
         if name not in self._kinds:
-            found = self._found(name)
+            found = self._find(name)
             if found is None:
                 raise KeyError(name)
             self._kinds[name] = found
@@ -80,13 +80,13 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             try:
                 self._check_name(point)
                 if point.name not in self._kinds:
-                    self._kinds[point.name] = self._loaded(point)
+                    self._kinds[point.name] = self._load(point)
             except KindError as error:
                 logger.warning("ppafo: %s", error)
                 problems.append(str(error))
         return tuple(problems)
 
-    def _found(self, name: str) -> Kind | None:
+    def _find(self, name: str) -> Kind | None:
         if not name:
             return None
         if _OBJECT.fullmatch(name):
@@ -94,7 +94,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
 
             point = EntryPoint(name, name, self.group)
             with _with_working_folder():
-                return self._loaded(point)
+                return self._load(point)
         points = [point for point in _entry_points(self.group, tuple(sys.path)) if point.name == name]
         if len({(point.value, _package(point)) for point in points}) > 1:
             packages = ", ".join(sorted({_package(point) for point in points}))
@@ -102,7 +102,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         if not points:
             self.load_all()
             return None
-        return self._loaded(points[0])
+        return self._load(points[0])
 
     def _check_name(self, point: "EntryPoint") -> None:
         if point.name in self._own:
@@ -111,7 +111,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
                 "it needs another name"
             )
 
-    def _loaded(self, point: "EntryPoint") -> Kind:
+    def _load(self, point: "EntryPoint") -> Kind:
         where = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
         try:
             kind = point.load()

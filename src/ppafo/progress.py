@@ -49,7 +49,7 @@ Report = Callable[[Progress], None]
 
 
 def report_nothing(_progress: Progress) -> None:
-    """Watch nothing: where nobody asked for progress."""
+    """Watch nothing: where no progress was requested."""
 
 
 @final

@@ -72,7 +72,7 @@ def split_quantity(text: str) -> tuple[float, str]:
     stripped = text.strip()
     match = _NUMBER.match(stripped)
     if match is None:
-        raise UnitError(f"{_shown(text)} does not start with a number; write for example '12.6 mm^2' or '50 psi_g'")
+        raise UnitError(f"{_quote(text)} does not start with a number; write for example '12.6 mm^2' or '50 psi_g'")
     unit = stripped[match.end() :].strip()
     check_unit(unit)
     return _finite(float(match.group()), text), unit
@@ -105,12 +105,12 @@ def format_quantity(value: float, unit: str) -> str:
 
 def check_unit(unit: str) -> None:
     """Refuse a unit that does not exist or is not written as ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``."""
-    _parsed(unit)
+    _parse_unit(unit)
 
 
 def base_value(value: float, unit: str) -> float:
     """Return ``value`` in the base units (m, kg, s, K, mol, rad) of its own unit, whatever its dimension is."""
-    parsed, kind = _parsed(unit)
+    parsed, kind = _parse_unit(unit)
     exact = Decimal(repr(_finite(value, value)))
     base = float(_registry().Quantity(exact, parsed).to_base_units().magnitude)
     return base + (STANDARD_ATMOSPHERE if kind == "g" else 0.0)
@@ -119,10 +119,10 @@ def base_value(value: float, unit: str) -> float:
 @functools.lru_cache(maxsize=512)
 def _conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     """Return scale, offset and whether the atmosphere is to be added; in decimals, so that 8.4 g is 0.0084 kg."""
-    given, kind = _parsed(unit)
-    wanted, _ = _parsed(si_unit)
+    given, kind = _parse_unit(unit)
+    wanted, _ = _parse_unit(si_unit)
     if given.dimensionality != wanted.dimensionality:
-        raise UnitError(f"{_named(unit)} does not fit: {_wanted(si_unit)}")
+        raise UnitError(f"{_quote_unit(unit)} does not fit: {_describe_unit(si_unit)}")
     _check_kind(unit, kind, si_unit)
     quantity = _registry().Quantity
     offset = quantity(Decimal(0), given).to(wanted).magnitude
@@ -140,10 +140,10 @@ def _check_kind(unit: str, kind: str, si_unit: str) -> None:
             f"or {name}_d for a difference"
         )
     if (kind == "d") != (si_unit == _DIFFERENCE):
-        raise UnitError(f"'{unit}' is a {_KINDS[kind]}, {_wanted(si_unit)}")
+        raise UnitError(f"'{unit}' is a {_KINDS[kind]}, {_describe_unit(si_unit)}")
 
 
-def _wanted(si_unit: str) -> str:
+def _describe_unit(si_unit: str) -> str:
     if si_unit == _LEVEL:
         return "a pressure level is needed, for example '50 psi_g' or '446 kPa_a'"
     if si_unit == _DIFFERENCE:
@@ -153,12 +153,12 @@ def _wanted(si_unit: str) -> str:
     return f"a unit like '{si_unit}' is needed" if si_unit else "a plain number without a unit is needed"
 
 
-def _named(unit: str) -> str:
+def _quote_unit(unit: str) -> str:
     return f"unit '{unit}'" if unit else "a number without a unit"
 
 
 @functools.lru_cache(maxsize=512)
-def _parsed(unit: str) -> "tuple[pint.Unit, str]":
+def _parse_unit(unit: str) -> "tuple[pint.Unit, str]":
     """Return pint's unit of a text, and ``g``, ``a`` or ``d`` for a pressure that says so; else an empty text."""
     import pint
 
@@ -183,7 +183,7 @@ def _normal(unit: str) -> str:
     normal = re.sub(r" *([/()^]) *", r"\1", normal.strip(" "))
     normal = re.sub(r" +", " ", normal)
     if normal and (len(normal) > _LONGEST_UNIT or _EXPRESSION.fullmatch(normal) is None):
-        raise UnitError(f"{_shown(unit)} is not a unit; write it like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'")
+        raise UnitError(f"{_quote(unit)} is not a unit; write it like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'")
     return normal
 
 
@@ -192,7 +192,7 @@ def _unknown_unit(name: str) -> UnitError:
         return UnitError(f"'{name}': {_KIND_BELONGS}")
     hint = nearest_name(name, [prefix + unit for unit in _UNITS for prefix in ("", *_PREFIXES)])
     known = f"{', '.join(_UNITS)}, with the prefixes {', '.join(_PREFIXES)}"
-    return UnitError(f"'{name}' is not a known unit{hint}; known are {known}")
+    return UnitError(f"'{name}' is not a known unit{hint}; available: {known}")
 
 
 @functools.cache
@@ -207,11 +207,11 @@ def _registry() -> "pint.UnitRegistry[Any]":
 
 def _finite(value: float, shown: object) -> float:
     if not math.isfinite(value):
-        raise UnitError(f"{_shown(shown)} is not a finite number")
+        raise UnitError(f"{_quote(shown)} is not a finite number")
     return value
 
 
-def _shown(text: object) -> str:
+def _quote(text: object) -> str:
     """Return a short quotation of what was given, on one line."""
     quoted = repr(text)
     return quoted if len(quoted) <= 50 else f"{quoted[:46]}...'"

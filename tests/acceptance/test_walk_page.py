@@ -42,10 +42,10 @@ def test_the_table_of_the_page_is_what_the_command_prints(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    shown = [line.split() for line in PAGE.partition("    ppafo walk")[2].splitlines()[2:10]]
+    shown = [line.split() for line in PAGE.partition("    ppafo walk")[2].splitlines()[2:11]]
     assert main(["walk", "solenoid", "--minutes", "0.2"]) == 0
-    assert [line.split() for line in capsys.readouterr().out.splitlines()[2:10]] == shown
-    assert len(shown) == 8
+    assert [line.split() for line in capsys.readouterr().out.splitlines()[2:11]] == shown
+    assert len(shown) == 9
 
 
 def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:

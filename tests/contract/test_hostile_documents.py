@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ppafo.cli.schema import FORMATS
-from ppafo.documents.json_text import MOST_LEVELS, is_nested_too_deeply, json_document
+from ppafo.documents.json_text import MAXIMUM_LEVELS, is_nested_too_deeply, json_document
 from ppafo.errors import DataError, PpafoError
 from ppafo.gait.loading import load_gait
 from ppafo.gait.recorded.mapping import load_map
@@ -207,7 +207,7 @@ def test_damaged_document_of_a_study_is_refused_by_its_key(tmp_path: Path, key: 
 
 def test_depth_of_a_document_is_counted_and_a_circle_has_none() -> None:
     deep: Any = 1
-    for _ in range(MOST_LEVELS):
+    for _ in range(MAXIMUM_LEVELS):
         deep = {"a": [deep]} if isinstance(deep, int) else {"a": deep}
     assert not is_nested_too_deeply(deep["a"])
     assert is_nested_too_deeply({"a": deep})

@@ -165,7 +165,7 @@ def test_file_that_is_there_is_not_replaced(name: str, tmp_path: Path, capsys: p
     out.write_text("mine")
     given = [word.format(result=result) for word in words]
     assert main([*name.split(), *given, "--out", str(out)]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     assert out.read_text() == "mine"
     out.unlink()
     assert main([*name.split(), *given, "--out", str(out)]) == 0

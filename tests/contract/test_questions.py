@@ -10,7 +10,7 @@ from ppafo.answers import Solved
 from ppafo.cli.main import build_parser
 from ppafo.documents.toml_text import TomlKind
 from ppafo.questions.catalogue import QUESTIONS, question
-from ppafo.questions.question import loaded
+from ppafo.questions.question import load_name
 
 NAMES = list(QUESTIONS)
 NO_VERB_OF_ITS_OWN = {
@@ -51,7 +51,7 @@ def test_what_a_question_comes_to_answers_draws_saves_and_becomes_data(name: str
     for kind in solved_types(name):
         assert issubclass(kind, Solved)
         home = f"{kind.__module__.rpartition('.')[0]}.answer"
-        assert list(inspect.signature(loaded(f"{home}:answer_of")).parameters)
+        assert list(inspect.signature(load_name(f"{home}:answer_of")).parameters)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in NO_VERB_OF_ITS_OWN])
@@ -68,4 +68,4 @@ def test_the_parser_of_the_command_is_made_without_loading_what_solves_it(name: 
     help_text = build_parser(name).format_help()
     assert name in help_text
     if declared.library:
-        assert isinstance(loaded(declared.library), TomlKind)
+        assert isinstance(load_name(declared.library), TomlKind)

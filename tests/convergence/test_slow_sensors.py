@@ -10,7 +10,7 @@ import ppafo
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.engine.run import batch_of
-from ppafo.model.sensors import Measurement, faded
+from ppafo.model.sensors import Measurement, decay_factors
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -46,7 +46,9 @@ class Listener:
 
 @pytest.mark.parametrize("share", [1e-3, 0.3, 1.0, 20.0, 39.0, 41.0, 1e3, 1e5, 1e8])
 def test_what_fades_in_a_step_is_the_exponential_and_its_mean_however_long_the_step(share: float) -> None:
-    assert faded(share / 0.01, 0.01) == pytest.approx((math.exp(-share), -math.expm1(-share) / share), abs=1e-12)
+    assert decay_factors(share / 0.01, 0.01) == pytest.approx(
+        (math.exp(-share), -math.expm1(-share) / share), abs=1e-12
+    )
 
 
 def test_a_slow_angle_sensor_shows_a_sine_smaller_and_later_and_the_others_show_the_truth() -> None:

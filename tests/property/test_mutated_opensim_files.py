@@ -32,7 +32,7 @@ PIECES = [
 ]
 
 
-def read(content: bytes) -> None:
+def check_is_read_whole_or_refused(content: bytes) -> None:
     descriptor, name = tempfile.mkstemp(suffix=".mot")
     try:
         with os.fdopen(descriptor, "wb") as file:
@@ -63,13 +63,13 @@ def test_a_table_with_pieces_put_in_cut_out_or_changed(data: st.DataObject) -> N
         last = data.draw(st.integers(first, min(len(content), first + 30)))
         piece = data.draw(st.one_of(st.sampled_from(PIECES), st.binary(max_size=6)))
         content = content[:first] + piece + content[last:]
-    read(content)
+    check_is_read_whole_or_refused(content)
 
 
 @settings(max_examples=100, deadline=None)
 @given(st.binary(max_size=400))
 def test_any_bytes(content: bytes) -> None:
-    read(content)
+    check_is_read_whole_or_refused(content)
 
 
 def test_the_table_that_is_damaged_is_good_before() -> None:

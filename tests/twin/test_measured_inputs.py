@@ -55,7 +55,7 @@ def test_planted_values_are_found_where_the_run_follows_the_recorded_supply(fold
     assert np.ptp(supply) > 3.0e4
     for path, true in TRUTH.items():
         assert found.values[path] == pytest.approx(true, rel=5e-3), path
-    assert max(channel.share for channel in found.channels) < 2e-3
+    assert max(channel.fraction for channel in found.channels) < 2e-3
 
 
 def test_a_supply_taken_as_constant_is_found_as_misfit(folder: Path) -> None:

@@ -132,8 +132,8 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
 
 
 def test_profiles_and_metrics_are_found_too(install: Install) -> None:
-    profile = "from dataclasses import replace\nfrom ppafo.control.profiles import sine\n"
-    install("other_profiles", profile + 'KIND = replace(sine.KIND, name="wave")\n', profiles="wave")
+    profile = "from dataclasses import replace\nfrom ppafo.control.profiles import SINE\n"
+    install("other_profiles", profile + 'KIND = replace(SINE, name="wave")\n', profiles="wave")
     metric = "from dataclasses import replace\nfrom ppafo.metrics import METRICS\n"
     install("other_metrics", metric + 'KIND = replace(METRICS["rms_error"], name="mine")\n', metrics="mine")
     document = dict(load_scenario("torque-task-proportional").origin.content)

@@ -13,7 +13,7 @@ Cell = str | float | None
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """The head of a column: its title, the kind of quantity below it (``shown_units.QUANTITIES``), its number format.
+    """The head of a column: its title, the kind of quantity below it (``display_units.QUANTITIES``), its number format.
 
     A column without a quantity holds plain numbers and texts. ``is_change`` is true for differences of two levels.
     """

@@ -26,7 +26,7 @@ def figure_of_panels(
     size: tuple[float, float], margins: Margins, rows: int, columns: int = 1, heights: Sequence[float] | None = None
 ) -> "tuple[Figure, list[list[Axes]]]":
     """Return a figure of this width and height [inches] and its panels by row, all of them over one horizontal axis."""
-    figure, panel_width = _framed_figure(size, margins, rows, columns)
+    figure, panel_width = _figure_with_margins(size, margins, rows, columns)
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False, height_ratios=heights).tolist()
     for axes in figure.axes:
         axes.yaxis.set_label_coords(-margins.label / panel_width, 0.5)
@@ -37,11 +37,13 @@ def figure_of_free_panels(
     size: tuple[float, float], margins: Margins, rows: int, columns: int, widths: Sequence[float] | None = None
 ) -> "tuple[Figure, list[list[Axes]]]":
     """Return a figure of this width and height [inches] and its panels by row, each with axes of its own."""
-    figure, _ = _framed_figure(size, margins, rows, columns)
+    figure, _ = _figure_with_margins(size, margins, rows, columns)
     return figure, figure.subplots(rows, columns, squeeze=False, width_ratios=widths).tolist()
 
 
-def _framed_figure(size: tuple[float, float], margins: Margins, rows: int, columns: int) -> "tuple[Figure, float]":
+def _figure_with_margins(
+    size: tuple[float, float], margins: Margins, rows: int, columns: int
+) -> "tuple[Figure, float]":
     """Return an empty figure with its margins, and the width of a panel [inches]."""
     from matplotlib.figure import Figure
 

@@ -27,7 +27,7 @@ def page_of(answer: Answer, drawn: Mapping[str, bytes]) -> bytes:
         "data": f"{answer.name}.json",
         "versions": f"ppafo {__version__}",
     }
-    return rendered_page("answer.html.jinja", values).encode()
+    return render_page("answer.html.jinja", values).encode()
 
 
 def _section(section: Section, drawn: Mapping[str, bytes]) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def _unbroken_unit(title: str) -> str:
     return words + bracket + unit.replace(" ", "\N{NO-BREAK SPACE}") if bracket and title.endswith(")") else title
 
 
-def rendered_page(template: str, values: Mapping[str, Any], package: str = "ppafo.answers") -> str:
+def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.answers") -> str:
     """Return a template of a package filled with values; texts are escaped, a value that is missing is an error."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 

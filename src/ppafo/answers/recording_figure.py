@@ -19,7 +19,7 @@ from ppafo.answers.style import (
     house_style,
     label_lines,
     mark_kind,
-    rendered,
+    render_figure,
 )
 from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
@@ -39,7 +39,7 @@ _PANEL, _GAP, _TOP, _BOTTOM, _REMARK_LINE = 1.15, 0.42, 0.75, 0.55, 0.17
 
 _REMARK_WIDTH = 100
 _HEADROOM = 0.06
-_MOST_TICKS = 5
+_MAXIMUM_TICKS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +136,7 @@ def recording_figure(
         return figure
 
 
-def stored_figure(stored: StoredResult) -> "Figure":
+def draw_stored_result(stored: StoredResult) -> "Figure":
     """Return the figure of a saved result: the same that ``Result.plot`` gave."""
     status = stored.document.get("status", {})
     scenario = stored.document.get("scenario", {})
@@ -148,7 +148,7 @@ def stored_figure(stored: StoredResult) -> "Figure":
 
 def figure_files(figure: "Figure") -> dict[str, bytes]:
     """Return the files that a result folder keeps of its figure, by name."""
-    return {f"figure.{file_format}": content for file_format, content in rendered(figure, ("png", "svg")).items()}
+    return {f"figure.{file_format}": content for file_format, content in render_figure(figure, ("png", "svg")).items()}
 
 
 def _grid(count: int, title: str, remark: str) -> "tuple[Figure, list[Axes]]":
@@ -181,4 +181,4 @@ def _set_limits(axes: "Axes", panel: Panel) -> None:
     missing = max(0.0, panel.smallest_span - span)
     air = _HEADROOM * (span + missing) + 0.5 * missing
     axes.set_ylim(min(shown) - air, max(shown) + air)
-    axes.locator_params(axis="y", nbins=_MOST_TICKS)
+    axes.locator_params(axis="y", nbins=_MAXIMUM_TICKS)

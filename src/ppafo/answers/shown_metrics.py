@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from ppafo.answers.answer import Column
-from ppafo.answers.shown_units import quantity_of_unit, shown, shown_change, shown_unit
+from ppafo.answers.display_units import display_difference, display_unit, display_value, quantity_of_unit
 from ppafo.metrics import METRICS, Metric
 
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
@@ -30,7 +30,7 @@ def metric_title(name: str) -> str:
 def metric_unit(name: str) -> str:
     """Return the unit in which a metric is shown, its own where it is no quantity of the table; empty for a number."""
     quantity = metric_quantity(name)
-    return shown_unit(quantity) if quantity else METRICS[name].unit.removeprefix("-")
+    return display_unit(quantity) if quantity else METRICS[name].unit.removeprefix("-")
 
 
 def metric_column(name: str, form: str = ".4g") -> Column:
@@ -51,13 +51,15 @@ def metrics_lines(metrics: Mapping[str, Metric]) -> list[str]:
 def metric_level(value: float, si_unit: str) -> tuple[float, str]:
     """Return a value of a metric or channel, and its unit, as people are shown them; pressures are gauge ones."""
     quantity = _quantity(si_unit)
-    return shown(value, quantity), shown_unit(quantity) or si_unit.removeprefix("-")
+    return display_value(value, quantity), display_unit(quantity) or si_unit.removeprefix("-")
 
 
 def metric_change(value: float, si_unit: str) -> tuple[float, str]:
     """Return a difference of two values of a metric or channel, and its unit, as people are shown them."""
     quantity = _quantity(si_unit)
-    return shown_change(value, quantity), shown_unit(quantity).replace("psi_g", "psi") or si_unit.removeprefix("-")
+    return display_difference(value, quantity), display_unit(quantity).replace("psi_g", "psi") or si_unit.removeprefix(
+        "-"
+    )
 
 
 def _quantity(unit: str) -> str:

@@ -31,7 +31,7 @@ class Solved:
         chosen = figures.get(name or next(iter(figures), ""))
         drawn = None if chosen is None else chosen.draw()
         if drawn is None or isinstance(drawn, bytes):
-            raise LookupError(f"there is no figure '{name or ''}'; there are {', '.join(figures) or 'none'}")
+            raise LookupError(f"there is no figure '{name or ''}'; available: {', '.join(figures) or 'none'}")
         return drawn
 
     def save(self, folder: str | Path) -> None:

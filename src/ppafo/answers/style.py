@@ -77,13 +77,13 @@ def house_style() -> Iterator[None]:
         yield
 
 
-def rendered(figure: "Figure", file_formats: Iterable[str]) -> dict[str, bytes]:
+def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, bytes]:
     """Return file contents by format (``png``, ``svg``, ``pdf``); the same figure gives the same bytes."""
     with house_style():
-        return {file_format: _saved(figure, file_format) for file_format in file_formats}
+        return {file_format: _encode_figure(figure, file_format) for file_format in file_formats}
 
 
-def _saved(figure: "Figure", file_format: str) -> bytes:
+def _encode_figure(figure: "Figure", file_format: str) -> bytes:
     buffer = io.BytesIO()
     undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     figure.savefig(buffer, format=file_format, metadata=undated.get(file_format))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ppafo.answers.answer import Answer, Cell, Column, Section, Table
-from ppafo.answers.shown_units import shown, shown_change, shown_unit, titled
+from ppafo.answers.display_units import display_difference, display_unit, display_value, title_with_unit
 
 MARK = "*"
 _NOTHING = "-"
@@ -34,14 +34,14 @@ def cell_text(cell: Cell, column: Column) -> str:
         return cell
     if isinstance(cell, int) and not column.quantity:
         return f"{cell:,}"
-    number = (shown_change if column.is_change else shown)(float(cell), column.quantity)
+    number = (display_difference if column.is_change else display_value)(float(cell), column.quantity)
     return f"{number:{column.form}}"
 
 
-def aligned(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
+def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
     """Return rows of texts as lines of aligned columns: the first ``left`` to the left, all others to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(_padded(row, widths, left)).rstrip() for row in rows]
+    return ["  ".join(_pad_row(row, widths, left)).rstrip() for row in rows]
 
 
 def _section_text(section: Section) -> str:
@@ -55,20 +55,20 @@ def _table_lines(table: Table) -> list[str]:
     if not table.rows:
         return []
     if not table.head:
-        return aligned(rows, len(rows[0]))
+        return align_columns(rows, len(rows[0]))
     rows = [head_texts(table), *rows]
     if table.marked:
         marks = ["", *(MARK if place in table.marked else "" for place in range(len(table.rows)))]
         rows = [[mark, *row] for mark, row in zip(marks, rows, strict=True)]
-    return aligned(rows, table.left + bool(table.marked))
+    return align_columns(rows, table.left + bool(table.marked))
 
 
 def _title(column: Column) -> str:
     if column.is_change and column.quantity == "pressure":
         return f"{column.title} (psi)"
-    return titled(column.title, column.quantity) if shown_unit(column.quantity) else column.title
+    return title_with_unit(column.title, column.quantity) if display_unit(column.quantity) else column.title
 
 
-def _padded(row: Sequence[str], widths: Sequence[int], left: int) -> list[str]:
+def _pad_row(row: Sequence[str], widths: Sequence[int], left: int) -> list[str]:
     cells = zip(row, widths, strict=True)
     return [f"{cell:<{width}}" if place < left else f"{cell:>{width}}" for place, (cell, width) in enumerate(cells)]

@@ -75,7 +75,7 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     return f"{number} {'' if unit == '-' else unit}".rstrip()
 
 
-def printed_quantity(value: float, unit: str) -> str:
+def format_printed_quantity(value: float, unit: str) -> str:
     """Return number and unit with no more digits than the number was printed with."""
     return f"{value:g} {'' if unit == '-' else unit}".rstrip()
 

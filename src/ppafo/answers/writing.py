@@ -4,7 +4,7 @@ from pathlib import Path
 
 from ppafo.answers.answer import Answer, Figure
 from ppafo.answers.page import page_of
-from ppafo.answers.style import rendered
+from ppafo.answers.style import render_figure
 from ppafo.answers.text import text_of
 from ppafo.documents.json_text import json_text
 from ppafo.storage.owned_folder import write_marked_folder
@@ -28,7 +28,7 @@ def files_of(answer: Answer) -> dict[str, bytes]:
 def _files_of_figure(figure: Figure) -> dict[str, bytes]:
     """Return the contents of a figure by the ending of their names."""
     drawn = figure.draw()
-    return {"gif": drawn} if isinstance(drawn, bytes) else rendered(drawn, FORMATS)
+    return {"gif": drawn} if isinstance(drawn, bytes) else render_figure(drawn, FORMATS)
 
 
 def write_answer(answer: Answer, folder: Path) -> None:

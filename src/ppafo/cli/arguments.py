@@ -20,6 +20,8 @@ RENAMED = {
     "--maximum": "--draws",
     "--most": "--draws",
     "--most-failed": "--maximum-failed",
+    "--runs": "--draws",
+    "--least-strides": "--minimum-strides",
 }
 """Options of version 0.1 and what they are called now."""
 
@@ -40,7 +42,7 @@ class CommandParser(argparse.ArgumentParser):
         bad_value = _BAD_VALUE.fullmatch(message)
         if bad_value is not None:
             raise UsageError(f"{bad_value[1]} {bad_value[2]}")
-        raise UsageError(f"{message.removeprefix('argument ')}; '{self.prog} --help' shows what belongs here")
+        raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
         """End the process after ``--help`` or ``--version``, once their text has really been written."""
@@ -65,7 +67,7 @@ def check_command(word: str | None, known: Sequence[str], moved: Mapping[str, st
         raise UsageError(f"'{word}' is no longer a command of the package: run {moved[word]} in a checkout of ppafo")
     if word is not None and word not in known:
         hint = nearest_name(word, known)
-        raise UsageError(f"there is no command '{word}'{hint}; known are {', '.join(known)}")
+        raise UsageError(f"there is no command '{word}'{hint}; available: {', '.join(known)}")
 
 
 def check_options(words: Sequence[str], parser: CommandParser) -> None:
@@ -78,7 +80,9 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
             if name in REMOVED:
                 raise UsageError(f"there is no option '{name}' any more: {REMOVED[name]}")
-            raise UsageError(f"there is no option '{name}'{_nearest_option(name, known)}; here are {', '.join(known)}")
+            raise UsageError(
+                f"there is no option '{name}'{_nearest_option(name, known)}; available: {', '.join(known)}"
+            )
 
 
 def _nearest_option(name: str, known: Sequence[str]) -> str:

@@ -57,7 +57,8 @@ def _text(parameter_set: "ParameterSet", findings: "list[Finding]", counts: dict
 def _lines(finding: "Finding") -> list[str]:
     lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
     lines += [
-        f"{_INDENT}{value.path} = {_written(value.value)} {value.unit} ({value.origin})" for value in finding.values
+        f"{_INDENT}{value.path} = {_format_value(value.value)} {value.unit} ({value.origin})"
+        for value in finding.values
     ]
     lines += textwrap.wrap(finding.paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
     if finding.accepted:
@@ -66,5 +67,5 @@ def _lines(finding: "Finding") -> list[str]:
     return lines
 
 
-def _written(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"

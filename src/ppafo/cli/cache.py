@@ -21,8 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Do what was asked for, and show what is there."""
-    from ppafo.engine.cache import cache_folder, clear, refusal
+    """Compile or remove programs as requested, and list what is there."""
+    from ppafo.engine.cache import cache_folder, clear
+    from ppafo.engine.private_folder import refusal
 
     check_output(parsed)
     folder = cache_folder()
@@ -46,16 +47,16 @@ def _warm(why_not: str) -> None:
 
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
-    from ppafo.engine.cache import LONGEST_UNUSED, MOST_BYTES, cached_programs
+    from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, list_programs
 
-    programs = [] if folder is None else cached_programs(folder)
+    programs = [] if folder is None else list_programs(folder)
     now = time.time()
     return {
         "folder": None if folder is None else str(folder),
         "not_used": why_not or None,
         "size": sum(program.size for program in programs),
         "kept_unused_days": LONGEST_UNUSED / _DAY,
-        "most_bytes": MOST_BYTES,
+        "most_bytes": MAXIMUM_BYTES,
         "programs": [
             {"name": program.place.name, "size": program.size, "unused_days": max(0.0, (now - program.used) / _DAY)}
             for program in programs

@@ -28,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json_argument(_action(actions, "list", "list the gaits that come with the package"))
     showing = _action(actions, "show", "show and draw a gait")
     showing.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
-    showing.add_argument("--speed", metavar="SPEED", help="at another walking speed, such as '1.2 m/s'")
+    showing.add_argument("--speed", metavar="SPEED", help="walking speed to scale to, such as '1.2 m/s'")
     add_output_arguments(showing)
-    _add_import_arguments(_action(actions, "import", "make a gait of recorded files (.mot, .sto, .csv, .c3d)"))
+    _add_import_arguments(_action(actions, "import", "make a gait from recorded files (.mot, .sto, .csv, .c3d, .trc)"))
     recording = _action(actions, "record", "write some strides of a gait as a synthetic recording")
     recording.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
     recording.add_argument("--strides", metavar="N", default="10", help="number of strides; default 10")
@@ -38,6 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     recording.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .csv file to write")
     exporting = _action(actions, "export", "write a recording or result as .sto for OpenSim")
     exporting.add_argument("recording", metavar="RECORDING", type=Path, help="a .csv or .nc file, or a result folder")
+    exporting.add_argument("--body-mass", metavar="MASS", help="for moments and forces per mass, such as '62 kg'")
+    exporting.add_argument("--side", metavar="right|left", default="right", help="which foot it was; default right")
     add_json_argument(exporting)
     exporting.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .sto file to write")
 
@@ -50,24 +52,42 @@ def _action(
 
 def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="files of one walk, on one clock")
-    parser.add_argument("--body-mass", metavar="MASS", required=True, help="mass of the wearer, such as '62 kg'")
+    parser.add_argument(
+        "--body-mass", metavar="MASS", help="mass of the wearer, such as '62 kg'; default: what a C3D file states"
+    )
     parser.add_argument("--side", metavar="right|left", default="right", help="which foot; default right")
     parser.add_argument("--map", metavar="FILE", type=Path, help="gait map (.toml): which columns, units and signs")
     parser.add_argument(
         "--speed", metavar="SPEED", help="walking speed, such as '1.2 m/s'; needed to scale the gait later"
     )
     parser.add_argument(
-        "--stature", metavar="LENGTH", help="of the wearer, such as '1.75 m'; gives the thigh that OpenSim files lack"
+        "--stature",
+        metavar="LENGTH",
+        help="stature of the wearer, such as '1.75 m'; gives the thigh length that OpenSim files lack",
     )
-    parser.add_argument("--low-pass", metavar="FREQUENCY", help="smooth the curves, such as '6 Hz'; not unless given")
-    parser.add_argument("--least-strides", metavar="N", default="2", help="refuse fewer whole strides; default 2")
+    parser.add_argument(
+        "--low-pass", metavar="FREQUENCY", help="cutoff of a low-pass filter, such as '6 Hz'; default: none"
+    )
+    parser.add_argument(
+        "--minimum-strides", metavar="N", help="minimum number of whole strides; default 2, overground 1"
+    )
+    parser.add_argument("--start", metavar="TIME", help="leave out what is before, such as '1.2 s'")
+    parser.add_argument("--end", metavar="TIME", help="leave out what is after, such as '3.4 s'")
+    parser.add_argument(
+        "--fill-gaps", metavar="TIME", help="fill gaps up to this length, such as '0.1 s'; default: none"
+    )
+    parser.add_argument(
+        "--ankle-neutral",
+        metavar="ANGLE",
+        help="reading of the ankle with the foot square to the shank, such as '3 deg'",
+    )
     parser.add_argument("--name", metavar="NAME", default="imported-gait", help="name of the gait and of its file")
     parser.add_argument("--title", metavar="TEXT", default="", help="one line: who walks, and how")
     add_output_arguments(parser)
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Do what was asked for."""
+    """Run the action that was given."""
     actions = {"list": _list, "show": _show, "import": _import, "record": _record, "export": _export}
     return actions[parsed.action](parsed)
 
@@ -106,24 +126,32 @@ def _settings(parsed: argparse.Namespace) -> "ImportSettings":
     from ppafo.gait.recorded import ImportSettings
     from ppafo.gait.recorded.mapping import load_map
 
-    if parsed.side not in _SIDES:
-        raise DataError(f"--side {parsed.side!r} is not known; it is right or left")
+    _check_side(parsed.side)
     return ImportSettings(
-        body_mass=_quantity("--body-mass", parsed.body_mass, "kg"),
+        body_mass=_optional("--body-mass", parsed.body_mass, "kg"),
         side=parsed.side,
         columns=None if parsed.map is None else load_map(parsed.map),
-        walking_speed=None if parsed.speed is None else _quantity("--speed", parsed.speed, "m/s"),
-        low_pass=None if parsed.low_pass is None else _quantity("--low-pass", parsed.low_pass, "Hz"),
-        least_strides=_whole("--least-strides", parsed.least_strides),
+        walking_speed=_optional("--speed", parsed.speed, "m/s"),
+        low_pass=_optional("--low-pass", parsed.low_pass, "Hz"),
+        least_strides=None if parsed.minimum_strides is None else _whole("--minimum-strides", parsed.minimum_strides),
         name=parsed.name,
         title=parsed.title,
-        stature=None if parsed.stature is None else _quantity("--stature", parsed.stature, "m"),
+        stature=_optional("--stature", parsed.stature, "m"),
+        start=_optional("--start", parsed.start, "s"),
+        end=_optional("--end", parsed.end, "s"),
+        longest_gap=_optional("--fill-gaps", parsed.fill_gaps, "s") or 0.0,
+        ankle_neutral=_optional("--ankle-neutral", parsed.ankle_neutral, "rad"),
     )
+
+
+def _check_side(side: str) -> None:
+    if side not in _SIDES:
+        raise DataError(f"--side {side!r}: must be right or left")
 
 
 def _whole(option: str, text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) < 7):
-        raise DataError(f"{option} {text!r} is not a whole number, such as 2")
+        raise DataError(f"{option} {text!r}: must be a whole number, such as 2")
     return int(text)
 
 
@@ -134,6 +162,10 @@ def _quantity(option: str, text: str, si_unit: str) -> float:
         return parse_quantity(text, si_unit)
     except UnitError as error:
         raise DataError(f"{option} {text!r}: {error}") from error
+
+
+def _optional(option: str, text: str | None, si_unit: str) -> float | None:
+    return None if text is None else _quantity(option, text, si_unit)
 
 
 def _deliver(gait: "Gait", imported: "ImportedGait | None", parsed: argparse.Namespace) -> int:
@@ -157,14 +189,19 @@ def _record(parsed: argparse.Namespace) -> int:
 
 
 def _export(parsed: argparse.Namespace) -> int:
+    from ppafo.gait.opensim_names import opensim_recording
     from ppafo.storage import read_recording
     from ppafo.storage.opensim import write_opensim
 
+    _check_side(parsed.side)
+    mass = _optional("--body-mass", parsed.body_mass, "kg")
     if parsed.out.suffix.lower() != ".sto":
-        raise DataError(f"--out {parsed.out}: OpenSim's name for such a file ends in .sto")
+        raise DataError(f"--out {parsed.out}: the name must end in .sto")
     check_new_file(parsed.out)
-    recording = read_recording(parsed.recording)
+    recording, missing = opensim_recording(read_recording(parsed.recording), parsed.side, mass)
     write_opensim(parsed.out, recording)
-    document = {"file": str(parsed.out), "samples": len(recording), "channels": list(recording.names)}
-    print_result(f"written: {parsed.out} ({len(recording)} samples)", document, parsed.json)
+    names = list(recording.names)
+    document = {"file": str(parsed.out), "samples": len(recording), "channels": names, "left_out": list(missing)}
+    said = f"\nleft out: {', '.join(missing)}, which are per body mass: give --body-mass" if missing else ""
+    print_result(f"written: {parsed.out} ({len(recording)} samples: {', '.join(names)}){said}", document, parsed.json)
     return EXIT_GOOD

@@ -26,7 +26,7 @@ def build_parser(chosen: str | None) -> CommandParser:
     parser = CommandParser(
         prog="ppafo",
         usage="ppafo [-h] [--version] COMMAND ...",
-        description=f"Model-based design of pneumatic powered orthoses.\n\n{_grouped_commands()}",
+        description=f"Model-based design of pneumatic powered orthoses.\n\n{_list_commands()}",
         epilog="'ppafo COMMAND --help' shows what a command takes.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -47,7 +47,7 @@ def build_parser(chosen: str | None) -> CommandParser:
     return parser
 
 
-def _grouped_commands() -> str:
+def _list_commands() -> str:
     """Return the commands with what each does, group by group."""
     width = max(map(len, COMMANDS))
     groups = [
@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     try:
-        parsed = _parsed(words)
+        parsed = _parse(words)
         return int(parsed.run(parsed))
     except PpafoError as error:
         print(f"ppafo: {_readable(one_line(error))}", file=sys.stderr)
@@ -87,7 +87,7 @@ def _readable(message: str) -> str:
     return f"{message[: _LONGEST_MESSAGE // 2]} ... {message[-_LONGEST_MESSAGE // 2 :]}"
 
 
-def _parsed(words: list[str]) -> argparse.Namespace:
+def _parse(words: list[str]) -> argparse.Namespace:
     _check_text(words)
     chosen = next((word for word in words if not word.startswith("-")), None)
     check_command(chosen, tuple(COMMANDS), MOVED)
@@ -95,7 +95,7 @@ def _parsed(words: list[str]) -> argparse.Namespace:
     check_options(words, parser)
     parsed = parser.parse_args(words)
     if parsed.command is None:
-        raise UsageError(f"no command was given; known are {', '.join(COMMANDS)}; 'ppafo --help' says what each does")
+        raise UsageError(f"no command was given; available: {', '.join(COMMANDS)}; 'ppafo --help' says what each does")
     return parsed
 
 

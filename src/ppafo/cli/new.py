@@ -72,9 +72,9 @@ KINDS: dict[str, _NewFile] = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("kind", metavar="KIND", help=f"one of: {', '.join(KINDS)}")
-    parser.add_argument("name", metavar="NAME", help="the name that it gets, and its file")
+    parser.add_argument("name", metavar="NAME", help="name of the file and of what it describes")
     parser.add_argument(
-        "--from", dest="source", metavar="SOURCE", help="copy this one: a name of the package, or a .toml file"
+        "--from", dest="source", metavar="SOURCE", help="copy this one: a shipped name, or a .toml file"
     )
     add_json_argument(parser)
     parser.add_argument("--out", metavar="FILE", type=Path, help="the .toml file to write; default NAME.toml")
@@ -84,14 +84,16 @@ def run(parsed: argparse.Namespace) -> int:
     """Write the file, see that it loads, and say what to run next."""
     if parsed.kind not in KINDS:
         hint = nearest_name(parsed.kind, KINDS)
-        raise DataError(f"there is no kind of file '{parsed.kind}'{hint}; known are {', '.join(KINDS)}")
+        raise DataError(f"there is no kind of file '{parsed.kind}'{hint}; available: {', '.join(KINDS)}")
     if not _NAME.fullmatch(parsed.name):
-        raise DataError(f"NAME {one_line(parsed.name)}: must be of letters, digits, - and _; --out says where to write")
+        raise DataError(
+            f"NAME {one_line(parsed.name)}: must consist of letters, digits, - and _; use --out for the path"
+        )
     kind, path = KINDS[parsed.kind], parsed.out or Path(parsed.name + _SUFFIX)
     if path.suffix != _SUFFIX:
         raise DataError(f"--out {path}: the name must end in {_SUFFIX}")
     if os.path.lexists(path):
-        raise DataError(f"{path}: is there already; remove it or choose another name")
+        raise DataError(f"{path}: already exists; remove it or choose another name")
     _write(path, kind, _content(parsed.kind, parsed.source, parsed.name, path))
     command = kind.command.replace("FILE", shlex.quote(str(path))).replace("NAME", parsed.name)
     document = {"kind": parsed.kind, "name": parsed.name, "file": str(path), "next": command}
@@ -120,10 +122,10 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
 
 def _write(path: Path, kind: _NewFile, text: str) -> None:
     """Write the file; where it does not load, such as one with a path relative to another folder, it is not left."""
-    from ppafo.questions.question import loaded
+    from ppafo.questions.question import load_name
     from ppafo.storage.files import write_file
 
-    load = loaded(kind.load)
+    load = load_name(kind.load)
     write_file(path, text.encode())
     is_good = False
     try:

@@ -38,7 +38,7 @@ def add_override_argument(parser: argparse.ArgumentParser) -> None:
         metavar="PATH=VALUE",
         action="append",
         default=[],
-        help="change one value, for example valve.area=12.6mm^2; may be given again",
+        help="override one value, for example valve.area=12.6mm^2; may be repeated",
     )
 
 
@@ -47,18 +47,18 @@ def check_output(parsed: argparse.Namespace) -> None:
     if parsed.out is not None:
         from ppafo.storage.owned_folder import check_owned_folder, marked_folder
 
-        with named_option():
+        with blame_out_option():
             check_owned_folder(parsed.out, marked_folder(_command(parsed)))
 
 
 def check_new_file(path: Path) -> None:
     """Refuse a file of ``--out`` that is there: nothing in it would say whose it is."""
     if os.path.lexists(path):
-        raise DataError(f"--out {path}: is there already; remove it or choose another name")
+        raise DataError(f"--out {path}: already exists; remove it or choose another name")
 
 
 @contextlib.contextmanager
-def named_option() -> Iterator[None]:
+def blame_out_option() -> Iterator[None]:
     """Begin what is said of a folder with the option that named it."""
     try:
         yield
@@ -72,7 +72,7 @@ def _command(parsed: argparse.Namespace) -> str:
 
 
 def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.Namespace) -> None:
-    """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where asked, and print one of them."""
+    """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where requested, and print one of them."""
     if parsed.out is not None:
         contents = {f"{name}.txt": text, f"{name}.json": json_text(document)}
         write_files(parsed, {file: f"{content}\n".encode() for file, content in contents.items()})
@@ -80,7 +80,7 @@ def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.
 
 
 def deliver_answer(answer: "Answer", parsed: argparse.Namespace, filled: str | None = None) -> int:
-    """Write an answer where asked, print it as text or JSON, and return the exit code.
+    """Write an answer where requested, print it as text or JSON, and return the exit code.
 
     ``filled`` is a folder that has the files already.
     """
@@ -138,7 +138,7 @@ def write_files(parsed: argparse.Namespace, contents: Mapping[str, bytes]) -> No
     """Make the folder of ``--out`` hold exactly these files, and the mark by which it is known: all of them or none."""
     from ppafo.storage.owned_folder import write_marked_folder
 
-    with named_option():
+    with blame_out_option():
         write_marked_folder(parsed.out, contents, _command(parsed))
 
 

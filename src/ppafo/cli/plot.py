@@ -21,7 +21,7 @@ _NAMED = 6
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("folder", metavar="DIR", type=Path, help="a folder that a command of ppafo has written")
+    parser.add_argument("folder", metavar="DIR", type=Path, help="a result folder written by ppafo")
     add_json_argument(parser)
     parser.add_argument(
         "--out", metavar="FILE", type=Path, help="a .png, .svg or .pdf file; default figure.png and figure.svg in DIR"
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(parsed: argparse.Namespace) -> int:
     """Draw the figures of the folder and write them; where the folder has its figures already, say which."""
     from ppafo.answers.recording_figure import FIGURE_FORMATS
-    from ppafo.answers.style import rendered
+    from ppafo.answers.style import render_figure
     from ppafo.storage.files import write_file
     from ppafo.storage.owned_folder import add_to_marked_folder
 
@@ -42,17 +42,17 @@ def run(parsed: argparse.Namespace) -> int:
         check_new_file(parsed.out)
     names = _names(parsed.folder)
     load_drawing()
-    drawn = _drawn(parsed.folder, names)
+    drawn = _draw_folder(parsed.folder, names)
     if not drawn:
         return _say_what_is_there(parsed, names)
     if parsed.out is not None:
-        (content,) = rendered(next(iter(drawn.values())), [parsed.out.suffix.removeprefix(".")]).values()
+        (content,) = render_figure(next(iter(drawn.values())), [parsed.out.suffix.removeprefix(".")]).values()
         written = [str(write_file(parsed.out, content))]
     else:
         files = {
             f"{stem}.{form}": content
             for stem, figure in drawn.items()
-            for form, content in rendered(figure, _FORMATS).items()
+            for form, content in render_figure(figure, _FORMATS).items()
         }
         add_to_marked_folder(parsed.folder, files)
         written = [str(parsed.folder / name) for name in files]
@@ -70,9 +70,9 @@ def _names(folder: Path) -> list[str]:
         raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
 
 
-def _drawn(folder: Path, names: list[str]) -> "dict[str, Figure]":
+def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     """Return figures by the stem of their files: of a run, a walk, a study or recordings of the rig; none of others."""
-    from ppafo.answers.recording_figure import recording_figure, stored_figure
+    from ppafo.answers.recording_figure import draw_stored_result, recording_figure
     from ppafo.questions.sweep.manifest import MANIFEST
     from ppafo.questions.sweep.results import load_study_results
     from ppafo.rig.folder import RIG_FILE
@@ -81,7 +81,7 @@ def _drawn(folder: Path, names: list[str]) -> "dict[str, Figure]":
     from ppafo.storage.result_folder import NETCDF_FILE, RUN_FILE
 
     if RUN_FILE in names:
-        return {_FIGURE: stored_figure(read_result(folder))}
+        return {_FIGURE: draw_stored_result(read_result(folder))}
     if MANIFEST in names:
         return {_FIGURE: load_study_results(folder).plot()}
     if RIG_FILE in names:
@@ -100,7 +100,7 @@ def _say_what_is_there(parsed: argparse.Namespace, names: list[str]) -> int:
     from ppafo.storage.owned_folder import MARK, marking_command
 
     if MARK not in names:
-        raise DataError(f"{parsed.folder}: is not a folder of results of ppafo")
+        raise DataError(f"{parsed.folder}: is not a result folder of ppafo")
     command = marking_command(parsed.folder)
     pictures = [name for name in names if name.endswith(_PICTURES)]
     page = next((name for name in names if name.endswith(".html")), None)

@@ -19,7 +19,7 @@ from ppafo.cli.output import (
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.documents.toml_text import TomlKind
 from ppafo.progress import ProgressLine
-from ppafo.questions.question import Question, loaded
+from ppafo.questions.question import Question, load_name
 
 
 def add_arguments(parser: argparse.ArgumentParser, question: Question) -> None:
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser, question: Question) -> None:
 def run(parsed: argparse.Namespace, question: Question) -> int:
     """Solve, print and write; 1 where the answer has not passed."""
     if question.library:
-        library = loaded(question.library)
+        library = load_name(question.library)
         if parsed.list:
             return _list(parsed, library, question.listing)
         _check_named(parsed, question, library)
@@ -46,7 +46,7 @@ def run(parsed: argparse.Namespace, question: Question) -> int:
         load_drawing()
     else:
         if parsed.out is None and question.default_folder:
-            parsed.out = loaded(question.default_folder)(values)
+            parsed.out = load_name(question.default_folder)(values)
         check_output(parsed)
     with progress_line() as progress:
         if "progress" in inspect.signature(solve).parameters:
@@ -84,13 +84,13 @@ def _check_named(parsed: argparse.Namespace, question: Question, library: TomlKi
 
 
 def _list(parsed: argparse.Namespace, library: TomlKind, listing: str) -> int:
-    from ppafo.answers.text import aligned
+    from ppafo.answers.text import align_columns
 
-    listed: list[dict[str, Any]] = loaded(listing)() if listing else _words_of_files(library)
+    listed: list[dict[str, Any]] = load_name(listing)() if listing else _words_of_files(library)
     rows = [[f"{value:,} {key}" if isinstance(value, int) else value for key, value in item.items()] for item in listed]
     rows = rows if listing else [[row[0], row[-1]] for row in rows]
     plural = f"{library.noun[:-1]}ies" if library.noun.endswith("y") else f"{library.noun}s"
-    print_result("\n".join(aligned(rows, len(rows[0]))), {plural: listed}, parsed.json)
+    print_result("\n".join(align_columns(rows, len(rows[0]))), {plural: listed}, parsed.json)
     return EXIT_GOOD
 
 

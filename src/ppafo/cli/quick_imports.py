@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import ModuleType
+from typing import Any
 
 _LINEAR_ALGEBRA = "scipy.linalg"
 
@@ -15,7 +16,8 @@ def load_compiler() -> None:
     """Import Numba without SciPy's linear algebra, which it looks for at import; compiled models have none."""
     if "numba" in sys.modules or _LINEAR_ALGEBRA in sys.modules:
         return
-    sys.modules[_LINEAR_ALGEBRA] = None  # type: ignore[assignment]  # as where it is not installed: the import fails
+    modules: dict[str, Any] = sys.modules
+    modules[_LINEAR_ALGEBRA] = None  # as where it is not installed: the import fails
     try:
         import numba.np.arraymath  # noqa: F401
     finally:
@@ -28,12 +30,12 @@ def load_drawing() -> None:
         return
     import matplotlib.artist
 
-    with _replaced(matplotlib.artist, "kwdoc", lambda _artist: ""):
+    with _replace_temporarily(matplotlib.artist, "kwdoc", lambda _artist: ""):
         import matplotlib.figure
 
 
 @contextmanager
-def _replaced(module: ModuleType, name: str, stand_in: object) -> Iterator[None]:
+def _replace_temporarily(module: ModuleType, name: str, stand_in: object) -> Iterator[None]:
     original = getattr(module, name)
     setattr(module, name, stand_in)
     try:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, named_option, print_result
+from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, blame_out_option, print_result
 from ppafo.cli.quick_imports import load_compiler
 from ppafo.errors import ParameterError
 
@@ -19,18 +19,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json_argument(listing)
     recording = actions.add_parser(
         "record",
-        help="do an experiment on the virtual rig",
-        description="Write what a laboratory would have, marked as synthetic, and rig.json with the truth behind it.",
+        help="run an experiment on the virtual rig",
+        description="Write the recording of a laboratory, marked as synthetic, and rig.json with the true values.",
     )
-    recording.add_argument("experiment", metavar="EXPERIMENT", help="one of those that 'ppafo rig list' shows")
+    recording.add_argument("experiment", metavar="EXPERIMENT", help="name of an experiment; see 'ppafo rig list'")
     recording.add_argument(
         "--preset", metavar="PRESET", default="paper-bench", help="preset or .toml file; default paper-bench"
     )
-    recording.add_argument("--seed", metavar="N", default="1", help="seed of noise and offsets; default 1")
+    recording.add_argument("--seed", metavar="N", default="1", help="random seed of noise and offsets; default 1")
     recording.add_argument(
         "--device", metavar="SET", default="ppafo2011", help="parameter set or .toml file; default ppafo2011"
     )
-    recording.add_argument("--valve", metavar="NAME", help="one of the set's valves; its default valve unless given")
+    recording.add_argument("--valve", metavar="NAME", help="valve of the parameter set; default: its default valve")
     add_override_argument(recording)
     add_json_argument(recording)
     recording.add_argument(
@@ -71,7 +71,7 @@ def _record(parsed: argparse.Namespace) -> int:
 
     find_experiment(parsed.experiment)
     seed = _whole_number(parsed.seed)
-    with named_option():
+    with blame_out_option():
         check_rig_folder(parsed.out, parsed.experiment)
     made = record(parsed.experiment, parsed.preset, seed, parsed.device, parsed.overrides, parsed.valve)
     files = write_rig_recording(parsed.out, made)

@@ -7,17 +7,17 @@ from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_output, deli
 from ppafo.errors import DataError, nearest_name
 
 FORMATS: dict[str, str] = {
-    "parameters": "ppafo.parameters.schema",
+    "parameters": "ppafo.parameters.loading",
     "scenario": "ppafo.simulation.schema",
     "study": "ppafo.studies.declaration",
     "tuning": "ppafo.questions.tune.file",
-    "parts": "ppafo.parameters.parts.schema",
+    "parts": "ppafo.parameters.parts.catalogue",
     "design": "ppafo.questions.design.file",
     "size": "ppafo.questions.size.file",
     "walk": "ppafo.walking.schema",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.column_map",
-    "rig": "ppafo.rig.schema",
+    "rig": "ppafo.rig.preset",
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",
     "bottle": "ppafo.questions.endurance.file",
@@ -35,7 +35,7 @@ def run(parsed: argparse.Namespace) -> int:
     """Print the schema, which is JSON with or without ``--json``."""
     if parsed.format not in FORMATS:
         hint = nearest_name(parsed.format, FORMATS)
-        raise DataError(f"there is no file format '{parsed.format}'{hint}; known are {', '.join(FORMATS)}")
+        raise DataError(f"there is no file format '{parsed.format}'{hint}; available: {', '.join(FORMATS)}")
     check_output(parsed)
     document = importlib.import_module(FORMATS[parsed.format]).json_schema()
     parsed.json = True

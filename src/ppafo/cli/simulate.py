@@ -10,7 +10,7 @@ from ppafo.cli.output import (
     EXIT_GOOD,
     add_json_argument,
     add_override_argument,
-    named_option,
+    blame_out_option,
     print_result,
 )
 from ppafo.cli.quick_imports import load_compiler, load_drawing
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check",
         action="store_true",
-        help="run again with half the error and from a start moved by 1e-7, and say which metrics the run determines",
+        help="run again with half the error and from a start moved by 1e-7, and report which metrics it determines",
     )
     add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, help="result folder; default out/NAME of the scenario")
@@ -51,9 +51,9 @@ def run(parsed: argparse.Namespace) -> int:
 
     scenario = load_scenario(parsed.scenario, parsed.overrides)
     folder = parsed.out if parsed.out is not None else DEFAULT_FOLDER / scenario.name
-    with named_option():
+    with blame_out_option():
         check_result_folder(folder)
-    result = _simulated(scenario)
+    result = _simulate(scenario)
     check = result.check() if parsed.check and result.status.is_completed else None
     _save(result, check, folder)
     print_result(_text(result, check, folder), _document(result, check, folder), parsed.json)
@@ -63,7 +63,7 @@ def run(parsed: argparse.Namespace) -> int:
     return EXIT_CHECK_FAILED
 
 
-def _simulated(scenario: "Scenario") -> "Result":
+def _simulate(scenario: "Scenario") -> "Result":
     load_compiler()
     from ppafo.simulation.simulate import simulate
 

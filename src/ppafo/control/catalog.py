@@ -1,5 +1,6 @@
 """The controllers and profiles that a scenario can name. To add one here: a module and one line."""
 
+from ppafo.control import tabulated
 from ppafo.control.controllers import (
     constant,
     damped_proportional,
@@ -11,8 +12,7 @@ from ppafo.control.controllers import (
     sliding_mode,
 )
 from ppafo.control.kind import ControllerKind, ProfileKind
-from ppafo.control.profiles import constant as constant_profile
-from ppafo.control.profiles import ramp_hold, sine, tabulated
+from ppafo.control.profiles import CONSTANT, RAMP_HOLD, SINE
 from ppafo.kinds import Kinds
 
 CONTROLLERS: Kinds[ControllerKind] = Kinds(
@@ -35,5 +35,5 @@ PROFILES: Kinds[ProfileKind] = Kinds(
     "ppafo.profiles",
     "profile",
     ProfileKind,
-    (constant_profile.KIND, ramp_hold.KIND, sine.KIND, tabulated.KIND),
+    (CONSTANT, RAMP_HOLD, SINE, tabulated.KIND),
 )

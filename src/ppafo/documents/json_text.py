@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-MOST_LEVELS = 50
+MAXIMUM_LEVELS = 50
 """No file of ours has a fifth of it; whoever goes through a document by calls of calls must come to an end."""
 
 
@@ -24,14 +24,14 @@ def json_document(content: bytes) -> Any:
     except RecursionError as error:
         raise ValueError("nested too deeply") from error
     if is_nested_too_deeply(document):
-        raise ValueError(f"nested deeper than {MOST_LEVELS} levels")
+        raise ValueError(f"nested deeper than {MAXIMUM_LEVELS} levels")
     return document
 
 
 def is_nested_too_deeply(document: Any) -> bool:
-    """Tell whether tables and lists lie in each other more than ``MOST_LEVELS`` deep, or in themselves."""
+    """Tell whether tables and lists lie in each other more than ``MAXIMUM_LEVELS`` deep, or in themselves."""
     level: list[Any] = [document]
-    for _ in range(MOST_LEVELS + 1):
+    for _ in range(MAXIMUM_LEVELS + 1):
         inside = {
             id(item): item
             for table in level

@@ -27,12 +27,12 @@ def first_problem(details: list[ErrorDetails], model: type[BaseModel]) -> str:
     if template is None:
         sentence = _SENTENCES.get(first["type"], _any_other)(spot, first)
     else:
-        sentence = template.format(path=spot.path, value=shown(first["input"]))
+        sentence = template.format(path=spot.path, value=quote(first["input"]))
     more = len(details) - 1
     return f"{sentence} (and {more} more)" if more else sentence
 
 
-def shown(value: object) -> str:
+def quote(value: object) -> str:
     """Return a short quotation of a value on one line."""
     quoted = one_line(repr(value))
     return quoted if len(quoted) <= _LONGEST_VALUE else f"{quoted[:_LONGEST_VALUE]}..."
@@ -72,12 +72,12 @@ def _below(node: Any, part: str) -> Any:
     """Return the type of what a table has at a key, or a table or list by names or numbers at any; None if unknown."""
     if _is_model(node):
         field = node.model_fields.get(part)
-        return None if field is None else _given(field.annotation)
+        return None if field is None else _required_type(field.annotation)
     members = [item for item in get_args(node) if item is not Ellipsis]
     return members[-1] if members else None
 
 
-def _given(annotation: Any) -> Any:
+def _required_type(annotation: Any) -> Any:
     """Return the type of a value that is there, for one that may be left out as ``X | None``."""
     members = [item for item in get_args(annotation) if item is not type(None)]
     return members[0] if get_origin(annotation) in (Union, UnionType) and len(members) == 1 else annotation
@@ -96,13 +96,13 @@ def _unknown_key(spot: _Spot, _detail: ErrorDetails) -> str:
 def _unknown_choice(spot: _Spot, detail: ErrorDetails) -> str:
     allowed = _quoted_names(detail["ctx"]["expected"].replace(" or ", ","))
     hint = nearest_name(str(detail["input"]), allowed)
-    return f"{spot.path} = {shown(detail['input'])} is not allowed{hint}; allowed: {', '.join(allowed)}"
+    return f"{spot.path} = {quote(detail['input'])} is not allowed{hint}; allowed: {', '.join(allowed)}"
 
 
 def _unknown_kind(spot: _Spot, detail: ErrorDetails) -> str:
     allowed, tag = _quoted_names(detail["ctx"]["expected_tags"]), detail["ctx"]["tag"]
     return (
-        f"{spot.path}.kind = {shown(tag)} is not known{nearest_name(str(tag), allowed)}; allowed: {', '.join(allowed)}"
+        f"{spot.path}.kind = {quote(tag)} is not known{nearest_name(str(tag), allowed)}; allowed: {', '.join(allowed)}"
     )
 
 
@@ -110,12 +110,12 @@ def _not_a_table(spot: _Spot, detail: ErrorDetails) -> str:
     fields = spot.wanted.model_fields if _is_model(spot.wanted) else {}
     required = [name for name, field in fields.items() if field.is_required()]
     keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{spot.path}]"
-    return f"{spot.path} = {shown(detail['input'])} must be a table{keys}"
+    return f"{spot.path} = {quote(detail['input'])} must be a table{keys}"
 
 
 def _any_other(spot: _Spot, detail: ErrorDetails) -> str:
     message = detail["msg"].removeprefix("Input should be ").removeprefix("String should ")
-    return f"{spot.path} = {shown(detail['input'])}: must be {one_line(message)}"
+    return f"{spot.path} = {quote(detail['input'])}: must be {one_line(message)}"
 
 
 def _quoted_names(text: str) -> list[str]:

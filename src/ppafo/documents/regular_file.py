@@ -3,24 +3,24 @@
 import stat
 from pathlib import Path
 
-MOST_BYTES_TYPED = 1_000_000
+MAXIMUM_BYTES_TYPED = 1_000_000
 """More than this is no scenario and no parameter set that a person wrote."""
 
 
-def read_regular_file(path: Path, most: int | None = None) -> bytes:
-    """Return the content of a regular file, refused above ``most`` bytes; any OSError has its reason as text."""
+def read_regular_file(path: Path, maximum: int | None = None) -> bytes:
+    """Return the content of a regular file, refused above ``maximum`` bytes; any OSError has its reason as text."""
     found = path.stat()
     mode = found.st_mode
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(None, "it is a directory, not a file")
     if not stat.S_ISREG(mode):
         raise OSError(None, "it is a device or a pipe, not a regular file")
-    if most is None or found.st_size <= most:
+    if maximum is None or found.st_size <= maximum:
         with path.open("rb") as file:
             # Python takes the room for as much as is asked for; what grows meanwhile, or states no size, is read on.
             content = file.read(found.st_size + 1)
             if len(content) > found.st_size:
-                content += file.read() if most is None else file.read(most + 1 - len(content))
-        if most is None or len(content) <= most:
+                content += file.read() if maximum is None else file.read(maximum + 1 - len(content))
+        if maximum is None or len(content) <= maximum:
             return content
-    raise OSError(None, f"it is larger than {most / 1e6:g} MB, the most that is read of such a file")
+    raise OSError(None, f"it is larger than {maximum / 1e6:g} MB, the maximum size of such a file")

@@ -7,8 +7,8 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from ppafo.documents.json_text import MOST_LEVELS, is_nested_too_deeply
-from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
+from ppafo.documents.json_text import MAXIMUM_LEVELS, is_nested_too_deeply
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.errors import PpafoError, nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
@@ -36,10 +36,10 @@ class TomlKind:
             return (self.shipped / (name + _SUFFIX)).read_bytes()
         if path.suffix != _SUFFIX and not _exists(path):
             hint = nearest_name(name, self.names())
-            known = f"known are {', '.join(self.names())}, or " if self.names() else ""
+            known = f"available: {', '.join(self.names())}, or " if self.names() else ""
             raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; {known}give a .toml file")
         try:
-            return read_regular_file(path, MOST_BYTES_TYPED)
+            return read_regular_file(path, MAXIMUM_BYTES_TYPED)
         except (OSError, ValueError) as error:
             raise self.error(f"{label(name)}: cannot be read: {reason(error)}") from error
 
@@ -50,7 +50,7 @@ class TomlKind:
         except UnicodeDecodeError as error:
             raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
         if not text.strip():
-            raise self.error(f"{file}: is empty; 'ppafo schema {self.schema}' prints what belongs in it")
+            raise self.error(f"{file}: is empty; 'ppafo schema {self.schema}' prints its format")
         try:
             document = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
@@ -63,7 +63,7 @@ class TomlKind:
     def check_depth(self, document: Mapping[str, Any], file: str) -> None:
         """Refuse tables that lie in each other too deep; ``file`` is what messages call the document."""
         if is_nested_too_deeply(document):
-            raise self.error(f"{file}: has tables nested deeper than {MOST_LEVELS} levels; a few are enough")
+            raise self.error(f"{file}: has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are enough")
 
 
 def label(file: str) -> str:

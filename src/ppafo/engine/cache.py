@@ -25,7 +25,8 @@ from types import ModuleType
 
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.engine.compile_errors import mistake
-from ppafo.engine.compile_times import SECONDS_FILE, announced, counted, expected_seconds
+from ppafo.engine.compile_times import SECONDS_FILE, announce, estimate_seconds, number_models
+from ppafo.engine.private_folder import WRITTEN_BY_OTHERS, refusal
 from ppafo.engine.program_lock import LOCK, one_process
 from ppafo.engine.shared_functions import compile_text, run_text
 from ppafo.engine.source_text import without_origins
@@ -35,9 +36,9 @@ logger = logging.getLogger("ppafo")
 
 CACHE_VARIABLE = "PPAFO_CACHE_DIR"
 LONGEST_UNUSED = 90.0 * 86400.0
-"""Seconds after which a program that no start has asked for is removed."""
+"""Seconds after which a program that no run has used is removed."""
 
-MOST_BYTES = 500_000_000
+MAXIMUM_BYTES = 500_000_000
 """Size of all programs above which those that were not used for longest are removed."""
 
 _PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
@@ -47,7 +48,6 @@ _ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{_PROGRAM.patte
 _LONGEST_ASIDE = 86400.0
 _CHECKSUMS = "checksums.json"
 _KEPT, _NOT_KEPT = "cache=True", "cache=False"
-_WRITTEN_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _LOADING = threading.RLock()
 
 
@@ -81,7 +81,7 @@ def load_generated(kind: str, source: str) -> ModuleType:
     name = _name(kind, source)
     # A second thread must not get a module of which only the beginning has run.
     with _LOADING:
-        return sys.modules[name] if name in sys.modules else _imported(name, source)
+        return sys.modules[name] if name in sys.modules else _import_program(name, source)
 
 
 def load_all(kind: str, sources: Iterable[str]) -> None:
@@ -90,7 +90,7 @@ def load_all(kind: str, sources: Iterable[str]) -> None:
         folder = cache_folder()
         missing = [source for source in dict.fromkeys(sources) if not _is_there(_name(kind, source), folder)]
         for number, source in enumerate(missing, 1):
-            with counted(number, len(missing)):
+            with number_models(number, len(missing)):
                 load_generated(kind, source)
 
 
@@ -102,57 +102,16 @@ def _is_there(name: str, folder: Path | None) -> bool:
     return name in sys.modules or (folder is not None and os.path.lexists(folder / f"{name}-{_machine()}"))
 
 
-def refusal(folder: Path | None) -> str:
-    """Return why programs are neither read from nor kept in a folder, as the end of a sentence; empty where they are.
-
-    The folder is made if need be. It must be this user's own and no link, and nobody else may write it or put another
-    in its place.
-    """
-    if folder is None:
-        return "this user has no home folder"
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
-        found = folder.lstat()
-        above = [place.stat() for place in Path(os.path.realpath(folder)).parents]
-    except (OSError, ValueError) as error:
-        return f"{folder} cannot be made: {reason(error)}"
-    whose = _why_not_private(folder, found, above)
-    if whose or os.access(folder, os.W_OK | os.X_OK):
-        return whose
-    return f"{folder} cannot be written"
-
-
-def _why_not_private(folder: Path, found: os.stat_result, above: list[os.stat_result]) -> str:
-    if not stat.S_ISDIR(found.st_mode):
-        return f"{folder} is {'a link' if stat.S_ISLNK(found.st_mode) else 'not a folder'}"
-    if not hasattr(os, "geteuid"):
-        return ""
-    if found.st_uid != os.geteuid():
-        return f"{folder} belongs to another user"
-    if found.st_mode & _WRITTEN_BY_OTHERS:
-        return f"others can write into {folder}; 'ppafo cache --clear' and 'chmod 700' make it safe"
-    is_exchanged = any(_can_be_exchanged(place) for place in above)
-    return f"others can put another folder in the place of {folder}" if is_exchanged else ""
-
-
-def _can_be_exchanged(place: os.stat_result) -> bool:
-    """Tell whether another user can rename what lies in a folder."""
-    is_theirs = place.st_uid not in (0, os.geteuid())
-    return is_theirs or bool(place.st_mode & stat.S_IWOTH and not place.st_mode & stat.S_ISVTX)
-
-
-def cached_programs(folder: Path) -> list[CachedProgram]:
+def list_programs(folder: Path) -> list[CachedProgram]:
     """Return the programs in a cache folder, the one that was used last first."""
-    places = [*_named(folder, _PROGRAM), *_named(folder / "__pycache__", _PROGRAM)]
-    return sorted((_measured(place) for place in places), key=lambda item: -item.used)
+    places = [*_entries_named(folder, _PROGRAM), *_entries_named(folder / "__pycache__", _PROGRAM)]
+    return sorted((_measure_program(place) for place in places), key=lambda item: -item.used)
 
 
 def clear(folder: Path) -> int:
     """Remove all programs, and the folder where nothing else is in it; returns how many bytes that made free."""
     freed = 0
-    for program in [*cached_programs(folder), *map(_measured, _named(folder, _ASIDE))]:
+    for program in [*list_programs(folder), *map(_measure_program, _entries_named(folder, _ASIDE))]:
         _remove(program.place)
         freed += 0 if os.path.lexists(program.place) else program.size
     for emptied in (folder / "__pycache__", folder):
@@ -162,36 +121,36 @@ def clear(folder: Path) -> int:
 
 
 def evict(folder: Path) -> None:
-    """Remove programs unused for ``LONGEST_UNUSED``, those beyond ``MOST_BYTES``, and what a killed process left."""
+    """Remove programs unused for ``LONGEST_UNUSED``, those beyond ``MAXIMUM_BYTES``, and what a killed process left."""
     now, total = time.time(), 0
-    for program in cached_programs(folder):
+    for program in list_programs(folder):
         total += program.size
-        if now - program.used > LONGEST_UNUSED or total > MOST_BYTES:
+        if now - program.used > LONGEST_UNUSED or total > MAXIMUM_BYTES:
             _remove(program.place)
-    for place in _named(folder, _ASIDE):
-        if now - _measured(place).used > _LONGEST_ASIDE:
+    for place in _entries_named(folder, _ASIDE):
+        if now - _measure_program(place).used > _LONGEST_ASIDE:
             _remove(place)
 
 
-def _imported(name: str, source: str) -> ModuleType:
+def _import_program(name: str, source: str) -> ModuleType:
     folder = cache_folder()
     why_not = refusal(folder)
     if folder is None or why_not:
         logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
-        return _compiled_in_memory(name, source)
+        return _compile_in_memory(name, source)
     kept = folder / f"{name}-{_machine()}"
-    module = _kept_module(kept, name, source)
+    module = _load_kept_module(kept, name, source)
     if module is not None:
         return module
     try:
         with one_process(kept):
-            return _kept_module(kept, name, source) or _compiled_and_kept(kept, name, source)
+            return _load_kept_module(kept, name, source) or _compile_and_keep(kept, name, source)
     except OSError as error:
         logger.warning("ppafo: the compiled model is not kept in %s: %s", folder, reason(error))
-        return _compiled_in_memory(name, source)
+        return _compile_in_memory(name, source)
 
 
-def _kept_module(kept: Path, name: str, source: str) -> ModuleType | None:
+def _load_kept_module(kept: Path, name: str, source: str) -> ModuleType | None:
     """Return the module of a program that is there and whole; one that is damaged is removed."""
     if not os.path.lexists(kept):
         return None
@@ -207,7 +166,7 @@ def _kept_module(kept: Path, name: str, source: str) -> ModuleType | None:
     return module
 
 
-def _compiled_and_kept(kept: Path, name: str, source: str) -> ModuleType:
+def _compile_and_keep(kept: Path, name: str, source: str) -> ModuleType:
     """Compile a program in a folder aside, which takes its place when it is whole."""
     aside = kept.with_name(f".writing-{secrets.token_hex(8)}")
     try:
@@ -215,7 +174,7 @@ def _compiled_and_kept(kept: Path, name: str, source: str) -> ModuleType:
         path = aside / f"{name}.py"
         path.write_text(source, encoding="utf-8")
         start = time.perf_counter()
-        with announced(expected_seconds(source, _named(kept.parent, _PROGRAM)), f"kept in {kept.parent}"):
+        with announce(estimate_seconds(source, _entries_named(kept.parent, _PROGRAM)), f"kept in {kept.parent}"):
             module = _run(name, source, path, compile_text)
         (aside / SECONDS_FILE).write_text(f"{time.perf_counter() - start:.2f}", encoding="ascii")
         (aside / _CHECKSUMS).write_text(json.dumps(_checksums(aside), indent=2), encoding="utf-8")
@@ -230,8 +189,8 @@ def _compiled_and_kept(kept: Path, name: str, source: str) -> ModuleType:
     return module
 
 
-def _compiled_in_memory(name: str, source: str) -> ModuleType:
-    with announced(expected_seconds(source, ()), "not kept"):
+def _compile_in_memory(name: str, source: str) -> ModuleType:
+    with announce(estimate_seconds(source, ()), "not kept"):
         return _run(name, source.replace(_KEPT, _NOT_KEPT), Path(f"<{name}>"), compile_text)
 
 
@@ -309,7 +268,7 @@ def _is_own(kept: Path) -> bool:
         return stat.S_ISDIR(found[0].st_mode)
     is_whose = all(item.st_uid in (0, os.geteuid()) for item in found)
     folders = [item for item in found if stat.S_ISDIR(item.st_mode)]
-    return is_whose and found[0] in folders and not any(item.st_mode & _WRITTEN_BY_OTHERS for item in folders)
+    return is_whose and found[0] in folders and not any(item.st_mode & WRITTEN_BY_OTHERS for item in folders)
 
 
 def _checksums(folder: Path) -> dict[str, str]:
@@ -322,7 +281,7 @@ def _checksum(path: Path) -> str:
     return hashlib.sha256(read_regular_file(path)).hexdigest()
 
 
-def _named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
+def _entries_named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
     """Return what in a folder has such a name; what others put beside it is left alone."""
     try:
         return [place for place in folder.iterdir() if pattern.fullmatch(place.name)]
@@ -330,7 +289,7 @@ def _named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
         return []
 
 
-def _measured(place: Path) -> CachedProgram:
+def _measure_program(place: Path) -> CachedProgram:
     try:
         files = [place] if place.is_symlink() or not place.is_dir() else [place, *place.rglob("*")]
         return CachedProgram(place, sum(path.lstat().st_size for path in files), place.lstat().st_mtime)

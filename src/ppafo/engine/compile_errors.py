@@ -42,11 +42,13 @@ def mistake(said: str, source: str) -> ProgramError:
     # The first is the innermost; several are the ways through one function, in an order that changes.
     number = min(numbers, default=0)
     text = lines[number - 1].strip() if 0 < number <= len(lines) else ""
-    found = place_in(lines, number) or _called(lines, text)
+    found = place_in(lines, number) or _find_called(lines, text)
     if found is None:
-        return ProgramError(f"the model cannot be compiled: {_problem(Report(said, source, text, text))}")
+        return ProgramError(
+            f"the model cannot be compiled: {_problem(Report(said=said, source=source, text=text, written=text))}"
+        )
     written = linecache.getline(found.file, found.line).strip()
-    problem = _problem(Report(said, source, text, written or text))
+    problem = _problem(Report(said=said, source=source, text=text, written=written or text))
     return refusal(found.file, _line_of(said, found), problem)
 
 
@@ -66,7 +68,7 @@ def place_in(lines: list[str], number: int) -> Place | None:
     return None
 
 
-def _called(lines: list[str], text: str) -> Place | None:
+def _find_called(lines: list[str], text: str) -> Place | None:
     """Where the last function of a file that is called in a line of the loop was defined."""
     for name in reversed(re.findall(r"\w+", text)):
         for number, line in enumerate(lines, 1):
@@ -86,15 +88,15 @@ def _line_of(report: str, place: Place) -> int:
 
 
 def _problem(report: Report) -> str:
-    tellers: tuple[Callable[[Report], str], ...] = (_attribute, _returns, _operator, _arguments, _unpacked)
+    tellers: tuple[Callable[[Report], str], ...] = (_attribute, _returns, _operator, _arguments, _unpack)
     for teller in tellers:
         problem = teller(report)
         if problem:
             return problem
-    told = [line.strip() for line in report.said.splitlines() if line.strip()]
-    told = [line for line in told if not line.startswith(("Failed in nopython", "During:", "File ", "- Resolution"))]
-    where = f"'{report.written}' is not compiled: " if report.written else ""
-    return where + one_line(told[0] if told else "no reason given")[:_LONGEST]
+    lines = [line.strip() for line in report.said.splitlines() if line.strip()]
+    lines = [line for line in lines if not line.startswith(("Failed in nopython", "During:", "File ", "- Resolution"))]
+    where = f"'{report.written}' cannot be compiled: " if report.written else ""
+    return where + one_line(lines[0] if lines else "no reason given")[:_LONGEST]
 
 
 def _attribute(report: Report) -> str:
@@ -103,7 +105,7 @@ def _attribute(report: Report) -> str:
         return ""
     name, kind = found.groups()
     if kind.startswith("Module"):
-        return f"'math.{name}' is not compiled"
+        return f"'math.{name}' cannot be compiled"
     owner = re.search(rf"([\w.]+)\.{name}\b", report.text)
     what = owner[1] if owner else "it"
     fields = _fields(report.source, kind)
@@ -131,7 +133,7 @@ def _operator(report: Report) -> str:
         return ""
     name, kinds = found[1], [kind_of(kind) for kind in _split(found[2])]
     what = f"'{_SIGNS[name]}'" if name in _SIGNS else f"{name}()"
-    return f"{what} is not compiled for {' and '.join(kinds)}, in '{report.written}'"
+    return f"{what} cannot be compiled for {' and '.join(kinds)}, in '{report.written}'"
 
 
 def _arguments(report: Report) -> str:
@@ -145,7 +147,7 @@ def _arguments(report: Report) -> str:
     return f"{name}({found[1]}): {engine}{found[2].rstrip('.')}"
 
 
-def _unpacked(report: Report) -> str:
+def _unpack(report: Report) -> str:
     found = re.search(
         r"failed to unpack (.+)|Tuple '.*' length (?:mismatch|does not match)|wrong tuple length", report.said
     )

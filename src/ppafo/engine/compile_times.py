@@ -18,14 +18,14 @@ SECONDS_FILE = "seconds.txt"
 """The file of a kept program that says how long it took to compile [s]."""
 _SECONDS_PER_BYTE = 2.5e-4
 """Of source text; what a common computer takes, until this one has compiled something."""
-_MOST_ASKED = 20
+_MAXIMUM_ASKED = 20
 
 _place = (1, 1)
 """Which model is compiled, and of how many; whoever compiles holds the lock of the cache."""
 
 
 @contextlib.contextmanager
-def counted(number: int, total: int) -> Iterator[None]:
+def number_models(number: int, total: int) -> Iterator[None]:
     """Say of what is compiled inside a ``with`` block that it is one of so many models."""
     global _place  # noqa: PLW0603  # like the lock beside which it is used, there is one for the process
     before, _place = _place, (number, total)
@@ -36,7 +36,7 @@ def counted(number: int, total: int) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def announced(expected: float, where: str) -> Iterator[None]:
+def announce(expected: float, where: str) -> Iterator[None]:
     """Say, once it takes longer than ``QUIET``, what is compiled and about how long [s] that takes, and how it ended.
 
     Nothing is said of what is quick.
@@ -58,13 +58,13 @@ def announced(expected: float, where: str) -> Iterator[None]:
         logger.warning("ppafo: compiled in %.1f s and %s", seconds, where)
 
 
-def expected_seconds(source: str, kept: Iterable[Path]) -> float:
+def estimate_seconds(source: str, kept: Iterable[Path]) -> float:
     """Return about how long [s] a source takes to compile, from how long the kept programs of this computer took."""
     rates = []
     for folder in kept:
         with contextlib.suppress(OSError, ValueError, StopIteration):
             seconds = float((folder / SECONDS_FILE).read_text(encoding="ascii"))
             rates.append(seconds / next(folder.glob("*.py")).stat().st_size)
-        if len(rates) == _MOST_ASKED:
+        if len(rates) == _MAXIMUM_ASKED:
             break
     return len(source) * (statistics.median(rates) if rates else _SECONDS_PER_BYTE)

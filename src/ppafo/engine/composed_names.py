@@ -61,22 +61,26 @@ class Composer(ast.NodeTransformer):
         return node if value is _INSIDE else self.stand_in(value, node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Replace ``module.name``."""
+        """Replace ``module.name``. ProgramError where it cannot be compiled."""
         value = self.value_of(node)
         if value is not _INSIDE:
             return self.stand_in(value, node)
         owner = self.value_of(node.value)
         if owner is not _INSIDE and not isinstance(owner, tuple):
-            raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which is not compiled")
+            raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which cannot be compiled")
         return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
-        """Check the arguments of what is called; those that a NamedTuple has of its own are written out."""
+        """Check the arguments of what is called; those that a NamedTuple has of its own are written out.
+
+        ProgramError where one does not fit.
+        """
         called = self.value_of(node.func)
         if called is _INSIDE:
             if isinstance(node.func, ast.Attribute):
                 raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which is not compiled")
-            return self.generic_visit(node)  # type: ignore[return-value]
+            self.generic_visit(node)
+            return node
         own: list[ast.expr] = []
         if isinstance(called, types.FunctionType) or is_row(called):
             own = self.own_arguments(called, node)
@@ -88,7 +92,10 @@ class Composer(ast.NodeTransformer):
         return ast.Call(function, [*arguments, *own], [])
 
     def own_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
-        """Fields of a NamedTuple after those given by place, where some have the defaults of its class; else none."""
+        """Fields of a NamedTuple after those given by place, where some have the defaults of its class; else none.
+
+        ProgramError where they do not fit.
+        """
         if any(isinstance(item, ast.Starred) for item in node.args):
             return []  # how many there are is known only to the compiler
         is_function = isinstance(called, types.FunctionType)
@@ -110,7 +117,7 @@ class Composer(ast.NodeTransformer):
         ]
 
     def value_of(self, node: ast.expr) -> Any:
-        """What a name or ``module.name`` stands for outside the function."""
+        """What a name or ``module.name`` stands for outside the function. ProgramError where it has no value."""
         if isinstance(node, ast.Name):
             return self.global_value(node)
         if not isinstance(node, ast.Attribute):
@@ -126,7 +133,7 @@ class Composer(ast.NodeTransformer):
         return value
 
     def global_value(self, node: ast.Name) -> Any:
-        """What a global name stands for now."""
+        """What a global name stands for now. ProgramError where it has no value."""
         if node.id in self.local:
             return _INSIDE
         scope = self.function.__globals__
@@ -135,32 +142,32 @@ class Composer(ast.NodeTransformer):
             return scope[node.id]
         if node.id not in COMPILED_BUILTINS:
             if hasattr(builtins, node.id):
-                raise self.refuse(node, f"'{node.id}' is not compiled")
+                raise self.refuse(node, f"'{node.id}' cannot be compiled")
             hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
             raise self.refuse(node, f"there is no '{node.id}'{hint}")
         return getattr(builtins, node.id)
 
     def stand_in(self, value: Any, node: ast.expr) -> ast.expr:
-        """What is written for a value from outside."""
+        """What is written for a value from outside. ProgramError where it is nothing that can be compiled."""
         # ``inf`` and ``nan`` of math are written by name, as they are in most sources.
         if isinstance(node, ast.Attribute) and self.value_of(node.value) is math:
-            return self.written("math", node.attr, node)
+            return self.global_name("math", node.attr, node)
         own = str(getattr(value, "__name__", ""))
         if isinstance(value, types.BuiltinFunctionType) and getattr(math, own, None) is value:
-            return self.written("math", own, node)
+            return self.global_name("math", own, node)
         if own in COMPILED_BUILTINS and getattr(builtins, own) is value:
-            return self.written("", own, node)
+            return self.global_name("", own, node)
         if isinstance(value, types.FunctionType) or is_row(value):
-            return self.written("", self.add(value), node)
+            return self.global_name("", self.add(value), node)
         name = ast.unparse(node)
         if getattr(value, "__module__", "") == "numpy" or own.startswith("numpy"):
             raise self.refuse(
-                node, f"'{name}' is of numpy, which is not compiled here; 'math' has its functions of one number"
+                node, f"'{name}' is from numpy, which cannot be compiled here; use 'math' for functions of one number"
             )
         return self.literal(value, node, f"'{name}'")
 
-    def written(self, module: str, name: str, node: ast.expr) -> ast.expr:
-        """A name of the generated module, which no local name may hide."""
+    def global_name(self, module: str, name: str, node: ast.expr) -> ast.expr:
+        """A name of the generated module, which no local name may hide. ProgramError where a local name hides it."""
         first = module or name
         if first in self.local:
             raise self.refuse(node, f"the local name '{first}' hides '{ast.unparse(node)}'; give it another name")
@@ -169,7 +176,7 @@ class Composer(ast.NodeTransformer):
         return ast.Attribute(ast.Name(module, ast.Load()), name, ast.Load())
 
     def literal(self, value: Any, where: ast.AST, name: str) -> ast.expr:
-        """A constant, to the last bit: a number, or a tuple or NamedTuple of them."""
+        """A constant, to the last bit: a number, or a tuple or NamedTuple of them. ProgramError for anything else."""
         if type(value) in (float, np.float64):
             size: ast.expr = ast.Constant(abs(float(value)))
             return ast.UnaryOp(ast.USub(), size) if math.copysign(1.0, value) < 0.0 else size

@@ -1,6 +1,6 @@
 """What the lanes do at a sample: sense, control, and keep what sensors and valve get late."""
 
-from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
+from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.scheme.parts import SAME_INSTANT
 from ppafo.model.gait_sensors import GaitMeasurement, measure_gait
 from ppafo.model.plant import chamber_pressures
@@ -25,7 +25,7 @@ def control_loop(rows: LaneRows) -> list[str]:
         *rows.store("controller_state"),
         f"{rows.cells['result.command']} = command",
     ]
-    return ["if step_index % steps_per_sample == 0:", *indented([*places(rows), *over_lanes(lines)])]
+    return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *over_lanes(lines)])]
 
 
 def places(rows: LaneRows) -> list[str]:
@@ -41,7 +41,7 @@ def sense(rows: LaneRows) -> list[str]:
     if rows.program.late_signals:
         signals = [f"{name} = signal_history[{row}, late, lane]" for row, name in enumerate(SIGNALS)]
     else:
-        signals = shown_now(rows)
+        signals = current_readings(rows)
     if not rows.program.ideal_sensors:
         seen = f"{add(measure)}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample_index)"
         return [rows.load("sensors"), *signals, f"seen = {seen}"]
@@ -52,7 +52,7 @@ def sense(rows: LaneRows) -> list[str]:
     ]
 
 
-def shown_now(rows: LaneRows) -> list[str]:
+def current_readings(rows: LaneRows) -> list[str]:
     """Lines that make what the sensors show at the present."""
     if not rows.program.slow_sensors:
         return ["angle = state.angle", pressures_of(rows, "state")]
@@ -92,19 +92,19 @@ def signals_before_start(rows: LaneRows) -> list[str]:
     """Fills the late signals with those at the start, which sensors show until the first have come."""
     if not rows.program.late_signals:
         return []
-    lines = [rows.load("plant"), rows.load("state"), *shown_now(rows)]
+    lines = [rows.load("plant"), rows.load("state"), *current_readings(rows)]
     lines += [f"signal_history[{row}, slot, lane] = {name}" for row, name in enumerate(SIGNALS)]
     return [
         "if step_index == 0:",
         "    for slot in range(signal_history.shape[1]):",
-        *indented(over_lanes(lines), 2),
+        *indent(over_lanes(lines), 2),
     ]
 
 
 def sense_end(rows: LaneRows, flag: str = "") -> list[str]:
     """What slow sensors show at the end of a step or part, and what late ones look at in it.
 
-    A signal that is late by a share of a step is looked at that share before the end of the step, at ``look_at`` [s].
+    A signal that is late by a fraction of a step is looked at by that much before its end, at ``look_at`` [s].
     """
     program = rows.program
     if not (program.slow_sensors or program.late_signals) or program.walks:

@@ -80,7 +80,7 @@ def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
     return {path: first + number for number, path in enumerate(paths)}
 
 
-def indented(lines: list[str], levels: int = 1) -> list[str]:
+def indent(lines: list[str], levels: int = 1) -> list[str]:
     """The lines, some levels further in."""
     return ["    " * levels + line for line in lines]
 
@@ -88,12 +88,12 @@ def indented(lines: list[str], levels: int = 1) -> list[str]:
 def over_lanes(lines: list[str]) -> list[str]:
     """A loop over all lanes of the block, without loads that nothing in it asks for: they take time to compile."""
     kept: list[str] = []
-    asked: set[str] = set()
+    loaded_groups: set[str] = set()
     for line in reversed(lines):
         load = _LOAD.fullmatch(line)
         words = re.findall(r"\w+", line)
         # A line that names its own group again, as in least = min(least, x), gathers over the lanes for what follows.
-        if load is None or load["group"] in asked or words.count(load["group"]) > 1:
+        if load is None or load["group"] in loaded_groups or words.count(load["group"]) > 1:
             kept.append(line)
-            asked.update(words)
-    return ["for lane in range(width):", *indented(kept[::-1])]
+            loaded_groups.update(words)
+    return ["for lane in range(width):", *indent(kept[::-1])]

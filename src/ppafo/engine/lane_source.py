@@ -2,7 +2,7 @@
 
 from ppafo.engine.lane_control import control_loop, remember_commands, signals_before_start
 from ppafo.engine.lane_meters import measure_sample
-from ppafo.engine.lane_rows import LaneRows, indented, lanes_of, over_lanes
+from ppafo.engine.lane_rows import LaneRows, indent, lanes_of, over_lanes
 from ppafo.engine.lane_step import plant_loop
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
@@ -26,7 +26,7 @@ SIGNATURE = (
 )
 COMPILED = f'@njit({SIGNATURE}, cache=True, nogil=True, fastmath=FAST, error_model="numpy")'
 SAME_MOMENT = 1.0e-9
-"""Shares of a step that are taken to be one instant."""
+"""Fractions of a step that are taken to be one instant."""
 ARGUMENTS = (
     "states, parameters, signal_history, command_history, record, trace, "
     "first_step, step_count, steps_in_all, steps_per_sample, interval, last_record, next_record, trace_every, "
@@ -45,7 +45,7 @@ def write_lanes(program: Program, collector: SourceCollector) -> str:
     body = [
         COMPILED,
         f"def advance({ARGUMENTS}):",
-        *indented(
+        *indent(
             [
                 f"x = np.empty(({rows.count}, {lanes_of(program)}))",
                 "width = states.shape[1]",
@@ -72,10 +72,10 @@ def all_steps(rows: LaneRows) -> list[str]:
         "due = next_record * interval",
         "goal = 1.0",
         "for step_index in range(first_step, first_step + step_count):",
-        *indented([*signals_before_start(rows), *control_loop(rows), *remember_commands(rows), *start, *step]),
+        *indent([*signals_before_start(rows), *control_loop(rows), *remember_commands(rows), *start, *step]),
         "if first_step + step_count == steps_in_all:",
         "    step_index = steps_in_all",
-        *indented(at_sample(rows, "step_index")),
+        *indent(at_sample(rows, "step_index")),
     ]
 
 
@@ -84,9 +84,9 @@ def between_samples(rows: LaneRows) -> list[str]:
     return [
         "reached = 0.0",
         "while reached < 1.0:",
-        *indented(at_sample(rows, "(step_index + reached)")),
+        *indent(at_sample(rows, "(step_index + reached)")),
         f"    goal = due - step_index if due < step_index + {1.0 - SAME_MOMENT!r} else 1.0",
-        *indented(plant_loop(rows)),
+        *indent(plant_loop(rows)),
         "    reached = goal",
     ]
 
@@ -99,7 +99,7 @@ def at_sample(rows: LaneRows, moment: str) -> list[str]:
     last = "last_record" if is_metered else "record.shape[0] - 1"
     return [
         f"if next_record <= {last} and due <= {moment} + {SAME_MOMENT!r}:",
-        *indented(take),
+        *indent(take),
         "    next_record += 1",
         "    due = next_record * interval",
     ]

@@ -7,19 +7,19 @@ that are through wait, masked, and no lane sees another.
 """
 
 from ppafo.engine.lane_control import sense_end
-from ppafo.engine.lane_rows import LaneRows, indented, over_lanes
+from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.scheme import motion, parts, pneumatics, supply_lines, thermal_gas, walking
 from ppafo.model.gait import gait_at
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
-MOST_PARTS = 100_000
+MAXIMUM_PARTS = 100_000
 
 
 def plant_loop(rows: LaneRows) -> list[str]:
     """Valve, gas and vane up to ``goal`` [-], a share of the step; 1 for programs that are not parted."""
     if rows.program.is_parted:
-        return parted_step(rows)
+        return step_in_parts(rows)
     return over_phases([*opening(rows), "length = timing.step"], phases(rows))
 
 
@@ -37,7 +37,7 @@ def opening(rows: LaneRows) -> list[str]:
     return [*[rows.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
 
 
-def parted_step(rows: LaneRows) -> list[str]:
+def step_in_parts(rows: LaneRows) -> list[str]:
     """As many parts as the lane with the most of them needs; places of late commands are the same for all lanes."""
     places = []
     if rows.program.late_commands:
@@ -48,21 +48,21 @@ def parted_step(rows: LaneRows) -> list[str]:
     inside = [*part_opening(rows), f"length = {rows.length}"]
     return [
         *places,
-        f"for part in range({MOST_PARTS}):",
-        *indented(over_lanes([*part_opening(rows), *measure(rows)])),
-        *indented(over_phases(inside, phases(rows))),
+        f"for part in range({MAXIMUM_PARTS}):",
+        *indent(over_lanes([*part_opening(rows), *measure(rows)])),
+        *indent(over_phases(inside, phases(rows))),
         "    longest = 0.0",
         "    for lane in range(width):",
         f"        longest = max(longest, {rows.remaining})",
         "    if longest == 0.0:",
         "        break",
         "else:",
-        *indented(over_lanes(give_up(rows))),
+        *indent(over_lanes(give_up(rows))),
     ]
 
 
 def give_up(rows: LaneRows) -> list[str]:
-    """Lines that end a run whose step is not done after ``MOST_PARTS``: it failed where it is, and hurries on."""
+    """Lines that end a run whose step is not done after ``MAXIMUM_PARTS``: it failed where it is, and hurries on."""
     failure, cause = rows.cells["result.failure_time"], rows.cells["result.too_many_parts"]
     return [
         rows.load("timing"),
@@ -102,7 +102,7 @@ def measure(rows: LaneRows) -> list[str]:
         lines.append(f"until = {add(parts.until_jump)}(valve, valve_state, command, time, until, {functions})")
     if program.is_adaptive:
         hurries = "remaining == 0.0 or result.failure_time <= time"
-        lines.append(f"until = remaining if {hurries} else {add(parts.paced)}(pace, until)")
+        lines.append(f"until = remaining if {hurries} else {add(parts.part_length)}(pace, until)")
         if program.angle is None:
             lines.append(f"begun, until = {add(motion.begin_part)}(plant, state, until)")
             lines += rows.keep("begun")
@@ -142,7 +142,7 @@ def connect(rows: LaneRows, line_state: str) -> str:
     """The ports of both chambers; where there are lines, at the pressures that they have in ``line_state``."""
     source = "plant"
     if rows.program.has_lines:
-        source = f"{rows.add(supply_lines.fed_plant)}(plant, lines, {line_state})"
+        source = f"{rows.add(supply_lines.plant_at_line_pressures)}(plant, lines, {line_state})"
     return f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"
 
 
@@ -162,7 +162,7 @@ def lead(rows: LaneRows) -> list[str]:
     """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
     program, add = rows.program, rows.add
     if program.walks:
-        return [rows.load("begun"), f"next_angle = {add(walking.next_angle)}(plant, walk, begun)"]
+        return [rows.load("begun"), f"next_angle = {add(walking.next_angle)}(plant, leg, walk, begun)"]
     if program.angle is None:
         return [rows.load("begun"), "next_angle = begun.next_angle"]
     if program.is_held:
@@ -170,7 +170,7 @@ def lead(rows: LaneRows) -> list[str]:
     return [
         rows.load("path"),
         f"next_angle, next_rate, _ = {add(program.angle.value)}(path, time + length)",
-        f"begun = {add(motion.LedStep)}(next_angle, next_rate)",
+        f"begun = {add(motion.PrescribedStep)}(next_angle, next_rate)",
     ]
 
 
@@ -250,7 +250,7 @@ def finish(rows: LaneRows) -> list[str]:
         rows.load("next_valve"),
         *([rows.load("next_lines")] if program.has_lines else []),
         "error = max(error, gas_error) / timing.tolerance",
-        f"error = error if {positive(rows)} else {parts.MOST_ERROR!r}",
+        f"error = error if {positive(rows)} else {parts.MAXIMUM_ERROR!r}",
         f"refused = {add(parts.is_refused)}(error, length) and not result.failure_time <= time",
         f"next_length = {add(parts.next_pace)}(pace, error, length, refused, timing.step).length",
         f"active = {rows.remaining} > 0.0",
@@ -285,7 +285,7 @@ def end_motion(rows: LaneRows) -> list[str]:
         given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, next_gait, length"
         lines = [rows.load("next_gait"), f"after, walk = {add(walking.end_walk)}({given})", *rows.store("walk")]
         if program.is_thermal:
-            assumed = f"{add(walking.next_angle)}(plant, walk_before, begun)"
+            assumed = f"{add(walking.next_angle)}(plant, leg, walk_before, begun)"
             lines.insert(1, "walk_before = walk")
             lines.append(f"after = {add(thermal_gas.after_motion)}(plant, thermal, after, {assumed}, after.angle)")
         return lines

@@ -56,7 +56,7 @@ class Clock:
 
 
 def samples_in(steps: int, interval: float) -> int:
-    """Number of samples every ``interval`` steps from step 0 to a number of steps, both among them."""
+    """Number of samples, one every ``interval`` steps [-] from step 0 to a number of steps, both included."""
     return math.floor((steps + SAME_MOMENT) / interval) + 1
 
 
@@ -86,7 +86,7 @@ def load_program(program: Program) -> ModuleType:
 
     A program is written anew where a number or function that it was made from stands for something else by now.
     """
-    return loaded(_current_source(program))
+    return load_source(_current_source(program))
 
 
 def load_programs(programs: Iterable[Program]) -> None:
@@ -98,22 +98,22 @@ def load_programs(programs: Iterable[Program]) -> None:
 
 def _current_source(program: Program) -> str:
     """The source of a program, written anew where it is out of date."""
-    collector, source = written(program)
+    collector, source = write_source(program)
     if collector.is_current():
         return source
-    written.cache_clear()
-    return written(program)[1]
+    write_source.cache_clear()
+    return write_source(program)[1]
 
 
 @lru_cache(maxsize=64)
-def written(program: Program) -> tuple[SourceCollector, str]:
+def write_source(program: Program) -> tuple[SourceCollector, str]:
     """What a program is made from, and its source."""
     collector = SourceCollector(INLINE)
     return collector, write_lanes(program, collector)
 
 
 @lru_cache(maxsize=64)
-def loaded(source: str) -> ModuleType:
+def load_source(source: str) -> ModuleType:
     """The module of a source."""
     return load_generated("lanes", source)
 
@@ -126,7 +126,7 @@ def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
         results[runs.start] = result
 
     run_blocks(batch, keep, threads)
-    return joined([results[start] for start in sorted(results)])
+    return join_results([results[start] for start in sorted(results)])
 
 
 def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads: int | None = None) -> None:
@@ -157,7 +157,7 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
             stop.set()
 
 
-def joined(results: Sequence[BatchResult]) -> BatchResult:
+def join_results(results: Sequence[BatchResult]) -> BatchResult:
     """Return the results of neighbouring blocks as one."""
     if len(results) == 1:
         return results[0]
@@ -185,8 +185,8 @@ class LaneBlock:
         self._clock = clock
         self._width = states.shape[1]
         self._next_step = 0
-        self._parameters = _filled(parameters)
-        self.states = _filled(states)
+        self._parameters = _pad_columns(parameters)
+        self.states = _pad_columns(states)
         records = clock.samples if clock.record_every else 0
         self._record = np.empty((records, states.shape[0], self._width))
         traces = (clock.samples - 1) // clock.trace_every + 1 if clock.trace_every else 0
@@ -233,7 +233,7 @@ class LaneBlock:
         return BatchResult(self.states[:, : self._width].copy(), record)
 
 
-def _filled(columns: Floats) -> Floats:
+def _pad_columns(columns: Floats) -> Floats:
     """A contiguous copy with a whole number of vectors of columns; the last one repeated where there are fewer."""
     missing = -columns.shape[1] % VECTOR
     if missing == 0:

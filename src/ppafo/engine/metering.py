@@ -12,7 +12,7 @@ from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.signals.meter import MeterKind
 
 
-def metered(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (), trace_every: int = 0) -> Batch:
+def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (), trace_every: int = 0) -> Batch:
     """The batch with meters at every sample that it would record, and traces of channels every so many samples."""
     program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
     clock, interval = batch.clock, batch.clock.record_every
@@ -24,7 +24,10 @@ def metered(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (
 
 
 def group_of(name: str, groups: dict[str, type], rows: Floats) -> Any:
-    """The NamedTuple of a group of rows (rows, runs), such as ``Program.state_rows`` names, with arrays (runs,)."""
+    """The NamedTuple of a group of rows (rows, runs), such as ``Program.state_rows`` names, with arrays (runs,).
+
+    KeyError where no group has that name.
+    """
     start = 0
     for group, row in groups.items():
         count = len(leaf_paths(row, group))
@@ -35,6 +38,6 @@ def group_of(name: str, groups: dict[str, type], rows: Floats) -> Any:
 
 
 def meters_of(program: Program, states: Floats) -> dict[str, Any]:
-    """The last state of each meter by its name, with arrays (runs,)."""
+    """The last state of each meter by its name, with arrays (runs,), in the units of the meter."""
     groups = program.state_rows()
     return {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}

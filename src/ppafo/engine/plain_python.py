@@ -1,4 +1,4 @@
-"""The part of Python that the engine compiles, and the line in which a user is told about anything else."""
+"""The part of Python that the engine compiles, and the line that tells a user of anything else."""
 
 import ast
 from collections.abc import Iterable, Iterator
@@ -58,7 +58,7 @@ def place(file: str, line: int) -> str:
 
 
 def check_grammar(tree: ast.FunctionDef, file: str) -> None:
-    """Refuse what is not compiled, the first of it in the file."""
+    """Refuse what cannot be compiled, the first of it in the file. ProgramError names the file and the line."""
     problems = list(_problems(tree))
     if problems:
         where, problem = min(problems, key=lambda item: (item[0].lineno, item[0].col_offset))
@@ -67,7 +67,7 @@ def check_grammar(tree: ast.FunctionDef, file: str) -> None:
 
 def _problems(tree: ast.FunctionDef) -> Iterator[tuple[ast.stmt | ast.expr | ast.keyword, str]]:
     if tree.args.vararg or tree.args.kwarg or getattr(tree, "type_params", None):
-        yield tree, f"'{tree.name}' takes any number of arguments, which is not compiled; name each of them"
+        yield tree, f"'{tree.name}' takes any number of arguments, which cannot be compiled; name each of them"
     left_away: set[ast.AST] = set()
     for node in (node for statement in tree.body for node in ast.walk(statement)):
         if isinstance(node, ast.AnnAssign):  # Python does not run the annotation of a local name
@@ -83,24 +83,27 @@ def _problems(tree: ast.FunctionDef) -> Iterator[tuple[ast.stmt | ast.expr | ast
 def _problem(node: ast.AST) -> str:
     if type(node) not in _PLAIN:
         word = _WORDS.get(type(node), f"'{type(node).__name__}'")
-        return f"{word} is not compiled; {_INSTEAD}"
+        return f"{word} cannot be compiled; {_INSTEAD}"
     if isinstance(node, ast.Starred) and not isinstance(node.ctx, ast.Load):
-        return f"'*' on the left is not compiled; {_INSTEAD}"
+        return f"'*' on the left cannot be compiled; {_INSTEAD}"
     if isinstance(node, ast.keyword) and node.arg is None:
-        return f"'**' is not compiled; {_INSTEAD}"
+        return f"'**' cannot be compiled; {_INSTEAD}"
     if isinstance(node, ast.Constant) and not isinstance(node.value, bool | int | float | None):
-        return f"a constant of type {type(node.value).__name__} is not compiled; {_INSTEAD}"
+        return f"a constant of type {type(node.value).__name__} cannot be compiled; {_INSTEAD}"
     if isinstance(node, ast.Attribute | ast.Subscript) and not isinstance(node.ctx, ast.Load):
         return f"'{ast.unparse(node)}' cannot be changed: a NamedTuple is a value; make a new one"
     return ""
 
 
 def check_flow(tree: ast.FunctionDef, file: str, local: Iterable[str]) -> None:
-    """Refuse a function that can end without a value, or read one of its ``local`` names before it has a value."""
+    """Refuse a function that can end without a value, or read one of its ``local`` names before it has a value.
+
+    ProgramError names the file and the line.
+    """
     arguments = tree.args
     given = {item.arg for item in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)}
     if _Flow(file, set(local)).end_of(tree.body, given) is not None:
-        raise refusal(file, tree, f"'{tree.name}' can end without 'return'; every way through it returns a value")
+        raise refusal(file, tree, f"'{tree.name}' can end without 'return'; every path through it must return a value")
 
 
 class _Flow:
@@ -130,21 +133,23 @@ class _Flow:
             return self.after_loop(statement, bound)
         if isinstance(statement, ast.Return) and getattr(statement.value, "value", statement) is None:
             raise refusal(self.file, statement, "'return' gives no value")
-        if isinstance(statement, ast.AugAssign) and statement.target.id not in bound:  # type: ignore[union-attr]
+        if isinstance(statement, ast.AugAssign) and _assigned_names(statement.target) - bound:
             raise self.unbound(statement, ast.unparse(statement.target))
         given = getattr(statement, "value", None)
         if isinstance(given, ast.expr):
             self.read(given, bound)
         ends_here = isinstance(statement, ast.Return | ast.Break | ast.Continue)
         targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
-        stored = set() if given is None else {name for item in targets if item is not None for name in _stored(item)}
+        stored = (
+            set() if given is None else {name for item in targets if item is not None for name in _assigned_names(item)}
+        )
         return None if ends_here else bound | stored
 
     def after_loop(self, statement: ast.For | ast.While, bound: set[str]) -> set[str] | None:
         """Names that have a value after a loop, which may be gone through not once."""
         if isinstance(statement, ast.For):
             self.read(statement.iter, bound)
-            self.end_of(statement.body, bound | _stored(statement.target))
+            self.end_of(statement.body, bound | _assigned_names(statement.target))
             return self.end_of(statement.orelse, bound)
         self.read(statement.test, bound)
         self.end_of(statement.body, bound)
@@ -161,8 +166,8 @@ class _Flow:
 
     def unbound(self, where: ast.AST, name: str) -> ProgramError:
         """The error for a name without a value."""
-        return refusal(self.file, where, f"'{name}' may have no value here; give it one before, on every way")
+        return refusal(self.file, where, f"'{name}' may have no value here; assign it before, on every path")
 
 
-def _stored(target: ast.AST) -> set[str]:
+def _assigned_names(target: ast.AST) -> set[str]:
     return {item.id for item in ast.walk(target) if isinstance(item, ast.Name)}

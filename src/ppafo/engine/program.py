@@ -5,9 +5,9 @@ from typing import NamedTuple, get_type_hints
 
 from ppafo.control.controllers import constant as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
-from ppafo.control.profiles import constant
+from ppafo.control.profiles import CONSTANT
 from ppafo.engine.scheme.ankle_torque import DeviceShare
-from ppafo.engine.scheme.motion import FreePart, LedStep
+from ppafo.engine.scheme.motion import FreePart, PrescribedStep
 from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, StillGas
 from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
@@ -56,7 +56,7 @@ class NoParameters(NamedTuple):
 class Program:
     """One combination of pieces; each combination is compiled once.
 
-    ``angle`` None leaves the vane free, otherwise it is led along that profile. ``controller`` None leaves the command
+    ``angle`` None leaves the vane free, otherwise that profile prescribes it. ``controller`` None leaves the command
     to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
     ``slow_sensors`` True a bandwidth and ``late_signals`` True a delay. ``late_commands`` True adds a dead time before
     the valve. ``is_thermal`` True gives the gas an energy balance instead of a constant temperature. ``walks`` True
@@ -143,13 +143,13 @@ class Program:
 
     @property
     def is_held(self) -> bool:
-        """True where the vane is led along a profile that never changes."""
-        return self.angle is constant.KIND
+        """True where the angle is prescribed by a profile that never changes."""
+        return self.angle is CONSTANT
 
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that the first stage of a step hands to the later phases, in order."""
         free = WalkStep if self.walks else FreePart
-        begun = free if self.angle is None else (NoParameters if self.is_held else LedStep)
+        begun = free if self.angle is None else (NoParameters if self.is_held else PrescribedStep)
         fed, free_gas = (FedThermalGas, ThermalGas) if self.is_thermal else (FedGas, MovingGas)
         still = self.is_held and not self.is_thermal
         gas = fed if self.has_lines else (StillGas if still else free_gas)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.control.kind import ProfileKind
 from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lanes import Batch, BatchResult, Floats, LaneBlock, joined, load_program
+from ppafo.engine.lanes import Batch, BatchResult, Floats, LaneBlock, join_results, load_program
 from ppafo.engine.program import Program
 from ppafo.engine.rows import row_numbers
 
@@ -33,7 +33,7 @@ def segment_value(segment: Segment, time: float) -> tuple[float, float, float]:
 
 
 def segment_bounds(_segment: Segment) -> tuple[float, float]:
-    """No bounds: the next piece may lead anywhere between the stops."""
+    """Bounds [rad] of a segment: none, because the next one may lead anywhere between the stops."""
     return -math.inf, math.inf
 
 
@@ -59,8 +59,8 @@ class StepInputs:
     parameters: Mapping[str, Floats]
 
 
-def led_by_recording(program: Program) -> Program:
-    """The program with the vane led along a recorded angle, by the parameters ``path.start``, ``.level``, ``.rate``."""
+def prescribe_recorded_angle(program: Program) -> Program:
+    """The program with a recorded angle prescribed, by the parameters ``path.start``, ``.level``, ``.rate``."""
     return replace(program, angle=RECORDED_ANGLE)
 
 
@@ -69,7 +69,7 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     runs = batch.states.shape[1]
     lanes = lanes_of(batch.program)
     blocks = [slice(first, min(first + lanes, runs)) for first in range(0, runs, lanes)]
-    return joined([_replay_block(batch, inputs, block) for block in blocks])
+    return join_results([_replay_block(batch, inputs, block) for block in blocks])
 
 
 def _replay_block(batch: Batch, inputs: StepInputs, runs: slice) -> BatchResult:

@@ -59,7 +59,7 @@ def leaves(row: Any) -> list[Any]:
 
 
 def numbers(row: Any) -> list[float]:
-    """All numbers of a NamedTuple of floats, in the order of ``leaf_paths``."""
+    """All numbers of a NamedTuple of floats, in the units of its fields, in the order of ``leaf_paths``."""
     return [float(value) for value in leaves(row)]
 
 
@@ -73,7 +73,7 @@ def table(groups: Sequence[Any], runs: int) -> "np.ndarray[tuple[int, int], np.d
 
 
 def rebuild(row: type, values: "np.ndarray[Any, Any] | list[float]") -> Any:
-    """The NamedTuple whose numbers are ``values``; the inverse of ``numbers``."""
+    """The NamedTuple whose numbers are ``values``, in the units of its fields; the inverse of ``numbers``."""
     return rebuilt(row, [float(value) for value in values])
 
 

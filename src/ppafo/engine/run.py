@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lane_step import MOST_PARTS
+from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 NEVER_FAILED = 1.0e300
 TOO_MANY_PARTS = (
-    f"a step was cut into {MOST_PARTS:,} parts and was still not done: try a smaller run.step, and look at the delays "
+    f"a step was cut into {MAXIMUM_PARTS:,} parts and was still not done: try a smaller run.step, and check the delays "
     "of the valve, the inertia and the volumes (ppafo audit)"
 )
 """Remedy for a run that ``LaneResult.too_many_parts`` ended."""
@@ -125,9 +125,9 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
-    masses = begun_masses(run.initial) if program.is_thermal else NoParameters()
+    masses = initial_masses(run.initial) if program.is_thermal else NoParameters()
     result = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
-    further = [*walk_states, *line_states, settled_sensors(run)]
+    further = [*walk_states, *line_states, initial_sensors(run)]
     states = table(
         [result, Pace(run.step), run.initial, masses, program.valve.initial(), controller_state, *further], runs
     )
@@ -168,7 +168,7 @@ def _program_and_clock(program: Program, counts: Floats) -> tuple[Program, Clock
     return own, Clock(int(step_count), int(steps_per_sample), every, int(signal_delay), int(command_delay))
 
 
-def begun_masses(initial: PlantState) -> ThermalState:
+def initial_masses(initial: PlantState) -> ThermalState:
     """True masses of gas at the reference temperature, and no energy yet."""
     return ThermalState(
         mass_1=initial.mass_1,
@@ -180,13 +180,20 @@ def begun_masses(initial: PlantState) -> ThermalState:
     )
 
 
-def settled_sensors(run: Run) -> SensorState | NoParameters:
+def initial_sensors(run: Run) -> SensorState | NoParameters:
     """Slow sensors that show what is true at the start of a run; nothing where there are none."""
     if not run.program.slow_sensors:
         return NoParameters()
     initial = run.initial
-    signals = initial.angle, *chamber_pressures(run.plant, initial.angle, initial.mass_1, initial.mass_2)
-    return SensorState(*signals, *signals)
+    pressure_1, pressure_2 = chamber_pressures(run.plant, initial.angle, initial.mass_1, initial.mass_2)
+    return SensorState(
+        angle=initial.angle,
+        pressure_1=pressure_1,
+        pressure_2=pressure_2,
+        true_angle=initial.angle,
+        true_pressure_1=pressure_1,
+        true_pressure_2=pressure_2,
+    )
 
 
 def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:

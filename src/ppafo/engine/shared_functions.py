@@ -60,7 +60,7 @@ def _run_with_shared(source: str, path: str, module: ModuleType) -> None:
         described = "\n".join([text, *(f"{item} {keys.get(item, '')}" for item in sorted(used))])
         key = hashlib.sha256(described.encode()).hexdigest()[:_LENGTH]
         if key not in _SHARED:
-            _SHARED[key] = _defined(node, path, name, key, used)
+            _SHARED[key] = _define(node, path, name, key, used)
         names[name], keys[name] = _SHARED[key], key
 
 
@@ -77,7 +77,7 @@ def _shared_name(node: ast.stmt) -> str:
     return node.name if is_called and not has_types else ""
 
 
-def _defined(node: ast.stmt, path: str, name: str, key: str, used: dict[str, Any]) -> Any:
+def _define(node: ast.stmt, path: str, name: str, key: str, used: dict[str, Any]) -> Any:
     """The function or row, with what it uses as its globals.
 
     Their module is one that every process can import: a kept program names it, and is loaded without the others.

@@ -100,11 +100,16 @@ class SourceCollector:
             )
 
     def _function_text(self, function: Any, name: str) -> str:
-        tree = parsed(function)
+        tree = parse_definition(function)
         file = function.__code__.co_filename
-        made = Made(function, function.__code__, function.__defaults__, dict(function.__kwdefaults__ or {}))
+        made = Made(
+            function=function,
+            code=function.__code__,
+            defaults=function.__defaults__,
+            named_defaults=dict(function.__kwdefaults__ or {}),
+        )
         if any(known.function is function for known in self.functions):
-            raise refusal(file, tree, f"'{function.__name__}' calls itself, which is not compiled")
+            raise refusal(file, tree, f"'{function.__name__}' calls itself, which cannot be compiled")
         self.functions.append(made)
         composer = Composer(function, self.add, self._note)
         arguments = tree.args
@@ -130,21 +135,21 @@ class SourceCollector:
 
 
 def check_is_plain(function: Any) -> None:
-    """Refuse what is no plain function: its source text would not be what Python runs."""
+    """Refuse what is no plain function: its source text would not be what Python runs. ProgramError says why."""
     name = getattr(function, "__qualname__", None) or repr(function)
     if type(function) is not FunctionType:
         if not callable(function):
-            raise ProgramError(f"cannot compile {name}: it is no function")
+            raise ProgramError(f"cannot compile {name}: it is not a function")
         if type(function).__module__ == "builtins" and type(function).__name__ == "builtin_function_or_method":
             raise ProgramError(f"cannot compile {name}: its source text is not available")
         raise ProgramError(f"cannot compile {name}: it must be a plain function defined with 'def'")
     where = place_of(function)
     if hasattr(function, "__wrapped__"):
-        raise ProgramError(f"{where}: '{name}' is wrapped by a decorator, which is not compiled; take it off")
+        raise ProgramError(f"{where}: '{name}' is wrapped by a decorator, which cannot be compiled; remove it")
     if function.__closure__:
         names = ", ".join(f"'{item}'" for item in function.__code__.co_freevars)
         raise ProgramError(
-            f"{where}: '{name}' uses {names} of the function around it, which is not compiled; make it a parameter"
+            f"{where}: '{name}' uses {names} of the function around it, which cannot be compiled; make it a parameter"
         )
 
 
@@ -154,8 +159,11 @@ def place_of(item: Any) -> str:
     return f"module {item.__module__}" if code is None else place(code.co_filename, code.co_firstlineno)
 
 
-def parsed(function: FunctionType) -> ast.FunctionDef:
-    """The definition of a plain function with the lines of its file; refused where it is not what Python runs."""
+def parse_definition(function: FunctionType) -> ast.FunctionDef:
+    """The definition of a plain function with the lines of its file; refused where it is not what Python runs.
+
+    ProgramError where the definition cannot be read or is not what Python runs.
+    """
     code = function.__code__
     file, name = code.co_filename, function.__qualname__
     try:
@@ -170,7 +178,7 @@ def parsed(function: FunctionType) -> ast.FunctionDef:
     if not isinstance(tree, ast.FunctionDef) or tree.name != code.co_name:
         raise refusal(file, code.co_firstlineno, f"'{name}' must be a plain function defined with 'def'")
     if tree.decorator_list:
-        raise refusal(file, tree, f"'{name}' is decorated, which is not compiled; take the decorator off")
+        raise refusal(file, tree, f"'{name}' is decorated, which cannot be compiled; remove the decorator")
     check_grammar(tree, file)
     if _shape(code) not in (_shape(item) for item in _code_of(tree, function)):
         changed = "is not what its source text says; the file has changed since it was loaded: start again"
@@ -207,7 +215,9 @@ def _row_text(row: Any, name: str) -> str:
     meanings -= set(vars(Read)) | {"__str__", "__format__"}
     if meanings:
         given = ", ".join(sorted(meanings))
-        raise ProgramError(f"{row.__module__}.{row.__qualname__} gives {given} a meaning, which is not compiled")
+        raise ProgramError(
+            f"{row.__module__}.{row.__qualname__} gives {given} a meaning of its own, which cannot be compiled"
+        )
     return f"{name} = namedtuple({name!r}, {list(row._fields)!r})"
 
 

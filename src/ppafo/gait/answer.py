@@ -3,7 +3,7 @@
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import quantity_of_unit, shown, shown_unit, shown_values
+from ppafo.answers.display_units import display_unit, display_value, display_values, quantity_of_unit
 from ppafo.gait.figure import gait_figure
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.events import Stride
@@ -42,6 +42,7 @@ def _facts(gait: Gait) -> tuple[tuple[str, str], ...]:
     return (
         ("source", gait.source),
         ("body mass", f"{gait.body_mass:.4g} kg"),
+        ("stature", "not known" if gait.stature is None else f"{gait.stature:.4g} m"),
         ("speed", speed),
         ("stride time", f"{gait.stride_time:.4g} s{_plus_minus(gait.stride_time_deviation)}"),
         ("stance", stance),
@@ -58,14 +59,14 @@ def _row(gait: Gait, name: str, imported: ImportedGait | None) -> tuple[str | No
     curve = gait.curves[name]
     is_ankle = name == "ankle_angle"
     series = curve.values_at(phases())
-    values = shown_values(clinical_angle(series) if is_ankle else series, quantity)
-    left = 0.0 if imported is None else shown(imported.fit_errors[name].root_mean_square, quantity)
+    values = display_values(clinical_angle(series) if is_ankle else series, quantity)
+    left = 0.0 if imported is None else display_value(imported.fit_errors[name].root_mean_square, quantity)
     return (
         f"{name} (0 neutral, dorsiflexion positive)" if is_ankle else name,
         f"{values.min():.3g}",
         f"{values.max():.3g}",
-        shown_unit(quantity) or plain_unit(CURVES[name]),
-        f"{shown(curve.deviation, quantity):.2g}" if curve.deviation else None,
+        display_unit(quantity) or plain_unit(CURVES[name]),
+        f"{display_value(curve.deviation, quantity):.2g}" if curve.deviation else None,
         f"{left:.2g}" if left > _NOISE else None,
     )
 
@@ -78,6 +79,7 @@ def _data(gait: Gait, imported: ImportedGait | None) -> dict[str, Any]:
         "source": gait.source,
         "notes": gait.notes,
         "body_mass": gait.body_mass,
+        "stature": gait.stature,
         "walking_speed": gait.walking_speed,
         "recorded_speed": gait.recorded_speed,
         "stride_time": gait.stride_time,

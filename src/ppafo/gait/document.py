@@ -3,10 +3,9 @@
 import functools
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, optional, published_schema, table
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import NAME, make_schema, optional, table, validate
 from ppafo.errors import DataError, UnitError
 from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
 from ppafo.units import parse_quantity, to_si
@@ -23,6 +22,7 @@ _SUMMARIES = {
 }
 _LIMITS = {
     "subject.body_mass": ("kg", 1.0, 500.0),
+    "subject.stature": ("m", 0.5, 2.5),
     "subject.walking_speed": ("m/s", 0.05, 4.0),
     "subject.recorded_speed": ("m/s", 0.05, 4.0),
     "stride.time": ("s", 0.3, 5.0),
@@ -39,6 +39,7 @@ def gait_file() -> type[BaseModel]:
     text = Annotated[str, Field(pattern=r"^\s*[+-]?(\d|\.\d)")]
     subject = {
         "body_mass": (text, Field(description="mass of the wearer, such as '62 kg'")),
+        "stature": optional(text, "height of the wearer, such as '1.75 m', where it is known"),
         "walking_speed": optional(text, "speed of this gait, such as '1.33 m/s'"),
         "recorded_speed": optional(text, "speed at which the curves were recorded, where it is another one"),
     }
@@ -96,10 +97,7 @@ def gait_of(document: dict[str, Any], file: str) -> Gait:
 
     DataError where it is not a gait.
     """
-    try:
-        gait_file().model_validate(document)
-    except ValidationError as error:
-        raise DataError(f"{file}: {first_problem(error.errors(include_url=False), gait_file())}") from error
+    validate(gait_file(), document, file, DataError)
     numbers = {path: _number(document, path, file) for path in _LIMITS}
     curves = {name: _curve(document[name], name, file) for name in CURVES if name in document}
     if numbers["stride.time"] is None or numbers["stride.stance_share"] is None or numbers["subject.body_mass"] is None:
@@ -110,6 +108,7 @@ def gait_of(document: dict[str, Any], file: str) -> Gait:
         origin=document["origin"],
         source=document["source"],
         body_mass=numbers["subject.body_mass"],
+        stature=numbers["subject.stature"],
         walking_speed=numbers["subject.walking_speed"],
         recorded_speed=numbers["subject.recorded_speed"],
         stride_time=numbers["stride.time"],
@@ -163,4 +162,4 @@ def _curve(given: dict[str, Any], name: str, file: str) -> Curve:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a gait file."""
-    return published_schema(gait_file(), "ppafo gait")
+    return make_schema(gait_file(), "ppafo gait")

@@ -111,9 +111,10 @@ class Curve:
 class Gait:
     """One stride of one wearer, as curves over the phase; those that were not recorded are None.
 
-    ``body_mass`` [kg], ``stride_time`` [s], ``stance_share`` (fraction of the stride until toe-off), ``walking_speed``
-    [m/s], None where it was not recorded. The two deviations are between strides, 0 where not known. ``recorded_speed``
-    is the speed at which the curves were recorded, where it is another than ``walking_speed``.
+    ``body_mass`` [kg], ``stature`` [m] of the subject, None where not known, ``stride_time`` [s], ``stance_share``
+    (share of the stride until toe-off), ``walking_speed`` [m/s], None where nobody recorded it. The two deviations are
+    between strides, 0 where not known. ``recorded_speed`` is the speed at which the curves were recorded, where it is
+    another than ``walking_speed``.
     """
 
     name: str
@@ -136,6 +137,7 @@ class Gait:
     strides: int = 0
     recorded_speed: float | None = None
     notes: str = ""
+    stature: float | None = None
 
     def __post_init__(self) -> None:
         if not (self.body_mass > 0.0 and self.stride_time > 0.0 and 0.0 < self.stance_share < 1.0):

@@ -23,6 +23,8 @@ def _lines(gait: Gait) -> Iterator[str]:
     texts = {"name": gait.name, "title": gait.title, "origin": gait.origin, "source": gait.source, "notes": gait.notes}
     yield from (f"{key} = {_text(value)}" for key, value in texts.items() if value)
     yield from ("", "[subject]", f'body_mass = "{gait.body_mass!r} kg"')
+    if gait.stature is not None:
+        yield f'stature = "{gait.stature!r} m"'
     for key in ("walking_speed", "recorded_speed"):
         speed = getattr(gait, key)
         if speed is not None:

@@ -43,7 +43,7 @@ _LOOKS: dict[Role, dict[str, Any]] = {
     "law": {"color": BLACK, "linewidth": 1.4},
     "other law": {"color": ORANGE, "linewidth": 1.4, "linestyle": "--"},
 }
-_MOST_POINTS = 1200
+_MAXIMUM_POINTS = 1200
 
 
 def procedure_figure(result: BenchResult) -> "Figure":
@@ -101,7 +101,7 @@ def _draw(axes: "Axes", letter: str, panel: Panel) -> None:
     (x_unit, x_scale), (y_unit, y_scale) = (_SHOWN_IN.get(unit, (unit, 1.0)) for unit in (panel.x_unit, panel.y_unit))
     drawn = [*(item for item in panel.series if "law" not in item.role), *(i for i in panel.series if "law" in i.role)]
     for item in drawn:
-        thin = slice(None, None, 1 if "law" in item.role else max(1, item.x.size // _MOST_POINTS))
+        thin = slice(None, None, 1 if "law" in item.role else max(1, item.x.size // _MAXIMUM_POINTS))
         axes.plot(x_scale * item.x[thin], y_scale * item.y[thin], label=item.name, **_LOOKS[item.role])
     axes.set_title(f"$\\bf{{{letter}}}$   {panel.title}", pad=20)
     axes.set_xlabel(_axis(panel.x_name, x_unit))

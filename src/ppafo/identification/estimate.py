@@ -1,4 +1,4 @@
-"""An estimate, one value of a parameter set with interval and verdict, and what is asked before and after a fit."""
+"""An estimate, one value of a parameter set with interval and verdict, and what is checked before and after a fit."""
 
 import math
 from dataclasses import dataclass
@@ -76,10 +76,10 @@ class Estimate:
     @property
     def verdict_in_words(self) -> str:
         """The verdict, where it holds, and how much wider the interval is where the law misses the recordings."""
-        told = f"{self.verdict}, {self.condition}" if self.condition else self.verdict
+        description = f"{self.verdict}, {self.condition}" if self.condition else self.verdict
         if self.is_usable and self.widened >= WORTH_TELLING:
-            return f"{told}, widened {self.widened:.3g} times (lack of fit)"
-        return told
+            return f"{description}, widened {self.widened:.3g} times (lack of fit)"
+        return description
 
     @property
     def half_width(self) -> float:

@@ -49,13 +49,13 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
 
 
 def _has_a_place(parameter_set: ParameterSet, estimate: Estimate) -> bool:
-    quantity = parameter_set.declared().get(estimate.path)
+    quantity = parameter_set.declarations().get(estimate.path)
     return quantity is not None and estimate.is_usable and is_within(estimate.value, quantity)
 
 
 def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> ParameterSet:
     """Return the set with one value replaced; it keeps the unit that the set had."""
-    quantity = parameter_set.declared()[estimate.path]
+    quantity = parameter_set.declarations()[estimate.path]
     before = parameter_set.numbers.get(estimate.path)
     atmosphere = atmospheric_pressure(parameter_set)
     unit = quantity.unit if before is None else before.unit
@@ -119,7 +119,7 @@ def _device_problem(parameter_set: ParameterSet, valve: str | None) -> str:
 
 def in_set_unit(number: float, path: str, si_unit: str, parameter_set: ParameterSet) -> tuple[float, str]:
     """Return a number of a path in the unit that the set has for it, and this unit; as it is where the set has none."""
-    entry, quantity = parameter_set.numbers.get(path), parameter_set.declared().get(path)
+    entry, quantity = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
     if entry is None or quantity is None or entry.unit == si_unit:
         return number, si_unit
     si = fitting_unit(entry.unit, quantity)

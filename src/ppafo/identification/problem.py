@@ -4,14 +4,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, one_of, published_schema
-from ppafo.documents.problems import first_problem
-from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
+from ppafo.documents.models import NAME, STRICT, Text, make_schema, validate
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name, reason
-from ppafo.identification.trajectory.section import STRICT, Text, TrajectorySection
+from ppafo.identification.trajectory.section import TrajectorySection
 from ppafo.storage.column_map import ColumnMap
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
@@ -132,7 +131,10 @@ class DeviceProblem(BaseModel):
 
 
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
-_KINDS = [StaticTorqueProblem, FreeDecayProblem, OpenValveFlowProblem, VaneLeakProblem, ValveMapProblem]
+_Procedure = Annotated[
+    StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem,
+    Field(discriminator="kind"),
+]
 
 
 class ProblemFile(BaseModel):
@@ -146,7 +148,7 @@ class ProblemFile(BaseModel):
     device: Annotated[DeviceProblem, Field(description="the set to start from")]
     columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = {}
     procedure: Annotated[
-        tuple[one_of(_KINDS), ...],  # type: ignore[valid-type]
+        tuple[_Procedure, ...],
         Field(strict=False, min_length=1, description="bench procedures to apply"),
     ] = ()
     trajectory: Annotated[
@@ -155,29 +157,30 @@ class ProblemFile(BaseModel):
 
 
 def load_problem(path: str | Path) -> ProblemFile:
-    """Return the problem in a TOML file; paths in it begin in its folder."""
+    """Return the problem in a TOML file; paths in it begin in its folder.
+
+    IdentificationError for a file that is not usable.
+    """
     try:
-        content = read_regular_file(Path(path), MOST_BYTES_TYPED)
+        content = read_regular_file(Path(path), MAXIMUM_BYTES_TYPED)
     except (OSError, ValueError) as error:
         raise IdentificationError(f"{label(str(path))}: cannot be read: {reason(error)}") from error
     return parse_problem(content, label(str(path)))
 
 
 def parse_problem(content: bytes, file: str) -> ProblemFile:
-    """Return the problem in the bytes of a TOML file; ``file`` is what messages call it."""
-    document = _with_hyphens(_FILE.parse(content, file))
-    try:
-        problem = ProblemFile.model_validate(document)
-    except ValidationError as error:
-        text = first_problem(error.errors(include_url=False), ProblemFile)
-        raise IdentificationError(f"{file}: {text}") from error
+    """Return the problem in the bytes of a TOML file; ``file`` is what messages call it.
+
+    IdentificationError for one that is not usable.
+    """
+    problem = validate(ProblemFile, _with_hyphens(_FILE.parse(content, file)), file, IdentificationError)
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")
     for place, name in _column_maps(problem):
         if name not in problem.columns:
             hint = nearest_name(name, problem.columns)
             known = ", ".join(problem.columns) or "none"
-            raise IdentificationError(f"{file}: {place}: there is no column map '{name}'{hint}; there are {known}")
+            raise IdentificationError(f"{file}: {place}: there is no column map '{name}'{hint}; available: {known}")
     return problem
 
 
@@ -206,4 +209,4 @@ def _column_maps(problem: ProblemFile) -> list[tuple[str, str]]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a problem file."""
-    return published_schema(ProblemFile, "ppafo identification problem")
+    return make_schema(ProblemFile, "ppafo identification problem")

@@ -46,14 +46,17 @@ class Setting:
     place: str
 
     def number(self, path: str) -> float:
-        """Return the value at a path [SI], or say that the set lacks it."""
+        """Return the value at a path [SI]; IdentificationError where the set lacks it."""
         value = number_in_si(self.parameter_set, path)
         if value is None:
             raise IdentificationError(f"{self.place}: needs {path}, which {self.parameter_set.file} does not have")
         return value
 
     def quantity(self, name: str, text: str | None, unit: str) -> float | None:
-        """Return a quantity of the problem file [unit], None where it was left out."""
+        """Return a quantity of the problem file [unit], None where it was left out.
+
+        IdentificationError where its text does not fit the unit.
+        """
         if text is None:
             return None
         try:
@@ -62,7 +65,10 @@ class Setting:
             raise IdentificationError(f"{self.place}: {name} = {text!r}: {error}") from error
 
     def gas(self, species: str | None, text: str | None = None) -> GasAt:
-        """Return the gas of the bench; species and temperature are the set's where none is named."""
+        """Return the gas of the bench; species and temperature are the set's where none is named.
+
+        IdentificationError for an unknown species.
+        """
         temperature, half_width = self._temperature(text)
         if species is None:
             own = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
@@ -70,7 +76,7 @@ class Setting:
         if species not in SPECIES:
             hint = nearest_name(species, SPECIES)
             known = ", ".join(SPECIES)
-            raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; known are {known}")
+            raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; available: {known}")
         known_gas = SPECIES[species]
         return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, half_width)
 

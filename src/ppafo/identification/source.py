@@ -63,16 +63,16 @@ def double_use(uses: Iterable[Use]) -> str:
 
     Recordings are the same where the hash of their numbers is, under whatever names their files go.
     """
-    return _shared_samples(combinations([(use, _digest(use.recording)) for use in uses], 2))
+    return _overlap_message(combinations([(use, _digest(use.recording)) for use in uses], 2))
 
 
 def common_use(ones: Iterable[Use], others: Iterable[Use]) -> str:
     """Return why some samples would count twice, once in each of two groups of uses; an empty text where none do."""
     first, second = ([(use, _digest(use.recording)) for use in group] for group in (ones, others))
-    return _shared_samples(product(first, second))
+    return _overlap_message(product(first, second))
 
 
-def _shared_samples(pairs: Iterable[tuple[tuple[Use, str], tuple[Use, str]]]) -> str:
+def _overlap_message(pairs: Iterable[tuple[tuple[Use, str], tuple[Use, str]]]) -> str:
     for (one, digest), (other, second) in pairs:
         if digest == second and one.overlaps(other):
             return (

@@ -25,7 +25,7 @@ def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
     if not varied:
         return function(*arguments)
     distinct, places = _distinct(varied)
-    gathered: Result = _gathered([function(*_filled(arguments, values)) for values in distinct], places)
+    gathered: Result = _gather([function(*_fill(arguments, values)) for values in distinct], places)
     return gathered
 
 
@@ -50,12 +50,12 @@ def whole(number: Any) -> Any:
 
 
 def at(number: Any, run: int) -> float:
-    """The number of one run."""
+    """The number of one run, in its own unit."""
     return float(number[run]) if isinstance(number, np.ndarray) else float(number)
 
 
 def first(number: Any) -> float:
-    """The number of the first run."""
+    """The number of the first run, in its own unit."""
     return at(number, 0)
 
 
@@ -75,14 +75,14 @@ def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence
     return rows.tolist(), places.reshape(-1)
 
 
-def _filled(arguments: Sequence[Any], values: Sequence[float]) -> list[Any]:
+def _fill(arguments: Sequence[Any], values: Sequence[float]) -> list[Any]:
     given = iter(values)
     return [next(given) if isinstance(argument, np.ndarray) else argument for argument in arguments]
 
 
-def _gathered(results: Sequence[Any], places: NDArray[np.intp]) -> Any:
+def _gather(results: Sequence[Any], places: NDArray[np.intp]) -> Any:
     first = results[0]
     if not isinstance(first, tuple):
         return np.array(results, dtype=np.float64)[places]
-    parts = [_gathered([result[index] for result in results], places) for index in range(len(first))]
+    parts = [_gather([result[index] for result in results], places) for index in range(len(first))]
     return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)

@@ -8,6 +8,7 @@ hand-over fades, so that the ankle does not jump.
 from typing import NamedTuple
 
 from ppafo.model.gait import GaitNow, GaitTiming
+from ppafo.model.leg import LegParameters
 
 SWING = 0.0
 HEEL = 1.0
@@ -37,9 +38,9 @@ class Landing(NamedTuple):
     leaves: float
 
 
-def is_free(contact: float) -> bool:
-    """True where the foot moves by its own dynamics."""
-    return contact < 1.5
+def is_free(contact: float, keeps_gait: float) -> bool:
+    """True where the foot moves by its own dynamics; that of a wearer who keeps the gait (1) never does."""
+    return contact < 1.5 and keeps_gait < 0.5
 
 
 def foot_angle(shank: float, ankle: float) -> float:
@@ -48,8 +49,8 @@ def foot_angle(shank: float, ankle: float) -> float:
 
 
 def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float) -> Ankle:
-    """What the ground prescribes: a flat foot leaves the ankle to the shank, on the toes it is as measured."""
-    flat = contact < 2.5
+    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, else it is as measured."""
+    flat = contact > 1.5 and contact < 2.5
     return Ankle(
         now.shank + QUARTER_TURN - ground_angle if flat else now.ankle,
         now.shank_rate if flat else now.ankle_rate,
@@ -71,37 +72,52 @@ def landing(contact: float, timing: GaitTiming, now: GaitNow, angle: float, offs
     after = SWING if leaves else after
     difference = angle - flat_angle if slaps else offset
     difference = angle - now.ankle if rises else difference
-    return Landing(after, difference, 1.0 if strikes else 0.0, 1.0 if slaps else 0.0, 1.0 if leaves else 0.0)
+    return Landing(
+        contact=after,
+        offset=difference,
+        strikes=1.0 if strikes else 0.0,
+        slaps=1.0 if slaps else 0.0,
+        leaves=1.0 if leaves else 0.0,
+    )
 
 
 SETTLES = 3.0
 """A foot that came down with its toes stands on its heel after one part in so many of the time to the heel's rise."""
 
 
-def heel_share(contact: float, timing: GaitTiming, phase: float, toes_first: float) -> float:
-    """Share of the ground force under the heel: all while it rolls there, none on the toes, straight between.
+def heel_fraction(contact: float, timing: GaitTiming, phase: float, toes_first: float) -> float:
+    """Fraction [-] of the ground force under the heel: all while it rolls there, none on the toes, straight between.
 
     A foot that met the ground with its toes (``toes_first`` 1) has none under the heel at first.
     """
     passed = max(0.0, min(1.0, phase / timing.heel_off))
     flat = 1.0 - passed
     rolling = 1.0 if contact == HEEL else flat
-    share = flat * min(1.0, SETTLES * passed) if toes_first > 0.5 else rolling
-    return share if contact > 0.5 and contact < 2.5 else 0.0
+    fraction = flat * min(1.0, SETTLES * passed) if toes_first > 0.5 else rolling
+    return fraction if contact > 0.5 and contact < 2.5 else 0.0
 
 
-def heel_torque(contact: float, now: GaitNow, heel_lever: float) -> float:
+def ground_lever(leg: LegParameters, tilt: float) -> float:
+    """Lever [m] of the ground force behind the ankle, for a foot tilted up [rad]: it shrinks as the heel rolls down."""
+    raised = 0.5 * (tilt + abs(tilt))
+    return leg.flat_heel_lever + (leg.heel_lever - leg.flat_heel_lever) * raised / (raised + leg.heel_roll_angle)
+
+
+def heel_torque(contact: float, now: GaitNow, leg: LegParameters, ground_angle: float, angle: float) -> float:
     """Torque [N m] of the ground about the ankle while the foot rolls on its heel, positive in plantarflexion.
 
-    What the measured moment leaves to the ground of the torque that moves the healthy foot. A foot that is still on
-    its heel when the healthy one is flat is turned by the force on ``heel_lever`` [m].
+    What the measured moment leaves to the ground of the torque that moves the healthy foot or, once that is flat, the
+    force on the lever of a heel that is nearly so; and the same force on a longer lever where this foot, at an ankle
+    angle [rad], is tilted up further: the ground force has rolled less far forward, and a loaded foot comes down.
     """
-    torque = now.healthy_torque + max(-now.moment, now.force * heel_lever)
-    return torque if contact == HEEL else 0.0
+    lever = ground_lever(leg, foot_angle(now.shank, angle) - ground_angle)
+    healthy = ground_lever(leg, foot_angle(now.shank, now.ankle) - ground_angle)
+    measured = now.healthy_torque + max(-now.moment, now.force * leg.flat_heel_lever)
+    return measured + now.force * (lever - healthy) if contact == HEEL else 0.0
 
 
 def ground_forces(contact: float, timing: GaitTiming, now: GaitNow, toes_first: float) -> tuple[float, float]:
     """Forces [N] under heel and toes; none in the swing."""
     total = 0.0 if contact == SWING else now.force
-    share = heel_share(contact, timing, now.phase, toes_first)
-    return total * share, total * (1.0 - share)
+    fraction = heel_fraction(contact, timing, now.phase, toes_first)
+    return total * fraction, total * (1.0 - fraction)

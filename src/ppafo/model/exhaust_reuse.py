@@ -36,7 +36,7 @@ class ReuseBalance(NamedTuple):
     pressure_after: float
 
 
-def joined_pressure(pressure_a: float, volume_a: float, pressure_b: float, volume_b: float) -> float:
+def equalised_pressure(pressure_a: float, volume_a: float, pressure_b: float, volume_b: float) -> float:
     """Pressure [Pa] of two volumes [m^3] after they were joined, isothermal; equation (3)."""
     return (pressure_a * volume_a + pressure_b * volume_b) / (volume_a + volume_b)
 
@@ -46,12 +46,12 @@ def reuse_cycle(cycle: ReuseCycle, reservoir_pressure: float) -> tuple[ReuseBala
     outside = cycle.atmospheric_pressure
     caught_at = reservoir_pressure
     if cycle.exhaust_pressure > reservoir_pressure:
-        caught_at = joined_pressure(
+        caught_at = equalised_pressure(
             cycle.exhaust_pressure, cycle.exhaust_volume, reservoir_pressure, cycle.reservoir_volume
         )
     filled_to = outside
     if caught_at > outside and cycle.reservoir_volume > 0.0:
-        filled_to = joined_pressure(caught_at, cycle.reservoir_volume, outside, cycle.fill_volume)
+        filled_to = equalised_pressure(caught_at, cycle.reservoir_volume, outside, cycle.fill_volume)
     filled_to = min(filled_to, max(cycle.fill_pressure, outside))
     returned = (filled_to - outside) * cycle.fill_volume
     left = caught_at - returned / cycle.reservoir_volume if cycle.reservoir_volume > 0.0 else outside

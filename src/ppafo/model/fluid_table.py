@@ -1,6 +1,6 @@
 """Properties of a real fluid read from a table: its gas, and where it has one its liquid at the same pressure.
 
-The table is over temperature and, for the gas, over the share of the densest gas that it holds at that temperature:
+The table is over temperature and, for the gas, over the fraction of the densest gas that it holds at that temperature:
 saturated vapour where there is a liquid, else a fixed density. Between the nodes all columns run straight, so nothing
 overshoots. Whoever makes the table says where its numbers come from.
 """
@@ -12,7 +12,7 @@ Column = tuple[float, ...]
 
 
 class FluidTable(NamedTuple):
-    """Nodes of a fluid: ``temperatures`` [K], ``shares`` of the densest gas [-] from 0 to 1, and values at them.
+    """Nodes of a fluid: ``temperatures`` [K], ``fractions`` of the densest gas [-] from 0 to 1, and values at them.
 
     By temperature: ``densest`` gas [kg/m^3], ``liquid_densities`` [kg/m^3] and ``liquid_energies`` [J/kg], both empty
     for a fluid without liquid here. By temperature and share: ``factors`` P/(rho R T) [-], ``energies`` [J/kg].
@@ -20,7 +20,7 @@ class FluidTable(NamedTuple):
 
     gas_constant: float
     temperatures: Column
-    shares: Column
+    fractions: Column
     densest: Column
     liquid_densities: Column
     liquid_energies: Column
@@ -61,10 +61,10 @@ def gas_specific_energy(table: FluidTable, temperature: float, density: float) -
 
 
 def _across(rows: tuple[Column, ...], table: FluidTable, temperature: float, density: float) -> float:
-    """Value at a temperature and a density, straight in the temperature and in the share of the densest gas."""
+    """Value at a temperature and a density, straight in the temperature and in the fraction of the densest gas."""
     index, weight = _place(table.temperatures, temperature)
-    share = min(density / _along(table.densest, index, weight), 1.0)
-    place = _place(table.shares, share)
+    fraction = min(density / _along(table.densest, index, weight), 1.0)
+    place = _place(table.fractions, fraction)
     return (1.0 - weight) * _along(rows[index], *place) + weight * _along(rows[index + 1], *place)
 
 
@@ -73,7 +73,7 @@ def _along(column: Column, index: int, weight: float) -> float:
 
 
 def _place(nodes: Column, at: float) -> tuple[int, float]:
-    """Node below a place and the share of the way to the next; the ends of the table hold outside it."""
+    """Node below a place and the fraction of the way to the next; the ends of the table hold outside it."""
     index = min(max(bisect_right(nodes, at) - 1, 0), len(nodes) - 2)
     weight = (at - nodes[index]) / (nodes[index + 1] - nodes[index])
     return index, min(max(weight, 0.0), 1.0)

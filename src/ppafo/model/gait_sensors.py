@@ -5,7 +5,7 @@ One draw a sample tells of every sensor with a fault whether its sample is lost:
 
 from typing import NamedTuple
 
-from ppafo.model.sensors import SensorParameters, measure, quantised, standard_noise, unit_noise
+from ppafo.model.sensors import SensorParameters, measure, quantise, standard_noise, unit_noise
 
 
 class GaitMeasurement(NamedTuple):
@@ -42,7 +42,7 @@ class Fault(NamedTuple):
 
 
 class GaitSensors(NamedTuple):
-    """How sensors follow, noise and step of the forces [N], shares of samples that are lost, and faults.
+    """How sensors follow, noise and step of the forces [N], fractions of samples that are lost, and faults.
 
     ``follow_rate`` [1/s] is that of the force sensors; ``angle_memory`` and ``pressure_memory`` are what is left of a
     first-order sensor's last value after one sample, 0 for one that follows at once.
@@ -82,13 +82,25 @@ class GaitSeen(NamedTuple):
 HALF = 0.5
 """Fraction of its period in which a fault that comes and goes is there."""
 
-NOTHING_SEEN = GaitSeen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NOTHING_SEEN = GaitSeen(
+    heel_force=0.0,
+    toe_force=0.0,
+    angle=0.0,
+    pressure_1=0.0,
+    pressure_2=0.0,
+    smooth_angle=0.0,
+    smooth_pressure_1=0.0,
+    smooth_pressure_2=0.0,
+)
 
 
-def followed(shown: float, true: float, follow_rate: float, step: float) -> float:
-    """What a first-order sensor shows after a step [s]; ``follow_rate`` [1/s] is the inverse of its time constant."""
-    share = follow_rate * step
-    return shown + (true - shown) * share / (1.0 + share)
+def lagged_reading(shown: float, true: float, follow_rate: float, step: float) -> float:
+    """What a first-order sensor shows after a step [s]; ``follow_rate`` [1/s] is the inverse of its time constant.
+
+    Both readings are in the sensor's unit.
+    """
+    fraction = follow_rate * step
+    return shown + (true - shown) * fraction / (1.0 + fraction)
 
 
 def is_active(fault: Fault, time: float) -> bool:
@@ -100,14 +112,14 @@ def is_active(fault: Fault, time: float) -> bool:
 
 
 def distorted(fault: Fault, reading: float, other: float, last: float, time: float) -> float:
-    """A reading with gain, offset, drift, lag and some of the other sensor's reading in it."""
+    """A reading at ``time`` [s] with gain, offset, drift, lag and some of the other sensor in it, in its unit."""
     mixed = reading + fault.crosstalk * (other - reading)
     target = fault.gain * mixed + fault.offset + fault.drift * (time - fault.time)
     return target + fault.memory * (last - target)
 
 
 def faulty(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
-    """A reading as a sensor with a fault gives it; ``other`` is that of the other sensor of its kind.
+    """A reading at ``time`` [s] as a sensor with a fault gives it, in its unit; ``other`` is that of the other sensor.
 
     ``draw`` from 0 to 1 tells whether the sample is lost.
     """
@@ -121,16 +133,16 @@ def faulty(fault: Fault, reading: float, other: float, last: float, time: float,
 def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, channel: int) -> float:
     """A force [N] with noise and steps, never below 0."""
     noisy = force + sensors.force_noise * standard_noise(seed, sample, channel)
-    return max(quantised(noisy, sensors.force_quantum), 0.0)
+    return max(quantise(noisy, sensors.force_quantum), 0.0)
 
 
-def shown_before(last: float, reading: float, sample: int) -> float:
-    """What a sensor showed before; before the first sample it showed the same, as one that has settled."""
+def previous_reading(last: float, reading: float, sample: int) -> float:
+    """The reading before, in the sensor's unit; before the first sample the same, as of a sensor that has settled."""
     return last if sample > 0 else reading
 
 
-def kept(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
-    """A reading, or the last one where the sample is lost."""
+def hold_if_lost(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
+    """A reading, or the last one where the sample is lost, in the sensor's unit; ``lost_share`` [-] are lost."""
     return last if unit_noise(seed, sample, channel) < lost_share else reading
 
 
@@ -147,7 +159,7 @@ def measure_gait(
     time: float,
     sample: int,
 ) -> tuple[GaitMeasurement, GaitSeen]:
-    """Measurement of one sample with bandwidth, noise, steps, lost samples and faults, and what to remember of it."""
+    """Measurement [SI] of a sample with bandwidth, noise, steps, loss and faults, and what to remember of it."""
     seed = int(sensors.seed)
     # A sensor has settled before the walk begins.
     angle_memory = gait_sensors.angle_memory if sample > 0 else 0.0
@@ -158,23 +170,42 @@ def measure_gait(
     seen = measure(sensors, smooth_angle, smooth_1, smooth_2, torque_constant, sample)
     heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
     toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
-    was_angle = shown_before(last.angle, seen.angle, sample)
-    was_1 = shown_before(last.pressure_1, seen.pressure_1, sample)
-    was_2 = shown_before(last.pressure_2, seen.pressure_2, sample)
-    was_heel = shown_before(last.heel_force, heel, sample)
-    was_toe = shown_before(last.toe_force, toe, sample)
-    kept_angle = kept(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
-    kept_1 = kept(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
-    kept_2 = kept(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
-    kept_heel = kept(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
-    kept_toe = kept(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
+    was_angle = previous_reading(last.angle, seen.angle, sample)
+    was_1 = previous_reading(last.pressure_1, seen.pressure_1, sample)
+    was_2 = previous_reading(last.pressure_2, seen.pressure_2, sample)
+    was_heel = previous_reading(last.heel_force, heel, sample)
+    was_toe = previous_reading(last.toe_force, toe, sample)
+    kept_angle = hold_if_lost(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
+    kept_1 = hold_if_lost(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
+    kept_2 = hold_if_lost(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
+    kept_heel = hold_if_lost(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
+    kept_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
     draw = unit_noise(seed, sample, 10)
     shown_angle = faulty(gait_sensors.angle_fault, kept_angle, kept_angle, was_angle, time, draw)
     shown_1 = faulty(gait_sensors.pressure_1_fault, kept_1, kept_2, was_1, time, draw)
     shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, kept_1, was_2, time, draw)
     shown_heel = faulty(gait_sensors.heel_fault, kept_heel, kept_toe, was_heel, time, draw)
     shown_toe = faulty(gait_sensors.toe_fault, kept_toe, kept_heel, was_toe, time, draw)
-    # Who works out the torque has only the readings, true or not.
-    torque = torque_constant * (shown_1 - shown_2)
-    remembered = GaitSeen(shown_heel, shown_toe, shown_angle, shown_1, shown_2, smooth_angle, smooth_1, smooth_2)
-    return GaitMeasurement(shown_angle, shown_1, shown_2, torque, shown_heel, shown_toe), remembered
+    remembered = GaitSeen(
+        heel_force=shown_heel,
+        toe_force=shown_toe,
+        angle=shown_angle,
+        pressure_1=shown_1,
+        pressure_2=shown_2,
+        smooth_angle=smooth_angle,
+        smooth_pressure_1=smooth_1,
+        smooth_pressure_2=smooth_2,
+    )
+    return measurement_of(remembered, torque_constant), remembered
+
+
+def measurement_of(shown: GaitSeen, torque_constant: float) -> GaitMeasurement:
+    """What a controller gets of what the sensors show; its torque is that of the readings, true or not."""
+    return GaitMeasurement(
+        angle=shown.angle,
+        pressure_1=shown.pressure_1,
+        pressure_2=shown.pressure_2,
+        torque=torque_constant * (shown.pressure_1 - shown.pressure_2),
+        heel_force=shown.heel_force,
+        toe_force=shown.toe_force,
+    )

@@ -14,8 +14,10 @@ class LegParameters(NamedTuple):
 
     ``ankle_stiffness`` [N m/rad] pulls the ankle to ``ankle_rest_angle`` [rad]; ``ankle_damping`` [N m s/rad].
     ``residual_share`` [-] of the measured ankle moment is what the wearer still has: 0 is the paper's full deficit.
-    ``heel_lever`` [m] is that of the ground force about the ankle while the foot rolls on its heel, ``toe_lever`` [m]
-    reaches from the ankle forward to the toes.
+    With ``keeps_gait`` 1 the wearer is nondisabled: muscles keep the measured ankle whatever the device does.
+    The ground force acts on a foot that rolls on its heel with a lever [m] behind the ankle: ``flat_heel_lever`` where
+    the foot is nearly flat, towards ``heel_lever`` as it tilts up, half of the way at ``heel_roll_angle`` [rad].
+    ``toe_lever`` [m] reaches from the ankle forward to the toes.
     """
 
     shank_length: float
@@ -30,7 +32,10 @@ class LegParameters(NamedTuple):
     ankle_rest_angle: float
     ankle_damping: float
     residual_share: float
+    keeps_gait: float
     heel_lever: float
+    flat_heel_lever: float
+    heel_roll_angle: float
     toe_lever: float
     gravity: float
 

@@ -7,25 +7,23 @@ that the time stepping uses: a square root times a polynomial, free of powers.
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
+
+TERMS = 7
+"""Coefficients of the polynomial of a flow curve."""
 
 
 class FlowCurve(NamedTuple):
     """A flow function as data: ``sqrt(1 - r)`` times a polynomial in ``1 - r``, constant below the critical ratio.
 
-    All dimensionless. Above ``linear_ratio`` the curve is the straight line to zero at ``r = 1``.
+    All dimensionless; coefficients from the constant one upwards. Above ``linear_ratio`` the curve is the straight line
+    to zero at ``r = 1``.
     """
 
     critical_ratio: float
     linear_ratio: float
     linear_slope: float
-    c0: float
-    c1: float
-    c2: float
-    c3: float
-    c4: float
-    c5: float
-    c6: float
+    coefficients: Annotated[tuple[float, ...], TERMS]
 
 
 def isentropic_flow_function(pressure_ratio: float, heat_capacity_ratio: float) -> float:
@@ -57,13 +55,13 @@ def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
     gap = 1.0 - pressure_ratio
     linear_gap = 1.0 - curve.linear_ratio
     inside = max(min(gap, 1.0 - curve.critical_ratio), linear_gap)
-    polynomial = curve.c6
-    polynomial = polynomial * inside + curve.c5
-    polynomial = polynomial * inside + curve.c4
-    polynomial = polynomial * inside + curve.c3
-    polynomial = polynomial * inside + curve.c2
-    polynomial = polynomial * inside + curve.c1
-    polynomial = polynomial * inside + curve.c0
+    polynomial = curve.coefficients[6]
+    polynomial = polynomial * inside + curve.coefficients[5]
+    polynomial = polynomial * inside + curve.coefficients[4]
+    polynomial = polynomial * inside + curve.coefficients[3]
+    polynomial = polynomial * inside + curve.coefficients[2]
+    polynomial = polynomial * inside + curve.coefficients[1]
+    polynomial = polynomial * inside + curve.coefficients[0]
     return math.sqrt(inside) * polynomial * min(gap * curve.linear_slope, 1.0)
 
 
@@ -76,19 +74,19 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
     linear_gap = 1.0 - curve.linear_ratio
     choked_gap = 1.0 - curve.critical_ratio
     inside = max(min(gap, choked_gap), linear_gap)
-    polynomial = curve.c6
-    derivative = curve.c6
-    polynomial = polynomial * inside + curve.c5
+    polynomial = curve.coefficients[6]
+    derivative = curve.coefficients[6]
+    polynomial = polynomial * inside + curve.coefficients[5]
     derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.c4
+    polynomial = polynomial * inside + curve.coefficients[4]
     derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.c3
+    polynomial = polynomial * inside + curve.coefficients[3]
     derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.c2
+    polynomial = polynomial * inside + curve.coefficients[2]
     derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.c1
+    polynomial = polynomial * inside + curve.coefficients[1]
     derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.c0
+    polynomial = polynomial * inside + curve.coefficients[0]
     root = math.sqrt(inside)
     value = root * polynomial
     # Near equal pressures the chord from there: with the slope of the curve a settled chamber would ring at the kink.
@@ -100,10 +98,10 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
 
 def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve) -> float:
     """Mass flow from a to b [kg/s], positive from a to b, antisymmetric under exchange. Eqs (6), (7)."""
-    return checked_flow(pressure_a, pressure_b, conductance, 1.0, curve)
+    return check_valve_flow(pressure_a, pressure_b, conductance, 1.0, curve)
 
 
-def checked_flow(
+def check_valve_flow(
     pressure_a: float, pressure_b: float, conductance: float, takes_back: float, curve: FlowCurve
 ) -> float:
     """As ``orifice_flow`` [kg/s], with nothing back into a where ``takes_back`` is 0, not 1. Equations (6) to (8)."""
@@ -117,13 +115,13 @@ def orifice_flow_slopes(
     pressure_a: float, pressure_b: float, conductance: float, curve: FlowCurve
 ) -> tuple[float, float, float]:
     """Mass flow from a to b [kg/s] and its derivatives with respect to both pressures [kg/(s Pa)]. Eqs (6), (7)."""
-    return checked_flow_slopes(pressure_a, pressure_b, conductance, 1.0, curve)
+    return check_valve_flow_slopes(pressure_a, pressure_b, conductance, 1.0, curve)
 
 
-def checked_flow_slopes(
+def check_valve_flow_slopes(
     pressure_a: float, pressure_b: float, conductance: float, takes_back: float, curve: FlowCurve
 ) -> tuple[float, float, float]:
-    """As ``checked_flow``, with its derivatives with respect to both pressures [kg/(s Pa)]."""
+    """As ``check_valve_flow``, with its derivatives with respect to both pressures [kg/(s Pa)]."""
     forward = pressure_a >= pressure_b
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream

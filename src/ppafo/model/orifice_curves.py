@@ -9,20 +9,19 @@ import numpy as np
 from ppafo.constants import STANDARD_REFERENCE_DENSITY_AIR, STANDARD_REFERENCE_TEMPERATURE
 from ppafo.model.columns import over_runs, root
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
-from ppafo.model.orifice import FlowCurve, isentropic_flow_function, iso6358_flow_function
+from ppafo.model.orifice import TERMS, FlowCurve, isentropic_flow_function, iso6358_flow_function
 
-DEGREE = 6
 FIT_POINTS = 400
 
 
 def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve of equations (6), (7) for a gas; within 3e-7 of the exact function below ``linear_ratio``."""
+    """Fitted curve [-] of equations (6), (7) for a gas; within 3e-7 of the exact function below ``linear_ratio``."""
     coefficients = over_runs(_isentropic_coefficients, heat_capacity_ratio)
     return _curve(critical_pressure_ratio(heat_capacity_ratio), linear_ratio, coefficients)
 
 
 def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve of ISO 6358 for a critical ratio b; within 1e-5 of the exact function below ``linear_ratio``.
+    """Fitted curve [-] of ISO 6358 for a critical ratio b; within 1e-5 of the exact function below ``linear_ratio``.
 
     The exact function depends on (1 - r) / (1 - b) alone, so one fit, scaled, serves every b.
     """
@@ -38,14 +37,14 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
 @lru_cache(maxsize=4096)
 def _isentropic_coefficients(heat_capacity_ratio: float) -> tuple[float, ...]:
     gaps = _gaps(critical_pressure_ratio(heat_capacity_ratio))
-    return _fitted(gaps, np.array([isentropic_flow_function(1.0 - gap, heat_capacity_ratio) for gap in gaps]))
+    return _fit_curve(gaps, np.array([isentropic_flow_function(1.0 - gap, heat_capacity_ratio) for gap in gaps]))
 
 
 @lru_cache(maxsize=1)
 def _iso6358_coefficients() -> tuple[float, ...]:
     """Coefficients for a critical ratio of 0."""
     gaps = _gaps(0.0)
-    return _fitted(gaps, np.array([iso6358_flow_function(1.0 - gap, 0.0) for gap in gaps]))
+    return _fit_curve(gaps, np.array([iso6358_flow_function(1.0 - gap, 0.0) for gap in gaps]))
 
 
 def area_conductance(
@@ -72,15 +71,20 @@ def _gaps(critical_ratio: float) -> "np.ndarray[tuple[int], np.dtype[np.float64]
     return np.asarray(0.5 * (1.0 - critical_ratio) * (1.0 - np.cos(angles)))
 
 
-def _fitted(
+def _fit_curve(
     gaps: "np.ndarray[tuple[int], np.dtype[np.float64]]", exact: "np.ndarray[tuple[int], np.dtype[np.float64]]"
 ) -> tuple[float, ...]:
     """Coefficients of a polynomial times a root, by relative least squares."""
     target = exact / np.sqrt(gaps)
-    powers = np.vander(gaps, DEGREE + 1, increasing=True)
+    powers = np.vander(gaps, TERMS, increasing=True)
     coefficients = np.linalg.lstsq(powers / target[:, None], np.ones_like(target), rcond=None)[0]
     return tuple(coefficients.tolist())
 
 
 def _curve(critical_ratio: float, linear_ratio: float, coefficients: Sequence[float]) -> FlowCurve:
-    return FlowCurve(critical_ratio, linear_ratio, 1.0 / (1.0 - linear_ratio), *coefficients)
+    return FlowCurve(
+        critical_ratio=critical_ratio,
+        linear_ratio=linear_ratio,
+        linear_slope=1.0 / (1.0 - linear_ratio),
+        coefficients=tuple(coefficients),
+    )

@@ -82,7 +82,7 @@ class ThermalState(NamedTuple):
 
 
 class Openings(NamedTuple):
-    """Share of the valve's full area that joins each chamber to the source and to the atmosphere, each 0 to 1."""
+    """Fraction of the valve's full area that joins each chamber to the source and to the atmosphere, each 0 to 1."""
 
     source_1: float
     vent_1: float
@@ -122,7 +122,7 @@ def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pres
 
 
 def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers for a steady opening from -1 to 1: above 0 feeds chamber 1 and vents 2. Equation (8)."""
+    """Ports of both chambers for a steady opening [-], -1 to 1: above 0 feeds chamber 1 and vents 2. Equation (8)."""
     conductance = abs(opening) * plant.valve_conductance
     feeds_1 = opening >= 0.0
     node_1 = plant.supply_pressure if feeds_1 else plant.atmospheric_pressure
@@ -130,13 +130,27 @@ def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, Si
     share_1 = 1.0 if feeds_1 else 0.0
     back_1 = plant.relieving if feeds_1 else 1.0
     back_2 = 1.0 if feeds_1 else plant.relieving
-    return SinglePort(conductance, node_1, share_1, back_1), SinglePort(conductance, node_2, 1.0 - share_1, back_2)
+    return SinglePort(
+        conductance=conductance, node_pressure=node_1, source_fraction=share_1, takes_back=back_1
+    ), SinglePort(conductance=conductance, node_pressure=node_2, source_fraction=1.0 - share_1, takes_back=back_2)
 
 
 def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPort, BlendedPort]:
     """Ports of both chambers for four openings, which may be means over a step. Equation (8)."""
     full, back = plant.valve_conductance, plant.relieving
     ambient = plant.atmospheric_pressure
-    port_1 = BlendedPort(openings.source_1 * full, plant.supply_pressure, openings.vent_1 * full, ambient, back)
-    port_2 = BlendedPort(openings.source_2 * full, plant.dorsiflexion_pressure, openings.vent_2 * full, ambient, back)
+    port_1 = BlendedPort(
+        source_conductance=openings.source_1 * full,
+        source_pressure=plant.supply_pressure,
+        vent_conductance=openings.vent_1 * full,
+        vent_pressure=ambient,
+        takes_back=back,
+    )
+    port_2 = BlendedPort(
+        source_conductance=openings.source_2 * full,
+        source_pressure=plant.dorsiflexion_pressure,
+        vent_conductance=openings.vent_2 * full,
+        vent_pressure=ambient,
+        takes_back=back,
+    )
     return port_1, port_2

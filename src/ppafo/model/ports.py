@@ -10,7 +10,7 @@ node takes back, 1 for the atmosphere and for a relieving supply, 0 for a supply
 
 from typing import NamedTuple
 
-from ppafo.model.orifice import FlowCurve, checked_flow, checked_flow_slopes, orifice_flow, orifice_flow_slopes
+from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_slopes, orifice_flow, orifice_flow_slopes
 
 
 class SinglePort(NamedTuple):
@@ -21,7 +21,7 @@ class SinglePort(NamedTuple):
 
     conductance: float
     node_pressure: float
-    source_share: float
+    source_fraction: float
     takes_back: float
 
 
@@ -61,27 +61,34 @@ def admitted_flow(flow: float, takes_back: float) -> float:
 
 def single_port_flow(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlow:
     """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through one open path. Equations (6) to (8)."""
-    flow = checked_flow(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
-    return PortFlow(flow, flow * port.source_share)
+    flow = check_valve_flow(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
+    return PortFlow(flow, flow * port.source_fraction)
 
 
 def single_port_flow_slopes(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlowSlopes:
     """As ``single_port_flow``, with derivatives."""
-    flow, _, slope = checked_flow_slopes(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
-    return PortFlowSlopes(flow, slope, flow * port.source_share, slope * port.source_share)
+    flow, _, slope = check_valve_flow_slopes(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
+    return PortFlowSlopes(
+        total=flow,
+        total_slope=slope,
+        from_source=flow * port.source_fraction,
+        source_slope=slope * port.source_fraction,
+    )
 
 
 def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlow:
     """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through two open paths. Equations (6) to (8)."""
-    source = checked_flow(port.source_pressure, pressure, port.source_conductance, port.takes_back, curve)
+    source = check_valve_flow(port.source_pressure, pressure, port.source_conductance, port.takes_back, curve)
     vent = orifice_flow(port.vent_pressure, pressure, port.vent_conductance, curve)
     return PortFlow(source + vent, source)
 
 
 def blended_port_flow_slopes(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlowSlopes:
     """As ``blended_port_flow``, with derivatives."""
-    source, _, source_slope = checked_flow_slopes(
+    source, _, source_slope = check_valve_flow_slopes(
         port.source_pressure, pressure, port.source_conductance, port.takes_back, curve
     )
     vent, _, vent_slope = orifice_flow_slopes(port.vent_pressure, pressure, port.vent_conductance, curve)
-    return PortFlowSlopes(source + vent, source_slope + vent_slope, source, source_slope)
+    return PortFlowSlopes(
+        total=source + vent, total_slope=source_slope + vent_slope, from_source=source, source_slope=source_slope
+    )

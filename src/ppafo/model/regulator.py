@@ -62,8 +62,8 @@ def regulated_mass(
     # 1 / (1 + x + x^2/2) stands for exp(-x): of second order, between 0 and 1, and the lanes keep it in vector code.
     scale = 1.0 / (1.0 + steps + 0.5 * steps * steps)
     regained = lacking * steps * (1.0 + 0.5 * steps) + loss * 0.5 * steps * (1.0 + steps)
-    most = largest_flow * step
-    return min(max(regained * scale / stiffness, -most * relieving), most)
+    largest = largest_flow * step
+    return min(max(regained * scale / stiffness, -largest * relieving), largest)
 
 
 def step_lines(

@@ -6,7 +6,7 @@ and on any number of threads.
 
 from typing import NamedTuple
 
-from ppafo.model.turns import DOUBLINGS, SMALLEST_SHARE, TERMS
+from ppafo.model.turns import DOUBLINGS, SMALLEST_FRACTION, TERMS
 
 MASK = 0xFFFFFFFF
 ARRIVAL = 40.0
@@ -50,10 +50,10 @@ class SensorState(NamedTuple):
     true_pressure_2: float
 
 
-def faded(rate: float, step: float) -> tuple[float, float]:
-    """exp(-rate step) and its mean over the step [-], by series at a small share of it, doubled up to the whole."""
+def decay_factors(rate: float, step: float) -> tuple[float, float]:
+    """exp(-rate step) and its mean over the step [-], by series at a small fraction of it, doubled up to the whole."""
     whole = rate * step
-    small = -min(whole, ARRIVAL) * SMALLEST_SHARE
+    small = -min(whole, ARRIVAL) * SMALLEST_FRACTION
     term, kept, mean = 1.0, 1.0, 1.0
     for order in range(1, TERMS):
         term *= small / order
@@ -67,7 +67,7 @@ def faded(rate: float, step: float) -> tuple[float, float]:
 
 def follow(rate: float, step: float, shown: float, before: float, now: float) -> float:
     """What a first-order sensor shows after a step [s] in which the truth runs straight, in its own unit; exact."""
-    kept, mean = faded(rate, step)
+    kept, mean = decay_factors(rate, step)
     return kept * shown + (mean - kept) * before + (1.0 - mean) * now if rate > 0.0 else now
 
 
@@ -76,16 +76,16 @@ def follow_signals(
 ) -> SensorState:
     """What the sensors show after a step [s] that leads to an angle [rad] and two absolute pressures [Pa]."""
     return SensorState(
-        follow(rates.angle, step, sensed.angle, sensed.true_angle, angle),
-        follow(rates.pressure, step, sensed.pressure_1, sensed.true_pressure_1, pressure_1),
-        follow(rates.pressure, step, sensed.pressure_2, sensed.true_pressure_2, pressure_2),
-        angle,
-        pressure_1,
-        pressure_2,
+        angle=follow(rates.angle, step, sensed.angle, sensed.true_angle, angle),
+        pressure_1=follow(rates.pressure, step, sensed.pressure_1, sensed.true_pressure_1, pressure_1),
+        pressure_2=follow(rates.pressure, step, sensed.pressure_2, sensed.true_pressure_2, pressure_2),
+        true_angle=angle,
+        true_pressure_1=pressure_1,
+        true_pressure_2=pressure_2,
     )
 
 
-def mixed(value: int) -> int:
+def mix_bits(value: int) -> int:
     """A 32-bit integer that looks unrelated to ``value`` (0 to 2^32 - 1): xor, shift and multiply, thrice."""
     value = (value ^ (value >> 16)) * 0x7FEB352D & MASK
     value = (value ^ (value >> 15)) * 0x6C50B47D & MASK
@@ -95,7 +95,7 @@ def mixed(value: int) -> int:
 
 def next_word(value: int) -> int:
     """The 32-bit word after this one."""
-    return mixed((value + 0x1E3779B9) & MASK)
+    return mix_bits((value + 0x1E3779B9) & MASK)
 
 
 def halves(value: int) -> int:
@@ -104,12 +104,12 @@ def halves(value: int) -> int:
 
 
 def standard_noise(seed: int, sample: int, channel: int) -> float:
-    """Random number of mean 0 and variance 1 for one sample of one channel: twelve uniforms added up.
+    """Random number [-] of mean 0 and variance 1 for one sample of one channel: twelve uniforms added up.
 
     The sum is within 6 and has an excess kurtosis of -0.1, near enough to normal for a sensor.
     """
     # Six words of two uniforms each, written out: a loop inside would keep the lanes from running side by side.
-    first = mixed(mixed(mixed(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))
+    first = mix_bits(mix_bits(mix_bits(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))
     second = next_word(first)
     third = next_word(second)
     fourth = next_word(third)
@@ -120,11 +120,11 @@ def standard_noise(seed: int, sample: int, channel: int) -> float:
 
 def unit_noise(seed: int, sample: int, channel: int) -> float:
     """Random number from 0 to 1 for one sample of one channel, as ``standard_noise`` draws them."""
-    return float(mixed(mixed(mixed(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))) / 4294967296.0
+    return float(mix_bits(mix_bits(mix_bits(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))) / 4294967296.0
 
 
-def quantised(value: float, quantum: float) -> float:
-    """``value`` rounded to a whole number of ``quantum`` (half upwards); unchanged where that is 0."""
+def quantise(value: float, quantum: float) -> float:
+    """``value`` rounded to a whole number of ``quantum`` of the same unit (half upwards); unchanged where that is 0."""
     safe = quantum if quantum > 0.0 else 1.0
     rounded = quantum * float(int(value / safe + 0.5)) if value >= 0.0 else -quantum * float(int(0.5 - value / safe))
     return rounded if quantum > 0.0 else value
@@ -135,7 +135,7 @@ def measure(
 ) -> Measurement:
     """Measurement of one sample with noise and quantisation; angle [rad], pressures [Pa absolute]."""
     seed = int(sensors.seed)
-    angle = quantised(angle + sensors.angle_noise * standard_noise(seed, sample, 0), sensors.angle_quantum)
-    first = quantised(pressure_1 + sensors.pressure_noise * standard_noise(seed, sample, 1), sensors.pressure_quantum)
-    second = quantised(pressure_2 + sensors.pressure_noise * standard_noise(seed, sample, 2), sensors.pressure_quantum)
-    return Measurement(angle, first, second, torque_constant * (first - second))
+    angle = quantise(angle + sensors.angle_noise * standard_noise(seed, sample, 0), sensors.angle_quantum)
+    first = quantise(pressure_1 + sensors.pressure_noise * standard_noise(seed, sample, 1), sensors.pressure_quantum)
+    second = quantise(pressure_2 + sensors.pressure_noise * standard_noise(seed, sample, 2), sensors.pressure_quantum)
+    return Measurement(angle=angle, pressure_1=first, pressure_2=second, torque=torque_constant * (first - second))

@@ -21,7 +21,7 @@ from ppafo.model.gas import choked_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
 
 _NARROW_ENOUGH = 1e-9
-_MOST_HALVINGS = 60
+_MAXIMUM_HALVINGS = 60
 
 
 class BottleWall(NamedTuple):
@@ -78,7 +78,12 @@ def bottle_content(table: FluidTable, mass: float, volume: float, temperature: f
     vapour = min(density, densest_gas(table, temperature))
     pressure = fluid_pressure(table, temperature, density)
     enthalpy = gas_specific_energy(table, temperature, density) + pressure / vapour
-    return BottleContent(temperature, pressure, liquid_mass(table, mass, volume, temperature), enthalpy)
+    return BottleContent(
+        temperature=temperature,
+        pressure=pressure,
+        liquid_mass=liquid_mass(table, mass, volume, temperature),
+        outflow_enthalpy=enthalpy,
+    )
 
 
 def liquid_mass(table: FluidTable, mass: float, volume: float, temperature: float) -> float:
@@ -123,7 +128,7 @@ def _between_nodes(table: FluidTable, mass: float, volume: float, energy: float,
     low, high = bracket
     miss_low = content_energy(table, mass, volume, low) - energy
     miss_high = content_energy(table, mass, volume, high) - energy
-    for _ in range(_MOST_HALVINGS):
+    for _ in range(_MAXIMUM_HALVINGS):
         middle = (low * miss_high - high * miss_low) / (miss_high - miss_low)
         miss = content_energy(table, mass, volume, middle) - energy
         if abs(miss) <= _NARROW_ENOUGH * abs(miss_high - miss_low) or high - low <= _NARROW_ENOUGH:

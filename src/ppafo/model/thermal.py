@@ -63,12 +63,12 @@ def wall_exchange(
     return heat_transfer_coefficient * area_per_volume * (heat_capacity_ratio - 1.0) / gas_constant
 
 
-def carried_mass(root: float) -> float:
+def mass_flow_ratio(root: float) -> float:
     """Mass flow [-] over that of gas at the reference temperature; ``root`` is sqrt(T_up/T_ref) [-], equation (6)."""
     return 1.0 / root
 
 
-def carried_energy(root: float, heat_capacity_ratio: float) -> float:
+def enthalpy_flow_ratio(root: float, heat_capacity_ratio: float) -> float:
     """Enthalpy that a flow carries over c_v T_ref and over its flow at the reference temperature [-].
 
     ``root`` is sqrt(T_up/T_ref) [-]: gas at four times the temperature flows half as much and is four times as rich.

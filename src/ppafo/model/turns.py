@@ -3,14 +3,14 @@
 TURN = 6.283185307179586
 
 DOUBLINGS = 12
-"""A function of a whole step is summed at a share of it, and doubled so often up to the whole."""
-SMALLEST_SHARE = 0.5**DOUBLINGS
+"""A function of a whole step is summed at a fraction of it, and doubled so often up to the whole."""
+SMALLEST_FRACTION = 0.5**DOUBLINGS
 TERMS = 9
 """Terms of such a series, with the one of order 0."""
 
 
 def sine_and_cosine(turns: float) -> tuple[float, float]:
-    """Sine and cosine of a number of turns, good to 1e-9: power series within a quarter turn of the nearest half turn.
+    """Sine and cosine [-] of a number of turns to 1e-9: power series within a quarter turn of the nearest half turn.
 
     A library sine cannot run in many lanes at once.
     """

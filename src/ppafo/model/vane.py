@@ -1,4 +1,4 @@
-"""The vane with the foot plate: torques and acceleration. Equations (1) and (2)."""
+"""The vane with the foot plate: torques, stick-slip friction and acceleration. Equations (1), (2) and (10)."""
 
 from ppafo.model.columns import Number
 
@@ -38,3 +38,22 @@ def vane_acceleration(
 ) -> float:
     """Angular acceleration [rad/s^2]; friction [N m] and damping are subtracted. Equation (1)."""
     return (driving_torque - viscous_damping * angular_velocity - friction) / inertia
+
+
+def sliding_friction(angular_velocity: float, dynamic_torque: float) -> float:
+    """Friction torque [N m] of a moving vane, along the angular velocity [rad/s]: it is subtracted. Equation (10).
+
+    The paper prints the opposite sign beside a friction that is subtracted too, which would drive the motion.
+    """
+    if angular_velocity > 0.0:
+        return dynamic_torque
+    if angular_velocity < 0.0:
+        return -dynamic_torque
+    return 0.0
+
+
+def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at_upper_stop: bool) -> bool:
+    """True where a vane at rest stays at rest: static friction or a stop balances the net torque [N m]."""
+    within = abs(net_torque) <= static_torque
+    against_stop = (at_lower_stop and net_torque < 0.0) or (at_upper_stop and net_torque > 0.0)
+    return within or against_stop

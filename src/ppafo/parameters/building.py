@@ -58,7 +58,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Devic
 
 def _reader(parameter_set: ParameterSet) -> Callable[[str], float]:
     """Return a function that gives the value at a path in SI, checked against its declared unit and range."""
-    declared = parameter_set.declared()
+    declared = parameter_set.declarations()
     atmosphere = atmospheric_pressure(parameter_set)
 
     def read(path: str) -> float:
@@ -92,7 +92,7 @@ def _species(parameter_set: ParameterSet) -> str:
     if name not in SPECIES:
         hint = nearest_name(name, SPECIES)
         known = ", ".join(SPECIES)
-        raise ParameterError(f"{parameter_set.file}: gas.species = '{name}' is unknown{hint}; known are {known}")
+        raise ParameterError(f"{parameter_set.file}: gas.species = '{name}' is unknown{hint}; available: {known}")
     return name
 
 
@@ -120,11 +120,13 @@ def _valve(parameter_set: ParameterSet, read: Callable[[str], float], name: str)
 
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
     """Return the names by which an orifice is given in both forms at once, none where it is in one or in neither."""
-    area, sonic = (_given(parameter_set, section, form) for form in (declaration.AREA_FORM, declaration.SONIC_FORM))
+    area, sonic = (
+        _given_names(parameter_set, section, form) for form in (declaration.AREA_FORM, declaration.SONIC_FORM)
+    )
     return (*area, *sonic) if area and sonic else ()
 
 
-def _given(parameter_set: ParameterSet, section: str, form: Iterable[Quantity]) -> list[str]:
+def _given_names(parameter_set: ParameterSet, section: str, form: Iterable[Quantity]) -> list[str]:
     return sorted(item.name for item in form if f"{section}.{item.name}" in parameter_set.numbers)
 
 
@@ -136,7 +138,7 @@ def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
             f"{parameter_set.file}: {section} has {', '.join(both)}; "
             f"give either area and discharge_coefficient or sonic_conductance and critical_ratio"
         )
-    return bool(_given(parameter_set, section, declaration.SONIC_FORM))
+    return bool(_given_names(parameter_set, section, declaration.SONIC_FORM))
 
 
 def _check_complete(parameter_set: ParameterSet, valve: str) -> None:

@@ -1,23 +1,98 @@
-"""From a name or a file to a parameter set; every mistake in a file is one clear line."""
+"""The layout of a parameter set file, built from the declarations, and the way from a name or a file to a set."""
 
+import functools
+import re
 from collections.abc import Iterable, Iterator
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from types import GenericAlias
+from typing import Any, Literal
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters import declaration
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import apply_overrides
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve
-from ppafo.parameters.provenance import Entry, FlagEntry, TextEntry
-from ppafo.parameters.schema import parameter_file
+from ppafo.parameters.provenance import Accepted, Citation, Entry, FlagEntry, TextEntry
 from ppafo.units import check_unit
+
+
+def _by_name(model: Any) -> Any:
+    return GenericAlias(dict, (str, model))
+
+
+def _fields(quantities: tuple[Quantity, ...]) -> dict[str, Any]:
+    return {quantity.name: optional(Entry, f"{quantity.summary} [{quantity.unit or '-'}]") for quantity in quantities}
+
+
+def _section(name: str, quantities: tuple[Quantity, ...], extra: dict[str, Any] | None = None) -> Any:
+    return table(name, _fields(quantities) | (extra or {}))
+
+
+def _valve_section(kind: str) -> Any:
+    return _section(
+        f"{re.sub(r'[^A-Za-z0-9_]', '_', kind.capitalize())}Valve",
+        declaration.ORIFICE + VALVES[kind].quantities,
+        {"kind": (Literal[kind], Field(description=VALVES[kind].summary))},
+    )
+
+
+def _sections() -> dict[str, Any]:
+    """Return the sections that hold values, each a model, all of them optional: a set may have gaps."""
+    leak = _section("Leak", declaration.ORIFICE)
+    valve_reports = _section("ReportedOfAValve", declaration.REPORTED_OF_A_VALVE)
+    reported = {
+        declaration.REPORTED_FORMULA: optional(TextEntry, "exponent inside C1, a formula in k"),
+        "valves": optional(_by_name(valve_reports), "what was reported for each valve, by its name"),
+    }
+    return {
+        "gas": _section("Gas", declaration.GAS, {"species": optional(TextEntry, "name of the gas")}),
+        "actuator": _section("Actuator", declaration.ACTUATOR, {"leak": optional(leak, "leak across the vane")}),
+        "friction": _section("Friction", declaration.FRICTION),
+        "foot_plate": _section("FootPlate", declaration.FOOT_PLATE),
+        "supply": _section("Supply", declaration.SUPPLY, {"relieving": optional(FlagEntry, declaration.RELIEVING)}),
+        "flow": _section("Flow", declaration.FLOW),
+        "reported": _section("Reported", declaration.REPORTED, reported),
+    }
+
+
+def parameter_file() -> type[BaseModel]:
+    """Return the model of a parameter set file, for the valves that are loaded."""
+    return _parameter_file(tuple(VALVES.items()))
+
+
+@functools.lru_cache(maxsize=4)
+def _parameter_file(_kinds: Any) -> type[BaseModel]:
+    fields: dict[str, Any] = {
+        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "name": (str, Field(pattern=NAME)),
+        "title": (str, Field(min_length=1)),
+        "citation": optional(Citation, "where the set was published"),
+        "notes": (str, ""),
+        "completed_by": (str, Field("", description="name of a set that completes this one")),
+        "default_valve": (str, Field(description="name of the valve that a device has by default")),
+        "accepted": (list[Accepted], Field(default_factory=list, description="contradictions kept for a reason")),
+    }
+    fields |= {name: optional(model, f"section {name}") for name, model in _sections().items()}
+    fields["valves"] = (
+        _by_name(one_of([_valve_section(kind) for kind in VALVES])),
+        Field(min_length=1, description="valves by name"),
+    )
+    return table("ParameterFile", fields)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a parameter set file, with the valves of all packages."""
+    VALVES.load_all()
+    return make_schema(parameter_file(), "ppafo parameter set")
+
 
 _FILE = TomlKind("parameter set", "parameters", resources.files("ppafo.parameters") / "sets", ParameterError)
 
@@ -42,15 +117,13 @@ def load_parameter_set(name_or_path: str | Path) -> ParameterSet:
 
 
 def parse_parameter_set(content: bytes, file: str) -> ParameterSet:
-    """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it."""
+    """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it.
+
+    ParameterError for one that is not usable.
+    """
     document = _FILE.parse(content, file)
     _find_valves(document)
-    try:
-        parsed = parameter_file().model_validate(document)
-    except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), parameter_file())
-        raise ParameterError(f"{file}: {problem}") from error
-    parameter_set = _flatten(parsed, file)
+    parameter_set = _flatten(validate(parameter_file(), document, file, ParameterError), file)
     _check(parameter_set)
     return parameter_set
 
@@ -95,7 +168,7 @@ def _leaves(node: object, path: str) -> Iterator[tuple[str, object]]:
 def _check(parameter_set: ParameterSet) -> None:
     """Refuse units that do not exist and names of valves that the set does not have."""
     chosen_valve(parameter_set, None)
-    declared = parameter_set.declared()
+    declared = parameter_set.declarations()
     for path, entry in parameter_set.numbers.items():
         if path not in declared:
             valve = path.split(".")[2]

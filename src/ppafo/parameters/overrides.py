@@ -41,7 +41,7 @@ class _Order:
         inside = self.typed.removeprefix(_CHOSEN)
         return f"valves.{self.chosen}.{inside}" if self.typed.startswith(_CHOSEN) else self.typed
 
-    def named(self, path: str) -> str:
+    def typed_path(self, path: str) -> str:
         """Return a path of the set in the way in which this override was typed."""
         own = f"valves.{self.chosen}."
         return _CHOSEN + path.removeprefix(own) if self.typed.startswith(_CHOSEN) and path.startswith(own) else path
@@ -57,7 +57,8 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
     Naming another gas brings that gas's molar mass and heat capacity ratio; giving an orifice in the form of ISO 6358
     drops its area and discharge coefficient, and the reverse. ``supply.pressure`` is that of both regulators where both
-    have one, unless ``supply.dorsiflexion_pressure`` is given apart.
+    have one, unless ``supply.dorsiflexion_pressure`` is given apart. ParameterError for an override that does not fit
+    the set.
     """
     chosen = chosen_valve(parameter_set, valve)
     orders = list(overrides)
@@ -66,7 +67,9 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
         on_one_line = one_line(override)
         path, separator, text = (part.strip() for part in on_one_line.partition("="))
         if not separator or not path or not text:
-            raise ParameterError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
+            raise ParameterError(
+                f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2"
+            )
         change = _CHANGES.get(path, _with_number)
         is_for_both = path == PRESSURE_PATH and has_one_pressure(parameter_set) and not _is_apart(given, number)
         parameter_set = change(parameter_set, _Order(path, chosen, text))
@@ -89,9 +92,9 @@ def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
 
 
 def _with_number(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
-    declared, path = parameter_set.declared(), order.path
+    declared, path = parameter_set.declarations(), order.path
     if path not in declared:
-        allowed = [order.named(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
+        allowed = [order.typed_path(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
         hint = nearest_name(order.typed, allowed) or f"; for example {', '.join(_neighbours(order.typed, allowed))}"
         raise order.refusal(f"{parameter_set.file} has no value '{order.typed}'{hint}")
     try:
@@ -108,7 +111,7 @@ def _with_species(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
     path, text = order.path, order.text
     species = SPECIES.get(text)
     if species is None:
-        raise order.refusal(f"unknown gas{nearest_name(text, SPECIES)}; known are {', '.join(SPECIES)}")
+        raise order.refusal(f"unknown gas{nearest_name(text, SPECIES)}; available: {', '.join(SPECIES)}")
     note = f"follows from the override {path}={text}"
     constants = {"gas.molar_mass": (species.molar_mass, "kg/mol")}
     constants["gas.heat_capacity_ratio"] = (species.heat_capacity_ratio, "")

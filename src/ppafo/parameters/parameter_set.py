@@ -46,13 +46,16 @@ class ParameterSet:
         """Return every value of the set by path, as it was given: texts, then flags, then numbers."""
         return {**self.texts, **self.flags, **self.numbers}
 
-    def declared(self) -> Mapping[str, Quantity]:
+    def declarations(self) -> Mapping[str, Quantity]:
         """Return the declaration of every number that this set may hold, by path."""
         return quantities(self.valve_kinds)
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
-    """Return the name of the valve to use: the requested one, else the set's default."""
+    """Return the name of the valve to use: the requested one, else the set's default.
+
+    ParameterError where the set has no such valve.
+    """
     name = valve or parameter_set.default_valve
     if name not in parameter_set.valve_kinds:
         known = ", ".join(parameter_set.valve_kinds)
@@ -62,20 +65,25 @@ def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
 
 
 def atmospheric_pressure(parameter_set: ParameterSet) -> float:
-    """Return the pressure [Pa absolute] from which the set's gauge pressures count."""
+    """Return the pressure [Pa absolute] from which the set's gauge pressures count.
+
+    ParameterError where it is not given as absolute.
+    """
     entry = parameter_set.numbers.get(ATMOSPHERE_PATH)
     if entry is None:
         return STANDARD_ATMOSPHERE
     if not entry.unit.endswith("_a"):
         unit = entry.unit
-        raise ParameterError(f"{parameter_set.file}: {ATMOSPHERE_PATH} = {entry.value:g} {unit}: give it as absolute")
-    return entry_in_si(entry, parameter_set.declared()[ATMOSPHERE_PATH], STANDARD_ATMOSPHERE)
+        raise ParameterError(
+            f"{parameter_set.file}: {ATMOSPHERE_PATH} = {entry.value:g} {unit}: give it as an absolute pressure"
+        )
+    return entry_in_si(entry, parameter_set.declarations()[ATMOSPHERE_PATH], STANDARD_ATMOSPHERE)
 
 
 def has_one_pressure(parameter_set: ParameterSet) -> bool:
     """Tell whether both regulators are set to one pressure, so that a change of the first is one of both."""
     entries = [parameter_set.numbers.get(path) for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)]
-    declared, atmosphere = parameter_set.declared(), atmospheric_pressure(parameter_set)
+    declared, atmosphere = parameter_set.declarations(), atmospheric_pressure(parameter_set)
     try:
         first, second = (
             entry_in_si(entry, declared[PRESSURE_PATH], atmosphere) for entry in entries if entry is not None
@@ -115,7 +123,7 @@ def number_in_si(parameter_set: ParameterSet, path: str) -> float | None:
     if entry is None:
         return None
     try:
-        return entry_in_si(entry, parameter_set.declared()[path], atmospheric_pressure(parameter_set))
+        return entry_in_si(entry, parameter_set.declarations()[path], atmospheric_pressure(parameter_set))
     except UnitError:
         return base_value(entry.value, entry.unit)
 

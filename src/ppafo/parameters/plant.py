@@ -17,7 +17,7 @@ def orifice_conductance(orifice: Orifice | SonicOrifice, gas: Gas) -> float:
 
 
 def orifice_curve(orifice: Orifice | SonicOrifice, gas: Gas, linear_ratio: float) -> FlowCurve:
-    """Flow function of an orifice in either form. Equations (6), (7)."""
+    """Flow function [-] of an orifice in either form, linear above ``linear_ratio`` [-]. Equations (6), (7)."""
     if isinstance(orifice, SonicOrifice):
         return iso6358_curve(orifice.critical_ratio, linear_ratio)
     return isentropic_curve(gas.heat_capacity_ratio, linear_ratio)

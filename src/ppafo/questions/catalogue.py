@@ -5,22 +5,22 @@ import importlib
 from ppafo.questions.question import Question
 
 QUESTIONS: dict[str, str] = {
-    "reproduce": "run the paper's experiments and report against its claims",
-    "unreported": "what the paper's results imply about the settings that it does not print",
-    "sweep": "run a study: many runs, a row for each, resumable",
-    "compare": "compare configurations, over an uncertain device too",
-    "sensitivity": "say which uncertain value matters: Sobol, Shapley or Morris indices",
-    "montecarlo": "draw until a statistic is known well enough",
-    "find": "the lowest or highest value of a number that meets a condition on a metric",
-    "identify": "bench recordings in, parameter set with uncertainty out",
+    "reproduce": "reproduce the paper's experiments and check its claims",
+    "unreported": "find what the paper's results imply about settings that it does not report",
+    "sweep": "run a study: many runs, one row each, resumable",
+    "compare": "compare configurations, also over an uncertain device",
+    "sensitivity": "rank uncertain values by their influence: Sobol, Shapley or Morris indices",
+    "montecarlo": "draw until the interval of a statistic is narrow enough",
+    "find": "find the lowest or highest value that meets a condition on a metric",
+    "identify": "identify a parameter set, with uncertainty, from bench recordings",
     "validate": "compare a parameter set with recordings, channel by channel",
-    "walk": "walk with the device, without it, and as the healthy gait would have it",
-    "endurance": "how long a bottle of gas lasts for a gas use, and why it ends",
-    "design": "find the parts and settings that no others beat in error, gas and mass",
-    "size": "torque profile and hours of use in, smallest valve, pressure and bottle out",
+    "walk": "simulate walking with the device, without it, and healthy",
+    "endurance": "compute how long a bottle of gas lasts, and why it ends",
+    "design": "find Pareto-optimal parts and settings: error, gas and mass",
+    "size": "find the smallest valve, pressure and bottle for a torque profile and hours of use",
     "parts": "list real parts with the origin of every figure",
-    "tune": "search gains for a goal under constraints, robust where asked",
-    "league": "rank every controller on a task, with the best that is possible",
+    "tune": "tune gains for an objective under constraints, optionally robust",
+    "league": "rank every controller on a task against what is possible at best",
 }
 """Name of the command to what it does, in the order of the help."""
 

@@ -74,17 +74,17 @@ class Question:
 
     def solver(self) -> Callable[..., Solved]:
         """Load and return the function that solves the question."""
-        found: Callable[..., Solved] = loaded(self.solve)
+        found: Callable[..., Solved] = load_name(self.solve)
         return found
 
 
-def loaded(place: str) -> Any:
+def load_name(place: str) -> Any:
     """Return what ``module:name`` stands for."""
     module, _, name = place.partition(":")
     return getattr(importlib.import_module(module), name)
 
 
-_MOST_DIGITS = 40
+_MAXIMUM_DIGITS = 40
 """A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
 
 
@@ -100,10 +100,10 @@ def counting_number(text: str) -> int:
 
 def _number_from(text: str, least: int) -> int:
     digits = text.replace("_", "").replace(",", "")
-    is_usable = digits.isascii() and digits.isdecimal() and len(digits) <= _MOST_DIGITS
+    is_usable = digits.isascii() and digits.isdecimal() and len(digits) <= _MAXIMUM_DIGITS
     if not is_usable or int(digits) < least:
         raise argparse.ArgumentTypeError(
-            f"{text}: must be a whole number, {least} or more, of at most {_MOST_DIGITS} digits"
+            f"{text}: must be a whole number, {least} or more, of at most {_MAXIMUM_DIGITS} digits"
         )
     return int(digits)
 
@@ -142,20 +142,22 @@ def minutes(text: str) -> float:
     try:
         return float(text) if _NUMBER.fullmatch(text) else parse_quantity(text, "s") / 60.0
     except UnitError as error:
-        raise argparse.ArgumentTypeError(f"{text!r}: a number of minutes, or a time such as '90 s'; {error}") from error
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: must be a number of minutes, or a time such as '90 s': {error}"
+        ) from error
 
 
 SET = Argument(
     ("--set",),
     "overrides",
-    "change one value, for example valve.area=12.6mm^2; may be given again",
+    "override one value, for example valve.area=12.6mm^2; may be repeated",
     metavar="PATH=VALUE",
     action="append",
     default=(),
 )
-SEED = Argument(("--seed",), "seed", "random seed; that of the file unless given", metavar="N", type=whole_number)
+SEED = Argument(("--seed",), "seed", "random seed; default: that of the file", metavar="N", type=whole_number)
 THREADS = Argument(
-    ("--threads",), "threads", "number of threads; all cores unless given", metavar="N", type=counting_number
+    ("--threads",), "threads", "number of threads; default: all cores", metavar="N", type=counting_number
 )
 CONFIDENCE = Argument(
     ("--confidence",),

@@ -100,7 +100,12 @@ def observables(plant: PlantParameters, rig: RigPhysics, state: RigState, angle:
     """What a bench could observe at an angle [rad]."""
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure)
-    return Observables(node_1, node_2, torque, static_limit(plant, rig, node_1.pressure, node_2.pressure))
+    return Observables(
+        node_1=node_1,
+        node_2=node_2,
+        torque=torque,
+        static_limit=static_limit(plant, rig, node_1.pressure, node_2.pressure),
+    )
 
 
 def sensor_rate(reading: float, true: float, rate: float) -> float:
@@ -133,12 +138,28 @@ def side(
     vented = orifice_exchange(rig, port, room, rig.ports_open * vent_fraction, valve_orifice, 1.0)
     mass, energy = supplied.mass - vented.mass, supplied.energy - vented.energy
     if rig.line_volume <= 0.0:
-        return Side(supplied.mass, vented.mass, energy, mass, energy, 0.0, 0.0, 0.0)
+        return Side(
+            supplied_mass=supplied.mass,
+            vented_mass=vented.mass,
+            enthalpy_in=energy,
+            into_mass=mass,
+            into_energy=energy,
+            line_mass=0.0,
+            line_energy=0.0,
+            line_heat=0.0,
+        )
     through = orifice_exchange(rig, port, node, 1.0, line_orifice, 1.0)
     heat = wall_heat(rig, port, rig.line_volume)
     line_energy = energy_rate(energy - through.energy, port.pressure, 0.0, heat)
     return Side(
-        supplied.mass, vented.mass, energy, through.mass, through.energy, mass - through.mass, line_energy, heat
+        supplied_mass=supplied.mass,
+        vented_mass=vented.mass,
+        enthalpy_in=energy,
+        into_mass=through.mass,
+        into_energy=through.energy,
+        line_mass=mass - through.mass,
+        line_energy=line_energy,
+        line_heat=heat,
     )
 
 
@@ -210,25 +231,25 @@ def rig_rates(
     heat_1, heat_2 = wall_heat(rig, node_1, volume_1), wall_heat(rig, node_2, volume_2)
     gas = 1.0 - rig.chambers_open
     return RigState(
-        sliding,
-        sliding_acceleration(plant, rig, state, node_1, node_2, angle, direction),
-        gas * (side_1.into_mass - leak.mass),
-        gas * energy_rate(side_1.into_energy - leak.energy, node_1.pressure, grows, heat_1),
-        gas * (side_2.into_mass + leak.mass),
-        gas * energy_rate(side_2.into_energy + leak.energy, node_2.pressure, -grows, heat_2),
-        gas * side_1.line_mass,
-        gas * side_1.line_energy,
-        gas * side_2.line_mass,
-        gas * side_2.line_energy,
-        gas * (side_1.supplied_mass + side_2.supplied_mass),
-        gas * (side_1.vented_mass + side_2.vented_mass),
-        gas * leak.mass,
-        droop_rate(rig, state.supply_drop_1, side_1.supplied_mass),
-        droop_rate(rig, state.supply_drop_2, side_2.supplied_mass),
-        gas * (side_1.enthalpy_in + side_2.enthalpy_in),
-        gas * grows * (node_1.pressure - node_2.pressure),
-        gas * (heat_1 + heat_2 + side_1.line_heat + side_2.line_heat),
-        sensor_rate(state.sensor_angle, angle, rig.angle_follow_rate),
-        sensor_rate(state.sensor_pressure_1, node_1.pressure, rig.pressure_follow_rate),
-        sensor_rate(state.sensor_pressure_2, node_2.pressure, rig.pressure_follow_rate),
+        angle=sliding,
+        angular_velocity=sliding_acceleration(plant, rig, state, node_1, node_2, angle, direction),
+        mass_1=gas * (side_1.into_mass - leak.mass),
+        energy_1=gas * energy_rate(side_1.into_energy - leak.energy, node_1.pressure, grows, heat_1),
+        mass_2=gas * (side_2.into_mass + leak.mass),
+        energy_2=gas * energy_rate(side_2.into_energy + leak.energy, node_2.pressure, -grows, heat_2),
+        line_mass_1=gas * side_1.line_mass,
+        line_energy_1=gas * side_1.line_energy,
+        line_mass_2=gas * side_2.line_mass,
+        line_energy_2=gas * side_2.line_energy,
+        supplied_mass=gas * (side_1.supplied_mass + side_2.supplied_mass),
+        vented_mass=gas * (side_1.vented_mass + side_2.vented_mass),
+        leaked_mass=gas * leak.mass,
+        supply_drop_1=droop_rate(rig, state.supply_drop_1, side_1.supplied_mass),
+        supply_drop_2=droop_rate(rig, state.supply_drop_2, side_2.supplied_mass),
+        enthalpy_in=gas * (side_1.enthalpy_in + side_2.enthalpy_in),
+        work_done=gas * grows * (node_1.pressure - node_2.pressure),
+        heat_in=gas * (heat_1 + heat_2 + side_1.line_heat + side_2.line_heat),
+        sensor_angle=sensor_rate(state.sensor_angle, angle, rig.angle_follow_rate),
+        sensor_pressure_1=sensor_rate(state.sensor_pressure_1, node_1.pressure, rig.pressure_follow_rate),
+        sensor_pressure_2=sensor_rate(state.sensor_pressure_2, node_2.pressure, rig.pressure_follow_rate),
     )

@@ -101,4 +101,6 @@ def line_orifice(device: Device, preset: Preset) -> ExactOrifice:
         gas.specific_gas_constant,
         gas.temperature,
     )
-    return ExactOrifice(conductance, 0.0, gas.heat_capacity_ratio, device.flow.linear_ratio)
+    return ExactOrifice(
+        conductance=conductance, is_iso6358=0.0, number=gas.heat_capacity_ratio, linear_ratio=device.flow.linear_ratio
+    )

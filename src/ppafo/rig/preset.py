@@ -5,14 +5,50 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from ppafo.documents.problems import shown
+from pydantic import BaseModel, Field
+
+from ppafo.documents.models import STRICT, make_schema, table
+from ppafo.documents.problems import quote
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
+from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import is_within
 from ppafo.rig.declaration import PATHS, SECTIONS
 from ppafo.units import parse_quantity, to_si
+
+
+class PresetValue(BaseModel):
+    """A value of the rig, with its reason."""
+
+    model_config = STRICT
+
+    value: float = Field(description="the number, in the unit beside it")
+    unit: str = Field(description="unit of the number, such as 'mm^2'; empty for a plain number")
+    reason: str = Field(min_length=1, description="reason for the number: a source, or why it was chosen")
+
+
+def _description(quantity: Quantity) -> str:
+    return f"{quantity.summary} [{quantity.unit or '-'}]"
+
+
+def _section(name: str, quantities: tuple[Quantity, ...]) -> type[BaseModel]:
+    title = "".join(part.capitalize() for part in name.split("_"))
+    return table(title, {item.name: (PresetValue, Field(description=_description(item))) for item in quantities})
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a preset; every value is needed."""
+    fields: dict[str, Any] = {
+        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "name": (str, Field(description="name of the preset")),
+        "title": (str, Field(description="which test bench it represents, in one line")),
+        "notes": (str, Field(description="what is on, what is off, and where the values come from")),
+    }
+    fields |= {name: (_section(name, members), Field()) for name, members in SECTIONS.items()}
+    return make_schema(table("RigPreset", fields), "ppafo rig preset")
+
 
 PREFIX = "rig."
 """An override whose path begins so belongs to the preset, any other one to the device or the experiment."""
@@ -83,10 +119,10 @@ def _override(preset: Preset, path: str, text: str) -> Preset:
 def _parse(document: dict[str, Any], file: str) -> Preset:
     """Check keys, units and ranges of a document; every value must be there."""
     if not document:
-        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints what belongs in it")
+        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints its format")
     _check_names(document, (*_HEAD, *SECTIONS), "", file)
     if document.get("schema_version") != 1:
-        raise ParameterError(f"{file}: schema_version must be 1, it is {shown(document.get('schema_version'))}")
+        raise ParameterError(f"{file}: schema_version must be 1, it is {quote(document.get('schema_version'))}")
     for key in _HEAD[1:]:
         if not isinstance(document.get(key), str):
             raise ParameterError(f"{file}: '{key}' must be a text in quotation marks")
@@ -103,7 +139,7 @@ def _with_entry(preset: Preset, path: str, entry: dict[str, Any], file: str) -> 
     _check_names(entry, _ENTRY, f"{path}.", file)
     value, unit, reason = (entry.get(name) for name in _ENTRY)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ParameterError(f"{file}: {path}.value = {shown(value)} must be a number")
+        raise ParameterError(f"{file}: {path}.value = {quote(value)} must be a number")
     if not isinstance(unit, str) or not isinstance(reason, str) or not reason:
         raise ParameterError(f"{file}: {path} needs a unit and a reason, both texts")
     try:

@@ -57,7 +57,7 @@ def find_experiment(name: str) -> Experiment:
     """Return the experiment of this name. ParameterError where there is none."""
     if name not in EXPERIMENTS:
         hint = nearest_name(name, EXPERIMENTS)
-        raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; there are {', '.join(EXPERIMENTS)}")
+        raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; available: {', '.join(EXPERIMENTS)}")
     return EXPERIMENTS[name]
 
 

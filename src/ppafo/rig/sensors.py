@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.model.sensors import quantised
+from ppafo.model.sensors import quantise
 from ppafo.rig.preset import Preset
 
 Floats = NDArray[np.float64]
@@ -44,7 +44,7 @@ class Sensor:
 
     def reads(self, true: float, sample: int) -> float:
         """Return the reading at a sample, in the unit of ``true`` [SI]."""
-        return quantised(true + self.offset + float(self.noise[sample]), self.quantum)
+        return quantise(true + self.offset + float(self.noise[sample]), self.quantum)
 
     def readings(self, true: Floats) -> Floats:
         """Return the readings [SI] at the first samples."""

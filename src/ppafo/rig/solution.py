@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.reference import vane_mode
-from ppafo.engine.reference.sampling import SAME_TIME
-from ppafo.engine.reference.segment import solve_segment
+from ppafo.engine.reference.sampling import SAME_TIME, solve_segment
 from ppafo.engine.rows import numbers, rebuild
 from ppafo.errors import SimulationError
-from ppafo.model.friction import holds_still
 from ppafo.model.sensors import Measurement
-from ppafo.model.vane import actuator_torque
+from ppafo.model.vane import actuator_torque, holds_still
 from ppafo.rig.rows import RigState
 from ppafo.rig.run import RigRun, RigSolution, sensor_signals, spool_position
 from ppafo.rig.source import ANGLE, INPUTS, OUTPUTS, RATE, UNKNOWNS, load_rig_program
@@ -193,7 +191,12 @@ class _Rig:
         )
         names = ("angle", "pressure_1", "pressure_2")
         angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, signals, strict=True))
-        return Measurement(angle, first, second, actuator_torque(first, second, self.plant.torque_constant))
+        return Measurement(
+            angle=angle,
+            pressure_1=first,
+            pressure_2=second,
+            torque=actuator_torque(first, second, self.plant.torque_constant),
+        )
 
     def advance_to(self, end: float) -> None:
         """Integrate over all that happens on the way."""

@@ -45,6 +45,7 @@ CHANNELS: dict[str, ChannelKind] = {
     ),
     "heel_force": ChannelKind("N", "force under the heel as its sensor follows it"),
     "toe_force": ChannelKind("N", "force under the toes as its sensor follows it"),
+    "dorsiflexor_moment": ChannelKind("N m", "moment of the muscles that lift the foot, 0 or more"),
     "toe_height": ChannelKind(
         "m", "toes over the ground, against the healthy gait with a flat foot at the same instant"
     ),

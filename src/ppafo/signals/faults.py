@@ -14,8 +14,8 @@ GAP_SAMPLES = 10.0
 FEWEST_AT_LIMIT = 20
 """Samples at exactly the same value from which a sensor may be at its limit."""
 
-_NOISY_SHARE = 0.2
-_ABRUPT_SHARE = 0.3
+_NOISY_FRACTION = 0.2
+_ABRUPT_FRACTION = 0.3
 _BEFORE = 5
 _EXCEPTIONAL = 5
 _PARTS = 20
@@ -91,7 +91,7 @@ def is_at_limit(values: Floats, plateau: Plateau) -> bool:
 def is_noisy(values: Floats) -> bool:
     """Return whether the values go up and down from sample to sample, as no smooth curve does."""
     ways = np.sign(np.diff(values))
-    return ways.size > 1 and float((ways[1:] * ways[:-1] < 0.0).mean()) > _NOISY_SHARE
+    return ways.size > 1 and float((ways[1:] * ways[:-1] < 0.0).mean()) > _NOISY_FRACTION
 
 
 def scatters(values: Floats) -> bool:
@@ -114,4 +114,4 @@ def _runs_into(values: Floats, plateau: Plateau) -> bool:
     if plateau.first < _BEFORE:
         return False
     steps = np.abs(values[_BEFORE:] - values[:-_BEFORE])
-    return float(steps[plateau.first - _BEFORE]) > _ABRUPT_SHARE * float(steps.max())
+    return float(steps[plateau.first - _BEFORE]) > _ABRUPT_FRACTION * float(steps.max())

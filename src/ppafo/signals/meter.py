@@ -41,7 +41,7 @@ class Course(NamedTuple):
 
 
 SAME_LEVEL = 1.0e-9
-"""Share of the largest reference up to which two values of it are the same level."""
+"""Fraction of the largest reference up to which two values of it are the same level."""
 
 
 def is_away(reference: float, last: float, tolerance: float) -> bool:
@@ -49,10 +49,15 @@ def is_away(reference: float, last: float, tolerance: float) -> bool:
     return abs(reference - last) > tolerance
 
 
-def followed(course: Course, sample: Sample) -> Course:
+def advance_course(course: Course, sample: Sample) -> Course:
     """The course with one sample more, of a monotone reference: away from its last value first, then at rest."""
     away = is_away(sample.reference, course.last, course.tolerance)
-    return Course(course.last, course.largest, course.tolerance, sample.number + 1.0 if away else course.hold_start)
+    return Course(
+        last=course.last,
+        largest=course.largest,
+        tolerance=course.tolerance,
+        hold_start=sample.number + 1.0 if away else course.hold_start,
+    )
 
 
 def ends_before_hold(course: Course, sample: Sample) -> bool:

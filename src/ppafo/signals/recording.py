@@ -125,7 +125,7 @@ class Recording:
         kept = {name: Channel(channel.values[inside], channel.unit) for name, channel in self.channels.items()}
         return Recording(self.label, self.time[inside], kept, self.kind)
 
-    def resampled(self, times: ArrayLike) -> "Recording":
+    def resample(self, times: ArrayLike) -> "Recording":
         """Return the recording at other times [s] within its own: the last value of a held channel, else a line."""
         wanted = np.asarray(times, dtype=np.float64)
         if wanted.size and (wanted.min() < self.time[0] or wanted.max() > self.time[-1]):
@@ -138,7 +138,7 @@ class Recording:
     def _channel(self, name: str) -> Channel:
         if name not in self.channels:
             hint = nearest_name(name, self.names)
-            raise DataError(f"{self.label}: there is no channel '{name}'{hint}; there are {', '.join(self.names)}")
+            raise DataError(f"{self.label}: there is no channel '{name}'{hint}; available: {', '.join(self.names)}")
         return self.channels[name]
 
 
@@ -147,16 +147,16 @@ def recording_kind(name: str) -> RecordingKind:
     for kind in _KINDS:
         if kind == name:
             return kind
-    raise DataError(f"{name!r} is no kind of recording{nearest_name(name, _KINDS)}; there are {', '.join(_KINDS)}")
+    raise DataError(f"{name!r} is no kind of recording{nearest_name(name, _KINDS)}; available: {', '.join(_KINDS)}")
 
 
-def aligned(first: Recording, second: Recording) -> tuple[Recording, Recording]:
+def align(first: Recording, second: Recording) -> tuple[Recording, Recording]:
     """Return both recordings at the times of the first that lie within the second, for a comparison in time."""
     start, end = max(first.time[0], second.time[0]), min(first.time[-1], second.time[-1])
     if start > end:
         raise DataError(f"{first.label} and {second.label} have no time in common: {_span(first)}, {_span(second)}")
     common = first.between(float(start), float(end))
-    return common, second.resampled(common.time)
+    return common, second.resample(common.time)
 
 
 def _values_at(recording: Recording, name: str, times: Floats) -> Floats:

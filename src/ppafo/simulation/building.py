@@ -1,15 +1,17 @@
-"""From the document of a scenario file to a Scenario in SI units."""
+"""From the document of a scenario file to a Scenario in SI units, and the values in it that no source gives."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ppafo.errors import ParameterError, nearest_name, one_line
+from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
+from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
+from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
-from ppafo.parameters.parameter_set import chosen_valve
-from ppafo.simulation.assumptions import Hardware, read_assumptions
+from ppafo.parameters.parameter_set import chosen_valve, entry_text
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
     AT_REST,
@@ -20,14 +22,16 @@ from ppafo.simulation.declaration import (
     TORQUE_LEVEL,
     controller_settings,
     kind_at,
+    quantities,
     value_at,
 )
 from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.motion import read_motion, read_profile
-from ppafo.simulation.overriding import OverriddenDocument
+from ppafo.simulation.overriding import OverriddenDocument, device_paths, scenario_paths, split_override
 from ppafo.simulation.reading import Reading, quantity_text
-from ppafo.simulation.scenario import Control, Origin, ProfileChoice, Scenario, Sensors
+from ppafo.simulation.scenario import Assumption, Control, Origin, ProfileChoice, Scenario, Sensors
 
+_SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
 
@@ -45,6 +49,14 @@ class ScenarioRequest:
     content: dict[str, Any]
     overrides: tuple[str, ...]
     parameter_set: ParameterSet | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Hardware:
+    """The parameter set with all overrides in it and the name of its valve that is used."""
+
+    parameter_set: ParameterSet
+    valve: str
 
 
 def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
@@ -145,4 +157,62 @@ def _sensors(reading: Reading, clock: Clock) -> Sensors:
         seed=int(reading.number("sensors.seed", SEED)),
         angle_bandwidth=values["angle_bandwidth"],
         pressure_bandwidth=values["pressure_bandwidth"],
+    )
+
+
+def read_assumptions(
+    before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[str]
+) -> tuple[Assumption, ...]:
+    """Return every assumption that still has a value; one that an override replaced says what it was ``before``.
+
+    ScenarioError for a path that has no value.
+    """
+    replaced = frozenset(split_override(text)[0] for text in overrides)
+    notes: Mapping[str, str] = reading.document.get(_SECTION, {})
+    assumptions = []
+    for path, note in notes.items():
+        value, earlier = _value(reading, hardware, path), _value(before, hardware, path)
+        if value is None and earlier is None:
+            raise _unknown(reading, path)
+        if value is not None:
+            assumptions.append(
+                Assumption(path, value, _note(before, path, note, earlier) if path in replaced else note)
+            )
+    return tuple(assumptions)
+
+
+def _note(before: Reading, path: str, note: str, earlier: str | None) -> str:
+    """Return the note of a value that an override has replaced."""
+    was = earlier if value_at(before.document, path) is not None else "another value"
+    return f"set by an override; the scenario has {was}: {note}"
+
+
+def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
+    """Return the value at a path as written in the file or, where it has none, the default; None without either."""
+    given = value_at(reading.document, path)
+    if path in scenario_paths(reading.document) and given is not None:
+        return str(given)
+    quantity = quantities(reading.document).get(path)
+    return _device_value(hardware, path) if quantity is None else _default(quantity)
+
+
+def _device_value(hardware: Hardware, path: str) -> str | None:
+    full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+    entry = hardware.parameter_set.entries().get(full)
+    quantity = hardware.parameter_set.declarations().get(full)
+    if entry is not None:
+        return entry_text(entry)
+    if path == RELIEVING_PATH:
+        return "false"
+    return None if quantity is None else _default(quantity)
+
+
+def _default(quantity: Quantity) -> str | None:
+    return None if quantity.default is None else quantity_text(quantity.default, quantity.unit)
+
+
+def _unknown(reading: Reading, path: str) -> ScenarioError:
+    hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
+    return ScenarioError(
+        f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.answers.shown_metrics import metric_change, metric_level
-from ppafo.answers.text import aligned
+from ppafo.answers.text import align_columns
 from ppafo.simulation.document import plain
 
 MOVE = 1.0e-7
@@ -99,7 +99,7 @@ class Check:
         rows = [_cells(row, names, metric_level) for row in self.metrics]
         rows += [_cells(row, names, metric_change) for row in self.courses]
         head = f"Check of '{self.scenario}': what changes in runs that should be the same"
-        return "\n".join([head, *aligned([["", "value", *names, ""], *rows]), "", self.sentence])
+        return "\n".join([head, *align_columns([["", "value", *names, ""], *rows]), "", self.sentence])
 
     def document(self) -> dict[str, Any]:
         """Return the check as data that JSON can hold, in SI units."""

@@ -332,7 +332,9 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
 
 def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifice:
     """An orifice for the reference solver, with the exact flow function."""
-    conductance = orifice_conductance(orifice, device.gas)
-    if isinstance(orifice, SonicOrifice):
-        return ExactOrifice(conductance, 1.0, orifice.critical_ratio, device.flow.linear_ratio)
-    return ExactOrifice(conductance, 0.0, device.gas.heat_capacity_ratio, device.flow.linear_ratio)
+    return ExactOrifice(
+        conductance=orifice_conductance(orifice, device.gas),
+        is_iso6358=float(isinstance(orifice, SonicOrifice)),
+        number=orifice.critical_ratio if isinstance(orifice, SonicOrifice) else device.gas.heat_capacity_ratio,
+        linear_ratio=device.flow.linear_ratio,
+    )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.problems import shown
+from ppafo.documents.problems import quote
 from ppafo.errors import ScenarioError, UnitError, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import is_within
@@ -30,7 +30,7 @@ class Reading:
         value = value_at(self.document, path)
         if path in self.overridden:
             return f"{self.file}: override {path}={one_line(value)}"
-        return f"{self.file}: {path} = {shown(value)}"
+        return f"{self.file}: {path} = {quote(value)}"
 
     def refusal(self, path: str, reason: str) -> ScenarioError:
         """Return the error that says why the value at a path is not usable."""

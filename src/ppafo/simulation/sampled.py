@@ -84,7 +84,10 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
             pressure_1, pressure_2 = chamber_pressures(plant, angle, *masses)
         if program.ideal_sensors:
             return Measurement(
-                angle, pressure_1, pressure_2, actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+                angle=angle,
+                pressure_1=pressure_1,
+                pressure_2=pressure_2,
+                torque=actuator_torque(pressure_1, pressure_2, plant.torque_constant),
             )
         return measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
 

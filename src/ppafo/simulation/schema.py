@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, WithJsonSchema
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.documents.models import NAME, one_of, optional, published_schema, table
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration, supply_line
 
@@ -173,4 +173,4 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a scenario file, with the controllers and profiles of all packages."""
     CONTROLLERS.load_all()
     PROFILES.load_all()
-    return published_schema(scenario_file(), "ppafo scenario")
+    return make_schema(scenario_file(), "ppafo scenario")

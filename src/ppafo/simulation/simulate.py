@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
+from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.metrics.catalog import evaluate
-from ppafo.model.friction import sliding_friction
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.model.thermal import energy_per_content
-from ppafo.model.vane import gravity_torque
+from ppafo.model.vane import gravity_torque, sliding_friction
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -126,7 +126,7 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
     """
     found: dict[str, tuple[Floats, str]] = {}
     if run.lines is not None:
-        lines = LineState(*(rows[f"line_state.{name}"] for name in LineState._fields))  # type: ignore[arg-type]
+        lines = rebuilt(LineState, [rows[path] for path in leaf_paths(LineState, "line_state")])
         line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)
         found |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
         found["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")

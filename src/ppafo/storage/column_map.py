@@ -7,50 +7,47 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
-from ppafo.documents.models import published_schema
-from ppafo.documents.problems import first_problem
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.models import STRICT, Text, make_schema, read_model
+from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, nearest_name
 
-_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-_Text = Annotated[str, Field(min_length=1)]
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
 
 
 class MappedChannel(BaseModel):
     """Where one channel comes from: a column, or a constant. The value is sign * (factor * number + offset) in unit."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     column: Annotated[
-        Annotated[int, Field(ge=1)] | _Text | None, Field(description="number of the column from 1, or its name")
+        Annotated[int, Field(ge=1)] | Text | None, Field(description="number of the column from 1, or its name")
     ] = None
-    constant: Annotated[_Text | None, Field(description="instead of a column: one value, such as '1 bar_a'")] = None
+    constant: Annotated[Text | None, Field(description="instead of a column: one value, such as '1 bar_a'")] = None
     unit: Annotated[str, Field(description="unit of the value, such as 'bar_g'; '-' for a plain number")] = "-"
     sign: Annotated[Literal[1, -1], Field(description="-1 where the file has the opposite sign")] = 1
     factor: Annotated[float, Field(description="unit per number, for a sensor's volts")] = 1.0
     offset: Annotated[float, Field(description="added after the factor, in unit")] = 0.0
-    times: Annotated[_Text | None, Field(description="a quantity to multiply by, such as a lever arm '0.13 m'")] = None
+    times: Annotated[Text | None, Field(description="a quantity to multiply by, such as a lever arm '0.13 m'")] = None
     thousands: Annotated[Thousands | None, Field(description="mark between groups of digits")] = None
 
 
 class MappedDirection(BaseModel):
     """Direction (1 or -1, 0 for neither) from how fast a channel moves; sweeps one way are counted as repetitions."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    of: Annotated[_Text, Field(description="channel whose rate decides")]
-    threshold: Annotated[_Text, Field(description="slowest rate that counts, such as '2 mm/s'")]
-    window: Annotated[_Text, Field(description="time over which the channel is smoothed, such as '0.2 s'")]
+    of: Annotated[Text, Field(description="channel whose rate decides")]
+    threshold: Annotated[Text, Field(description="slowest rate that counts, such as '2 mm/s'")]
+    window: Annotated[Text, Field(description="time over which the channel is smoothed, such as '0.2 s'")]
     sign: Annotated[Literal[1, -1], Field(description="-1 where a growing channel means falling pressure")] = 1
 
 
 class ColumnMap(BaseModel):
     """How a file is written and what its columns are."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     delimiter: Annotated[
         Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what separates columns")
@@ -76,21 +73,20 @@ _FILE = TomlKind("file of column maps", "columns", resources.files("ppafo.storag
 
 
 def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
-    """Return a column map of a TOML file by its name; without a name the file's only one."""
-    file = label(str(path))
-    document = _FILE.parse(_FILE.read(path), file)
-    try:
-        maps = ColumnMaps.model_validate(document).columns
-    except ValidationError as error:
-        raise DataError(f"{file}: {first_problem(error.errors(include_url=False), ColumnMaps)}") from error
+    """Return a column map of a TOML file by its name; without a name the file's only one.
+
+    DataError where it has no such map, or several and no name is given.
+    """
+    parsed, file = read_model(_FILE, ColumnMaps, path)
+    maps = parsed.columns
     known = ", ".join(maps)
     if name is None and len(maps) > 1:
-        raise DataError(f"{file}: has several column maps; name one as {file}:NAME; there are {known}")
+        raise DataError(f"{file}: has several column maps; name one as {file}:NAME; available: {known}")
     if name is not None and name not in maps:
-        raise DataError(f"{file}: there is no column map '{name}'{nearest_name(name, maps)}; there are {known}")
+        raise DataError(f"{file}: there is no column map '{name}'{nearest_name(name, maps)}; available: {known}")
     return maps[name or next(iter(maps))]
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a file of column maps."""
-    return published_schema(ColumnMaps, "ppafo column maps")
+    return make_schema(ColumnMaps, "ppafo column maps")

@@ -31,7 +31,10 @@ class Column:
 
 
 def parse_header(cells: list[str]) -> list[Column]:
-    """Return the columns of a header such as ``time [s]``, ``pressure_1 [psi_g]``; time comes first."""
+    """Return the columns of a header such as ``time [s]``, ``pressure_1 [psi_g]``; time comes first.
+
+    DataError for one that cannot be read.
+    """
     if not cells:
         raise DataError("the header must come first, line 1 is empty")
     columns = [_column(cell) for cell in cells]
@@ -53,7 +56,10 @@ def _column(cell: str) -> Column:
 
 
 def check_clock(time: Floats, lines: Sequence[int]) -> None:
-    """Refuse a clock that goes backwards or stands still; ``lines`` are those of the rows in the file."""
+    """Refuse a clock [s] that goes backwards or stands still; ``lines`` are those of the rows in the file.
+
+    DataError names the line.
+    """
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
         index = int(stalled[0]) + 1
@@ -65,7 +71,10 @@ def check_clock(time: Floats, lines: Sequence[int]) -> None:
 
 
 def in_si(column: Column, values: Floats, atmosphere: float) -> Floats:
-    """Return the values in the unit in which a recording keeps them; gauge counts from ``atmosphere`` [Pa absolute]."""
+    """Return the values in the unit in which a recording keeps them; gauge counts from ``atmosphere`` [Pa absolute].
+
+    DataError for a unit that does not fit.
+    """
     from ppafo.units import check_unit, to_si
 
     try:

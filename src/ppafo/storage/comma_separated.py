@@ -62,7 +62,7 @@ def csv_bytes(recording: Recording) -> bytes:
 def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
     """Return the recording in a CSV file, in SI units; its label is the file's name unless one is given.
 
-    Gauge pressure counts from ``atmosphere`` [Pa absolute].
+    Gauge pressure counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
     """
     lines = _lines(path)
     first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
@@ -86,7 +86,10 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
 
 
 def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
-    """Return the kind that a comment names; a misspelt one must not let a simulation pass for a measurement."""
+    """Return the kind that a comment names; a misspelt one must not let a simulation pass for a measurement.
+
+    DataError for a misspelt one or two of them.
+    """
     named: list[RecordingKind] = []
     for match in filter(None, map(_MARK.fullmatch, comments)):
         near = difflib.get_close_matches(match[1], _MARKS, n=1, cutoff=_SIMILAR)

@@ -17,14 +17,14 @@ LEFT_ASIDE = ".writing-"
 _CURRENT_FOLDER, _EXCHANGE = -100, 2
 """``AT_FDCWD`` and ``RENAME_EXCHANGE`` of Linux."""
 
-MOST_BYTES_RECORDED = 2_000_000_000
+MAXIMUM_BYTES_RECORDED = 2_000_000_000
 """More than this is no recording that is read: an hour at 1 kHz with twenty channels stays below it, as text too."""
 
 
-def read_bytes(path: str | Path, most: int = MOST_BYTES_RECORDED) -> bytes:
-    """Return the content of a regular file that is there and is not empty, refused above ``most`` bytes."""
+def read_bytes(path: str | Path, maximum: int = MAXIMUM_BYTES_RECORDED) -> bytes:
+    """Return the content of a regular file; DataError where it is absent, empty or above ``maximum`` bytes."""
     try:
-        content = read_regular_file(Path(path), most)
+        content = read_regular_file(Path(path), maximum)
     except (OSError, ValueError) as error:
         raise DataError(f"{path}: cannot be read: {reason(error)}") from error
     if not content:

@@ -28,7 +28,10 @@ _COMMENT = "#"
 def read_foreign(
     path: str | Path, columns: ColumnMap, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE
 ) -> Recording:
-    """Return the recording in a table through a column map, in SI units; gauge counts from ``atmosphere`` [Pa abs]."""
+    """Return the recording in a table through a column map, in SI units; gauge counts from ``atmosphere`` [Pa abs].
+
+    DataError names the file and the column.
+    """
     try:
         lines = _lines(path, columns.encoding)
         names, rows = _rows(lines, columns)

@@ -58,7 +58,10 @@ def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None
 
 
 def read_netcdf(path: str | Path) -> Recording:
-    """Return the recording in a NetCDF file; one that points outside itself or unpacks to far more is refused."""
+    """Return the recording in a NetCDF file; one that points outside itself or unpacks to far more is refused.
+
+    DataError says what is wrong with it.
+    """
     content = read_bytes(path)
     try:
         return _recording(content, path)
@@ -98,7 +101,7 @@ def _own_variables(file: Any) -> dict[str, Any]:
         if len(getattr(variable, "shape", None) or ()) != 1 or variable.dtype.kind not in _NUMBERS:
             raise DataError(f"'{name}' must be numbers over '{TIME}' alone")
         if variable.is_virtual or variable.external:
-            raise DataError(f"the numbers of '{name}' lie in another file; a recording must contain its numbers itself")
+            raise DataError(f"the numbers of '{name}' are in another file; a recording must contain its numbers itself")
     return variables
 
 
@@ -135,11 +138,11 @@ def _check_chunks(name: str, variable: Any) -> None:
     size, chunks = variable.size, variable.chunks
     if chunks is None:
         if variable.id.get_storage_size() < size * variable.dtype.itemsize:
-            raise DataError(f"'{name}' has {size} values, and the file does not hold them")
+            raise DataError(f"'{name}' has {size} values, and the file does not contain them")
         return
     count = variable.id.get_num_chunks()
     if count < -(-size // chunks[0]):
-        raise DataError(f"'{name}' has {size} values, and the file does not hold all of them")
+        raise DataError(f"'{name}' has {size} values, and the file does not contain all of them")
     most = chunks[0] * variable.dtype.itemsize + _CHECKSUM_ROOM
     for number in range(count):
         stored = variable.id.get_chunk_info(number)

@@ -5,14 +5,14 @@ or in the older style ``datarows 9009``. Then come one line of labels and the ro
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ppafo.errors import DataError, first_twice, one_line
-from ppafo.signals import Recording
+from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.channels import TIME
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes, write_file
@@ -23,13 +23,16 @@ _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)",
 _DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
 _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
 _LONGEST_SHOWN = 40
+_KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSimTable:
     """A table: time [s] and columns by label; ``in_degrees`` is None where the header does not say.
 
-    ``first_line`` is the line of the file in which the first row stands.
+    ``is_old`` tells a header of the older style, that of SIMM, whose angles are in degrees.
+    ``kind`` is that of a recording that nobody measured, where this package wrote it.
+    ``first_line`` is the line of the file in which the first row stands, ``remarks`` say what was mended.
     """
 
     name: str
@@ -37,6 +40,9 @@ class OpenSimTable:
     columns: Mapping[str, Floats]
     in_degrees: bool | None
     first_line: int
+    remarks: tuple[str, ...] = ()
+    kind: RecordingKind = "measured"
+    is_old: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,21 +52,61 @@ class _Header:
     width: int | None
     in_degrees: bool | None
     end: int
+    kind: RecordingKind
+    is_old: bool
 
 
 def read_opensim(path: str | Path) -> OpenSimTable:
-    """Return the table in a ``.mot`` or ``.sto`` file; DataError names file, line and column of what is wrong."""
+    """Return the table in a ``.mot`` or ``.sto`` file; DataError names file, line and column of what is wrong.
+
+    A count of columns in the header that all rows contradict, and last rows that repeat a time, are mended; remarks say
+    so.
+    """
+    return _read(path, _number)
+
+
+def read_opensim_with_gaps(path: str | Path) -> OpenSimTable:
+    """Return the table as ``read_opensim`` does, with NaN where a cell says so, to fill or to refuse."""
+    return _read(path, _number_or_gap)
+
+
+Cell = Callable[[str, int, str], float]
+
+
+def _read(path: str | Path, cell: Cell) -> OpenSimTable:
     try:
         lines = _lines(read_bytes(path))
         header = _header(lines)
         number, labels = _labels(lines, header)
-        values = _rows(lines, number + 1, labels, header)
+        values, remarks = _without_repeats(_rows(lines, number + 1, labels, header, cell))
         time = values[:, 0]
         _check_clock(time, number + 1)
+        remarks = [*_width_remarks(labels, header), *remarks]
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     columns = {label: values[:, index] for index, label in enumerate(labels) if index > 0}
-    return OpenSimTable(header.name, time, columns, header.in_degrees, number + 1)
+    return OpenSimTable(
+        header.name, time, columns, header.in_degrees, number + 1, tuple(remarks), header.kind, header.is_old
+    )
+
+
+def _width_remarks(labels: list[str], header: _Header) -> list[str]:
+    """Return a remark where the header counts other columns than labels and rows have, which agree."""
+    if header.width is None or header.width == len(labels):
+        return []
+    return [f"the header states {header.width} columns, labels and every row have {len(labels)}, which were taken"]
+
+
+def _without_repeats(values: Floats) -> tuple[Floats, list[str]]:
+    """Return the rows without last ones that repeat a time, as some tools write them, and a remark on these."""
+    kept = len(values)
+    while kept > 1 and values[kept - 1, 0] == values[kept - 2, 0]:
+        kept -= 1
+    dropped = len(values) - kept
+    if dropped == 0:
+        return values, []
+    rows = "the last row repeats" if dropped == 1 else f"the last {dropped} rows repeat"
+    return values[:kept], [f"{rows} the time {values[-1, 0]:g} s and {'was' if dropped == 1 else 'were'} dropped"]
 
 
 def _lines(content: bytes) -> list[str]:
@@ -92,7 +138,10 @@ def _header(lines: list[str]) -> _Header:
     rows, width = (
         counts.get(new, counts.get(old)) for new, old in (("nrows", "datarows"), ("ncolumns", "datacolumns"))
     )
-    return _Header(one_line(name), rows, width, in_degrees, end)
+    kinds = [kind for line in lines[:end] for kind in _KINDS if line.strip() == f"kind={kind}"]
+    return _Header(
+        one_line(name), rows, width, in_degrees, end, kinds[0] if kinds else "measured", "datacolumns" in counts
+    )
 
 
 def _whole(text: str, key: str, number: int) -> int:
@@ -117,12 +166,12 @@ def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
     for number in range(header.end + 2, len(lines) + 1):
         if lines[number - 1].strip():
             labels = _cells(lines[number - 1])
-            _check_labels(labels, number, header)
+            _check_labels(labels, number)
             return number, labels
     raise DataError(f"has nothing after '{_END}': the file is cut off")
 
 
-def _check_labels(labels: list[str], number: int, header: _Header) -> None:
+def _check_labels(labels: list[str], number: int) -> None:
     if labels[0].lower() != TIME:
         raise DataError(
             f"line {number}: the first column must be '{TIME}', it is {one_line(labels[0])[:_LONGEST_SHOWN]!r}"
@@ -132,8 +181,6 @@ def _check_labels(labels: list[str], number: int, header: _Header) -> None:
         raise DataError(f"line {number}: there are two columns {twice!r}; rename or remove one")
     if "" in labels:
         raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
-    if header.width is not None and header.width != len(labels):
-        raise DataError(f"line {number} names {len(labels)} columns, the header states {header.width}")
 
 
 def _cells(line: str) -> list[str]:
@@ -143,7 +190,7 @@ def _cells(line: str) -> list[str]:
     return line.split()
 
 
-def _rows(lines: list[str], first: int, labels: list[str], header: _Header) -> Floats:
+def _rows(lines: list[str], first: int, labels: list[str], header: _Header, cell: Cell) -> Floats:
     """Return the numbers, row by row; blank lines may only follow the last row."""
     last = len(lines)
     while last >= first and not lines[last - 1].strip():
@@ -161,7 +208,9 @@ def _rows(lines: list[str], first: int, labels: list[str], header: _Header) -> F
         cells = lines[first - 1 + index].split()
         if len(cells) != len(labels):
             raise DataError(f"line {first + index} has {len(cells)} values for {len(labels)} columns")
-        table[index] = [_number(cell, first + index, label) for cell, label in zip(cells, labels, strict=True)]
+        table[index, 0] = _number(cells[0], first + index, labels[0])
+        pairs = zip(cells[1:], labels[1:], strict=True)
+        table[index, 1:] = [cell(text, first + index, label) for text, label in pairs]
     return table
 
 
@@ -173,6 +222,10 @@ def _number(cell: str, line: int, label: str) -> float:
             f"line {line}, column {label!r}: {shown!r} is not a finite number; fill the gap or cut the file there"
         )
     return value
+
+
+def _number_or_gap(cell: str, line: int, label: str) -> float:
+    return float("nan") if cell.lower() == "nan" else _number(cell, line, label)
 
 
 def _check_clock(time: Floats, first_line: int) -> None:

@@ -14,7 +14,7 @@ from ppafo.documents.json_text import json_document, json_text
 from ppafo.errors import DataError, one_line, reason
 from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_bytes, replace_folder
 
-_MOST_BYTES_WRITTEN = 16_000_000
+_MAXIMUM_BYTES_WRITTEN = 16_000_000
 """No document of ours comes near; one repeats what a scenario file of at most 1 MB says, but not sixteen times."""
 _NAMED = 3
 
@@ -56,7 +56,10 @@ _UNMARKED: dict[str, dict[str, tuple[str, ...]]] = {
 
 
 def marked_folder(command: str) -> FolderKind:
-    """Return the kind of folder that a command writes which marks it by ``MARK``."""
+    """Return the kind of folder that a command writes which marks it by ``MARK``.
+
+    Its list of files is a DataError where another command wrote the folder.
+    """
 
     def files_of(folder: Path) -> set[str]:
         if marking_command(folder) != command:
@@ -109,7 +112,7 @@ def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: st
 
 
 def check_owned_folder(folder: Path, kind: FolderKind) -> None:
-    """Refuse a folder that holds anything of somebody else's, or that cannot be made."""
+    """Refuse a folder that holds anything of somebody else's, or that cannot be made. It is a DataError."""
     if os.path.isdir(folder):  # noqa: PTH112  # Path.is_dir raises where no file can have the name
         _check_own(folder, kind)
     elif os.path.lexists(folder):
@@ -124,9 +127,9 @@ def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: Folder
 
 
 def read_json(path: Path) -> Any:
-    """Return what a JSON file of ours holds, as plain data."""
+    """Return what a JSON file of ours holds, as plain data. DataError where it is none."""
     try:
-        return json_document(read_bytes(path, _MOST_BYTES_WRITTEN))
+        return json_document(read_bytes(path, _MAXIMUM_BYTES_WRITTEN))
     except ValueError as error:
         raise DataError(f"{path}: is not JSON: {one_line(error)}") from error
 
@@ -145,5 +148,5 @@ def _check_own(folder: Path, kind: FolderKind) -> None:
     if foreign:
         shown = ", ".join(foreign[:_NAMED]) + (", ..." if len(foreign) > _NAMED else "")
         raise DataError(
-            f"{folder}: holds files that are not of its {kind.noun} ({shown}); move them or choose another folder"
+            f"{folder}: contains files that are not part of its {kind.noun} ({shown}); move them or use another folder"
         )

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _LEVEL = 1
-_MOST_VALUES = 200_000_000
+_MAXIMUM_VALUES = 200_000_000
 """Values of a table that is read; those of a chunk with channels over time are some millions."""
 
 _FLOATING = ("double", "float")
@@ -84,7 +84,7 @@ def _check_size(metadata: Any, name: str) -> None:
         for group in range(metadata.num_row_groups)
         for column in range(metadata.row_group(group).num_columns)
     )
-    if values > _MOST_VALUES:
+    if values > _MAXIMUM_VALUES:
         raise DataError(f"{name}: has {values:,} values, more than any table of a study")
 
 
@@ -93,7 +93,7 @@ def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:
     return {name: table.column(name).to_numpy() for name in table.column_names}
 
 
-def coded_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":
+def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":
     """Return a column of texts from their numbers in a list."""
     import pyarrow as pa
 

@@ -16,7 +16,7 @@ from ppafo.errors import DataError, reason
 from ppafo.storage.files import LEFT_ASIDE, write_file
 
 _ADDRESS_MARK = "://"
-_MOST_BYTES_OF_DOCUMENT = 100_000_000
+_MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
 
 
 class Place(Protocol):
@@ -28,11 +28,14 @@ class Place(Protocol):
         ...
 
     def names(self) -> frozenset[str]:
-        """Return the names of all files in it and in its folders, none where it does not exist."""
+        """Return the names of all files in it and in its folders, none where it does not exist.
+
+        DataError where the place is a file.
+        """
         ...
 
     def open(self, name: str) -> io.BufferedIOBase:
-        """Return a file for reading; OSError where there is none."""
+        """Return a file for reading; OSError where there is none, or no regular one."""
         ...
 
     def write(self, name: str, content: bytes) -> None:
@@ -55,9 +58,9 @@ class Place(Protocol):
 def read_document(place: Place, name: str) -> Any:
     """Return what a JSON file of ours holds, as plain data; OSError or ValueError where that is not possible."""
     with place.open(name) as file:
-        content = file.read(_MOST_BYTES_OF_DOCUMENT + 1)
-    if len(content) > _MOST_BYTES_OF_DOCUMENT:
-        raise ValueError(f"{name} is larger than {_MOST_BYTES_OF_DOCUMENT / 1e6:g} MB")
+        content = file.read(_MAXIMUM_BYTES_OF_DOCUMENT + 1)
+    if len(content) > _MAXIMUM_BYTES_OF_DOCUMENT:
+        raise ValueError(f"{name} is larger than {_MAXIMUM_BYTES_OF_DOCUMENT / 1e6:g} MB")
     return json_document(content)
 
 
@@ -79,14 +82,17 @@ class DiskFolder:
         return str(self.folder)
 
     def names(self) -> frozenset[str]:
-        """Return the names of all files, those left aside by a killed process not among them."""
+        """Return the names of all files, those left aside by a killed process not among them.
+
+        DataError where it is a file.
+        """
         if self.folder.exists() and not self.folder.is_dir():
             raise DataError(f"{self.folder}: is a file; the results need a folder")
         files = (path for path in self.folder.rglob("*") if not path.is_dir() and LEFT_ASIDE not in path.name)
         return frozenset(path.relative_to(self.folder).as_posix() for path in files)
 
     def open(self, name: str) -> io.BufferedIOBase:
-        """Return a file for reading."""
+        """Return a file for reading. OSError where it is no regular file."""
         path = self.folder / name
         if not stat.S_ISREG(path.stat().st_mode):
             raise OSError(None, f"{path} is not a regular file")
@@ -131,7 +137,7 @@ class RemoteFolder:
         return io.BytesIO(self.system.cat_file(f"{self.root}/{name}"))
 
     def write(self, name: str, content: bytes) -> None:
-        """Put a file whole."""
+        """Put a file whole. DataError where it cannot be written."""
         try:
             self.system.makedirs(f"{self.root}/{name}".rpartition("/")[0], exist_ok=True)
             self.system.pipe_file(f"{self.root}/{name}", content)

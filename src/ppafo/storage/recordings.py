@@ -18,7 +18,7 @@ WALK_RECORDING = "recording.nc"
 def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
     """Return the recording in a ``.nc`` or ``.csv`` file, or in a result folder or that of a walk.
 
-    Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute].
+    Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
     """
     place = Path(path)
     if place.is_dir():
@@ -26,7 +26,9 @@ def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) ->
         if recording.is_file() and not (place / RUN_FILE).exists():
             return _of_strangers(recording)
         if not (place / RUN_FILE).exists():
-            raise DataError(f"{place}: holds no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})")
+            raise DataError(
+                f"{place}: contains no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})"
+            )
         return read_result(place).recording
     if place.suffix == ".nc":
         return _of_strangers(place)

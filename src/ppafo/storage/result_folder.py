@@ -66,7 +66,7 @@ def check_result_folder(folder: str | Path) -> None:
 
 
 def read_result(folder: str | Path) -> StoredResult:
-    """Return what a result folder holds."""
+    """Return what a result folder holds. DataError for a folder that holds none."""
     place = Path(folder)
     if not place.is_dir():
         raise DataError(f"{folder}: is not a folder")
@@ -86,7 +86,7 @@ def _checksum(content: bytes) -> str:
 
 
 def read_document(folder: str | Path) -> dict[str, Any]:
-    """Return ``run.json`` of a result folder as plain data, or refuse what is not one."""
+    """Return ``run.json`` of a result folder as plain data, or refuse what is not one. DataError says why."""
     path = Path(folder) / RUN_FILE
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != FORMAT:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from ppafo.errors import DataError
 
-_MOST_SECONDS, _BYTES_PER_SECOND = 30.0, 5e6
+_MAXIMUM_SECONDS, _BYTES_PER_SECOND = 30.0, 5e6
 """How long reading may take: what a start takes on a busy computer, and as long as a slow disk needs for the file."""
 
-_ALWAYS_ALLOWED, _MOST_GROWTH = 400_000_000, 100
+_ALWAYS_ALLOWED, _MAXIMUM_GROWTH = 400_000_000, 100
 """Bytes of memory that reading any file may take, and how often its own size a larger one may."""
 
 _REFUSED, _OUT_OF_MEMORY = 76, 77
@@ -37,18 +37,18 @@ except MemoryError:
 def check_can_be_read(path: Path, module: str, function: str, library: str) -> None:
     """Refuse a file on which ``function(path)`` of a module brings down a process, or which it refuses itself.
 
-    Memory is limited where the system can do it.
+    Memory is limited where the system can do it. DataError says why.
     """
     if not sys.executable or not path.is_file():
         return
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     # -P: nothing of the working folder is imported
     words = [sys.executable, "-P", "-c", _TRIAL, module, function, library, str(path)]
-    most = _MOST_SECONDS + path.stat().st_size / _BYTES_PER_SECOND
+    limit = _MAXIMUM_SECONDS + path.stat().st_size / _BYTES_PER_SECOND
     nothing = subprocess.DEVNULL
     try:
         done = subprocess.run(
-            words, env=environment, stdin=nothing, stdout=subprocess.PIPE, stderr=nothing, timeout=most, check=False
+            words, env=environment, stdin=nothing, stdout=subprocess.PIPE, stderr=nothing, timeout=limit, check=False
         )
     except subprocess.TimeoutExpired as error:
         raise DataError(f"{path}: is damaged: the library {library} does not finish reading it") from error
@@ -68,6 +68,6 @@ def limit_memory(path: str) -> None:
     import resource
 
     has = int(pages.read_text().split()[0]) * resource.getpagesize()
-    most = has + max(_ALWAYS_ALLOWED, _MOST_GROWTH * Path(path).stat().st_size)
+    limit = has + max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * Path(path).stat().st_size)
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-    resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    resource.setrlimit(resource.RLIMIT_AS, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))

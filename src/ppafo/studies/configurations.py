@@ -45,7 +45,7 @@ def valid_baseline(name: str | None, names: Sequence[str]) -> str:
     """Return the configuration that all others are compared with; the first by default."""
     if name is not None and name not in names:
         raise StudyError(
-            f"baseline: no configuration '{name}'{nearest_name(name, names)}; there are {', '.join(names)}"
+            f"baseline: no configuration '{name}'{nearest_name(name, names)}; available: {', '.join(names)}"
         )
     return name if name is not None else names[0]
 

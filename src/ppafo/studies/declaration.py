@@ -6,45 +6,42 @@ says which unit it needs.
 
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, published_schema
+from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema
 
-MOST_RUNS = 2**32
-MOST_RUNS_OF_CHUNK = 1_000_000
+MAXIMUM_RUNS = 2**32
+MAXIMUM_RUNS_OF_CHUNK = 1_000_000
 LARGEST_SEED = 2**32 - 1
-MOST_GRID_VALUES = 1_000_000
+MAXIMUM_GRID_VALUES = 1_000_000
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-_Text = Annotated[str, Field(min_length=1)]
-_Texts = Annotated[tuple[_Text, ...], Field(strict=False)]
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
 _Values = Annotated[tuple[_Value, ...], Field(strict=False, min_length=1)]
-_Path = Annotated[_Text, Field(description="what is varied: a path as for --set, such as 'supply.pressure'")]
-_Only = Annotated[_Texts, Field(description="names of the configurations in which it varies; default: all")]
+_Path = Annotated[Text, Field(description="what is varied: a path as for --set, such as 'supply.pressure'")]
+_Only = Annotated[Texts, Field(description="names of the configurations in which it varies; default: all")]
 
 
 class Configuration(BaseModel):
     """One base scenario; several of them get the same draws."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     name: Annotated[str, Field(pattern=NAME, max_length=100, description="label in tables and figures")]
-    scenario: Annotated[_Text, Field(description="name of a scenario, or a path relative to this file")]
-    overrides: Annotated[_Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
+    scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
+    overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
 
 
 class Grid(BaseModel):
     """Values at equal distances, both ends among them."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["grid"]
     first: _Value
     last: _Value
-    count: Annotated[int, Field(ge=2, le=MOST_GRID_VALUES, description="number of values")]
+    count: Annotated[int, Field(ge=2, le=MAXIMUM_GRID_VALUES, description="number of values")]
     spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
     only: _Only = ()
 
@@ -52,7 +49,7 @@ class Grid(BaseModel):
 class Listed(BaseModel):
     """Values one by one; crossed with every other list and grid."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["list"]
@@ -63,7 +60,7 @@ class Listed(BaseModel):
 class Uniform(BaseModel):
     """Every value between two bounds equally likely."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["uniform"]
@@ -75,7 +72,7 @@ class Uniform(BaseModel):
 class LogUniform(BaseModel):
     """The logarithm equally likely between two bounds above 0."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["log_uniform"]
@@ -87,7 +84,7 @@ class LogUniform(BaseModel):
 class Normal(BaseModel):
     """A normal distribution."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["normal"]
@@ -99,7 +96,7 @@ class Normal(BaseModel):
 class TruncatedNormal(BaseModel):
     """A normal distribution of which only the part between two bounds is drawn; mean and deviation are of the whole."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["truncated_normal"]
@@ -113,7 +110,7 @@ class TruncatedNormal(BaseModel):
 class LogNormal(BaseModel):
     """A distribution whose logarithm is normal: median, and the factor that one standard deviation is."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["log_normal"]
@@ -125,7 +122,7 @@ class LogNormal(BaseModel):
 class Triangular(BaseModel):
     """A density that rises in a line to the mode and falls in a line from it."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["triangular"]
@@ -138,7 +135,7 @@ class Triangular(BaseModel):
 class Choice(BaseModel):
     """One of some values, each with its weight; equal weights by default."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["choice"]
@@ -150,7 +147,7 @@ class Choice(BaseModel):
 class WholeNumbers(BaseModel):
     """Equally likely whole numbers, both bounds among them; for the seed of the noise."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["whole_numbers"]
@@ -162,7 +159,7 @@ class WholeNumbers(BaseModel):
 class Stated(BaseModel):
     """Normal, with value and uncertainty as the parameter set states them; a half width of 95 % is 1.96 deviations."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Literal["stated"]
@@ -172,31 +169,31 @@ class Stated(BaseModel):
 class Correlation(BaseModel):
     """Correlation of two distributions, as that of the normal scores behind them (a Gaussian copula)."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    between: Annotated[tuple[_Text, _Text], Field(strict=False, description="two paths that have distributions")]
+    between: Annotated[tuple[Text, Text], Field(strict=False, description="two paths that have distributions")]
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
 
 
 class Sample(BaseModel):
     """How often and how the distributions are drawn; the whole sample is taken at every point of the grid."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     method: Literal["random", "latin_hypercube", "sobol"]
-    runs: Annotated[int, Field(ge=1, le=MOST_RUNS, description="number of draws; each is run in every configuration")]
+    runs: Annotated[int, Field(ge=1, le=MAXIMUM_RUNS, description="draws; each is run in every configuration")]
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 1
 
 
 class Outputs(BaseModel):
     """What is kept of every run."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    metrics: Annotated[_Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
-    trajectories: Annotated[_Texts, Field(description="channels kept for every run")] = ()
-    bands: Annotated[_Texts, Field(description="channels whose quantiles over all runs are kept")] = ()
-    every: Annotated[_Text, Field(description="time between two kept samples; default 10 ms")] = "10 ms"
+    metrics: Annotated[Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
+    trajectories: Annotated[Texts, Field(description="channels kept for every run")] = ()
+    bands: Annotated[Texts, Field(description="channels whose quantiles over all runs are kept")] = ()
+    every: Annotated[Text, Field(description="time between two kept samples; default 10 ms")] = "10 ms"
     quantiles: Annotated[tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...], Field(strict=False, min_length=1)] = (
         DEFAULT_QUANTILES
     )
@@ -205,11 +202,11 @@ class Outputs(BaseModel):
 class SameAs(BaseModel):
     """The value that another varied path has in the same run."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     path: _Path
     kind: Annotated[Literal["same_as"], Field(description="optional")] = "same_as"
-    same_as: Annotated[_Text, Field(description="a path that varies in this study")]
+    same_as: Annotated[Text, Field(description="a path that varies in this study")]
     only: _Only = ()
 
 
@@ -233,7 +230,7 @@ VARIED = get_args(Varied)
 class StudyFile(BaseModel):
     """A study file, as it is written."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -244,7 +241,9 @@ class StudyFile(BaseModel):
     runs_of_chunk: Annotated[
         int | None,
         Field(
-            ge=1, le=MOST_RUNS_OF_CHUNK, description="runs computed and written together; default: chosen automatically"
+            ge=1,
+            le=MAXIMUM_RUNS_OF_CHUNK,
+            description="runs computed and written together; default: chosen automatically",
         ),
     ] = None
     sample: Annotated[Sample | None, Field(description="required if there are distributions")] = None
@@ -253,4 +252,4 @@ class StudyFile(BaseModel):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a study file."""
-    return published_schema(StudyFile, "ppafo study")
+    return make_schema(StudyFile, "ppafo study")

@@ -17,7 +17,7 @@ class Distribution(Protocol):
     """What turns uniform numbers into values."""
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value [SI] below which each share lies."""
+        """Return the quantile [SI] at each probability."""
         ...
 
 
@@ -29,7 +29,7 @@ class UniformBetween:
     maximum: float
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value [SI] below which each share lies."""
+        """Return the quantile [SI] at each probability."""
         return self.minimum + (self.maximum - self.minimum) * uniform
 
 
@@ -41,7 +41,7 @@ class LogUniformBetween:
     maximum: float
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value [SI] below which each share lies."""
+        """Return the quantile [SI] at each probability."""
         return self.minimum * np.exp(math.log(self.maximum / self.minimum) * uniform)
 
 
@@ -53,7 +53,7 @@ class NormalAround:
     standard_deviation: float
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value [SI] below which each share lies."""
+        """Return the quantile [SI] at each probability."""
         from scipy.special import ndtri
 
         return np.asarray(self.mean + self.standard_deviation * ndtri(uniform))
@@ -69,7 +69,7 @@ class NormalBetween:
     maximum: float
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value [SI] below which each share lies; computed in the tail that keeps its digits."""
+        """Return the quantile [SI] at each probability; computed in the tail that keeps its digits."""
         from scipy.special import ndtr, ndtri
 
         low = (self.minimum - self.mean) / self.standard_deviation
@@ -89,7 +89,7 @@ class LogNormalAround:
     factor: float
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value [SI] below which each share lies."""
+        """Return the quantile [SI] at each probability."""
         from scipy.special import ndtri
 
         return np.asarray(self.median * np.exp(math.log(self.factor) * ndtri(uniform)))
@@ -104,7 +104,7 @@ class TriangularBetween:
     maximum: float
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value [SI] below which each share lies."""
+        """Return the quantile [SI] at each probability."""
         width = self.maximum - self.minimum
         left = (self.mode - self.minimum) / width
         rising = self.minimum + np.sqrt(uniform * width * (self.mode - self.minimum))
@@ -114,14 +114,14 @@ class TriangularBetween:
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """One of some values; ``shares`` are the cumulated weights, the last one 1."""
+    """One of some values; ``cumulated`` are the cumulated weights, the last one 1."""
 
     choices: tuple[float, ...]
-    shares: tuple[float, ...]
+    cumulated: tuple[float, ...]
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value [SI] below which each share lies."""
-        number = np.searchsorted(np.asarray(self.shares[:-1]), uniform, side="right")
+        """Return the quantile [SI] at each probability."""
+        number = np.searchsorted(np.asarray(self.cumulated[:-1]), uniform, side="right")
         return np.asarray(self.choices)[number]
 
 
@@ -133,5 +133,5 @@ class WholeNumbersBetween:
     maximum: float
 
     def values(self, uniform: Floats) -> Floats:
-        """Return the value below which, with itself, each share lies."""
+        """Return the value at each probability of the cumulated weights."""
         return np.minimum(np.floor(self.minimum + (self.maximum - self.minimum + 1.0) * uniform), self.maximum)

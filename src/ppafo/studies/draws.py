@@ -15,7 +15,7 @@ from ppafo.studies.noise import NOISE, other_noise, with_noise
 from ppafo.studies.sampling import correlate, uniform_numbers
 from ppafo.studies.study import Configuration, Drawn, Sample, Study, with_followers
 
-MOST_DRAWS = 2**26
+MAXIMUM_DRAWS = 2**26
 REPLICATES = 16
 """Independent scrambles of the Sobol sequence among which draws are dealt out in turn."""
 
@@ -40,8 +40,8 @@ class Uncertainty:
 
     def columns(self, uniform: Floats) -> Columns:
         """Return values [SI] (draws,) by path for uniform numbers in (0, 1), shape (draws, paths)."""
-        shares = uniform if self.scores is None else correlate(uniform, self.scores)
-        values = {item.path: item.distribution.values(shares[:, row]) for row, item in enumerate(self.drawn)}
+        fractions = uniform if self.scores is None else correlate(uniform, self.scores)
+        values = {item.path: item.distribution.values(fractions[:, row]) for row, item in enumerate(self.drawn)}
         return with_followers(values, self.same)
 
     def random_columns(self, first: int, count: int, seed: int) -> Columns:
@@ -81,9 +81,9 @@ def replicate_seed(seed: int, replicate: int) -> int:
     return int(np.random.SeedSequence([seed, replicate]).generate_state(1, np.uint64)[0])
 
 
-def with_new_noise(columns: Columns, most: int) -> Columns:
-    """Return the first draws, at most so many, each with another noise stream and all else as it was."""
-    first = {path: column[:most] for path, column in columns.items()}
+def with_new_noise(columns: Columns, maximum: int) -> Columns:
+    """Return the first ``maximum`` draws, each with another noise stream and all else as it was."""
+    first = {path: column[:maximum] for path, column in columns.items()}
     return first | {NOISE: other_noise(first[NOISE])}
 
 
@@ -131,7 +131,7 @@ def choose_configuration(study: Study, name: str | None) -> Configuration:
         return study.configurations[0]
     if name not in names:
         hint = nearest_name(name, names)
-        raise StudyError(f"study '{study.name}' has no configuration '{name}'{hint}; known are {', '.join(names)}")
+        raise StudyError(f"study '{study.name}' has no configuration '{name}'{hint}; available: {', '.join(names)}")
     return study.configurations[names.index(name)]
 
 

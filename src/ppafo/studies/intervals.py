@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.studies.distributions import Floats
 
-FEWEST_CARRYING = 50.0
+FEWEST_EFFECTIVE = 50.0
 """Draws that must carry a mean before its interval by the central limit theorem is believed to half a percent."""
 
 
@@ -57,7 +57,7 @@ def jackknife_reach(left_out: Floats, confidence: float) -> Floats:
     return np.asarray(float(stdtrit(count - 1, 0.5 + 0.5 * confidence)) * error)
 
 
-def draws_that_carry(values: Floats) -> float:
+def effective_sample_size(values: Floats) -> float:
     """Return how many draws determine the mean: their number over the square of their skewness, at most their number.
 
     An interval by the central limit theorem misses the mean by about a quarter of the inverse of this more often than

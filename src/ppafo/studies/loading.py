@@ -7,9 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics import METRICS
@@ -17,7 +15,7 @@ from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.noise import with_noise
 from ppafo.studies.outputs import valid_outputs
-from ppafo.studies.sampling import MOST_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix
+from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix
 from ppafo.studies.study import Axis, Configuration, Drawn, Sample, Study
 from ppafo.studies.varying import VariedPath, axis_or_distribution, stated_normal, varied_path
 
@@ -29,11 +27,16 @@ def list_studies() -> tuple[str, ...]:
     return STUDY_FILES.names()
 
 
-def load_study(study: str | Path | Mapping[str, Any], overrides: Sequence[str] = (), runs: int | None = None) -> Study:
+def load_study(
+    study: str | Path | Mapping[str, Any],
+    overrides: Sequence[str] = (),
+    draws: int | None = None,
+    seed: int | None = None,
+) -> Study:
     """Return a study by its name in the package, by the path of a TOML file, or from data laid out as such a file.
 
-    ``overrides`` as on the command line change every configuration; ``runs`` is the number of draws in place of that
-    of the file. StudyError for anything that is not usable.
+    ``overrides`` as on the command line change every configuration; ``draws`` and ``seed`` replace the number of draws
+    and the random seed of the file. StudyError for anything that is not usable.
     """
     if isinstance(study, Mapping):
         STUDY_FILES.check_depth(study, "study")
@@ -41,7 +44,8 @@ def load_study(study: str | Path | Mapping[str, Any], overrides: Sequence[str] =
     else:
         source = _Source(label(str(study)), Path(study).parent, STUDY_FILES.read(study))
         document = STUDY_FILES.parse(source.text, source.file)
-    return _build(_apply_overrides(_with_kinds(document), overrides, runs, source.file), source)
+    changed = _apply_overrides(_with_kinds(document), overrides, {"runs": draws, "seed": seed}, source.file)
+    return _build(changed, source)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,27 +70,27 @@ def _with_kinds(document: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-def _apply_overrides(document: dict[str, Any], overrides: Sequence[str], runs: int | None, file: str) -> dict[str, Any]:
+def _apply_overrides(
+    document: dict[str, Any], overrides: Sequence[str], sample: Mapping[str, int | None], file: str
+) -> dict[str, Any]:
     """Return the document as if what the command line changes stood in the file."""
     parsed = _parse(document, file)
     if overrides:
         for table in document["configurations"]:
             table["overrides"] = [*table.get("overrides", []), *overrides]
-    if runs is not None:
-        if parsed.sample is None:
-            raise StudyError(
-                f"{file}: has no [sample], so the number of runs is that of its grid and cannot be changed"
-            )
-        document["sample"]["runs"] = runs
+    given = {key: value for key, value in sample.items() if value is not None}
+    if given and parsed.sample is None:
+        raise StudyError(
+            f"{file}: has no [sample], so the number of runs is that of its grid and nothing is random: "
+            "it takes neither draws nor a seed"
+        )
+    if given:
+        document["sample"] |= given
     return document
 
 
 def _parse(document: Mapping[str, Any], file: str) -> declared.StudyFile:
-    try:
-        return declared.StudyFile.model_validate(document)
-    except ValidationError as error:
-        text = first_problem(error.errors(include_url=False), declared.StudyFile)
-        raise StudyError(f"{file}: {text}") from error
+    return validate(declared.StudyFile, document, file, StudyError)
 
 
 def _build(document: dict[str, Any], source: _Source) -> Study:
@@ -210,7 +214,7 @@ def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath], sou
         if not isinstance(item, declared.SameAs):
             continue
         if item.same_as not in own:
-            hint = nearest_name(item.same_as, own) or f"; there are {', '.join(own) or 'none'}"
+            hint = nearest_name(item.same_as, own) or f"; available: {', '.join(own) or 'none'}"
             raise source.refusal(
                 f"vary '{item.path}': same_as = '{item.same_as}' does not vary independently here{hint}"
             )
@@ -238,7 +242,7 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn], source: _Source)
         for path in item.between:
             if path not in paths:
                 raise source.refusal(
-                    f"correlations: '{path}' has no distribution here{nearest_name(path, paths)}; there are {paths}"
+                    f"correlations: '{path}' has no distribution here{nearest_name(path, paths)}; available: {paths}"
                 )
         if one == other or (one, other) in coefficients or (other, one) in coefficients:
             raise source.refusal(
@@ -261,6 +265,6 @@ def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn], source: _Source)
         return Sample(None, 1, 0)
     if parsed.sample is None:
         raise source.refusal("'sample' is missing: distributions need [sample] with method and runs")
-    if parsed.sample.method == "sobol" and len(drawn) > MOST_SOBOL_DIMENSIONS:
-        raise source.refusal(f"sample.method = 'sobol' allows at most {MOST_SOBOL_DIMENSIONS} distributions")
+    if parsed.sample.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
+        raise source.refusal(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")
     return Sample(parsed.sample.method, parsed.sample.runs, parsed.sample.seed)

@@ -15,7 +15,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import MOST_DRAWS
+from ppafo.studies.draws import MAXIMUM_DRAWS
 from ppafo.units import parse_quantity
 
 _LEVELS = {"Pa": "Pa_a", "-": ""}
@@ -84,7 +84,7 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
     for name in metrics:
         if name not in METRICS:
             hint = nearest_name(name, METRICS)
-            raise StudyError(f"there is no metric '{name}'{hint}; known are {', '.join(METRICS)}")
+            raise StudyError(f"there is no metric '{name}'{hint}; available: {', '.join(METRICS)}")
         if "reference" in METRICS[name].channels and scenario.control.kind == OPEN_LOOP:
             raise StudyError(f"scenario '{scenario.name}' has no '{name}': its controller follows no reference")
     repeated = first_twice(metrics)
@@ -102,13 +102,13 @@ def join(pieces: Sequence[Outcomes]) -> Outcomes:
     )
 
 
-def check_failures(outcomes: Outcomes, most_failed: float, what: str) -> None:
+def check_failures(outcomes: Outcomes, maximum_failed: float, what: str) -> None:
     """Refuse to continue where more than a fraction of the runs failed; ``what`` names them in the message."""
-    share = outcomes.failures / outcomes.runs
-    if share > most_failed:
+    fraction = outcomes.failures / outcomes.runs
+    if fraction > maximum_failed:
         raise StudyError(
-            f"{what}: {outcomes.failures:,} of {outcomes.runs:,} runs failed ({100.0 * share:.3g} %), more than the "
-            f"{100.0 * most_failed:.3g} % allowed; the first: {outcomes.reason}"
+            f"{what}: {outcomes.failures:,} of {outcomes.runs:,} runs failed ({100.0 * fraction:.3g} %), more than the "
+            f"{100.0 * maximum_failed:.3g} % allowed; the first: {outcomes.reason}"
         )
 
 
@@ -128,8 +128,8 @@ def check_confidence(value: float) -> float:
 
 def check_draws(draws: int, fewest: int) -> int:
     """Return a number of draws that can be made; StudyError for any other."""
-    if not fewest <= draws <= MOST_DRAWS:
-        raise StudyError(f"draws = {draws!r}: must be at least {fewest} and at most {MOST_DRAWS:,}")
+    if not fewest <= draws <= MAXIMUM_DRAWS:
+        raise StudyError(f"draws = {draws!r}: must be at least {fewest} and at most {MAXIMUM_DRAWS:,}")
     return draws
 
 

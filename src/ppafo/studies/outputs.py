@@ -54,7 +54,7 @@ def _check_names(key: str, given: Sequence[str], known: Collection[str], refusal
         if name not in known:
             what = "metric" if key == "metrics" else "channel"
             hint = nearest_name(name, known)
-            raise refusal(f"outputs.{key}: there is no {what} '{name}'{hint}; known are {', '.join(known)}")
+            raise refusal(f"outputs.{key}: there is no {what} '{name}'{hint}; available: {', '.join(known)}")
     repeated = first_twice(given)
     if repeated is not None:
         raise refusal(f"outputs.{key}: '{repeated}' is named twice")

@@ -27,8 +27,8 @@ _ROUNDS = 6
 _WORDS_PER_STEP = 4
 _FRACTION_BITS = 53
 _SOBOL_BITS = 32
-MOST_SOBOL_DIMENSIONS = 21201
-_MOST_ENGINES = 64
+MAXIMUM_SOBOL_DIMENSIONS = 21201
+_MAXIMUM_ENGINES = 64
 """Wound engines that are remembered; the one that was made first goes first."""
 
 
@@ -62,7 +62,7 @@ def _in_strata(uniform: Floats, sample: Sample, first: int) -> Floats:
 
 @dataclass(slots=True)
 class _Wound:
-    """Scipy's Sobol engines by what made them, wound to where they were last asked."""
+    """Scipy's Sobol engines by what made them, wound to where they were last used."""
 
     engines: dict[tuple[int, int], Any]
     lock: Any
@@ -81,7 +81,7 @@ def _sobol(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
         if engine is None or engine.num_generated > first:
             engine = qmc.Sobol(dimensions, scramble=True, bits=_SOBOL_BITS, rng=np.random.default_rng(sample.seed))
             _WOUND.engines[key] = engine
-            if len(_WOUND.engines) > _MOST_ENGINES:
+            if len(_WOUND.engines) > _MAXIMUM_ENGINES:
                 del _WOUND.engines[next(iter(_WOUND.engines))]
         if first > engine.num_generated:
             engine.fast_forward(first - engine.num_generated)

@@ -66,7 +66,7 @@ class VariedPath:
             raise UnitError("a difference of temperatures is given in K")
         return self._in_si(value, replace(self.quantity, unit=unit))
 
-    def shown(self, value: float) -> str:
+    def quote(self, value: float) -> str:
         """Return a value of the path as messages write it."""
         unit = WRITTEN_UNITS.get(self.quantity.unit, self.quantity.unit) if self.quantity.unit != "Pa_a" else "Pa_a"
         return f"{from_si(value, unit, self.quantity.unit, self.atmosphere):.6g} {unit}".rstrip()
@@ -81,8 +81,8 @@ class VariedPath:
     def _limits(self) -> str:
         lowest, highest = self.quantity.minimum, self.quantity.maximum
         word = "at least" if self.quantity.minimum_allowed else "more than"
-        parts = [f"{word} {self.shown(lowest)}"] if math.isfinite(lowest) else []
-        return " and ".join([*parts, f"at most {self.shown(highest)}"] if math.isfinite(highest) else parts)
+        parts = [f"{word} {self.quote(lowest)}"] if math.isfinite(lowest) else []
+        return " and ".join([*parts, f"at most {self.quote(highest)}"] if math.isfinite(highest) else parts)
 
 
 def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
@@ -189,8 +189,8 @@ def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
         )
     if min(weights) < 0.0 or math.fsum(weights) <= 0.0:
         raise UnitError(f"weights = {list(weights)} must be at least 0, and not all of them 0")
-    shares = np.cumsum(weights) / np.sum(weights)
-    return OneOf(values, tuple(shares.tolist()))
+    fractions = np.cumsum(weights) / np.sum(weights)
+    return OneOf(values, tuple(fractions.tolist()))
 
 
 def _whole_numbers(item: declared.WholeNumbers, place: VariedPath) -> Distribution:
@@ -265,4 +265,4 @@ def _stated_entry(path: str, scenario: Scenario) -> tuple[Entry | None, float]:
     entry = parameters.numbers.get(inside)
     if entry is None:
         return None, 0.0
-    return entry, entry_in_si(entry, parameters.declared()[inside], atmospheric_pressure(parameters))
+    return entry, entry_in_si(entry, parameters.declarations()[inside], atmospheric_pressure(parameters))

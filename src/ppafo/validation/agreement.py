@@ -72,14 +72,14 @@ class ChannelAgreement:
     limit: float
 
     @property
-    def share(self) -> float:
+    def fraction(self) -> float:
         """RMS error over the full range [-]."""
         return self.rms / self.full_range
 
     @property
     def passes(self) -> bool:
         """True where the RMS error is within its limit."""
-        return self.share <= self.limit
+        return self.fraction <= self.limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +217,7 @@ def _comparisons(measured: Measured, replayed: Replayed, device: Device, setting
         full_range = kind.full_range(device, gauge)
         model = replayed.recording
         curve = Curve(measured.recording.time, values, model.time, model[name], full_range)
-        items.append(Comparison(name, kind.unit, curve, settings.thresholds.limit(name).share_of(full_range)))
+        items.append(Comparison(name, kind.unit, curve, settings.thresholds.limit(name).fraction_of(full_range)))
     if not items:
         word = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
         raise DataError(f"{measured.file}: has nothing to compare; it needs {word}")

@@ -10,8 +10,8 @@ DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
 
 _SHIFTS = 81
-_MOST_SAMPLES = 4000
-_LEAST_GAIN = 25.0
+_MAXIMUM_SAMPLES = 4000
+_MINIMUM_GAIN = 25.0
 """In variances of one sample: five standard deviations of white noise. Less is noise and no delay."""
 _SMALLEST_GAIN = 1.0e-12
 """Gain below which two curves are the same to the accuracy of the engine."""
@@ -65,7 +65,7 @@ def estimate_delay(curves: "list[Curve]", limit: float) -> Delay:
 
 def _thin(curve: Curve) -> Curve:
     """The curve with no more measured samples than the search needs."""
-    step = -(-curve.times.size // _MOST_SAMPLES)
+    step = -(-curve.times.size // _MAXIMUM_SAMPLES)
     return replace(curve, times=curve.times[::step], values=curve.values[::step])
 
 
@@ -82,7 +82,7 @@ def _is_significant(curves: "list[Curve]", delay: float) -> bool:
     shifted = _cost(curves, delay)
     gain = _cost(curves, 0.0) - shifted
     samples = sum(curve.times.size for curve in curves)
-    return gain > _SMALLEST_GAIN and gain * samples > _LEAST_GAIN * shifted
+    return gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * shifted
 
 
 def _minimum(curves: "list[Curve]", low: float, high: float) -> float:

@@ -53,11 +53,11 @@ COMPARED: dict[str, Compared] = {
 }
 """As the paper has them: 110 deg, 55 psi, 55 psi and 110 psi; the torque follows from the pressure difference."""
 
-ACCEPTABLE_SHARE = 0.10
+ACCEPTABLE_FRACTION = 0.10
 """RMS error over full range that the paper calls acceptable (page with figure 7)."""
 
-_SHARE_UNITS = ("%", "percent")
-_EXAMPLES = "write for example 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
+_FRACTION_UNITS = ("%", "percent")
+_EXAMPLES = "a threshold is written 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +65,11 @@ class Limit:
     """Largest RMS error: a fraction of the full range [-], or an error in the SI unit of the channel."""
 
     value: float
-    is_share: bool
+    is_fraction: bool
 
-    def share_of(self, full_range: float) -> float:
+    def fraction_of(self, full_range: float) -> float:
         """The limit as a fraction [-] of a full range in the SI unit of the channel."""
-        return self.value if self.is_share else self.value / full_range
+        return self.value if self.is_fraction else self.value / full_range
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class Thresholds:
 
 def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
     """Return the thresholds of texts such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later ones win."""
-    others = Limit(ACCEPTABLE_SHARE, is_share=True)
+    others = Limit(ACCEPTABLE_FRACTION, is_fraction=True)
     channels: dict[str, Limit] = {}
     for text in texts:
         name, separator, value = text.rpartition("=")
@@ -103,19 +103,19 @@ def _channel(name: str, text: str) -> str:
         hint = nearest_name(name, COMPARED)
         known = ", ".join(COMPARED)
         raise DataError(
-            f"threshold '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; there are {known}"
+            f"threshold '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; available: {known}"
         )
     return name
 
 
 def _limit(value: str, text: str, unit: str) -> Limit:
     try:
-        is_share = split_quantity(value)[1] in _SHARE_UNITS
-        number = parse_quantity(value, "" if is_share else unit)
+        is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
+        number = parse_quantity(value, "" if is_fraction else unit)
     except UnitError as error:
         raise DataError(f"threshold '{one_line(text)}': {error}; {_EXAMPLES}") from error
-    if not unit and not is_share:
+    if not unit and not is_fraction:
         raise DataError(f"threshold '{one_line(text)}': a limit for all channels is a percentage of the full range")
     if number <= 0.0:
         raise DataError(f"threshold '{one_line(text)}': must be above 0; {_EXAMPLES}")
-    return Limit(number, is_share)
+    return Limit(number, is_fraction)

@@ -25,8 +25,8 @@ MINIMUM_SAMPLES = 10
 
 _REMARKED_GAP = 3.0
 _ABOVE_SUPPLY = 0.05
-_MOST_RANGES = 20.0
-_LEAST_CHANGE = 0.01
+_MAXIMUM_RANGES = 20.0
+_MINIMUM_CHANGE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
             raise DataError(f"{file}: channel '{name}' is not known{hint}")
     if COMMAND not in recording:
         names = ", ".join(recording.names)
-        raise DataError(f"{file}: there is no channel '{COMMAND}', which the replay needs; there are {names}")
+        raise DataError(f"{file}: there is no channel '{COMMAND}', which the replay needs; available: {names}")
     if not any(name in recording for name in COMPARED):
         raise DataError(f"{file}: has none of the channels to compare: {', '.join(COMPARED)}")
     return tuple(f"channel '{name}' is not known and was ignored" for name in unknown)
@@ -102,11 +102,11 @@ def _check_size(recording: Recording, device: Device, file: str) -> None:
     for name in (name for name in (*supplies, *COMPARED) if name in recording):
         full_range = highest if name in supplies else COMPARED[name].full_range(device, highest)
         worst = int(np.argmax(np.abs(recording[name])))
-        if abs(recording[name][worst]) > _MOST_RANGES * full_range:
+        if abs(recording[name][worst]) > _MAXIMUM_RANGES * full_range:
             where = f"{recording.time[worst]:.6g} s (sample {worst + 1})"
             raise DataError(
                 f"{file}: '{name}' is {recording[name][worst]:.6g} {recording.unit(name)} at {where}, more than "
-                f"{_MOST_RANGES:g} times what {device.name} can reach"
+                f"{_MAXIMUM_RANGES:g} times what {device.name} can reach"
             )
 
 
@@ -150,10 +150,10 @@ def _check_change(recording: Recording, device: Device, file: str) -> None:
             f"{file}: {owner} is not above the atmosphere, so there is no full range to compare pressures with"
         )
     compared = [name for name in COMPARED if name in recording]
-    shares = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
-    if max(shares) < _LEAST_CHANGE:
+    fractions = [lasting_change(recording[name]) / COMPARED[name].full_range(device, gauge) for name in compared]
+    if max(fractions) < _MINIMUM_CHANGE:
         raise DataError(
-            f"{file}: nothing happens in it: {', '.join(compared)} change by less than {_LEAST_CHANGE:.0%} of full "
+            f"{file}: nothing happens in it: {', '.join(compared)} change by less than {_MINIMUM_CHANGE:.0%} of full "
             "range, so it cannot tell a good model from a bad one"
         )
 

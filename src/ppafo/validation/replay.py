@@ -36,7 +36,7 @@ from ppafo.validation.measured import Measured
 Motion = Literal["free", "measured", "held"]
 MOTIONS: tuple[Motion, ...] = ("free", "measured", "held")
 
-MOST_STEPS = 20_000_000
+MAXIMUM_STEPS = 20_000_000
 _WHOLE = 1.0e-9
 _RECORD_INTERVAL = 2.5e-4
 """Seconds between two records of the model, or less: fine enough to be shifted in time and read between."""
@@ -80,16 +80,16 @@ def _inputs(measured: Measured, motion: Motion) -> RecordedInputs:
 
 
 def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extra: float) -> Run:
-    """The run of a free or a held vane; the steps of a free one are fine enough for a led one too."""
+    """The run of a free or a held vane; the steps of a free one are fine enough for a prescribed one too."""
     recording = measured.recording
     duration = recording.duration + max(extra, sample_period(recording.time))
     highest, held = with_highest_supply(device, recording), held_vane(start.angle) if motion == "held" else None
     scenario = replay_scenario(recording, highest, start, duration, measured.file, held)
     run = plan_run(scenario)
-    if run.step_count > MOST_STEPS:
+    if run.step_count > MAXIMUM_STEPS:
         raise DataError(
             f"{measured.file}: {duration:.4g} s would take {run.step_count} steps of {run.step:.2g} s, at most "
-            f"{MOST_STEPS} are allowed; split the recording into parts"
+            f"{MAXIMUM_STEPS} are allowed; split the recording into parts"
         )
     supply = device.supply
     plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)
@@ -104,7 +104,7 @@ def _record_every(run: Run) -> int:
 
 
 def _is_used(measured: Measured, name: str, motion: Motion) -> bool:
-    """True where an input is in the recording; a torque on a led vane is what leads it, not an input."""
+    """True where an input is in the recording; the torque on a prescribed vane is what moves it, not an input."""
     return measured.has(name) and not (name == EXTERNAL_TORQUE and motion != "free")
 
 
@@ -135,11 +135,16 @@ def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
     """Return initial values in SI by channel from texts such as ``pressure_1=0 psi_g``."""
     values = {}
     for text in texts:
-        name, _, value = (part.strip() for part in text.partition("="))
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise DataError(
+                f"initial value '{one_line(text)}' is not of the form CHANNEL=VALUE, for example '{_EXAMPLES[ANGLE]}'"
+            )
         if name not in _UNITS:
             hint = nearest_name(name, _UNITS)
             raise DataError(
-                f"initial value '{one_line(text)}': give {', '.join(_UNITS)}{hint}, as '{_EXAMPLES[ANGLE]}'"
+                f"initial value '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; "
+                f"available: {', '.join(_UNITS)}"
             )
         try:
             values[name] = parse_quantity(value, _UNITS[name], atmosphere)

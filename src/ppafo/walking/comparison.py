@@ -2,11 +2,16 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from ppafo.control.walking import off
 from ppafo.metrics import Metric
+from ppafo.model.leg import passive_torque
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.gait_series import landing_phase
+from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import Progress, WalkResult, silent, walk
 from ppafo.walking.walk_metrics import healthy_positive_work, healthy_toe_height, lowest_toes
 
@@ -54,7 +59,18 @@ def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:
     if gait.ankle_moment is not None:
         work = healthy_positive_work(configuration)
         found["push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
+        if configuration.wearer.keeps_gait >= 0.5:
+            found["dorsiflexor_moment"] = _dorsiflexor_moment(configuration)
     return found
+
+
+def _dorsiflexor_moment(configuration: Configuration) -> Metric:
+    """Moment of the muscles that lift the foot without any device, from the measured moment less tissue."""
+    gait, wearer = configuration.gait, configuration.wearer
+    torque: Any = passive_torque  # plain arithmetic, of arrays too
+    tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
+    moment = np.maximum(tissue - wearer.body_mass * gait.curve("ankle_moment").values_at(PHASES), 0.0)
+    return Metric(float(moment[:-1].mean()), "N m", "moment of the wearer's dorsiflexors, mean over the stride")
 
 
 def _landing_rate(configuration: Configuration) -> float:

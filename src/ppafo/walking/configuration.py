@@ -19,6 +19,7 @@ class Configuration:
 
     ``supply_lines`` are the lines behind its regulators, None where the supply pressures are constant. ``thermal`` is
     how the gas takes up heat, None where it keeps its temperature.
+    ``wearer_origin`` says in words whose body mass it is.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
 
@@ -38,6 +39,7 @@ class Configuration:
     overrides: tuple[str, ...]
     supply_lines: SupplyLines | None = None
     thermal: Thermal | None = None
+    wearer_origin: str = "the paper's subject"
 
     @property
     def has_ideal_sensors(self) -> bool:

@@ -1,20 +1,17 @@
 """A gait as the engine uses it: eight harmonics of each curve, its events, and how the heel meets the ground."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.gait import Gait
 from ppafo.gait.gait import Curve
-from ppafo.model.fourier import Series
+from ppafo.model.fourier import HARMONICS, Harmonic, Series
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.signals.recording import Floats
 from ppafo.walking.wearer import Wearer
-
-HARMONICS = 8
-"""Harmonics that the engine follows; those of the built-in gait above are below 0.04 deg and 0.4 % of body weight."""
 
 FLAT_FROM, FLAT_TO = 0.15, 0.35
 """Phases between which every foot stands flat; the angle of the foot is taken from there."""
@@ -28,21 +25,24 @@ USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
 EVENT_PHASES = np.linspace(0.0, 1.0, 1001)[150:]
 """Phases at which events are looked for, from the first flat foot on."""
 
+ROLL_ANGLES = tuple(math.radians(degrees) for degrees in range(2, 16))
+"""Tilts at which the lever of the ground force may have risen half of the way."""
+
 CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
 """Shares of the swing between which the toes must clear the ground."""
 
-ZERO = Series(**dict.fromkeys(Series._fields, 0.0))
+ZERO = Series(mean=0.0, harmonics=(Harmonic(0.0, 0.0),) * HARMONICS)
 
 
 def gait_series(gait: Gait) -> GaitSeries:
     """The curves of a gait for the engine; a moment, force or knee motion that was not measured is 0."""
     return GaitSeries(
-        _series(gait, "shank_angle"),
-        _series(gait, "ankle_angle"),
-        _series(gait, "ankle_moment"),
-        _series(gait, "vertical_force"),
-        _series(gait, "knee_forward"),
-        _series(gait, "knee_up"),
+        shank=_series(gait, "shank_angle"),
+        ankle=_series(gait, "ankle_angle"),
+        moment=_series(gait, "ankle_moment"),
+        force=_series(gait, "vertical_force"),
+        knee_forward=_series(gait, "knee_forward"),
+        knee_up=_series(gait, "knee_up"),
     )
 
 
@@ -52,7 +52,7 @@ def _series(gait: Gait, name: str) -> Series:
         return ZERO
     missing = (0.0,) * HARMONICS
     pairs = zip((*curve.cosines, *missing)[:HARMONICS], (*curve.sines, *missing)[:HARMONICS], strict=True)
-    return Series(curve.mean, *[number for pair in pairs for number in pair])
+    return Series(mean=curve.mean, harmonics=tuple(Harmonic(cosine, sine) for cosine, sine in pairs))
 
 
 def truncate(curve: Curve) -> Curve:
@@ -60,16 +60,46 @@ def truncate(curve: Curve) -> Curve:
     return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
 
 
-def heel_lever(gait: Gait, wearer: Wearer) -> float:
-    """Lever [m] of the ground force about the ankle where the measured foot has nearly come down.
+@dataclass(frozen=True, slots=True)
+class HeelRocker:
+    """Lever [m] of the ground force behind the ankle: nearly flat, far up, and the tilt [rad] half of the way up."""
 
-    From the measured moment; that of the heel itself bounds it, and stands in where moment or force are missing.
+    flat: float
+    raised: float
+    half: float
+
+
+def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
+    """The lever over the tilt of the measured foot while it comes down on its heel alone, by least squares.
+
+    From the measured moment, which horizontal forces are part of, or without one from the centre of pressure. A heel
+    that is still up when the toes of the measured foot take over keeps the last lever. The lever of the heel itself
+    bounds it, and stands in where nothing was measured.
     """
-    if gait.ankle_moment is None or gait.vertical_force is None:
-        return wearer.heel_lever
-    landing = landing_phase(gait)
-    moment, force = truncate(gait.ankle_moment).value(landing), truncate(gait.vertical_force).value(landing)
-    return min(max(-moment / max(force * STANDARD_GRAVITY, 1.0), 0.0), wearer.heel_lever)
+    phases = np.linspace(0.0, landing_phase(gait), 151)
+    levers = _measured_levers(gait, phases)
+    tilt = _foot_angles(gait, phases) - gait_timing(gait).ground_angle
+    if levers is None or gait.vertical_force is None:
+        return HeelRocker(wearer.heel_lever, wearer.heel_lever, ROLL_ANGLES[0])
+    force = np.maximum(truncate(gait.vertical_force).values_at(phases), 0.0)
+    flat = min(max(float(levers[-1]), 0.0), wearer.heel_lever)
+    _, rise, half = min(_rise(half, np.maximum(tilt, 0.0), levers - flat, force) for half in ROLL_ANGLES)
+    return HeelRocker(flat, min(max(flat + rise, flat), wearer.heel_lever), half)
+
+
+def _measured_levers(gait: Gait, phases: Floats) -> Floats | None:
+    if gait.ankle_moment is not None and gait.vertical_force is not None:
+        force = np.maximum(truncate(gait.vertical_force).values_at(phases) * STANDARD_GRAVITY, 1.0)
+        return -truncate(gait.ankle_moment).values_at(phases) / force
+    return None if gait.centre_of_pressure is None else -truncate(gait.centre_of_pressure).values_at(phases)
+
+
+def _rise(half: float, tilt: Floats, levers: Floats, force: Floats) -> tuple[float, float, float]:
+    """Squares left over, the rise [m] of the lever far up, and the angle [rad] of half of it; weighted by the force."""
+    shape = force * tilt / (tilt + half)
+    rise = float(shape @ (force * levers)) / max(float(shape @ shape), 1.0e-12)
+    left = force * levers - rise * shape
+    return float(left @ left), rise, half
 
 
 def landing_phase(gait: Gait) -> float:
@@ -92,11 +122,13 @@ def gait_timing(gait: Gait) -> GaitTiming:
     """Frequency [Hz], events [strides] and the flat foot's angle [rad]; heel rise and angle come from the curves."""
     foot = _foot_angles(gait, EVENT_PHASES)
     events = gait_events(foot[None, :], np.array([gait.stance_share]))
-    return GaitTiming(1.0 / gait.stride_time, 0.0, *(float(values[0]) for values in events))
+    return GaitTiming(
+        frequency=1.0 / gait.stride_time, start=0.0, **{name: float(values[0]) for name, values in events.items()}
+    )
 
 
-def gait_events(foot: Floats, stance_share: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """The fields of ``GaitTiming`` after ``start``, for feet that stand at angles [rad] (people, phases).
+def gait_events(foot: Floats, stance_share: Floats) -> dict[str, Floats]:
+    """The fields (people,) of ``GaitTiming`` after ``start``, for feet that stand at angles [rad] (people, phases).
 
     ``foot`` is over the horizontal, at ``EVENT_PHASES``; ``stance_share`` is (people,).
     """
@@ -106,10 +138,10 @@ def gait_events(foot: Floats, stance_share: Floats) -> tuple[Floats, Floats, Flo
     usual = USUAL_HEEL_RISE * stance_share
     heel_off = np.where(steep.any(axis=1), EVENT_PHASES[np.argmax(steep, axis=1)], usual)
     swing = 1.0 - stance_share
-    return (
-        np.minimum(heel_off, LATEST_HEEL_RISE * stance_share),
-        stance_share,
-        stance_share + CLEARANCE_FROM * swing,
-        stance_share + CLEARANCE_TO * swing,
-        ground_angle,
-    )
+    return {
+        "heel_off": np.minimum(heel_off, LATEST_HEEL_RISE * stance_share),
+        "toe_off": stance_share,
+        "clearance_from": stance_share + CLEARANCE_FROM * swing,
+        "clearance_to": stance_share + CLEARANCE_TO * swing,
+        "ground_angle": ground_angle,
+    }

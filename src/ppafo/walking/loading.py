@@ -7,10 +7,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from ppafo.control.walking.catalog import load_walking_controller, walking_controllers
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.gait import NORMATIVE, Gait, load_gait
@@ -39,8 +37,8 @@ from ppafo.walking.declaration import (
     controller_settings,
     quantities,
 )
+from ppafo.walking.gait_subject import read_wearer, wearer_origin
 from ppafo.walking.schema import walk_file
-from ppafo.walking.wearer import WEARER, Wearer
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 _TURN = 2.0 * math.pi
@@ -57,27 +55,26 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` replaces the
-    gait of the file. ScenarioError, ParameterError or DataError for anything that cannot be used.
+    gait of the file. A gait that is named, by the file or by ``gait``, brings its subject as the default wearer.
+    ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
     document = _apply_overrides(FILE.parse(FILE.read(name_or_path), file), given, file)
     load_walking_controller(kind_at(document, "controller"))
-    try:
-        walk_file().model_validate(document)
-    except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), walk_file())
-        raise ScenarioError(f"{file}: {problem}") from error
+    validate(walk_file(), document, file, ScenarioError)
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
     kind = walking_controllers()[kind_at(document, "controller")]
     device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
+    walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
+    is_named = gait is not None or "gait" in document
     configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
-        gait=_gait(gait or document.get("gait", NORMATIVE), folder, gait is None),
-        wearer=Wearer(**reading.section("wearer", WEARER)),
+        gait=walked,
+        wearer=read_wearer(reading, walked, is_named),
         controller=kind,
         settings=reading.section("controller", kind.quantities),
         sensors=_sensors(reading),
@@ -90,6 +87,7 @@ def load_walk(name_or_path: str | Path, overrides: Iterable[str] = (), gait: str
         overrides=given,
         supply_lines=read_supply_lines(reading, device),
         thermal=read_thermal(reading),
+        wearer_origin=wearer_origin(reading, walked, is_named),
     )
     check_walk(configuration, reading)
     return configuration

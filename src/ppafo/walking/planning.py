@@ -24,7 +24,7 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import Pieces, Steps, compose_run
 from ppafo.simulation.scenario import ProfileChoice, Thermal
-from ppafo.walking.gait_series import gait_series, gait_timing, heel_lever
+from ppafo.walking.gait_series import gait_series, gait_timing, heel_rocker
 from ppafo.walking.wearer import Wearer
 
 ANGLES = (math.radians(60.0), math.radians(115.0))
@@ -59,7 +59,8 @@ class WalkPlan:
 
 def plan_walk(plan: WalkPlan) -> Run:
     """The run of a walk, which begins at a heel strike with the healthy ankle and vented chambers."""
-    leg = plan.wearer.leg()._replace(heel_lever=heel_lever(plan.gait, plan.wearer))
+    rocker = heel_rocker(plan.gait, plan.wearer)
+    leg = plan.wearer.leg()._replace(heel_lever=rocker.raised, flat_heel_lever=rocker.flat, heel_roll_angle=rocker.half)
     bare = plant_parameters(plan.device)
     walk = _walk(plan, leg, bare)
     pieces = Pieces(

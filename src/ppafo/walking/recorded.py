@@ -8,7 +8,7 @@ import numpy as np
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.model.contact import SWING
-from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix
+from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.model.plant import chamber_pressures
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.simulate import gas_channels
@@ -52,6 +52,8 @@ def recording_of_walk(configuration: Configuration, run: Run, time: Floats, reco
         "supplied_mass": (record["state.supplied_mass"], "kg"),
         "vented_mass": (record["state.vented_mass"], "kg"),
     }
+    if run.walk.leg.keeps_gait >= 0.5:
+        channels["dorsiflexor_moment"] = (dorsiflexor_moment(run, record), "N m")
     channels |= gas_channels(configuration.device.gas, run, record)
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
@@ -62,7 +64,20 @@ def recording_of_walk(configuration: Configuration, run: Run, time: Floats, reco
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
 
 
-def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> Floats:
+def dorsiflexor_moment(run: Run, record: Mapping[str, Any]) -> Floats:
+    """Moment [N m] of the muscles that lift the foot, 0 or more, of a wearer who keeps the measured ankle.
+
+    What the healthy ankle needs, by its moment on the ground and by equation (11) in the swing, less tissue and T_ex.
+    The literature shows the activity of the tibialis anterior in its place.
+    """
+    assert run.walk is not None, "a walk has a leg"
+    in_swing = record["walk.contact"] == SWING
+    needed = np.where(in_swing, record["walk.now.healthy_torque"], record["walk.now.moment"])
+    tissue = passive_torque(run.walk.leg, record["walk.now.ankle"])
+    return np.asarray(np.maximum(tissue + record["walk.external_torque"] - needed, 0.0))
+
+
+def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Any]) -> Floats:
     """T_1 of equation (11) [N m] in the swing: what moves shank and foot as prescribed; 0 on the ground.
 
     There it would need the horizontal force of the ground, which a gait file does not have.
@@ -72,9 +87,9 @@ def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Floats]) -> F
     theta, phi = record["state.angle"], record["walk.now.shank"]
     alpha = phi - theta + 0.5 * np.pi
     ankle_acceleration = np.gradient(record["state.angular_velocity"], time)
-    matrix = mass_matrix(leg, np.cos(theta))  # type: ignore[arg-type]
-    turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])  # type: ignore[arg-type]
+    matrix = mass_matrix(leg, np.cos(theta))
+    turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])
     forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
-    weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)  # type: ignore[arg-type]
+    weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)
     inertial = matrix.shank * record["walk.now.shank_acceleration"] + matrix.coupling * ankle_acceleration
     return np.where(record["walk.contact"] == SWING, inertial + turning.knee + weight.knee, 0.0)

@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS, walking_controllers
-from ppafo.documents.models import NAME, one_of, optional, published_schema, table
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.simulation import supply_line
 from ppafo.simulation.declaration import SAMPLING
 from ppafo.simulation.schema import (
@@ -67,10 +67,15 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=100)),
         "description": (str, Field("", description="what this file tries, and why")),
-        "gait": optional(str, "name of a gait, or the path of a gait file; the built-in one unless given"),
+        "gait": optional(
+            str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
+        ),
         "device": (table("WalkDevice", device_fields()), Field(description="the hardware")),
         "controller": (_controller(), Field(description="what commands the valve")),
-        "wearer": optional(table("Wearer", quantity_fields(WEARER)), "who walks; the paper's subject unless given"),
+        "wearer": optional(
+            table("Wearer", quantity_fields(WEARER)),
+            "who walks; the subject of the gait that is named, else the paper's, unless given",
+        ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
         "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
         "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
@@ -90,4 +95,4 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a walk file."""
     WALKING_CONTROLLERS.load_all()
     CONTROLLERS.load_all()
-    return published_schema(walk_file(), "ppafo walk")
+    return make_schema(walk_file(), "ppafo walk")

@@ -6,10 +6,10 @@ import numpy as np
 
 from ppafo.gait import Gait
 from ppafo.gait.gait import KNEE, Curve
-from ppafo.model.gait import GaitTiming
+from ppafo.model.fourier import HARMONICS
 from ppafo.signals.recording import Floats
 from ppafo.walking.anthropometry import draw_bounded_normal
-from ppafo.walking.gait_series import EVENT_PHASES, HARMONICS, gait_events
+from ppafo.walking.gait_series import EVENT_PHASES, gait_events
 
 SERIES = {
     "shank": "shank_angle",
@@ -47,11 +47,11 @@ class SeriesOfMany:
         return SeriesOfMany(self.mean * factor, self.cosines * factor[:, None], self.sines * factor[:, None])
 
     def rows(self) -> dict[str, Floats]:
-        """Coefficients (people,) by field of ``model.fourier.Series``, in the SI unit of the curve."""
+        """Coefficients (people,) by path in ``model.fourier.Series``, in the SI unit of the curve."""
         found = {"mean": self.mean}
         for order in range(HARMONICS):
-            found[f"cosine_{order + 1}"] = self.cosines[:, order]
-            found[f"sine_{order + 1}"] = self.sines[:, order]
+            found[f"harmonics[{order}].cosine"] = self.cosines[:, order]
+            found[f"harmonics[{order}].sine"] = self.sines[:, order]
         return found
 
 
@@ -106,4 +106,4 @@ def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> d
         foot = (shank.cosines - ankle.cosines)[part] @ cosine + (shank.sines - ankle.sines)[part] @ sine
         foot += level[:, None]
         found.append(gait_events(foot, stance_share[part]))
-    return dict(zip(GaitTiming._fields[2:], np.concatenate(found, axis=1), strict=True))
+    return {name: np.concatenate([part[name] for part in found]) for name in found[0]}

@@ -12,6 +12,7 @@ from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, LaneB
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, batch_of
 from ppafo.errors import ScenarioError
+from ppafo.gait.opensim_names import opensim_recording
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.simulation.result import Status
@@ -83,8 +84,9 @@ class WalkResult:
         return walk_figure({self.configuration.name: self})
 
     def save_opensim(self, path: str | Path) -> Path:
-        """Write the recording as a ``.sto`` file that OpenSim reads; returns the path."""
-        return write_opensim(path, self.recording)
+        """Write the recording as a ``.sto`` file in OpenSim's names, zero and signs, right leg; returns the path."""
+        named, _ = opensim_recording(self.recording, body_mass=self.configuration.wearer.body_mass)
+        return write_opensim(path, named)
 
 
 def walk(

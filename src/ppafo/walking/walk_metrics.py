@@ -67,6 +67,9 @@ def stride_metrics(
             found["push_off_share"] = Metric(
                 fraction, "-", "work of T_ex in push-off over the healthy ankle's positive work"
             )
+    if "dorsiflexor_moment" in averages:
+        moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
+        found["dorsiflexor_moment"] = Metric(moment, "N m", "moment of the wearer's dorsiflexors, mean over the stride")
     if "toe_height" in averages:
         found["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
     if "angle" in averages:

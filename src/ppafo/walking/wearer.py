@@ -23,6 +23,14 @@ WEARER = (
     Quantity(
         "residual_share", "1", "fraction of the healthy ankle moment that the wearer can still produce", 0.0, 0.0, 1.0
     ),
+    Quantity(
+        "keeps_gait",
+        "1",
+        "1: nondisabled, muscles keep the measured ankle whatever the device does; 0: the ankle follows the torques",
+        0.0,
+        0.0,
+        1.0,
+    ),
 )
 """Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008."""
 
@@ -45,6 +53,7 @@ class Wearer:
     ankle_rest_angle: float
     ankle_damping: float
     residual_share: float
+    keeps_gait: float
 
     def leg(self) -> LegParameters:
         """The leg as the engine takes it."""
@@ -61,7 +70,10 @@ class Wearer:
             ankle_rest_angle=self.ankle_rest_angle,
             ankle_damping=self.ankle_damping,
             residual_share=self.residual_share,
+            keeps_gait=self.keeps_gait,
             heel_lever=self.heel_lever,
+            flat_heel_lever=self.heel_lever,
+            heel_roll_angle=1.0,
             toe_lever=self.toe_lever,
             gravity=STANDARD_GRAVITY,
         )

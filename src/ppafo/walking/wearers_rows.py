@@ -33,6 +33,7 @@ def batch_of_many(
     count = build.mass.size
     assert run.walk is not None, "a population walks"
     segments = segment_values(replace(configuration.wearer, heel_lever=run.walk.leg.heel_lever), build)
+    segments["flat_heel_lever"] = run.walk.leg.flat_heel_lever * build.stature
     parameters, states = (np.repeat(column, count, axis=1) for column in (single.parameters, single.states))
     _overwrite(
         parameters, row_numbers(single.program.parameter_rows()), _parameter_rows(run, segments, gaits, generator)
@@ -107,7 +108,8 @@ def _gait_at_heel_strike(run: Run, segments: Mapping[str, Floats], gaits: Varied
     knee = {name: gaits.series[name].at_heel_strike(frequency)[0] for name in KNEE}
     # A leg of arrays: the functions of the leg are plain arithmetic.
     own = {name: row for name, row in segments.items() if name in LegParameters._fields}
-    leg: Any = run.walk.leg._replace(**own)  # type: ignore[arg-type]
+    leg: Any = run.walk.leg
+    leg = leg._replace(**own)
     torque: Any = torque_of_shank
     foot = shank - ankle + 0.5 * np.pi
     directions = np.sin(shank), np.cos(shank), np.sin(foot), np.cos(foot)

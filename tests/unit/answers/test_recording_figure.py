@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ppafo.answers.recording_figure import figure_files, recording_figure
 from ppafo.answers.shown_metrics import metrics_lines
-from ppafo.answers.style import house_style, rendered
+from ppafo.answers.style import house_style, render_figure
 from ppafo.errors import DataError
 from ppafo.metrics import Metric
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
@@ -97,7 +97,7 @@ def test_a_recording_with_nothing_to_draw_is_refused() -> None:
 
 
 def test_every_format_is_written_and_the_same_recording_gives_the_same_bytes() -> None:
-    files = [rendered(recording_figure(recording(angle=1.0)), ("png", "svg", "pdf")) for _ in range(2)]
+    files = [render_figure(recording_figure(recording(angle=1.0)), ("png", "svg", "pdf")) for _ in range(2)]
     assert files[0] == files[1]
     assert files[0]["png"].startswith(b"\x89PNG")
     assert b"<svg" in files[0]["svg"]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ppafo.answers.typesetting import printed_quantity, quantity, sentence, typeset, with_paths_as_code
+from ppafo.answers.typesetting import format_printed_quantity, quantity, sentence, typeset, with_paths_as_code
 
 SPACE, TIMES, MINUS = "\N{NO-BREAK SPACE}", "\N{MULTIPLICATION SIGN}", "\N{MINUS SIGN}"
 APOSTROPHE, DASH = "\N{RIGHT SINGLE QUOTATION MARK}", "\N{EN DASH}"
@@ -53,8 +53,8 @@ def test_a_quantity_keeps_its_digits_and_a_missing_one_is_a_dash() -> None:
 
 
 def test_a_printed_number_gets_no_digits_that_were_not_printed() -> None:
-    assert printed_quantity(15.0, "%") == "15 %"
-    assert printed_quantity(0.113, "-") == "0.113"
+    assert format_printed_quantity(15.0, "%") == "15 %"
+    assert format_printed_quantity(0.113, "-") == "0.113"
 
 
 def test_paths_become_code_and_everything_else_is_escaped() -> None:

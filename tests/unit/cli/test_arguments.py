@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.cli.whole_numbers import whole_number
+from ppafo.questions.question import whole_number
 
 FULL = Path("/dev/full")
 
@@ -16,20 +16,20 @@ FULL = Path("/dev/full")
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ([], "no command was given; known are reproduce, simulate"),
+        ([], "no command was given; available: reproduce, simulate"),
         (["simulat"], "there is no command 'simulat', did you mean 'simulate'?"),
-        (["--bogus"], "there is no option '--bogus'; here are --help, --version, -h"),
+        (["--bogus"], "there is no option '--bogus'; available: --help, --version, -h"),
         (["--bogus", "simulate", "step-response"], "there is no option '--bogus'"),
-        (["simulate", "--bogus"], "there is no option '--bogus'; here are --check, --help, --json"),
+        (["simulate", "--bogus"], "there is no option '--bogus'; available: --check, --help, --json"),
         (["audit", "--josn"], "there is no option '--josn', did you mean '--json'?"),
         (["audit", "ppafo2011", "--out=x", "--sett=valve.area=1mm^2"], "no option '--sett', did you mean '--set'?"),
         (["sets", "-j"], "there is no option '-j'"),
         (
             ["simulate", "step-response", "--set"],
-            "--set: expected one argument; 'ppafo simulate --help' shows",
+            "--set: expected one argument; see 'ppafo simulate --help'",
         ),
-        (["audit"], "the following arguments are required: SET; 'ppafo audit --help' shows"),
-        (["sets", "show"], "the following arguments are required: SET; 'ppafo sets show --help' shows"),
+        (["audit"], "the following arguments are required: SET; see 'ppafo audit --help'"),
+        (["sets", "show"], "the following arguments are required: SET; see 'ppafo sets show --help'"),
         (["sets", "shwo"], "invalid choice: 'shwo'"),
         (["plot", "one", "two"], "unrecognized arguments: two"),
         (["si\nmulate"], "there is no command 'si mulate', did you mean 'simulate'?"),
@@ -145,9 +145,7 @@ def test_number_or_key_without_end_is_one_line_that_can_be_read(
 def test_count_may_have_its_digits_in_groups_but_not_as_python_refuses_them(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert (
-        whole_number("1__000", "--runs") == whole_number("1_000", "--runs") == whole_number("1,000", "--runs") == 1000
-    )
-    assert main(["sweep", "pressure-and-area", "--runs", "1__0"]) == 2
+    assert whole_number("1__000") == whole_number("1_000") == whole_number("1,000") == 1000
+    assert main(["sweep", "pressure-and-area", "--draws", "1__0"]) == 2
     assert main(["sweep", "pressure-and-area", "--threads", "0"]) == 2
     assert "--threads 0: must be a whole number, 1 or more" in capsys.readouterr().err

@@ -49,10 +49,10 @@ def test_warming_compiles_every_scenario_of_the_package(
 
 
 def test_model_that_was_compiled_for_later_is_the_one_that_a_run_uses(fresh_cache: Path) -> None:
-    from ppafo.engine.lanes import loaded
+    from ppafo.engine.lanes import load_source
 
-    loaded.cache_clear()
+    load_source.cache_clear()
     simulate.compile_models(["torque-task-proportional"])
-    asked = loaded.cache_info().misses
+    asked = load_source.cache_info().misses
     simulate.simulate("torque-task-proportional", ["run.duration=10 ms"])
-    assert loaded.cache_info().misses == asked == 1
+    assert load_source.cache_info().misses == asked == 1

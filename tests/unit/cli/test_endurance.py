@@ -105,7 +105,7 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path: Path, capsys: pytest.
         (["--gas-per-step", "0.3 g", "--rest", "-1 min"], "rest must be at least 0 s"),
         (["--gas-per-step", "0.3 g", "--reuse", "reservoir_volume=50 cm^3"], "more than the 0.3 g"),
         ([*QUICK[1:], *("--reuse", "reservoir_volume=50 cm^3") * 2], "--reuse reservoir_volume: given twice"),
-        (["."], ".: holds no result of a walk or a simulation"),
+        (["."], ".: contains no result of a walk or a simulation"),
         (["absent.csv"], "absent.csv: cannot be read"),
     ],
 )

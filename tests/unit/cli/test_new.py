@@ -11,7 +11,7 @@ from ppafo import load_device, load_parameter_set, load_scenario, load_study, lo
 from ppafo.cli.main import build_parser, main
 from ppafo.cli.new import KINDS
 from ppafo.parameters.audit import audit
-from ppafo.questions.question import loaded
+from ppafo.questions.question import load_name
 
 SHIPPED = [
     (kind, Path(item.name).stem)
@@ -35,7 +35,7 @@ def test_there_is_one_template_for_each_kind() -> None:
 def test_every_template_loads_as_it_is_under_its_new_name(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["new", kind, "my-own", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["file"] == "my-own.toml"
-    made = loaded(KINDS[kind].load)("my-own.toml")
+    made = load_name(KINDS[kind].load)("my-own.toml")
     assert getattr(made, "name", "my-own") == "my-own"
     text = Path("my-own.toml").read_text(encoding="utf-8")
     assert 'name = "template"' not in text
@@ -89,7 +89,7 @@ def test_the_next_command_is_one_that_there_is(kind: str, capsys: pytest.Capture
 def test_a_file_that_is_there_is_not_overwritten(capsys: pytest.CaptureFixture[str]) -> None:
     Path("mine.toml").write_text("mine")
     assert main(["new", "scenario", "mine"]) == 2
-    assert "mine.toml: is there already" in capsys.readouterr().err
+    assert "mine.toml: already exists" in capsys.readouterr().err
     assert Path("mine.toml").read_text() == "mine"
 
 

@@ -151,7 +151,7 @@ MISTAKES = {
     "--minutes nan": "a walk of nan min: must be",
     "--minutes 1e9": "a walk of 1e+09 min: must be 0.087 min (5 strides) or more, and at most 60 min",
     "--minutes -1": "a walk of -1 min: must be",
-    "--minutes soon": "--minutes 'soon': a number of minutes, or a time such as '90 s'",
+    "--minutes soon": "--minutes 'soon': must be a number of minutes, or a time such as '90 s'",
     "--set controller.unload_threshold=80N": "must be below controller.load_threshold, which is 60 N",
     "--set controller.swing_angel=90deg": "did you mean 'controller.swing_angle'?",
     "--wearers many": "--wearers many: must be a whole number",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ppafo.control.profiles.tabulated import KIND, KNOTS, NEVER, Tabulated, bounds, used_knots, value
+from ppafo.control.tabulated import KIND, KNOTS, NEVER, Tabulated, bounds, used_knots, value
 from ppafo.engine.rows import rebuilt
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError
 from ppafo.parameters import load_parameter_set
 from ppafo.simulation.loading import load_scenario
@@ -52,10 +52,10 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("load", "kind"), [(load_scenario, ScenarioError), (load_parameter_set, ParameterError)])
 def test_a_typed_file_of_more_than_a_megabyte_is_refused(load, kind: type[PpafoError], tmp_path: Path) -> None:
     file = tmp_path / "long.toml"
-    file.write_bytes(b"#" * MOST_BYTES_TYPED)
+    file.write_bytes(b"#" * MAXIMUM_BYTES_TYPED)
     with pytest.raises(kind, match=r"^(?!.*larger).*$"):
         load(file)
-    file.write_bytes(b"#" * (MOST_BYTES_TYPED + 1))
+    file.write_bytes(b"#" * (MAXIMUM_BYTES_TYPED + 1))
     with pytest.raises(kind, match=r"long\.toml: cannot be read: it is larger than 1 MB"):
         load(file)
 
@@ -68,9 +68,9 @@ def test_a_document_of_ours_that_is_far_too_long_is_refused(tmp_path: Path) -> N
 
 
 def test_a_link_to_a_file_is_read_and_recordings_may_be_long(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(b"x" * (MOST_BYTES_TYPED + 1))
+    (tmp_path / "file").write_bytes(b"x" * (MAXIMUM_BYTES_TYPED + 1))
     (tmp_path / "link").symlink_to(tmp_path / "file")
-    assert len(read_regular_file(tmp_path / "link")) == MOST_BYTES_TYPED + 1
+    assert len(read_regular_file(tmp_path / "link")) == MAXIMUM_BYTES_TYPED + 1
 
 
 def test_room_is_taken_for_what_is_there_and_not_for_the_most_that_may_be(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.engine import cache, compile_times
-from ppafo.engine.compile_times import announced, counted, expected_seconds
+from ppafo.engine.compile_times import announce, estimate_seconds, number_models
 
 QUICK = "answer = {}\n"
 
@@ -18,7 +18,7 @@ def _soon(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_nothing_is_said_of_what_is_quick(caplog: pytest.LogCaptureFixture) -> None:
-    with announced(12.0, "kept"):
+    with announce(12.0, "kept"):
         pass
     time.sleep(0.1)
     assert caplog.messages == []
@@ -27,19 +27,19 @@ def test_nothing_is_said_of_what_is_quick(caplog: pytest.LogCaptureFixture) -> N
 def test_what_takes_longer_is_said_while_it_runs_with_its_number_and_about_how_long(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    with counted(1, 2), announced(12.3, "kept in a folder"):
+    with number_models(1, 2), announce(12.3, "kept in a folder"):
         time.sleep(0.2)
         assert caplog.messages == ["ppafo: compiling model 1 of 2 for this computer, about 12 s ..."]
     assert len(caplog.messages) == 2
     assert caplog.messages[1].startswith("ppafo: compiled in 0.")
     assert caplog.messages[1].endswith(" s and kept in a folder")
-    with announced(12.3, "not kept"):
+    with announce(12.3, "not kept"):
         time.sleep(0.2)
     assert caplog.messages[2] == "ppafo: compiling a model for this computer, about 12 s ..."
 
 
 def test_what_fails_is_no_longer_announced(caplog: pytest.LogCaptureFixture) -> None:
-    with pytest.raises(KeyboardInterrupt), announced(12.0, "kept"):
+    with pytest.raises(KeyboardInterrupt), announce(12.0, "kept"):
         raise KeyboardInterrupt
     time.sleep(0.1)
     assert caplog.messages == []
@@ -51,8 +51,8 @@ def test_the_time_expected_is_that_of_what_this_computer_has_compiled_by_length(
         (tmp_path / name / "program.py").write_text("x" * 100)
         (tmp_path / name / "seconds.txt").write_text(seconds)
     (tmp_path / "e").mkdir()
-    assert expected_seconds("y" * 200, sorted(tmp_path.iterdir())) == pytest.approx(8.0)
-    assert 5.0 < expected_seconds("y" * 40_000, []) < 20.0
+    assert estimate_seconds("y" * 200, sorted(tmp_path.iterdir())) == pytest.approx(8.0)
+    assert 5.0 < estimate_seconds("y" * 40_000, []) < 20.0
 
 
 def test_models_that_are_needed_together_are_counted_and_those_that_are_there_are_not(
@@ -71,6 +71,6 @@ def test_models_that_are_needed_together_are_counted_and_those_that_are_there_ar
     cache.load_generated("test", sources[1])
     cache.load_all("test", [*sources, sources[0]])
     assert heard == [(1, 1), (1, 2), (2, 2)]
-    kept = [item.place / "seconds.txt" for item in cache.cached_programs(fresh_cache)]
+    kept = [item.place / "seconds.txt" for item in cache.list_programs(fresh_cache)]
     assert len(kept) == 3
     assert all(float(file.read_text()) >= 0.0 for file in kept)

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from ppafo.engine import cache
-from ppafo.engine.cache import cache_folder, cached_programs, clear, evict, load_generated, refusal
+from ppafo.engine.cache import cache_folder, clear, evict, list_programs, load_generated
+from ppafo.engine.private_folder import refusal
 
 SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef twice(x):\n    return 2.0 * x\n'
 
@@ -26,7 +27,7 @@ print(load_generated("test", {SOURCE!r}).twice(21.0))
 def compiled(fresh_cache: Path) -> Path:
     """The folder of the one program in a fresh cache."""
     assert loaded() == 42.0
-    (program,) = cached_programs(fresh_cache)
+    (program,) = list_programs(fresh_cache)
     return program.place
 
 
@@ -201,7 +202,7 @@ def test_programs_beyond_the_largest_size_are_removed_oldest_first(
     (older / "large").write_bytes(bytes(1000))
     used = compiled.stat().st_mtime
     os.utime(older, (used - 60.0, used - 60.0))
-    monkeypatch.setattr(cache, "MOST_BYTES", cached_programs(compiled.parent)[0].size + 500)
+    monkeypatch.setattr(cache, "MAXIMUM_BYTES", list_programs(compiled.parent)[0].size + 500)
     evict(compiled.parent)
     assert compiled.is_dir()
     assert not older.exists()

@@ -77,7 +77,7 @@ def test_a_decorated_function_is_refused_even_where_it_hides_that_it_was(write: 
 def test_a_function_of_a_function_is_refused_by_the_names_that_it_takes_from_there(write: Write) -> None:
     module = write("def make(gain):\n    def law(x):\n        return gain * x\n\n    return law\n")
     assert refused(module.make(2.0)) == (
-        "my_law.py:2: 'make.<locals>.law' uses 'gain' of the function around it, which is not compiled; "
+        "my_law.py:2: 'make.<locals>.law' uses 'gain' of the function around it, which cannot be compiled; "
         "make it a parameter"
     )
 
@@ -380,7 +380,7 @@ MEASUREMENT = (
         ),
         (
             "def law(measurement, x):\n    if x > 0.0:\n        return x\n",
-            "my_law.py:12: 'law' can end without 'return'; every way through it returns a value",
+            "my_law.py:12: 'law' can end without 'return'; every path through it must return a value",
         ),
         (
             "def law(measurement, x):\n    if x > 0.0:\n        return x, x\n    return x\n",
@@ -388,16 +388,17 @@ MEASUREMENT = (
         ),
         (
             "def law(measurement, x):\n    return {0: x}[0]\n",
-            "my_law.py:13: a dictionary is not compiled; a law is made of numbers, tuples, NamedTuples, 'math' and "
+            "my_law.py:13: a dictionary cannot be compiled; a law is made of numbers, tuples, NamedTuples, 'math' and "
             "other plain functions",
         ),
         (
             "def law(measurement, x):\n    return np.clip(x, 0.0, 1.0)\n",
-            "my_law.py:13: 'np.clip' is of numpy, which is not compiled here; 'math' has its functions of one number",
+            "my_law.py:13: 'np.clip' is from numpy, which cannot be compiled here; "
+            "use 'math' for functions of one number",
         ),
         (
             "def law(measurement, x):\n    return measurement / x\n",
-            "my_law.py:13: '/' is not compiled for a Measurement and a number, in 'return measurement / x'",
+            "my_law.py:13: '/' cannot be compiled for a Measurement and a number, in 'return measurement / x'",
         ),
         (
             "def law(measurement, x):\n    return Measurement(x, torqe=x).torque\n",
@@ -405,7 +406,7 @@ MEASUREMENT = (
         ),
         (
             "def law(measurement, x):\n    if x > 0.0:\n        y = x\n    return y\n",
-            "my_law.py:15: 'y' may have no value here; give it one before, on every way",
+            "my_law.py:15: 'y' may have no value here; assign it before, on every path",
         ),
         (
             "def law(measurement, x):\n    a, b = x\n    return a\n",
@@ -413,7 +414,7 @@ MEASUREMENT = (
         ),
         (
             "def law(measurement, x):\n    return math.fsum((x, x))\n",
-            "my_law.py:13: 'math.fsum' is not compiled",
+            "my_law.py:13: 'math.fsum' cannot be compiled",
         ),
         (
             "def law(measurement, x, y):\n    return x\n",

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.engine.scheme.motion import with_gas
-from ppafo.engine.scheme.pneumatics import begin_moving_gas, end_moving_gas
-from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, fed_plant
+from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, begin_moving_gas, moving_change, second_moving_stage
+from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, plant_at_line_pressures
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
 from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
@@ -57,14 +57,19 @@ def open_ports(plant: PlantParameters) -> tuple[SinglePort, SinglePort]:
     return port_1, SinglePort(plant.valve_conductance, plant.dorsiflexion_pressure, 1.0, 1.0)
 
 
+def end_of(plant: PlantParameters, begun: MovingGas, ports: tuple[SinglePort, SinglePort], step: float) -> GasChange:
+    """What a step [s] adds [kg], from its first stage."""
+    return moving_change(plant, begun.still, second_moving_stage(plant, begun, *ports, single_port_flow), step)
+
+
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     """Both chambers filled at once from full lines, the vane held."""
     state, gas = vented_state(plant, ANGLE, 0.0), full_lines(plant, lines)
     for _ in range(round(DURATION / step)):
-        ports = open_ports(fed_plant(plant, lines, gas))
+        ports = open_ports(plant_at_line_pressures(plant, lines, gas))
         begun = begin_fed_gas(plant, lines, gas, state, ANGLE, *ports, step, single_port_flow_slopes)
-        ports = open_ports(fed_plant(plant, lines, begun.lines.after))
-        change = end_moving_gas(plant, begun.chambers, *ports, step, single_port_flow)
+        ports = open_ports(plant_at_line_pressures(plant, lines, begun.lines.after))
+        change = end_of(plant, begun.chambers, ports, step)
         gas = end_lines(plant, lines, gas, begun, change, ports[1], step, single_port_flow)
         state = with_gas(state, change)
     return Filled(state, gas)
@@ -141,7 +146,7 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
     ports, state = open_ports(plant), vented_state(plant, ANGLE, 0.0)
     for _ in range(round(DURATION / step)):
         begun = begin_moving_gas(plant, state, ANGLE, *ports, step, single_port_flow_slopes)
-        state = with_gas(state, end_moving_gas(plant, begun, *ports, step, single_port_flow))
+        state = with_gas(state, end_of(plant, begun, ports, step))
     ideal = np.array(chamber_pressures(plant, ANGLE, state.mass_1, state.mass_2))
     away = []
     for droop in (1.0e7, 1.0e6, 1.0e5, 1.0):

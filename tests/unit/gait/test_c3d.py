@@ -28,7 +28,7 @@ def written(
 
     def write(points: dict[str, Floats] | None = None, plate: bool = False, walk_along: float = 1.0) -> Path:
         frames = np.arange(0.0, walk.duration, 0.01)
-        at = walk.resampled(frames)
+        at = walk.resample(frames)
         shank, nothing = at["shank_angle"], np.zeros(frames.size)
         forward, up = knee_way(frames)
         knee = np.array([walk_along * 1000.0 * forward, nothing, 1000.0 * up])
@@ -94,7 +94,9 @@ def test_markers_and_outputs_of_plug_in_gait_are_read_by_convention(
     assert found.curve("vertical_force").mean == pytest.approx(normative.curve("vertical_force").mean, abs=0.01)
 
 
-def test_a_force_plate_and_a_walk_the_other_way_need_a_map(written: Callable[..., Path], normative: Gait) -> None:
+def test_a_walk_the_other_way_is_seen_in_the_markers_and_a_map_may_name_axes_and_plate(
+    written: Callable[..., Path], normative: Gait
+) -> None:
     columns = GaitMap(
         shank_angle=ShankMap(knee="RKNE", ankle="RANK", forward="-x"),
         ankle_angle=AngleMap(terms=("RAnkleAngles.x",), positive="dorsiflexion", unit="deg"),
@@ -105,8 +107,13 @@ def test_a_force_plate_and_a_walk_the_other_way_need_a_map(written: Callable[...
     found = import_gait([path], ImportSettings(normative.body_mass, columns=columns)).gait
     assert same(found, normative)
     assert knee_error(found, normative) < 0.15
+    seen = import_gait([path], ImportSettings(normative.body_mass))
+    assert same(seen.gait, normative)
+    assert knee_error(seen.gait, normative) < 0.15
+    assert "the walk goes along -x, upwards is z" in seen.remarks
+    forwards = columns.model_copy(update={"shank_angle": ShankMap(knee="RKNE", ankle="RANK")})
     with pytest.raises(DataError, match="shank_angle grows while the foot stands"):
-        import_gait([path], ImportSettings(normative.body_mass))
+        import_gait([path], ImportSettings(normative.body_mass, columns=forwards))
 
 
 def test_a_gap_in_a_marker_is_named(written: Callable[..., Path], walk: Recording) -> None:

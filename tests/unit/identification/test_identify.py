@@ -184,7 +184,7 @@ def test_the_published_schema_knows_every_procedure() -> None:
         ("", "procedure"),
         (STATIC.replace("static-torque", "static_torqe"), "did you mean 'static-torque'"),
         (f"{STATIC}colums = 'rig'\n", "did you mean 'columns'"),
-        (f"{STATIC}columns = 'rig'\n", "procedure 1: there is no column map 'rig'; there are none"),
+        (f"{STATIC}columns = 'rig'\n", "procedure 1: there is no column map 'rig'; available: none"),
         (STATIC.replace("static.csv", "nowhere.csv"), "nowhere.csv"),
         (STATIC.replace("static.csv", "decay.csv"), "decay.csv: static-torque needs a channel 'torque [N m]'"),
         (f'{DECAY}start = "2 m"\n', "procedure 1, free-decay: start = '2 m': unit 'm' does not fit"),

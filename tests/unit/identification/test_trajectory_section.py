@@ -272,7 +272,7 @@ def test_the_published_schema_has_the_section() -> None:
         (FIT.replace("foot_plate.inertia", "foot_plate.inertial"), "did you mean 'foot_plate.inertia'"),
         (FIT.replace("2 g m^2", "2 g m"), "parameter 'foot_plate.inertia': low = '2 g m': unit 'g m' does not fit"),
         (FIT.replace("2 g m^2", "70 g m^2"), "problem.toml: trajectory: foot_plate.inertia: start 0.0084 must lie"),
-        (f"{FIT}columns = 'rig'\n", "experiment 'step': there is no column map 'rig'; there are none"),
+        (f"{FIT}columns = 'rig'\n", "experiment 'step': there is no column map 'rig'; available: none"),
         (f"{FIT}inputs = ['comand']\n", "experiment 'step': 'comand' is not a measured input, did you mean 'command'"),
         (f"{FIT}inputs = ['external_torque']\n", "has no channel 'external_torque' to follow"),
         (f"{FIT}channels = ['torque']\n", "channel 'torque' cannot be fitted"),

@@ -14,7 +14,7 @@ from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import Readings
 from ppafo.metrics.switching import UNDECIDED, Swing, count_of, next_swing, reversals
 from ppafo.signals import Channel, Recording
-from ppafo.signals.meter import SAME_LEVEL, Course, MeterKind, Sample, followed
+from ppafo.signals.meter import SAME_LEVEL, Course, MeterKind, Sample, advance_course
 
 Floats = NDArray[np.float64]
 
@@ -29,10 +29,10 @@ def samples_of(recording: Recording) -> list[Sample]:
 
 
 def metered(meter: MeterKind, samples: Sequence[Sample], course: Course) -> tuple[Any, Course]:
-    course = followed(course, samples[0])
+    course = advance_course(course, samples[0])
     state = meter.start(course, samples[0])
     for sample in samples[1:]:
-        course = followed(course, sample)
+        course = advance_course(course, sample)
         state = meter.update(state, course, sample)
     return state, course
 

@@ -51,7 +51,7 @@ def test_a_constant_error_is_its_own_rms_error_on_ramp_and_hold() -> None:
 
 def test_the_rms_error_does_not_depend_on_how_densely_a_part_is_sampled() -> None:
     sparse = recording(reference=RAMP, torque=0.9 * RAMP)
-    crowded = sparse.resampled(np.concatenate([TIME[:1000], np.linspace(1.0, 1.2, 5000), TIME[1201:]]))
+    crowded = sparse.resample(np.concatenate([TIME[:1000], np.linspace(1.0, 1.2, 5000), TIME[1201:]]))
     assert evaluate(crowded)["rms_error"].value == pytest.approx(evaluate(sparse)["rms_error"].value, rel=1e-5)
 
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ppafo.engine.rows import leaves
 from ppafo.model.columns import over_runs
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
 from ppafo.model.orifice_curves import isentropic_curve, iso6358_curve, sonic_conductance_mass
@@ -60,6 +61,6 @@ def test_a_function_is_called_once_for_each_combination_that_occurs() -> None:
 )
 def test_flow_of_many_runs_is_that_of_each_alone(function: object, columns: tuple[list[float], ...]) -> None:
     assert callable(function)
-    together = np.atleast_2d(function(*(np.array(column) for column in columns)))
+    together = np.array(leaves((function(*(np.array(column) for column in columns)),)))
     for run, values in enumerate(zip(*columns, strict=True)):
-        assert together[:, run].tolist() == np.atleast_1d(function(*values)).tolist()
+        assert together[:, run].tolist() == leaves((function(*values),))

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_mass, chamber_pressure
-from ppafo.model.friction import holds_still, sliding_friction
-from ppafo.model.sensors import SensorParameters, measure, quantised, standard_noise
-from ppafo.model.vane import actuator_torque, gravity_torque, vane_acceleration
+from ppafo.model.sensors import SensorParameters, measure, quantise, standard_noise
+from ppafo.model.vane import actuator_torque, gravity_torque, holds_still, sliding_friction, vane_acceleration
 
 
 def test_printed_volumes_are_the_case_without_dead_volume_and_lower_stop() -> None:
@@ -72,7 +71,7 @@ def test_noise_of_channels_and_seeds_is_unrelated() -> None:
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e3))
 def test_quantised_values_are_whole_quanta_within_half_of_one(value: float, quantum: float) -> None:
-    result = quantised(value, quantum)
+    result = quantise(value, quantum)
     assert abs(result - value) <= 0.5 * quantum * (1 + 1e-9)
     assert result / quantum == pytest.approx(round(result / quantum), abs=1e-6)
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from ppafo.model.exhaust_reuse import (
     ReuseCycle,
-    joined_pressure,
+    equalised_pressure,
     reuse_balance,
     reuse_cycle,
     steady_reservoir_pressure,
@@ -36,8 +36,8 @@ def settled(cycle: ReuseCycle, turns: int = 5000) -> float:
 
 
 def test_joined_volumes_keep_their_gas() -> None:
-    assert joined_pressure(3e5, 2e-5, 1e5, 2e-5) == pytest.approx(2e5)
-    assert joined_pressure(3e5, 2e-5, 1e5, 0.0) == 3e5
+    assert equalised_pressure(3e5, 2e-5, 1e5, 2e-5) == pytest.approx(2e5)
+    assert equalised_pressure(3e5, 2e-5, 1e5, 0.0) == 3e5
 
 
 def test_nothing_is_saved_without_a_reservoir_and_little_with_a_tiny_one() -> None:
@@ -48,7 +48,7 @@ def test_nothing_is_saved_without_a_reservoir_and_little_with_a_tiny_one() -> No
 
 def test_a_very_large_reservoir_settles_where_the_two_chambers_would_meet_directly() -> None:
     large = CYCLE._replace(reservoir_volume=1e3)
-    meeting = joined_pressure(CYCLE.exhaust_pressure, 80e-6, OUTSIDE, 40e-6)
+    meeting = equalised_pressure(CYCLE.exhaust_pressure, 80e-6, OUTSIDE, 40e-6)
     assert steady_reservoir_pressure(large) == pytest.approx(meeting, rel=1e-6)
     assert reuse_balance(large).returned_mass == pytest.approx((meeting - OUTSIDE) * 40e-6 / 56300.0, rel=1e-6)
 

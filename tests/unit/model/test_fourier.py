@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.model.fourier import Series, acceleration_at, harmonics, rate_at, value_at
+from ppafo.model.fourier import Harmonic, Series, acceleration_at, harmonics, rate_at, value_at
 from ppafo.model.turns import sine_and_cosine
 
 FREQUENCY = 0.9
@@ -13,14 +13,15 @@ FREQUENCY = 0.9
 
 def some_series() -> Series:
     chance = np.random.default_rng(3)
-    return Series(*[float(value) for value in chance.standard_normal(17)])
+    mean, *terms = (float(value) for value in chance.standard_normal(17))
+    return Series(mean=mean, harmonics=tuple(map(Harmonic, terms[0::2], terms[1::2])))
 
 
 def expected(series: Series, time: float, derivative: int) -> float:
     angular = 2.0 * math.pi * FREQUENCY
     total = series.mean if derivative == 0 else 0.0
     for order in range(1, 9):
-        a, b = series[2 * order - 1], series[2 * order]
+        a, b = series.harmonics[order - 1]
         turned = order * angular * time + derivative * math.pi / 2
         total += (order * angular) ** derivative * (a * math.cos(turned) + b * math.sin(turned))
     return total

@@ -25,7 +25,10 @@ def some_leg() -> LegParameters:
         ankle_rest_angle=math.pi / 2,
         ankle_damping=0.0,
         residual_share=0.0,
+        keeps_gait=0.0,
         heel_lever=0.05,
+        flat_heel_lever=0.05,
+        heel_roll_angle=0.1,
         toe_lever=0.13,
         gravity=9.80665,
     )

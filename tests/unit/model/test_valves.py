@@ -73,7 +73,7 @@ def test_spool_step_is_the_closed_form_for_any_frequency_damping_and_length(deca
 def test_spool_answers_a_step_as_a_second_order_system() -> None:
     settings = {**SPOOL, "spool_damping_ratio": 0.2}
     valve = proportional.prepare_moving(settings)
-    state, highest = proportional.closed_at_rest(), 0.0
+    state, highest = proportional.spool_at_rest(), 0.0
     for _ in range(1000):
         _, state = proportional.advance_moving(valve, state, 0.5, 0.0, 1e-4)
         highest = max(highest, state.opening)
@@ -83,7 +83,7 @@ def test_spool_answers_a_step_as_a_second_order_system() -> None:
 
 def test_slew_limit_bounds_the_rate_of_the_opening() -> None:
     valve = proportional.prepare_moving({**SPOOL, "spool_frequency": 0.0, "slew_limit": 20.0})
-    state = proportional.closed_at_rest()
+    state = proportional.spool_at_rest()
     for _ in range(25):
         _, state = proportional.advance_moving(valve, state, 0.6, 0.0, 1e-3)
     assert state.opening == pytest.approx(0.5)

@@ -104,4 +104,4 @@ def test_the_atmosphere_of_the_set_is_the_zero_of_its_gauge_pressures() -> None:
 
 
 def test_an_atmosphere_given_as_gauge_is_refused() -> None:
-    assert "give it as absolute" in problem_of("supply.atmospheric_pressure=0 psi_g")
+    assert "give it as an absolute pressure" in problem_of("supply.atmospheric_pressure=0 psi_g")

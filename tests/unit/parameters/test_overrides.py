@@ -98,7 +98,7 @@ def test_another_gas_brings_its_own_constants() -> None:
 
 
 def test_an_unknown_gas_names_the_nearest() -> None:
-    assert "unknown gas, did you mean 'CO2'?; known are CO2, air" in problem_of("gas.species=CO")
+    assert "unknown gas, did you mean 'CO2'?; available: CO2, air" in problem_of("gas.species=CO")
 
 
 def test_one_form_of_an_orifice_replaces_the_other() -> None:

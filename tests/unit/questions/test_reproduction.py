@@ -44,7 +44,7 @@ def printed_with(**values: float) -> Printed:
         path = name.replace("__", ".")
         numbers[path] = numbers[path].model_copy(update={"value": value})
     changed = dataclasses.replace(printed.parameter_set, numbers=numbers)
-    return Printed(changed, Evidence(changed, changed.declared()))
+    return Printed(changed, Evidence(changed, changed.declarations()))
 
 
 def arithmetic(**values: float) -> dict[str, Claim]:

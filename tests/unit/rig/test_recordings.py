@@ -13,8 +13,7 @@ from ppafo.rig.bench.static_torque import on_scale
 from ppafo.rig.catalog import EXPERIMENTS
 from ppafo.rig.declaration import PATHS, SECTIONS
 from ppafo.rig.folder import write_rig_recording
-from ppafo.rig.preset import Preset
-from ppafo.rig.schema import json_schema
+from ppafo.rig.preset import Preset, json_schema
 from ppafo.rig.solution import make_solver
 from ppafo.signals.channels import CHANNELS
 from ppafo.storage import read_csv
@@ -241,7 +240,7 @@ def test_a_foreign_rig_file_is_not_overwritten(tmp_path: Path) -> None:
 def test_an_empty_preset_points_to_the_schema(tmp_path: Path) -> None:
     for text in ("", "# nothing yet\n"):
         (tmp_path / "mine.toml").write_text(text)
-        with pytest.raises(ParameterError, match="'ppafo schema rig' prints what belongs in it"):
+        with pytest.raises(ParameterError, match="'ppafo schema rig' prints its format"):
             load_preset(tmp_path / "mine.toml")
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
-from ppafo.signals.recording import aligned
+from ppafo.signals.recording import align
 
 
 def recording(label: str = "bench", start: float = 0.0) -> Recording:
@@ -40,7 +40,7 @@ def test_what_is_made_of_a_recording_is_of_its_kind() -> None:
     given = Recording("bench", np.arange(3.0), {"angle": Channel(np.arange(3.0), "rad")}, "synthetic")
     made = (
         given.between(0.0, 1.0),
-        given.resampled([0.5, 1.5]),
+        given.resample([0.5, 1.5]),
         given.with_channel("command", [1.0, 0.0, 1.0], "-"),
         pickle.loads(pickle.dumps(given)),
         copy.deepcopy(given),
@@ -129,25 +129,25 @@ def test_a_part_without_samples_is_refused() -> None:
 
 
 def test_between_samples_a_command_is_held_and_everything_else_runs_straight() -> None:
-    moved = recording().resampled([0.5, 1.75, 4.0])
+    moved = recording().resample([0.5, 1.75, 4.0])
     assert moved["angle"].tolist() == [0.5, 1.75, 4.0]
     assert moved["command"].tolist() == [1.0, -1.0, 1.0]
 
 
 def test_nothing_is_made_up_outside_a_recording() -> None:
     with pytest.raises(DataError, match="nothing is known"):
-        recording().resampled([3.0, 4.5])
+        recording().resample([3.0, 4.5])
 
 
 def test_two_recordings_are_brought_to_the_times_they_share() -> None:
-    first, second = aligned(recording(), recording("other", start=1.5))
+    first, second = align(recording(), recording("other", start=1.5))
     assert first.time.tolist() == second.time.tolist() == [2.0, 3.0, 4.0]
     assert second["angle"].tolist() == [0.5, 1.5, 2.5]
 
 
 def test_recordings_without_a_common_time_are_refused() -> None:
     with pytest.raises(DataError, match="no time in common"):
-        aligned(recording(), recording("other", start=10.0))
+        align(recording(), recording("other", start=10.0))
 
 
 def test_copies_are_equal_and_stay_read_only() -> None:

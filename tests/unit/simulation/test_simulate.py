@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine import lane_step
-from ppafo.engine.lanes import written
+from ppafo.engine.lanes import write_source
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, SimulationError
@@ -248,12 +248,12 @@ def test_a_step_that_is_not_done_in_the_most_parts_ends_the_run_with_time_and_re
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A coil that switches inside a step, after 10.3 ms, cuts it in two; here one part is the most."""
-    monkeypatch.setattr(lane_step, "MOST_PARTS", 1)
-    written.cache_clear()
+    monkeypatch.setattr(lane_step, "MAXIMUM_PARTS", 1)
+    write_source.cache_clear()
     try:
         result = simulate("torque-task-solenoid", ["run.duration=0.1 s", "valve.opening_delay=10.3 ms"])
     finally:
-        written.cache_clear()
+        write_source.cache_clear()
     assert result.status.kind == "diverged"
     assert result.status.time == pytest.approx(0.0103, rel=1e-9)
     assert result.status.message.startswith("diverged at t = 0.0103 s")

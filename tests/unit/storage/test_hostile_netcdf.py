@@ -112,8 +112,8 @@ def shuffled_after_gzip(file: h5py.File) -> None:
 
 HOSTILE = {
     promised: "requires 808 MB of memory",
-    fill_value: "the file does not hold them",
-    some_chunks_missing: "the file does not hold all of them",
+    fill_value: "the file does not contain them",
+    some_chunks_missing: "the file does not contain all of them",
     huge_chunk: "requires 400 MB of memory",
     many_names: "requires 80 MB of memory",
     gzip_within_gzip: "compressed in a way that is not supported",
@@ -187,7 +187,7 @@ def test_library_that_crashes_or_hangs_on_a_file_takes_nobody_with_it(
         file["time"].attrs["units"] = "s"
     assert len(read_recording(tmp_path / "bench.nc")) == 3
     monkeypatch.setattr(trial_reading, "_TRIAL", code)
-    monkeypatch.setattr(trial_reading, "_MOST_SECONDS", 1.5)
+    monkeypatch.setattr(trial_reading, "_MAXIMUM_SECONDS", 1.5)
     with pytest.raises(DataError, match=rf"bench\.nc: is damaged: {message}"):
         read_recording(tmp_path / "bench.nc")
 

@@ -64,7 +64,7 @@ def test_a_result_of_version_0_1_is_replaced_but_not_with_files_of_others(
         (out / name).write_bytes(content)
     check_owned_folder(out, marked_folder(command))
     (out / "notes.txt").write_text("mine")
-    with pytest.raises(DataError, match=r"holds files that are not of its .* \(notes\.txt\)"):
+    with pytest.raises(DataError, match=r"contains files that are not part of its .* \(notes\.txt\)"):
         check_owned_folder(out, marked_folder(command))
     (out / "notes.txt").unlink()
     write_marked_folder(out, WHOLE, command)
@@ -89,14 +89,14 @@ def claims_that_are_no_json(folder: Path) -> str:
 def a_reproduction_and_notes(folder: Path) -> str:
     write_reproduction(folder, WHOLE)
     (folder / "notes.txt").write_text("mine")
-    return r"holds files that are not of its result of 'ppafo reproduce' \(notes\.txt\)"
+    return r"contains files that are not part of its result of 'ppafo reproduce' \(notes\.txt\)"
 
 
 def a_reproduction_with_a_folder_in_it(folder: Path) -> str:
     write_reproduction(folder, WHOLE)
     (folder / "report.html").unlink()
     (folder / "report.html").mkdir()
-    return r"holds files that are not of its result of 'ppafo reproduce' \(report\.html\)"
+    return r"contains files that are not part of its result of 'ppafo reproduce' \(report\.html\)"
 
 
 FILLS = (

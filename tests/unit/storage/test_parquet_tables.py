@@ -10,7 +10,7 @@ from ppafo.errors import DataError
 from ppafo.storage.parquet import (
     TableColumn,
     as_numpy,
-    coded_texts,
+    encode_texts,
     lists_of,
     parquet_bytes,
     read_parquet,
@@ -25,7 +25,7 @@ def content() -> bytes:
     columns = {
         "run": TableColumn(np.arange(500), "-", "number"),
         "torque": TableColumn(random.normal(size=500), "N m", "a torque"),
-        "status": TableColumn(coded_texts(np.arange(500) % 2, ("good", "bad")), "-", "how it ended"),
+        "status": TableColumn(encode_texts(np.arange(500) % 2, ("good", "bad")), "-", "how it ended"),
         "reason": TableColumn(texts_of_some({3: "why"}, 500), "-", "why"),
         "trace": TableColumn(lists_of(random.normal(size=(500, 4)).astype(np.float32)), "N m", "over time"),
     }
@@ -63,8 +63,8 @@ def test_a_changed_bit_in_the_data_is_found_by_the_checksum_of_its_page() -> Non
 
 
 def test_table_of_more_values_than_any_of_ours_is_refused_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ppafo.storage.parquet._MOST_VALUES", 3999)
+    monkeypatch.setattr("ppafo.storage.parquet._MAXIMUM_VALUES", 3999)
     with pytest.raises(DataError, match="file: has 4,000 values, more than any table of a study"):
         read_parquet(io.BytesIO(content()), "file")
-    monkeypatch.setattr("ppafo.storage.parquet._MOST_VALUES", 4000)
+    monkeypatch.setattr("ppafo.storage.parquet._MAXIMUM_VALUES", 4000)
     assert read_parquet(io.BytesIO(content()), "file").num_rows == 500

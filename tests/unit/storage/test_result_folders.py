@@ -87,13 +87,13 @@ def filled_with_a_run_file_of_another_program(folder: Path) -> str:
 def filled_with_a_result_and_something_else(folder: Path) -> str:
     write_result(folder, recording(), DOCUMENT, {})
     (folder / "notes.txt").write_text("keep me")
-    return r"holds files that are not of its ppafo result \(notes.txt\)"
+    return r"contains files that are not part of its ppafo result \(notes.txt\)"
 
 
 def filled_with_a_result_and_a_folder_by_the_name_of_a_file(folder: Path) -> str:
     write_result(folder, recording(), DOCUMENT, {})
     (folder / "figure.png").mkdir()
-    return r"holds files that are not of its ppafo result \(figure.png\)"
+    return r"contains files that are not part of its ppafo result \(figure.png\)"
 
 
 @pytest.mark.parametrize(
@@ -237,5 +237,5 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     for place in (tmp_path / "a.xlsx", tmp_path / "nothing"):
         with pytest.raises(DataError, match=r"neither a \.nc or \.csv file nor a result folder"):
             read_recording(place)
-    with pytest.raises(DataError, match=r"holds no result of a walk or a simulation"):
+    with pytest.raises(DataError, match=r"contains no result of a walk or a simulation"):
         read_recording(tmp_path)

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from ppafo.studies.intervals import (
-    draws_that_carry,
+    effective_sample_size,
     fraction_interval,
     quantile_interval,
     replicates_interval,
@@ -25,10 +25,10 @@ def test_the_interval_of_a_mean_is_the_one_of_student_over_replicates() -> None:
 
 def test_one_large_draw_carries_a_mean_alone_and_normal_draws_all_do() -> None:
     random = np.random.default_rng(1)
-    assert draws_that_carry(np.array([0.0] * 499 + [1.0])) == pytest.approx(1.0, rel=0.01)
-    assert draws_that_carry(random.normal(size=500)) == 500.0
-    assert draws_that_carry(random.exponential(size=100_000)) == pytest.approx(25_000, rel=0.2)
-    assert draws_that_carry(np.ones(7)) == 7.0
+    assert effective_sample_size(np.array([0.0] * 499 + [1.0])) == pytest.approx(1.0, rel=0.01)
+    assert effective_sample_size(random.normal(size=500)) == 500.0
+    assert effective_sample_size(random.exponential(size=100_000)) == pytest.approx(25_000, rel=0.2)
+    assert effective_sample_size(np.ones(7)) == 7.0
 
 
 @pytest.mark.parametrize(("hits", "draws"), [(0, 40), (3, 40), (40, 40), (250, 1000)])

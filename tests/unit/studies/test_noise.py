@@ -135,7 +135,7 @@ def test_monte_carlo_says_how_much_is_noise(statistic: Mean | Quantile) -> None:
 
     drawn = (Drawn("x", NormalAround(0.0, 1.0)),)
     heard = Uncertainty(*with_noise(drawn, None, [ppafo.load_scenario("torque-task-proportional", NOISY)], ["x"]))
-    rule = StoppingRule(0.2, False, first=1024, most=4096)
+    rule = StoppingRule(0.2, False, first=1024, maximum=4096)
     share = draw_until(model, heard, "rms_error", statistic, rule, 1).noise
     assert share is not None
     assert share.value == pytest.approx(0.2, abs=0.04)

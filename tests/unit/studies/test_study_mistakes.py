@@ -204,7 +204,9 @@ def test_distributions_need_a_sample_and_a_grid_has_none(varying: Callable[..., 
     assert "[sample] is given, but nothing has a distribution" in refused(document)
     del document["sample"]
     with pytest.raises(StudyError, match=r"has no \[sample\], so the number of runs is that of its grid"):
-        load_study(document, runs=4)
+        load_study(document, draws=4)
+    with pytest.raises(StudyError, match="takes neither draws nor a seed"):
+        load_study(document, seed=4)
 
 
 def test_configurations_have_names_of_their_own(small: Any) -> None:
@@ -227,7 +229,7 @@ def test_files_are_named_in_messages_and_scenarios_are_relative_to_them(tmp_path
     with pytest.raises(StudyError, match=r"mine\.toml: "):
         load_study(path)
     path.write_text("", encoding="utf-8")
-    with pytest.raises(StudyError, match="is empty; 'ppafo schema study' prints what belongs in it"):
+    with pytest.raises(StudyError, match="is empty; 'ppafo schema study' prints its format"):
         load_study(path)
 
 

@@ -49,7 +49,7 @@ def written(folder: Path, *lines: str) -> Path:
         ([HEADER.replace("pressure_1 [psi_g]", "pressure_1 [psi]"), *ROWS], ["pressure_1 [psi]", "psi_g"]),
         ([HEADER.replace("angle [deg]", "angle [s]"), *ROWS], ["angle [s]", "an angle is needed"]),
         ([HEADER.replace("angle [deg]", "angel [deg]"), *ROWS], ["'angel' is not known", "did you mean 'angle'"]),
-        ([HEADER.replace("command [-]", "valve [-]"), *ROWS], ["no channel 'command'", "there are valve, angle"]),
+        ([HEADER.replace("command [-]", "valve [-]"), *ROWS], ["no channel 'command'", "available: valve, angle"]),
         (
             [HEADER, *ROWS[:5], ROWS[5].replace(",1,", ",nan,"), *ROWS[6:]],
             ["line 7, column 'command [-]': 'nan' is not a number"],
@@ -174,10 +174,10 @@ def test_a_bad_threshold_is_refused(text: str, words: str) -> None:
 
 def test_thresholds_are_shares_or_errors_and_the_last_one_wins() -> None:
     thresholds = parse_thresholds(["5%", "angle=2.2 deg", "pressure_1=20%", "pressure_1=7 percent"])
-    assert thresholds.limit("torque").share_of(123.0) == 0.05
-    assert thresholds.limit("pressure_1").share_of(1e5) == pytest.approx(0.07)
-    assert thresholds.limit("angle").share_of(np.radians(110.0)) == pytest.approx(0.02)
-    assert parse_thresholds().limit("angle").share_of(1.0) == 0.10
+    assert thresholds.limit("torque").fraction_of(123.0) == 0.05
+    assert thresholds.limit("pressure_1").fraction_of(1e5) == pytest.approx(0.07)
+    assert thresholds.limit("angle").fraction_of(np.radians(110.0)) == pytest.approx(0.02)
+    assert parse_thresholds().limit("angle").fraction_of(1.0) == 0.10
 
 
 @pytest.mark.parametrize("text", ["pressure_3=0 psi_g", "angle=3 psi_g", "pressure_1=3 psi", "pressure_1"])

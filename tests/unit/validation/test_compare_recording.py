@@ -43,7 +43,7 @@ def late(recording: Recording, delay: float) -> Recording:
 
 
 def shares(agreement: Any) -> dict[str, float]:
-    return {channel.channel: channel.share for channel in agreement.channels}
+    return {channel.channel: channel.fraction for channel in agreement.channels}
 
 
 def test_a_simulated_recording_agrees_with_its_own_set_to_rounding(step: Step, agree: Agree) -> None:
@@ -77,7 +77,7 @@ def test_a_shift_in_time_is_found_and_taken_out(delay: float, step: Step, agree:
     agreement = agree(late(recording, delay), device)
     assert agreement.delay.value == pytest.approx(delay, abs=5e-5)
     angle = agreement.channels[0]
-    assert angle.share < 1e-4
+    assert angle.fraction < 1e-4
     assert angle.rms_unaligned > 100 * angle.rms
 
 
@@ -158,7 +158,7 @@ def test_sampling_at_other_times_gives_the_same_answer(step: Step, agree: Agree)
     random = np.random.default_rng(5)
     times = np.sort(random.uniform(0.0, recording.time[-1], 700))
     times = np.unique(np.concatenate([[0.0], times]))
-    seen = only(recording, "angle", "pressure_1", "pressure_2", "command").resampled(times)
+    seen = only(recording, "angle", "pressure_1", "pressure_2", "command").resample(times)
     agreement = agree(seen, device)
     assert max(shares(agreement).values()) < 2e-3
     assert any("not regular" in remark for remark in agreement.remarks)
@@ -166,7 +166,7 @@ def test_sampling_at_other_times_gives_the_same_answer(step: Step, agree: Agree)
 
 def test_slow_samples_are_replayed_in_fine_steps(step: Step, agree: Agree) -> None:
     device, recording = step
-    seen = only(recording, "angle", "pressure_1", "pressure_2", "command").resampled(recording.time[::20])
+    seen = only(recording, "angle", "pressure_1", "pressure_2", "command").resample(recording.time[::20])
     agreement = agree(seen, device)
     assert agreement.step <= 1e-3
     assert max(shares(agreement).values()) < 1e-9

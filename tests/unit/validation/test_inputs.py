@@ -83,9 +83,9 @@ def test_a_varying_supply_and_a_led_vane_are_followed_as_an_independent_solver_h
     agreement = agree(recording, device, motion="measured")
     assert agreement.inputs == ("command", "supply_pressure", "angle")
     assert {channel.channel for channel in agreement.channels} == {"pressure_1", "pressure_2", "pressure_difference"}
-    assert max(channel.share for channel in agreement.channels) < 3e-4
+    assert max(channel.fraction for channel in agreement.channels) < 3e-4
     constant = recording.with_channel("supply_pressure", np.full(TIMES.size, 4.0e5), "Pa")
-    assert max(channel.share for channel in agree(constant, device, motion="measured").channels) > 2e-2
+    assert max(channel.fraction for channel in agree(constant, device, motion="measured").channels) > 2e-2
 
 
 def test_a_held_vane_is_filled_as_an_independent_solver_has_it(agree: Agree) -> None:
@@ -95,9 +95,9 @@ def test_a_held_vane_is_filled_as_an_independent_solver_has_it(agree: Agree) -> 
     without = Recording("bench", TIMES, {n: recording.channels[n] for n in recording.names if n != "angle"})
     agreement = agree(without, device, motion="held", initial={"angle": 1.3})
     assert {channel.channel for channel in agreement.channels} == {"pressure_1", "pressure_2", "pressure_difference"}
-    assert max(channel.share for channel in agreement.channels) < 3e-4
+    assert max(channel.fraction for channel in agreement.channels) < 3e-4
     moved = agree(without, device, motion="held", initial={"angle": 1.6})
-    assert max(channel.share for channel in moved.channels) > 2e-2
+    assert max(channel.fraction for channel in moved.channels) > 2e-2
 
 
 @pytest.mark.parametrize("command", [0.1, -0.1])
@@ -128,10 +128,10 @@ def test_a_fixed_volume_without_a_vane_is_filled_and_vented_as_an_independent_so
     }
     agreement = agree(Recording("tank", TIMES, channels), device, volume=volume)
     assert [channel.channel for channel in agreement.channels] == ["pressure_1"]
-    assert agreement.channels[0].share < 3e-4
+    assert agreement.channels[0].fraction < 3e-4
     assert any("a fixed volume of 60 cm^3 without a vane" in remark for remark in agreement.remarks)
     wrong = agree(Recording("tank", TIMES, channels), device, volume=1.1 * volume)
-    assert wrong.channels[0].share > 5e-3
+    assert wrong.channels[0].fraction > 5e-3
 
 
 def test_a_supply_unlike_that_of_the_set_is_followed_and_said(agree: Agree) -> None:

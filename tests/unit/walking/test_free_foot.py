@@ -12,12 +12,13 @@ from scipy.integrate import solve_ivp
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.engine.scheme.ankle_torque import DeviceShare, foot_direction, leg_torque
-from ppafo.gait import Gait
+from ppafo.gait import Gait, load_gait
+from ppafo.gait.gait import Curve
 from ppafo.model import contact as ground
 from ppafo.model.gait import gait_at
 from ppafo.model.leg import foot_inertia_about_ankle, passive_torque
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.walking.gait_series import truncate
+from ppafo.walking.gait_series import heel_rocker, landing_phase, truncate
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import Wearer, paper_subject
 
@@ -141,8 +142,8 @@ def test_the_ground_under_the_heel_turns_the_toes_down(walk_plan: Callable[[str]
     for phase in (0.03, 0.06, 0.2):
         now = gait_at(walk.gait, walk.timing._replace(start=phase), walk.leg, 0.0)
         foot = foot_direction(now.shank, now.ankle)
-        on_heel = leg_torque(walk.leg, walk.share, ground.HEEL, now, now.ankle, foot)
-        in_air = leg_torque(walk.leg, walk.share, ground.SWING, now, now.ankle, foot)
+        on_heel = leg_torque(walk.leg, walk.share, ground.HEEL, now, walk.timing.ground_angle, now.ankle, foot)
+        in_air = leg_torque(walk.leg, walk.share, ground.SWING, now, walk.timing.ground_angle, now.ankle, foot)
         # No more than the whole force at the heel.
         assert 0.0 < on_heel - in_air < 0.05 * now.force
 
@@ -152,8 +153,38 @@ def test_before_the_foot_is_flat_the_ground_gives_what_was_measured(walk_plan: C
     assert walk is not None
     for phase in (0.03, 0.05, 0.07):
         now = gait_at(walk.gait, walk.timing._replace(start=phase), walk.leg, 0.0)
-        given = ground.heel_torque(ground.HEEL, now, walk.leg.heel_lever)
+        given = ground.heel_torque(ground.HEEL, now, walk.leg, walk.timing.ground_angle, now.ankle)
         assert given == pytest.approx(now.healthy_torque - now.moment)
+
+
+def test_a_loaded_heel_pulls_a_raised_foot_down_harder_than_the_device_can_hold(
+    walk_plan: Callable[[str], Any],
+) -> None:
+    walk = plan_walk(walk_plan("off")).walk
+    assert walk is not None
+    level = walk.timing.ground_angle
+    for phase in (0.12, 0.15, 0.2):
+        now = gait_at(walk.gait, walk.timing._replace(start=phase), walk.leg, 0.0)
+        flat = now.shank + 0.5 * math.pi - level
+        torques = [ground.heel_torque(ground.HEEL, now, walk.leg, level, flat - tilt) for tilt in (0.0, 0.05, 0.1, 0.2)]
+        assert torques[0] > 5.5
+        assert torques == sorted(torques)
+        assert torques[-1] - torques[0] > 2.0
+
+
+@pytest.mark.parametrize("measured", ["moment", "centre of pressure", "nothing"])
+def test_the_lever_of_the_ground_is_bounded_by_the_heel_whatever_was_measured(measured: str) -> None:
+    gait, wearer = load_gait("falisse2019-subject1"), paper_subject()
+    if measured != "moment":
+        gait = replace(gait, ankle_moment=None)
+    if measured == "centre of pressure":
+        # It runs from 4 cm behind the ankle to the ankle while the foot comes down.
+        gait = replace(gait, centre_of_pressure=Curve(0.0, (-0.04,), (0.0,)))
+    rocker = heel_rocker(gait, wearer)
+    assert 0.0 <= rocker.flat <= rocker.raised <= wearer.heel_lever
+    assert rocker.half > 0.0
+    if measured == "centre of pressure":
+        assert rocker.flat == pytest.approx(0.04 * math.cos(2.0 * math.pi * landing_phase(gait)))
 
 
 def test_the_weight_of_the_foot_plate_pulls_the_toes_down(walk_plan: Callable[[str], Any]) -> None:
@@ -163,7 +194,7 @@ def test_the_weight_of_the_foot_plate_pulls_the_toes_down(walk_plan: Callable[[s
     now = gait_at(walk.gait, walk.timing._replace(start=0.3), walk.leg, 0.0)
     level = foot_direction(0.0, 0.5 * math.pi)
     heavy, light = (
-        leg_torque(walk.leg, DeviceShare(0.0, 0.0, moment), ground.SWING, now, 1.5, level) for moment in (0.2, 0.0)
+        leg_torque(walk.leg, DeviceShare(0.0, 0.0, moment), ground.SWING, now, 0.0, 1.5, level) for moment in (0.2, 0.0)
     )
     assert heavy - light == pytest.approx(0.2 * walk.leg.gravity, rel=0.1)
 
@@ -176,8 +207,8 @@ def test_a_foot_plate_is_carried_along_like_a_foot_of_its_mass_and_inertia(walk_
     for phase in (0.66, 0.8, 0.95):
         now = gait_at(walk.gait, walk.timing._replace(start=phase), leg, 0.0)
         foot = foot_direction(now.shank, now.ankle + 0.2)
-        bare = leg_torque(leg, DeviceShare(0.0, 0.0, 0.0), ground.SWING, now, now.ankle + 0.2, foot)
+        bare = leg_torque(leg, DeviceShare(0.0, 0.0, 0.0), ground.SWING, now, 0.0, now.ankle + 0.2, foot)
         twice = leg_torque(
-            leg, DeviceShare(foot_inertia_about_ankle(leg), 0.0, moment), ground.SWING, now, now.ankle + 0.2, foot
+            leg, DeviceShare(foot_inertia_about_ankle(leg), 0.0, moment), ground.SWING, now, 0.0, now.ankle + 0.2, foot
         )
         assert twice - bare == pytest.approx(bare - passive_torque(leg, now.ankle + 0.2))

@@ -132,7 +132,10 @@ def test_a_walk_that_diverges_says_when_and_what_to_do() -> None:
 def test_a_walk_is_written_for_opensim(tmp_path: Path) -> None:
     result = compared("solenoid").with_device
     table = read_opensim(result.save_opensim(tmp_path / "walk.sto"))
-    np.testing.assert_array_equal(table.columns["angle"], result.recording["angle"])
+    np.testing.assert_array_equal(table.columns["ankle_angle_r"], 0.5 * np.pi - result.recording["angle"])
+    np.testing.assert_array_equal(table.columns["ankle_angle_r_device_moment"], -result.recording["external_torque"])
+    load = result.recording["heel_force"] + result.recording["toe_force"]
+    np.testing.assert_array_equal(table.columns["ground_force_r_vy"], load)
     assert table.in_degrees is False
 
 

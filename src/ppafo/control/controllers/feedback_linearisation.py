@@ -41,7 +41,9 @@ def update(
         parameters.nominal, measurement.angle, velocity, measurement.pressure_1, measurement.pressure_2
     )
     requested = reference_rate + parameters.convergence_rate * (reference - measurement.torque)
-    return opening_for_rate(rates, requested), FeedbackLinearisationState(reference, measurement.angle, velocity, 1.0)
+    return opening_for_rate(rates, requested), FeedbackLinearisationState(
+        reference=reference, angle=measurement.angle, angular_velocity=velocity, started=1.0
+    )
 
 
 def restart(state: FeedbackLinearisationState, requested: float, continues: float) -> FeedbackLinearisationState:
@@ -64,7 +66,7 @@ KIND = ControllerKind(
         *NOMINAL_QUANTITIES,
     ),
     parameters=FeedbackLinearisationParameters,
-    initial=FeedbackLinearisationState(0.0, 0.0, 0.0, 0.0),
+    initial=FeedbackLinearisationState(reference=0.0, angle=0.0, angular_velocity=0.0, started=0.0),
     update=update,
     restart=restart,
 )

@@ -36,7 +36,7 @@ def pid_command(
     unlimited = ahead + parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
     command = max(-1.0, min(1.0, unlimited))
     integral = integral + parameters.anti_windup * period * (command - unlimited)
-    return command, PidState(integral, error, slope, 1.0)
+    return command, PidState(integral=integral, error=error, slope=slope, started=1.0)
 
 
 def update(
@@ -70,7 +70,7 @@ KIND = ControllerKind(
         ),
     ),
     parameters=PidParameters,
-    initial=PidState(0.0, 0.0, 0.0, 0.0),
+    initial=PidState(integral=0.0, error=0.0, slope=0.0, started=0.0),
     update=update,
     restart=restart,
 )

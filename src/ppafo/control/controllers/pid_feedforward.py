@@ -79,7 +79,7 @@ KIND = ControllerKind(
         *NOMINAL_QUANTITIES,
     ),
     parameters=PidFeedforwardParameters,
-    initial=PidFeedforwardState(PidState(0.0, 0.0, 0.0, 0.0), 0.0),
+    initial=PidFeedforwardState(PidState(integral=0.0, error=0.0, slope=0.0, started=0.0), 0.0),
     update=update,
     restart=restart,
 )

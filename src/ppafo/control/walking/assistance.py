@@ -124,17 +124,22 @@ def assess(
     torque = requested_torque(parameters.assistance, phase, measurement.angle, rate)
     works = phases.lifts(phase.phase) or phase.phase == phases.PUSH_OFF
     return Assessment(
-        phase,
-        watch,
-        TorqueRequest(measurement.angle, rate, torque),
-        1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
-        1.0 if works and watch.level < 0.5 else 0.0,
+        phase=phase,
+        safety=watch,
+        request=TorqueRequest(measurement.angle, rate, torque),
+        continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
+        acts=1.0 if works and watch.level < 0.5 else 0.0,
     )
 
 
 def torque_measurement(measurement: GaitMeasurement) -> Measurement:
     """The part of a measurement that a torque law uses."""
-    return Measurement(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
+    return Measurement(
+        angle=measurement.angle,
+        pressure_1=measurement.pressure_1,
+        pressure_2=measurement.pressure_2,
+        torque=measurement.torque,
+    )
 
 
 def valve_command(assessment: Assessment, command: float, period: float) -> tuple[float, SafetyState]:

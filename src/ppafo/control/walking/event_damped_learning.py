@@ -65,7 +65,9 @@ def update(
     )
     command, law = damped_command(parameters.law, law, assessment.request.torque, torque, ahead, period)
     command, watch = assistance.valve_command(assessment, command, period)
-    return command, EventDampedLearningState(phase, watch, assessment.request, law, table)
+    return command, EventDampedLearningState(
+        phase=phase, safety=watch, request=assessment.request, law=law, table=table
+    )
 
 
 TUNED = {
@@ -88,7 +90,11 @@ KIND = ControllerKind(
     ),
     parameters=EventDampedLearningParameters,
     initial=EventDampedLearningState(
-        phases.START, safety.START, assistance.START, TorqueSlope(0.0, 0.0, 0.0), learnt_table.EMPTY
+        phase=phases.START,
+        safety=safety.START,
+        request=assistance.START,
+        law=TorqueSlope(0.0, 0.0, 0.0),
+        table=learnt_table.EMPTY,
     ),
     update=update,
 )

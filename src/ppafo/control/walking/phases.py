@@ -43,7 +43,15 @@ class PhaseState(NamedTuple):
     strikes: float
 
 
-START = PhaseState(SWING, Switch(0.0, 0.0), Switch(0.0, 0.0), 0.0, 0.0, 0.0, 0.0)
+START = PhaseState(
+    phase=SWING,
+    heel=Switch(0.0, 0.0),
+    toe=Switch(0.0, 0.0),
+    in_phase=0.0,
+    since_strike=0.0,
+    stride_time=0.0,
+    strikes=0.0,
+)
 
 
 def lifts(phase: float) -> bool:
@@ -85,18 +93,26 @@ def next_phase_state(
     toe = next_switch(rules, state.toe, toe_force, period)
     since = state.since_strike + period
     known = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
-    aged = PhaseState(state.phase, heel, toe, state.in_phase + period, since, known, state.strikes)
+    aged = PhaseState(
+        phase=state.phase,
+        heel=heel,
+        toe=toe,
+        in_phase=state.in_phase + period,
+        since_strike=since,
+        stride_time=known,
+        strikes=state.strikes,
+    )
     phase = next_phase(rules, aged, heel.loaded, toe.loaded)
     # A foot that comes down on its toes, or with a lost heel sensor, begins a stride too.
     strikes = state.phase == SWING and phase != SWING
     plausible = state.strikes > 0.5 and since > 0.5 * known and since < 2.0 * known
     learnt = known + rules.stride_weight * (since - known) if plausible else known
     return PhaseState(
-        phase,
-        heel,
-        toe,
-        0.0 if phase != state.phase else aged.in_phase,
-        0.0 if strikes else since,
-        learnt if strikes else known,
-        state.strikes + (1.0 if strikes else 0.0),
+        phase=phase,
+        heel=heel,
+        toe=toe,
+        in_phase=0.0 if phase != state.phase else aged.in_phase,
+        since_strike=0.0 if strikes else since,
+        stride_time=learnt if strikes else known,
+        strikes=state.strikes + (1.0 if strikes else 0.0),
     )

@@ -105,8 +105,10 @@ START = SafetyState(
     level=HELPS,
     good_strides=0.0,
     ventings=0.0,
-    finding=Finding(NO_SIGN, 0.0, 0.0, 0.0, 0.0, 0.0),
-    readings=LastReadings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    finding=Finding(sign=NO_SIGN, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0),
+    readings=LastReadings(
+        heel_force=0.0, toe_force=0.0, angle=0.0, heel_unchanged=0.0, toe_unchanged=0.0, angle_unchanged=0.0
+    ),
     toe_strides=0.0,
     steady=0.0,
     valve_times=ValveTimes(0.0, 0.0, 0.0),
@@ -137,12 +139,12 @@ def time_unchanged(last: float, reading: float, since: float, period: float) -> 
 def next_readings(last: LastReadings, measurement: GaitMeasurement, period: float) -> LastReadings:
     """The last readings after a sample, taken every ``period`` [s]."""
     return LastReadings(
-        measurement.heel_force,
-        measurement.toe_force,
-        measurement.angle,
-        time_unchanged(last.heel_force, measurement.heel_force, last.heel_unchanged, period),
-        time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, period),
-        time_unchanged(last.angle, measurement.angle, last.angle_unchanged, period),
+        heel_force=measurement.heel_force,
+        toe_force=measurement.toe_force,
+        angle=measurement.angle,
+        heel_unchanged=time_unchanged(last.heel_force, measurement.heel_force, last.heel_unchanged, period),
+        toe_unchanged=time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, period),
+        angle_unchanged=time_unchanged(last.angle, measurement.angle, last.angle_unchanged, period),
     )
 
 
@@ -274,36 +276,28 @@ def monitor(
     resumes = (state.level == PAUSED) & (good_strides >= rules.resume_strides)
     level = max(HELPS if resumes else state.level, signs.level_of(sign))
     vents = level > state.level
-    now = Finding(
-        sign,
-        measurement.heel_force,
-        measurement.toe_force,
-        measurement.angle,
-        measurement.pressure_1,
-        measurement.pressure_2,
-    )
     return SafetyState(
-        level,
-        good_strides,
-        state.ventings + (1.0 if vents else 0.0),
-        later_finding(vents, now, state.finding),
-        readings,
-        toe_strides,
-        steady,
-        state.valve_times,
-        slow_pressures,
+        level=level,
+        good_strides=good_strides,
+        ventings=state.ventings + (1.0 if vents else 0.0),
+        finding=later_finding(vents, sign, measurement, state.finding),
+        readings=readings,
+        toe_strides=toe_strides,
+        steady=steady,
+        valve_times=state.valve_times,
+        slow_pressures=slow_pressures,
     )
 
 
-def later_finding(vents: bool, now: Finding, last: Finding) -> Finding:
+def later_finding(vents: bool, sign: float, measurement: GaitMeasurement, last: Finding) -> Finding:
     """The finding of this sample where it vents the chambers, else the last one."""
     return Finding(
-        now.sign if vents else last.sign,
-        now.heel_force if vents else last.heel_force,
-        now.toe_force if vents else last.toe_force,
-        now.angle if vents else last.angle,
-        now.pressure_1 if vents else last.pressure_1,
-        now.pressure_2 if vents else last.pressure_2,
+        sign=sign if vents else last.sign,
+        heel_force=measurement.heel_force if vents else last.heel_force,
+        toe_force=measurement.toe_force if vents else last.toe_force,
+        angle=measurement.angle if vents else last.angle,
+        pressure_1=measurement.pressure_1 if vents else last.pressure_1,
+        pressure_2=measurement.pressure_2 if vents else last.pressure_2,
     )
 
 
@@ -323,13 +317,13 @@ def safe_command(state: SafetyState, command: float, period: float) -> tuple[flo
         state.valve_times.venting + period if vents else 0.0,
     )
     return sent, SafetyState(
-        state.level,
-        state.good_strides,
-        state.ventings,
-        state.finding,
-        state.readings,
-        state.toe_strides,
-        state.steady,
-        valve_times,
-        state.slow_pressures,
+        level=state.level,
+        good_strides=state.good_strides,
+        ventings=state.ventings,
+        finding=state.finding,
+        readings=state.readings,
+        toe_strides=state.toe_strides,
+        steady=state.steady,
+        valve_times=valve_times,
+        slow_pressures=state.slow_pressures,
     )

@@ -91,7 +91,8 @@ def bind(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Cal
 
 def row_with_law(name: str, row: Any, law: type) -> Any:
     """Return a NamedTuple class as ``row`` is one, whose field ``law`` is of the class that one law has."""
-    made: Any = collections.namedtuple(name, row._fields, module=__name__)  # type: ignore[misc]
+    namedtuple: Any = collections.namedtuple
+    made = namedtuple(name, row._fields, module=__name__)
     made.__annotations__ = {**row.__annotations__, "law": law}
     return made
 

@@ -15,7 +15,7 @@ IMPACT_WINDOW = 5.0e-3
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Largest and root-mean-square differences as shares of the angle range and of the supply's gauge pressure [-].
+    """Largest and root-mean-square differences as fractions of the angle range and of the supply's gauge pressure [-].
 
     Where the supply is at the pressure of the atmosphere, that pressure stands for the gauge pressure. Instants within
     5 ms of an impact on a stop are left out. ``supplied`` is relative, ``impacts`` in seconds.
@@ -78,7 +78,7 @@ def measure_agreement(run: Run, outcome: BatchResult, reference: ReferenceResult
 
 
 def plant_states(run: Run, outcome: BatchResult) -> Floats:
-    """The seven numbers of ``PlantState`` at each record (records, 7) of the first run in a result."""
+    """The seven numbers [SI] of ``PlantState`` at each record (records, 7) of the first run in a result."""
     paths = [path for name, row in run.program.state_rows().items() for path in leaf_paths(row, name)]
     first = paths.index("state.angle")
     return outcome.record[:, first : first + 7, 0]

@@ -38,7 +38,7 @@ class GasRates(NamedTuple):
     leaked: float
 
 
-class Passed(NamedTuple):
+class Transport(NamedTuple):
     """Mass and energy that pass [kg/s], the energy as a content of ``PlantState``."""
 
     mass: float
@@ -67,11 +67,11 @@ def exact_flow_function(ratio: float, orifice: ExactOrifice) -> float:
     return value * min((1.0 - ratio) / (1.0 - orifice.linear_ratio), 1.0)
 
 
-def exact_flow(pressure_a: float, pressure_b: float, share: float, orifice: ExactOrifice) -> float:
-    """Mass flow from a to b [kg/s] through a share of an orifice, positive from a to b. Equations (6), (7)."""
+def exact_flow(pressure_a: float, pressure_b: float, fraction: float, orifice: ExactOrifice) -> float:
+    """Mass flow from a to b [kg/s] through a fraction of an orifice, positive from a to b. Equations (6), (7)."""
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
-    flow = share * orifice.conductance * upstream * exact_flow_function(ratio, orifice)
+    flow = fraction * orifice.conductance * upstream * exact_flow_function(ratio, orifice)
     return flow if pressure_a >= pressure_b else -flow
 
 
@@ -91,19 +91,25 @@ def gas_rates(
     vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, openings.vent_1, valve_orifice)
     vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, openings.vent_2, valve_orifice)
     leak = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
-    return GasRates(source_1 - vent_1 - leak, source_2 - vent_2 + leak, source_1 + source_2, vent_1 + vent_2, abs(leak))
+    return GasRates(
+        mass_1=source_1 - vent_1 - leak,
+        mass_2=source_2 - vent_2 + leak,
+        supplied=source_1 + source_2,
+        vented=vent_1 + vent_2,
+        leaked=abs(leak),
+    )
 
 
-def passed(
+def transport(
     thermal: ThermalParameters, pressure_a: float, pressure_b: float, warmth_a: float, warmth_b: float, flow: float
-) -> Passed:
+) -> Transport:
     """What a flow [kg/s] that holds at the reference temperature carries, with the temperature of its upstream side.
 
     Warmths are T/T_0 [-] on both sides; flow from a to b. Equation (6).
     """
     warmth = warmth_a if pressure_a >= pressure_b else warmth_b
     mass = flow / math.sqrt(warmth)
-    return Passed(mass, thermal.heat_capacity_ratio * warmth * mass)
+    return Transport(mass, thermal.heat_capacity_ratio * warmth * mass)
 
 
 def thermal_gas_rates(
@@ -129,22 +135,22 @@ def thermal_gas_rates(
     outlet_1 = exact_flow(pressure_1, room, openings.vent_1, valve_orifice)
     outlet_2 = exact_flow(pressure_2, room, openings.vent_2, valve_orifice)
     across = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
-    source_1 = passed(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
-    source_2 = passed(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)
-    vent_1 = passed(thermal, pressure_1, room, warmth_1, 1.0, outlet_1)
-    vent_2 = passed(thermal, pressure_2, room, warmth_2, 1.0, outlet_2)
-    leak = passed(thermal, pressure_1, pressure_2, warmth_1, warmth_2, across)
+    source_1 = transport(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
+    source_2 = transport(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)
+    vent_1 = transport(thermal, pressure_1, room, warmth_1, 1.0, outlet_1)
+    vent_2 = transport(thermal, pressure_2, room, warmth_2, 1.0, outlet_2)
+    leak = transport(thermal, pressure_1, pressure_2, warmth_1, warmth_2, across)
     compression = (thermal.heat_capacity_ratio - 1.0) * plant.volume_per_angle * angular_velocity
     wall_1 = thermal.wall_exchange * volume_1 * (1.0 - warmth_1)
     wall_2 = thermal.wall_exchange * volume_2 * (1.0 - warmth_2)
     return ThermalGasRates(
-        source_1.content - vent_1.content - leak.content - compression * contents[0] / volume_1 + wall_1,
-        source_2.content - vent_2.content + leak.content + compression * contents[1] / volume_2 + wall_2,
-        source_1.mass - vent_1.mass - leak.mass,
-        source_2.mass - vent_2.mass + leak.mass,
-        source_1.mass + source_2.mass,
-        vent_1.mass + vent_2.mass,
-        abs(leak.mass),
+        content_1=source_1.content - vent_1.content - leak.content - compression * contents[0] / volume_1 + wall_1,
+        content_2=source_2.content - vent_2.content + leak.content + compression * contents[1] / volume_2 + wall_2,
+        mass_1=source_1.mass - vent_1.mass - leak.mass,
+        mass_2=source_2.mass - vent_2.mass + leak.mass,
+        supplied=source_1.mass + source_2.mass,
+        vented=vent_1.mass + vent_2.mass,
+        leaked=abs(leak.mass),
     )
 
 

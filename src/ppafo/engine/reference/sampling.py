@@ -1,4 +1,9 @@
-"""The sampled controller beside the reference solver: late signals in, late commands out."""
+"""The sampled controller beside a solution in continuous time: late signals, late commands; and its stretches."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
@@ -62,6 +67,28 @@ class SampledControl:
         if run.program.ideal_sensors:
             angle, pressure_1, pressure_2 = signals
             return Measurement(
-                angle, pressure_1, pressure_2, actuator_torque(pressure_1, pressure_2, run.plant.torque_constant)
+                angle=angle,
+                pressure_1=pressure_1,
+                pressure_2=pressure_2,
+                torque=actuator_torque(pressure_1, pressure_2, run.plant.torque_constant),
             )
         return measure(run.sensors, *signals, run.plant.torque_constant, sample)
+
+
+Floats = NDArray[np.float64]
+
+
+def solve_segment(solver: Any, y: Floats, time: float, end: float, wanted: Floats, name: str) -> Any:
+    """Solution from ``time`` to ``end`` [s], or to an event before, also at the ``wanted`` times that lie ahead.
+
+    ``wanted`` may hold times before ``time`` and after ``end``. SimulationError, which calls the solver ``name``, where
+    the solver gives up.
+    """
+    inside = wanted[(wanted > time + SAME_TIME) & (wanted < end - SAME_TIME)]
+    grid = np.unique(np.concatenate([[time], inside, [end]]))
+    # With only two times the solver would return its own steps instead of the end.
+    times = grid if grid.size > 2 else np.array([grid[0], 0.5 * (grid[0] + grid[1]), grid[1]])
+    solution = solver.solve(times, y)
+    if not solution.success:
+        raise SimulationError(f"{name} stopped at t = {solution.t[-1]:.6g} s: {solution.message}")
+    return solution

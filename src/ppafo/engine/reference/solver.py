@@ -11,8 +11,7 @@ from ppafo.engine.cache import load_generated
 from ppafo.engine.lanes import samples_in
 from ppafo.engine.program import NoParameters
 from ppafo.engine.reference import vane_mode
-from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals
-from ppafo.engine.reference.segment import solve_segment
+from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals, solve_segment
 from ppafo.engine.reference.source import (
     PLANT_UNKNOWNS,
     gas_unknowns,
@@ -20,7 +19,7 @@ from ppafo.engine.reference.source import (
     unknowns_before_valve,
 )
 from ppafo.engine.rows import numbers, rebuild
-from ppafo.engine.run import Run, settled_sensors
+from ppafo.engine.run import Run, initial_sensors
 from ppafo.errors import SimulationError
 from ppafo.model.plant import chamber_pressures
 
@@ -30,7 +29,7 @@ MASS_TOLERANCE = 1e-15
 TOLERANCES = (1e-11, 1e-10, *(MASS_TOLERANCE,) * 5)
 VALVE_TOLERANCE = 1e-11
 SIGNAL_TOLERANCES = (1e-10, 1e-4, 1e-4)
-MOST_STEPS = 200_000
+MAXIMUM_STEPS = 200_000
 
 
 @dataclass(slots=True)
@@ -52,18 +51,20 @@ def load_right_hand_side(run: Run) -> Callable[..., None]:
 
 
 def right_hand_side_parameters(run: Run) -> Floats:
-    """The numbers that ``fill`` needs, in its order."""
+    """The numbers [SI] that ``fill`` needs, in its order."""
     groups = (run.plant, run.thermal, run.valve_orifice, run.leak_orifice, run.valve, run.path, run.sensor_rates)
     return np.array([number for group in groups for number in numbers(group)])
 
 
 def solve_reference(run: Run, tolerance: float = 1e-10) -> ReferenceResult:
-    """Solve a run with relative tolerance ``tolerance``; records at the run's record times.
+    """Solve a run to a relative tolerance [-]; the result [SI] is recorded at the run's record times.
 
     SimulationError where the extra ``reference`` is not installed or the solver gives up.
     """
     if run.lines is not None:
-        raise SimulationError("the reference solver knows no [supply_line]: leave the section out to compare with it")
+        raise SimulationError(
+            "the reference solver does not support [supply_line]; omit the section to compare with it"
+        )
     return _Solution(run, tolerance).solve()
 
 
@@ -75,7 +76,7 @@ class _Solution:
         self.fill = load_right_hand_side(run)
         self.parameters = right_hand_side_parameters(run)
         masses = [run.initial.mass_1, run.initial.mass_2] if run.program.is_thermal else []
-        shown = numbers(settled_sensors(run))[:3]
+        shown = numbers(initial_sensors(run))[:3]
         self.y = np.array([*numbers(run.initial), *masses, *shown, *numbers(run.program.valve.initial())])
         self.valve_from = unknowns_before_valve(run.program)
         self.command = 0.0
@@ -101,11 +102,12 @@ class _Solution:
             self.result.evaluations += 1
             self.fill(t, y, yp, self.parameters, self.command, self.way)
 
-        def roots(_t: float, y: Floats, events: Floats) -> None:
+        def write_roots(_t: float, y: Floats, events: Floats) -> None:
             events[:] = self.roots(y)
 
-        roots.terminal = [True, True]  # type: ignore[attr-defined]
-        roots.direction = [-1, -1]  # type: ignore[attr-defined]
+        roots: Any = write_roots
+        roots.terminal = [True, True]
+        roots.direction = [-1, -1]
         gas_count = gas_unknowns(self.run.program) - PLANT_UNKNOWNS
         shown = SIGNAL_TOLERANCES if self.run.program.slow_sensors else ()
         valve_count = self.y.size - self.valve_from
@@ -116,7 +118,7 @@ class _Solution:
             atol=np.array(TOLERANCES + (MASS_TOLERANCE,) * gas_count + shown + (VALVE_TOLERANCE,) * valve_count),
             eventsfn=roots if free else None,
             num_events=2 if free else 0,
-            max_num_steps=MOST_STEPS,
+            max_num_steps=MAXIMUM_STEPS,
         )
 
     def roots(self, y: Floats) -> vane_mode.Roots:
@@ -214,11 +216,11 @@ class _Solution:
         while self.records < times.size and times[self.records] < end - 2 * SAME_TIME:
             moment = times[self.records]
             state = self.y if solution is None else solution.y[np.argmin(np.abs(solution.t - moment))]
-            self.result.states[self.records] = self.led(state[:PLANT_UNKNOWNS], moment)
+            self.result.states[self.records] = self.with_prescribed_angle(state[:PLANT_UNKNOWNS], moment)
             self.result.commands[self.records] = self.control.decided
             self.records += 1
 
-    def led(self, state: Floats, time: float) -> Floats:
+    def with_prescribed_angle(self, state: Floats, time: float) -> Floats:
         """The state with the prescribed angle put in, where there is one."""
         if self.run.program.angle is None:
             return state

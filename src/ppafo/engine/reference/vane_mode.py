@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from ppafo.model.friction import holds_still
 from ppafo.model.plant import PlantParameters, chamber_pressures, driving_torque
+from ppafo.model.vane import holds_still
 
 SLOWEST_REBOUND = 1.0e-7
 
@@ -22,7 +22,7 @@ def torque_on_vane(plant: PlantParameters, angle: float, mass_1: float, mass_2: 
 
 
 def mode_at_rest(plant: PlantParameters, angle: float, torque: float) -> float:
-    """Way in which a vane at rest sets off: 1, -1, or 0 where it is held."""
+    """Direction in which a vane at ``angle`` [rad] sets off under ``torque`` [N m]: 1, -1, or 0 where it is held."""
     if holds_still(torque, plant.static_torque, angle <= plant.angle_min, angle >= plant.angle_max):
         return 0.0
     return 1.0 if torque > 0.0 else -1.0

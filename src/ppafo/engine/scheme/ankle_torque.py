@@ -35,27 +35,39 @@ def foot_direction(shank: float, angle: float) -> Direction:
 
 
 def leg_torque(
-    leg: LegParameters, share: DeviceShare, contact: float, now: GaitNow, angle: float, foot: Direction
+    leg: LegParameters,
+    share: DeviceShare,
+    contact: float,
+    now: GaitNow,
+    ground_angle: float,
+    angle: float,
+    foot: Direction,
 ) -> float:
     """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
 
     The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the foot plate, and the ground
-    under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles,
-    so that a wearer who has all of them and no device walks the measured gait.
+    under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles, on the heel
+    the measured moment less tissue, so that a wearer who has all of them and no device walks the measured gait.
+    ``ground_angle`` [rad] is that of a flat foot.
     """
-    heel = ground.heel_torque(contact, now, leg.heel_lever)
-    muscles = now.healthy_torque - heel - passive_torque(leg, now.ankle)
+    heel = ground.heel_torque(contact, now, leg, ground_angle, angle)
+    active = now.moment if contact == ground.HEEL else now.healthy_torque
+    muscles = active - passive_torque(leg, now.ankle)
     wearer = leg.residual_share * muscles + passive_torque(leg, angle)
-    carried = carried_torque(leg, leg.foot_mass * leg.foot_mass_centre, foot_inertia_about_ankle(leg), now, foot)
+    carried = torque_of_body_on_foot(
+        leg, leg.foot_mass * leg.foot_mass_centre, foot_inertia_about_ankle(leg), now, foot
+    )
     return wearer + heel + plate_torque(leg, share, now, foot) - carried
 
 
 def plate_torque(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> float:
     """Torque [N m] of foot plate and vane by their weight and the shank's motion, positive in plantarflexion."""
-    return -carried_torque(leg, share.mass_moment, share.inertia, now, foot)
+    return -torque_of_body_on_foot(leg, share.mass_moment, share.inertia, now, foot)
 
 
-def carried_torque(leg: LegParameters, mass_moment: float, inertia: float, now: GaitNow, foot: Direction) -> float:
+def torque_of_body_on_foot(
+    leg: LegParameters, mass_moment: float, inertia: float, now: GaitNow, foot: Direction
+) -> float:
     """Torque [N m] that shank, knee and weight ask of the ankle for a body on the foot: see ``torque_of_shank_on``."""
     return torque_of_shank_on(
         mass_moment,

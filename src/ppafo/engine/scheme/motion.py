@@ -1,4 +1,4 @@
-"""One step of the vane, free between its stops or led along a prescribed angle, with the gas in the chambers.
+"""One step of the vane, free between its stops or with a prescribed angle, with the gas in the chambers.
 
 Order of a free step: the angle is predicted with the present acceleration; the gas runs with volumes that lead to the
 predicted angle; the angular velocity follows from the trapezoidal rule with the new pressures. What ends or starts
@@ -10,23 +10,23 @@ import math
 from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import GasChange
-from ppafo.model.friction import holds_still
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, driving_torque
+from ppafo.model.vane import holds_still
 
 ALLOWED_OF_ANGLE = 2.0e-6
 """Error of one part over the range of the angle; with it a run keeps to 2e-4 of the range."""
 ALLOWED_BY_GAS = 3.0e-6
 """Error of one part over the angle in which the smaller chamber would close."""
-MISSED_SHARE = 0.2
-"""Share of the way between where the gas took the vane to be and where an event left it that counts as an error."""
+MISSED_FRACTION = 0.2
+"""Fraction of the way between where the gas took the vane to be and where an event left it that counts as an error."""
 LOWEST_REBOUND = 1.0e-7
 """Height over the range of the angle below which a rebound is none."""
 
 
 class Departure(NamedTuple):
-    """Second part of a step: where it begins (share of the step), angle [rad], angular velocity [rad/s]."""
+    """Second part of a step: where it begins (fraction of the step), angle [rad], angular velocity [rad/s]."""
 
-    share: float
+    fraction: float
     angle: float
     angular_velocity: float
 
@@ -53,19 +53,19 @@ class FreePart(NamedTuple):
     meets_stop: float
 
 
-class LedStep(NamedTuple):
-    """Where a led step leads [rad], [rad/s]."""
+class PrescribedStep(NamedTuple):
+    """Angle [rad] and angular velocity [rad/s] at the end of a prescribed step."""
 
     next_angle: float
     next_rate: float
 
 
 def direction_of(value: float) -> float:
-    """Sign of a number: 1, -1 or 0."""
+    """Sign of a number [-]: 1, -1 or 0."""
     return (1.0 if value > 0.0 else 0.0) - (1.0 if value < 0.0 else 0.0)
 
 
-def bounded(plant: PlantParameters, angle: float) -> float:
+def clamp_angle(plant: PlantParameters, angle: float) -> float:
     """``angle`` [rad], not beyond the stops."""
     return max(plant.angle_min, min(plant.angle_max, angle))
 
@@ -105,7 +105,7 @@ def depart(
     start_torque = torque + waits * change
     way = direction_of(departure.angular_velocity) if moving else way
     sliding = way * plant.dynamic_torque
-    duration = step * (1.0 - departure.share) * (1.0 - waits)
+    duration = step * (1.0 - departure.fraction) * (1.0 - waits)
     velocity = departure.angular_velocity
     first = (start_torque - sliding - plant.viscous_damping * velocity) / plant.inertia
     last = (next_torque - sliding) / plant.inertia
@@ -116,7 +116,7 @@ def depart(
     angle = departure.angle + (travel if goes and travel * way > 0.0 else 0.0)
     rate = next_rate if goes and not turned else 0.0
     hits = angle < plant.angle_min or angle > plant.angle_max
-    return bounded(plant, angle), (0.0 if hits else rate)
+    return clamp_angle(plant, angle), (0.0 if hits else rate)
 
 
 def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tuple[FreePart, float]:
@@ -138,9 +138,11 @@ def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tup
     meets_stop = way != 0.0 and gets_there and impact <= longest
     length = impact if meets_stop else longest
     stop = plant.angle_max if way > 0.0 else plant.angle_min
-    free_angle = bounded(plant, state.angle + length * (velocity + 0.5 * length * acceleration))
+    free_angle = clamp_angle(plant, state.angle + length * (velocity + 0.5 * length * acceleration))
     next_angle = stop if meets_stop else free_angle
-    return FreePart(way, acceleration, torque, next_angle, 1.0 if meets_stop else 0.0), length
+    return FreePart(
+        way=way, acceleration=acceleration, torque=torque, next_angle=next_angle, meets_stop=1.0 if meets_stop else 0.0
+    ), length
 
 
 def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length: float) -> tuple[float, float, float]:
@@ -157,10 +159,10 @@ def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length:
 
     fall = velocity - full_velocity
     turns = way != 0.0 and not slides
-    share = velocity / (fall if fall != 0.0 else 1.0) if turns else 0.0
-    turning_angle = bounded(plant, state.angle + 0.5 * share * length * velocity)
-    left_torque = begun.torque + share * (next_torque - begun.torque)
-    left_angle, left_velocity = depart(plant, Departure(share, turning_angle, 0.0), left_torque, next_torque, length)
+    fraction = velocity / (fall if fall != 0.0 else 1.0) if turns else 0.0
+    turning_angle = clamp_angle(plant, state.angle + 0.5 * fraction * length * velocity)
+    left_torque = begun.torque + fraction * (next_torque - begun.torque)
+    left_angle, left_velocity = depart(plant, Departure(fraction, turning_angle, 0.0), left_torque, next_torque, length)
     rebound = rebound_velocity(plant, full_velocity, next_torque)
     slid_velocity = rebound if begun.meets_stop > 0.5 else full_velocity
     angle = begun.next_angle if slides else left_angle
@@ -168,7 +170,7 @@ def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length:
 
     last = (sliding_torque - plant.viscous_damping * full_velocity) / plant.inertia
     bent = abs(last - begun.acceleration) * length * length / 6.0 if way != 0.0 else 0.0
-    missed = MISSED_SHARE * abs(angle - begun.next_angle)
+    missed = MISSED_FRACTION * abs(angle - begun.next_angle)
     # Where a chamber is small, a little of the angle is much of the pressure.
     volume_1, volume_2 = chamber_volumes(plant, begun.next_angle)
     allowed_by_gas = ALLOWED_BY_GAS * min(volume_1, volume_2) / plant.volume_per_angle
@@ -202,14 +204,14 @@ def first_event(
     reverses = way != 0.0 and full_velocity * way <= 0.0
     reversal = velocity / (fall if reverses else 1.0)
     stop = plant.angle_max if velocity > 0.0 else plant.angle_min
-    hits = way != 0.0 and free_angle != bounded(plant, free_angle)
+    hits = way != 0.0 and free_angle != clamp_angle(plant, free_angle)
     impact = min(time_to_stop(abs(stop - state.angle), abs(velocity), acceleration * way) / step, 1.0)
     hits_first = hits and not (reverses and reversal < impact)
-    turning_angle = bounded(plant, state.angle + 0.5 * reversal * step * velocity)
-    share = impact if hits_first else (reversal if reverses else 0.0)
+    turning_angle = clamp_angle(plant, state.angle + 0.5 * reversal * step * velocity)
+    fraction = impact if hits_first else (reversal if reverses else 0.0)
     angle = stop if hits_first else (turning_angle if reverses else state.angle)
     rebound = -plant.restitution * (velocity - impact * fall)
-    return Departure(share, angle, rebound if hits_first else 0.0)
+    return Departure(fraction, angle, rebound if hits_first else 0.0)
 
 
 def begin_free(plant: PlantParameters, state: PlantState, added_torque: float, step: float) -> FreeStep:
@@ -237,14 +239,14 @@ def end_free(
     velocity = state.angular_velocity
     way = direction_of(velocity)
     moving = way != 0.0
-    predicted = bounded(plant, begun.free_angle)
+    predicted = clamp_angle(plant, begun.free_angle)
     next_1, next_2 = chamber_pressures(plant, predicted, state.mass_1, state.mass_2)
     next_torque = driving_torque(plant, predicted, next_1, next_2) + added_torque
     sliding_torque = next_torque - way * plant.dynamic_torque
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
 
     departure = first_event(plant, state, begun.free_angle, begun.acceleration, full_velocity, step)
-    departure_torque = begun.torque + departure.share * (next_torque - begun.torque)
+    departure_torque = begun.torque + departure.fraction * (next_torque - begun.torque)
     left_angle, left_velocity = depart(plant, departure, departure_torque, next_torque, step)
     slides_through = moving and full_velocity * way > 0.0 and begun.free_angle == predicted
     next_angle = predicted if slides_through else left_angle
@@ -255,13 +257,13 @@ def end_free(
 def with_motion(state: PlantState, angle: float, angular_velocity: float) -> PlantState:
     """State with a new angle [rad] and angular velocity [rad/s]."""
     return PlantState(
-        angle,
-        angular_velocity,
-        state.mass_1,
-        state.mass_2,
-        state.supplied_mass,
-        state.vented_mass,
-        state.leaked_mass,
+        angle=angle,
+        angular_velocity=angular_velocity,
+        mass_1=state.mass_1,
+        mass_2=state.mass_2,
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
     )
 
 
@@ -269,11 +271,11 @@ def with_gas(state: PlantState, gas: GasChange) -> PlantState:
     """State with the gas of one step added."""
     vented = gas.supplied - gas.mass_1 - gas.mass_2
     return PlantState(
-        state.angle,
-        state.angular_velocity,
-        state.mass_1 + gas.mass_1,
-        state.mass_2 + gas.mass_2,
-        state.supplied_mass + gas.supplied,
-        state.vented_mass + vented,
-        state.leaked_mass + abs(gas.leaked),
+        angle=state.angle,
+        angular_velocity=state.angular_velocity,
+        mass_1=state.mass_1 + gas.mass_1,
+        mass_2=state.mass_2 + gas.mass_2,
+        supplied_mass=state.supplied_mass + gas.supplied,
+        vented_mass=state.vented_mass + vented,
+        leaked_mass=state.leaked_mass + abs(gas.leaked),
     )

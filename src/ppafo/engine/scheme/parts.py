@@ -8,8 +8,8 @@ SAME_INSTANT = 1.0e-9
 SHORTEST_PART = 1.0e-6
 """A part [s] this short is taken as it is."""
 SAFETY = 0.81
-LEAST_ERROR = 0.2025
-MOST_ERROR = 20.25
+MINIMUM_ERROR = 0.2025
+MAXIMUM_ERROR = 20.25
 """Errors over what is allowed at which the length of a part changes by the largest factors, 2 and 0.2."""
 
 
@@ -37,7 +37,7 @@ def until_jump(
     return jump if jump < remaining - SAME_INSTANT else remaining
 
 
-def paced(pace: Pace, remaining: float) -> float:
+def part_length(pace: Pace, remaining: float) -> float:
     """Length [s] of a part: what the error allows, in equal parts where two of them reach the end."""
     halves = 0.5 * remaining if remaining < 2.0 * pace.length else pace.length
     return remaining if remaining <= pace.length else halves
@@ -50,7 +50,7 @@ def is_refused(error: float, length: float) -> bool:
 
 def next_pace(pace: Pace, error: float, length: float, refused: bool, longest: float) -> Pace:
     """Length of the next part after one of ``length`` [s] with an error [-]; one that an event cut says little."""
-    factor = math.sqrt(SAFETY / max(LEAST_ERROR, min(MOST_ERROR, error)))
+    factor = math.sqrt(SAFETY / max(MINIMUM_ERROR, min(MAXIMUM_ERROR, error)))
     wanted = length * factor
     kept = max(pace.length, wanted) if factor >= 1.0 and not refused else wanted
     return Pace(max(min(kept, longest), SHORTEST_PART))

@@ -18,8 +18,8 @@ GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
 ALLOWED_OF_PRESSURE = 2.5e-5
 """Error of one step over the pressure that matters; with it a run keeps to 1e-3 of the pressure range."""
-LEAST_PRESSURE = 0.02
-"""The least pressure that matters, as a share of the atmosphere's."""
+MINIMUM_PRESSURE = 0.02
+"""The least pressure that matters, as a fraction of the atmosphere's."""
 
 
 class GasChange(NamedTuple):
@@ -74,10 +74,10 @@ class MovingGas(NamedTuple):
 def response(linear: Linearisation, rate_1: float, rate_2: float) -> Flows:
     """Gamma h times the change of all flows in time [kg/s] while the masses change at two rates [kg/s]."""
     return Flows(
-        (1.0 - linear.a) * rate_1 - linear.b * rate_2,
-        (1.0 - linear.d) * rate_2 - linear.c * rate_1,
-        linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
-        linear.b * rate_2 - linear.c * rate_1,
+        mass_1=(1.0 - linear.a) * rate_1 - linear.b * rate_2,
+        mass_2=(1.0 - linear.d) * rate_2 - linear.c * rate_1,
+        supplied=linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
+        leaked=linear.b * rate_2 - linear.c * rate_1,
     )
 
 
@@ -86,10 +86,10 @@ def solve_stage(linear: Linearisation, flow_1: float, flow_2: float, supplied: f
     rate_1 = (linear.d * flow_1 - linear.b * flow_2) * linear.scale
     rate_2 = (linear.a * flow_2 - linear.c * flow_1) * linear.scale
     return Flows(
-        rate_1,
-        rate_2,
-        supplied + linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
-        leaked + linear.b * rate_2 - linear.c * rate_1,
+        mass_1=rate_1,
+        mass_2=rate_2,
+        supplied=supplied + linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
+        leaked=leaked + linear.b * rate_2 - linear.c * rate_1,
     )
 
 
@@ -117,8 +117,18 @@ def linearise(
     c = -leak_by_1 * weight_1
     d = 1.0 - (in_2.total_slope + leak_by_2) * weight_2
     scale = 1.0 / (a * d - b * c)
-    linear = Linearisation(a, b, c, d, scale, in_1.source_slope * weight_1, in_2.source_slope * weight_2)
-    return linear, Flows(in_1.total - leak, in_2.total + leak, in_1.from_source + in_2.from_source, leak)
+    linear = Linearisation(
+        a=a,
+        b=b,
+        c=c,
+        d=d,
+        scale=scale,
+        supplied_by_1=in_1.source_slope * weight_1,
+        supplied_by_2=in_2.source_slope * weight_2,
+    )
+    return linear, Flows(
+        mass_1=in_1.total - leak, mass_2=in_2.total + leak, supplied=in_1.from_source + in_2.from_source, leaked=leak
+    )
 
 
 def begin_still_gas(
@@ -135,7 +145,7 @@ def begin_still_gas(
     end_1, end_2 = chamber_pressures(
         plant, state.angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
-    return StillGas(linear, first, end_1, end_2)
+    return StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2)
 
 
 def begin_moving_gas(
@@ -180,7 +190,7 @@ def begin_moving_stage(
     end_1, end_2 = chamber_pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
-    return MovingGas(StillGas(linear, first, end_1, end_2), drift)
+    return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
 
 
 def second_right_sides(
@@ -192,20 +202,20 @@ def second_right_sides(
     leak = orifice_flow(begun.end_1, begun.end_2, plant.leak_conductance, plant.leak_curve)
     first = begun.first
     return Flows(
-        flow_1.total - leak - 2.0 * first.mass_1,
-        flow_2.total + leak - 2.0 * first.mass_2,
-        flow_1.from_source + flow_2.from_source - 2.0 * first.supplied,
-        leak - 2.0 * first.leaked,
+        mass_1=flow_1.total - leak - 2.0 * first.mass_1,
+        mass_2=flow_2.total + leak - 2.0 * first.mass_2,
+        supplied=flow_1.from_source + flow_2.from_source - 2.0 * first.supplied,
+        leaked=leak - 2.0 * first.leaked,
     )
 
 
 def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
     """Changes of mass [kg] in one step [s]."""
     return GasChange(
-        step * (1.5 * first.mass_1 + 0.5 * second.mass_1),
-        step * (1.5 * first.mass_2 + 0.5 * second.mass_2),
-        step * (1.5 * first.supplied + 0.5 * second.supplied),
-        step * (1.5 * first.leaked + 0.5 * second.leaked),
+        mass_1=step * (1.5 * first.mass_1 + 0.5 * second.mass_1),
+        mass_2=step * (1.5 * first.mass_2 + 0.5 * second.mass_2),
+        supplied=step * (1.5 * first.supplied + 0.5 * second.supplied),
+        leaked=step * (1.5 * first.leaked + 0.5 * second.leaked),
     )
 
 
@@ -237,7 +247,7 @@ def still_change(plant: PlantParameters, begun: StillGas, second: Flows, step: f
     change = both_stages(begun.first, second, step)
     # Only a leak can push gas towards the source here, hardly any: what would go back counts as vented.
     supplied = admitted_flow(change.supplied, plant.relieving)
-    return GasChange(change.mass_1, change.mass_2, supplied, change.leaked)
+    return GasChange(mass_1=change.mass_1, mass_2=change.mass_2, supplied=supplied, leaked=change.leaked)
 
 
 def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: float) -> GasChange:
@@ -250,15 +260,9 @@ def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: 
     supplied = admitted_flow(change.supplied, plant.relieving)
     kept = supplied - change.supplied
     to_1 = kept if begun.linear.supplied_by_1 < begun.linear.supplied_by_2 else 0.0
-    return GasChange(change.mass_1 + to_1, change.mass_2 + (kept - to_1), supplied, change.leaked)
-
-
-def end_moving_gas(
-    plant: PlantParameters, begun: MovingGas, port_1: Any, port_2: Any, step: float, port_flow: Callable[..., Any]
-) -> GasChange:
-    """Changes of mass [kg] in one step [s] with moving volumes, from its first stage."""
-    second = second_moving_stage(plant, begun, port_1, port_2, port_flow)
-    return moving_change(plant, begun.still, second, step)
+    return GasChange(
+        mass_1=change.mass_1 + to_1, mass_2=change.mass_2 + (kept - to_1), supplied=supplied, leaked=change.leaked
+    )
 
 
 def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle: float, step: float) -> float:
@@ -299,10 +303,10 @@ def opening_error(plant: PlantParameters, begun: StillGas, shift: float, next_an
 
 def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:
     """Pressure [Pa] against which an error is seen: of the supplies or of the chamber, over the atmosphere."""
-    return max(supplied_range(plant), abs(pressure - plant.atmospheric_pressure))
+    return max(supply_range(plant), abs(pressure - plant.atmospheric_pressure))
 
 
-def supplied_range(plant: PlantParameters) -> float:
-    """Pressure [Pa] of the higher supply over the atmosphere, not less than a share of the latter."""
+def supply_range(plant: PlantParameters) -> float:
+    """Pressure [Pa] of the higher supply over the atmosphere, not less than a fraction of the latter."""
     supplied = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
-    return max(supplied, LEAST_PRESSURE * plant.atmospheric_pressure)
+    return max(supplied, MINIMUM_PRESSURE * plant.atmospheric_pressure)

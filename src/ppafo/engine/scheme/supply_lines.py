@@ -20,7 +20,7 @@ from ppafo.engine.scheme.pneumatics import (
     linearise,
     pressure_that_matters,
 )
-from ppafo.engine.scheme.thermal_flows import ThermalFlows, carried
+from ppafo.engine.scheme.thermal_flows import ThermalFlows, transport
 from ppafo.engine.scheme.thermal_gas import ThermalGas, begin_thermal_stage, thermal_pressures
 from ppafo.model.plant import (
     PlantParameters,
@@ -43,7 +43,7 @@ class FedGas(NamedTuple):
     lines: LineStep
 
 
-def fed_plant(plant: PlantParameters, lines: SupplyLines, state: LineState) -> PlantParameters:
+def plant_at_line_pressures(plant: PlantParameters, lines: SupplyLines, state: LineState) -> PlantParameters:
     """The plant with the pressures of its lines in place of those that the regulators are set to."""
     pressure_1, pressure_2 = line_pressures(lines, plant.gas_product, state)
     return PlantParameters(
@@ -72,12 +72,34 @@ def fed_plant(plant: PlantParameters, lines: SupplyLines, state: LineState) -> P
     )
 
 
+def lines_after(
+    plant: PlantParameters,
+    lines: SupplyLines,
+    state: LineState,
+    taken_1: float,
+    taken_2: float,
+    inlet_rise: float,
+    step: float,
+) -> LineStep:
+    """Both lines after a step [s], as ``step_lines``, with regulators that are set to the pressures of the plant."""
+    set_1, set_2 = plant.supply_pressure, plant.dorsiflexion_pressure
+    return step_lines(lines, set_1, set_2, plant.gas_product, state, taken_1, taken_2, inlet_rise, step)
+
+
 def with_lines(linear: Linearisation, share_1: float, share_2: float) -> Linearisation:
     """The linearisation with lines that lose what their chambers gain; shares are volumes of chamber over line [-]."""
     more_1, more_2 = linear.supplied_by_1 * share_1, linear.supplied_by_2 * share_2
     a, d = linear.a - more_1, linear.d - more_2
     scale = 1.0 / (a * d - linear.b * linear.c)
-    return Linearisation(a, linear.b, linear.c, d, scale, linear.supplied_by_1 + more_1, linear.supplied_by_2 + more_2)
+    return Linearisation(
+        a=a,
+        b=linear.b,
+        c=linear.c,
+        d=d,
+        scale=scale,
+        supplied_by_1=linear.supplied_by_1 + more_1,
+        supplied_by_2=linear.supplied_by_2 + more_2,
+    )
 
 
 def begin_fed_gas(
@@ -103,18 +125,8 @@ def begin_fed_gas(
     drift_2 = linear.supplied_by_2 * state.mass_2 * growth
     from_2 = port_flow_slopes(pressure_2, port_2, plant.valve_curve).from_source
     taken_2 = from_2 + drift_2 + linear.supplied_by_2 * first.mass_2
-    stepped = step_lines(
-        lines,
-        plant.supply_pressure,
-        plant.dorsiflexion_pressure,
-        plant.gas_product,
-        line_state,
-        step * (first.supplied - taken_2),
-        step * taken_2,
-        0.0,
-        step,
-    )
-    return FedGas(chambers, taken_2, drift_2, stepped)
+    stepped = lines_after(plant, lines, line_state, step * (first.supplied - taken_2), step * taken_2, 0.0, step)
+    return FedGas(chambers=chambers, taken_2=taken_2, drift_2=drift_2, lines=stepped)
 
 
 def end_lines(
@@ -134,17 +146,8 @@ def end_lines(
     # Half the second stage's rate of chamber 2 is what the change has beside the first stage.
     responded = still.linear.supplied_by_2 * (change.mass_2 - 1.5 * step * still.first.mass_2)
     taken_2 = step * (1.5 * begun.taken_2 + 0.5 * second) + responded
-    return step_lines(
-        lines,
-        plant.supply_pressure,
-        plant.dorsiflexion_pressure,
-        plant.gas_product,
-        line_state,
-        change.supplied - taken_2,
-        taken_2,
-        begun.lines.inlet_rise,
-        step,
-    ).after
+    inlet_rise = begun.lines.inlet_rise
+    return lines_after(plant, lines, line_state, change.supplied - taken_2, taken_2, inlet_rise, step).after
 
 
 def line_error(plant: PlantParameters, lines: SupplyLines, first: LineState, after: LineState) -> float:
@@ -169,9 +172,9 @@ class FedThermalGas(NamedTuple):
     lines: LineStep
 
 
-def with_line(flow: PortFlowSlopes, share: float) -> PortFlowSlopes:
-    """The flow of a port whose line loses what its chamber gains; ``share`` as in ``with_lines``."""
-    more = flow.source_slope * share
+def with_line(flow: PortFlowSlopes, fraction: float) -> PortFlowSlopes:
+    """The flow of a port whose line loses what its chamber gains; ``fraction`` as in ``with_lines``."""
+    more = flow.source_slope * fraction
     return PortFlowSlopes(
         total=flow.total,
         total_slope=flow.total_slope + more,
@@ -182,7 +185,7 @@ def with_line(flow: PortFlowSlopes, share: float) -> PortFlowSlopes:
 
 def mass_from_source(thermal: ThermalParameters, flow: float, state: PlantState, masses: ThermalState) -> float:
     """True mass flow [kg/s] out of line 2 from the flow at the reference temperature, below 0 for warm gas back in."""
-    return flow * carried(thermal, flow, 1.0, math.sqrt(state.mass_2 / masses.mass_2)).mass
+    return flow * transport(thermal, flow, 1.0, math.sqrt(state.mass_2 / masses.mass_2)).mass
 
 
 def begin_fed_thermal_gas(
@@ -209,18 +212,8 @@ def begin_fed_thermal_gas(
     first, by_2 = chambers.first, chambers.matrix.slopes.supplied_by_2
     drift_2 = by_2 * state.mass_2 * chambers.growth / at_begin.volume_2
     taken_2 = mass_from_source(thermal, in_2.from_source, state, masses) + drift_2 + by_2 * first.content_2
-    stepped = step_lines(
-        lines,
-        plant.supply_pressure,
-        plant.dorsiflexion_pressure,
-        plant.gas_product,
-        line_state,
-        step * (first.supplied - taken_2),
-        step * taken_2,
-        0.0,
-        step,
-    )
-    return FedThermalGas(chambers, taken_2, drift_2, stepped)
+    stepped = lines_after(plant, lines, line_state, step * (first.supplied - taken_2), step * taken_2, 0.0, step)
+    return FedThermalGas(chambers=chambers, taken_2=taken_2, drift_2=drift_2, lines=stepped)
 
 
 def end_thermal_lines(
@@ -242,14 +235,4 @@ def end_thermal_lines(
     second_2 = from_2 - 2.0 * begun.taken_2 - begun.drift_2 + gas.matrix.slopes.supplied_by_2 * second.content_2
     taken_2 = step * (1.5 * begun.taken_2 + 0.5 * second_2)
     supplied = step * (1.5 * gas.first.supplied + 0.5 * second.supplied)
-    return step_lines(
-        lines,
-        plant.supply_pressure,
-        plant.dorsiflexion_pressure,
-        plant.gas_product,
-        line_state,
-        supplied - taken_2,
-        taken_2,
-        begun.lines.inlet_rise,
-        step,
-    ).after
+    return lines_after(plant, lines, line_state, supplied - taken_2, taken_2, begun.lines.inlet_rise, step).after

@@ -14,8 +14,8 @@ from ppafo.engine.scheme.pneumatics import ALLOWED_OF_PRESSURE, GAMMA, SHORTEST,
 from ppafo.engine.scheme.thermal_flows import (
     FlowSlopes,
     ThermalFlows,
-    answered,
-    combined,
+    combine_flows,
+    flow_response,
     flow_slopes,
     thermal_flows,
 )
@@ -29,7 +29,7 @@ from ppafo.model.plant import (
     chamber_volumes,
 )
 from ppafo.model.ports import PortFlow, admitted_flow
-from ppafo.model.thermal import carried_energy
+from ppafo.model.thermal import enthalpy_flow_ratio
 
 
 class ThermalMatrix(NamedTuple):
@@ -100,7 +100,18 @@ def thermal_matrix(
     b = -slopes.content_1_by_2 - wall_1 * slopes.mass_1_by_2
     c = -slopes.content_2_by_1 - wall_2 * slopes.mass_2_by_1
     d = 1.0 - slopes.content_2_by_2 - work / volume_2 + cooling_2 - wall_2 * slopes.mass_2_by_2
-    return ThermalMatrix(slopes, a, b, c, d, 1.0 / (a * d - b * c), wall_1, wall_2, cooling_1, cooling_2)
+    return ThermalMatrix(
+        slopes=slopes,
+        a=a,
+        b=b,
+        c=c,
+        d=d,
+        scale=1.0 / (a * d - b * c),
+        wall_1=wall_1,
+        wall_2=wall_2,
+        cooling_1=cooling_1,
+        cooling_2=cooling_2,
+    )
 
 
 def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFlows:
@@ -109,21 +120,21 @@ def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFl
     right_2 = right.content_2 + matrix.wall_2 * right.mass_2
     content_1 = (matrix.d * right_1 - matrix.b * right_2) * matrix.scale
     content_2 = (matrix.a * right_2 - matrix.c * right_1) * matrix.scale
-    by_contents = answered(matrix.slopes, content_1, content_2)
+    by_contents = flow_response(matrix.slopes, content_1, content_2)
     mass_1 = right.mass_1 + by_contents.mass_1
     mass_2 = right.mass_2 + by_contents.mass_2
     warmed_1 = matrix.wall_1 * mass_1 - matrix.cooling_1 * content_1
     warmed_2 = matrix.wall_2 * mass_2 - matrix.cooling_2 * content_2
     return ThermalFlows(
-        content_1,
-        content_2,
-        mass_1,
-        mass_2,
-        right.supplied + by_contents.supplied,
-        right.leaked + by_contents.leaked,
-        right.source_content + by_contents.source_content,
-        right.port_content + by_contents.port_content,
-        right.heat + warmed_1 + warmed_2,
+        content_1=content_1,
+        content_2=content_2,
+        mass_1=mass_1,
+        mass_2=mass_2,
+        supplied=right.supplied + by_contents.supplied,
+        leaked=right.leaked + by_contents.leaked,
+        source_content=right.source_content + by_contents.source_content,
+        port_content=right.port_content + by_contents.port_content,
+        heat=right.heat + warmed_1 + warmed_2,
     )
 
 
@@ -188,11 +199,20 @@ def begin_thermal_stage(
     slopes = flow_slopes(thermal, root_1, root_2, weight * per_content_1, weight * per_content_2, in_1, in_2, leak)
     matrix = thermal_matrix(thermal, state, masses, volume_1, volume_2, growth, weight, slopes)
     # A growing volume lowers the pressure as a loss of content at this rate would.
-    drift = answered(slopes, -state.mass_1 * growth / volume_1, state.mass_2 * growth / volume_2)
-    first = solve_thermal_stage(matrix, combined(flows, 1.0, drift, 1.0))
-    change = combined(first, step, first, 0.0)
+    drift = flow_response(slopes, -state.mass_1 * growth / volume_1, state.mass_2 * growth / volume_2)
+    first = solve_thermal_stage(matrix, combine_flows(flows, 1.0, drift, 1.0))
+    change = combine_flows(first, step, first, 0.0)
     end, end_masses = with_thermal_gas(state, masses, change)
-    return ThermalGas(matrix, first, drift, end, end_masses, at_begin.next_1, at_begin.next_2, growth)
+    return ThermalGas(
+        matrix=matrix,
+        first=first,
+        drift=drift,
+        end=end,
+        end_masses=end_masses,
+        volume_1=at_begin.next_1,
+        volume_2=at_begin.next_2,
+        growth=growth,
+    )
 
 
 def second_thermal_stage(
@@ -212,7 +232,7 @@ def second_thermal_stage(
     flows = thermal_flows(
         thermal, begun.end, begun.end_masses, begun.volume_1, begun.volume_2, begun.growth, in_1, in_2, leak
     )
-    right = combined(combined(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
+    right = combine_flows(combine_flows(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
     return solve_thermal_stage(begun.matrix, right)
 
 
@@ -220,28 +240,28 @@ def thermal_change(
     plant: PlantParameters, thermal: ThermalParameters, begun: ThermalGas, second: ThermalFlows, step: float
 ) -> ThermalFlows:
     """Changes [kg] in one step [s] from both stages; supplies that take no gas back are as in ``moving_change``."""
-    change = combined(begun.first, 1.5 * step, second, 0.5 * step)
+    change = combine_flows(begun.first, 1.5 * step, second, 0.5 * step)
     supplied = admitted_flow(change.supplied, plant.relieving)
     kept = supplied - change.supplied
     to_1 = kept if begun.matrix.slopes.supplied_by_1 < begun.matrix.slopes.supplied_by_2 else 0.0
     to_2 = kept - to_1
-    carries = carried_energy(1.0, thermal.heat_capacity_ratio)
+    carries = enthalpy_flow_ratio(1.0, thermal.heat_capacity_ratio)
     return ThermalFlows(
-        change.content_1 + to_1 * carries,
-        change.content_2 + to_2 * carries,
-        change.mass_1 + to_1,
-        change.mass_2 + to_2,
-        supplied,
-        change.leaked,
-        change.source_content + kept * carries,
-        change.port_content + kept * carries,
-        change.heat,
+        content_1=change.content_1 + to_1 * carries,
+        content_2=change.content_2 + to_2 * carries,
+        mass_1=change.mass_1 + to_1,
+        mass_2=change.mass_2 + to_2,
+        supplied=supplied,
+        leaked=change.leaked,
+        source_content=change.source_content + kept * carries,
+        port_content=change.port_content + kept * carries,
+        heat=change.heat,
     )
 
 
 def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlows, step: float) -> float:
     """Estimated error of both pressures at the end of a step [s] over what is allowed [-], as ``gas_error``."""
-    added = solve_thermal_stage(begun.matrix, combined(begun.first, 1.0, second, 1.0))
+    added = solve_thermal_stage(begun.matrix, combine_flows(begun.first, 1.0, second, 1.0))
     return 0.5 * over_allowed(plant, begun, added.content_1, added.content_2, step)
 
 
@@ -274,13 +294,13 @@ def after_motion(
     work_1, work_2 = half * (volume_1 - assumed_1), half * (volume_2 - assumed_2)
     # The isentrope between two near volumes, to third order in their difference.
     return PlantState(
-        state.angle,
-        state.angular_velocity,
-        state.mass_1 * (mean_1 - work_1) / (mean_1 + work_1),
-        state.mass_2 * (mean_2 - work_2) / (mean_2 + work_2),
-        state.supplied_mass,
-        state.vented_mass,
-        state.leaked_mass,
+        angle=state.angle,
+        angular_velocity=state.angular_velocity,
+        mass_1=state.mass_1 * (mean_1 - work_1) / (mean_1 + work_1),
+        mass_2=state.mass_2 * (mean_2 - work_2) / (mean_2 + work_2),
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
     )
 
 
@@ -289,21 +309,21 @@ def with_thermal_gas(state: PlantState, masses: ThermalState, change: ThermalFlo
     vented = change.supplied - change.mass_1 - change.mass_2
     return (
         PlantState(
-            state.angle,
-            state.angular_velocity,
-            state.mass_1 + change.content_1,
-            state.mass_2 + change.content_2,
-            state.supplied_mass + change.supplied,
-            state.vented_mass + vented,
-            state.leaked_mass + abs(change.leaked),
+            angle=state.angle,
+            angular_velocity=state.angular_velocity,
+            mass_1=state.mass_1 + change.content_1,
+            mass_2=state.mass_2 + change.content_2,
+            supplied_mass=state.supplied_mass + change.supplied,
+            vented_mass=state.vented_mass + vented,
+            leaked_mass=state.leaked_mass + abs(change.leaked),
         ),
         ThermalState(
-            masses.mass_1 + change.mass_1,
-            masses.mass_2 + change.mass_2,
-            masses.supplied_content + change.source_content,
-            masses.vented_content + change.source_content - change.port_content,
-            masses.heat_content + change.heat,
-            masses.gas_work,
+            mass_1=masses.mass_1 + change.mass_1,
+            mass_2=masses.mass_2 + change.mass_2,
+            supplied_content=masses.supplied_content + change.source_content,
+            vented_content=masses.vented_content + change.source_content - change.port_content,
+            heat_content=masses.heat_content + change.heat,
+            gas_work=masses.gas_work,
         ),
     )
 
@@ -314,10 +334,10 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
     after_1, after_2 = chamber_pressures(plant, after.angle, after.mass_1, after.mass_2)
     difference = 0.5 * (before_1 - before_2 + after_1 - after_2)
     return ThermalState(
-        masses.mass_1,
-        masses.mass_2,
-        masses.supplied_content,
-        masses.vented_content,
-        masses.heat_content,
-        masses.gas_work + difference * plant.volume_per_angle * (after.angle - before.angle),
+        mass_1=masses.mass_1,
+        mass_2=masses.mass_2,
+        supplied_content=masses.supplied_content,
+        vented_content=masses.vented_content,
+        heat_content=masses.heat_content,
+        gas_work=masses.gas_work + difference * plant.volume_per_angle * (after.angle - before.angle),
     )

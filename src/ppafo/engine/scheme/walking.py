@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from ppafo.engine.scheme.ankle_torque import DeviceShare, Direction, foot_direction, leg_torque, plate_torque
-from ppafo.engine.scheme.motion import FreeStep, begin_free, bounded, end_free, with_motion
+from ppafo.engine.scheme.motion import FreeStep, begin_free, clamp_angle, end_free, with_motion
 from ppafo.model import contact as ground
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import (
@@ -64,21 +64,22 @@ def begin_walk(
     step: float,
 ) -> WalkStep:
     """Where one step [s] leads the foot, by its own dynamics and by the ground."""
-    torque = leg_torque(leg, share, walk.contact, walk.now, state.angle, walk.foot)
+    torque = leg_torque(leg, share, walk.contact, walk.now, timing.ground_angle, state.angle, walk.foot)
     free = begin_free(plant, state, torque, step)
     offset = walk.offset / (1.0 + step / ground.FADING_TIME)
     prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle)
     led = ground.Ankle(
-        bounded(plant, prescribed.angle + offset),
+        clamp_angle(plant, prescribed.angle + offset),
         prescribed.rate - offset / ground.FADING_TIME,
         prescribed.acceleration + offset / (ground.FADING_TIME * ground.FADING_TIME),
     )
     return WalkStep(free, led, offset)
 
 
-def next_angle(plant: PlantParameters, walk: WalkState, begun: WalkStep) -> float:
+def next_angle(plant: PlantParameters, leg: LegParameters, walk: WalkState, begun: WalkStep) -> float:
     """Angle [rad] to which the volumes run."""
-    return bounded(plant, begun.free.free_angle) if ground.is_free(walk.contact) else begun.led.angle
+    is_free = ground.is_free(walk.contact, leg.keeps_gait)
+    return clamp_angle(plant, begun.free.free_angle) if is_free else begun.led.angle
 
 
 def external_torque(
@@ -120,11 +121,11 @@ def end_walk(
     step: float,
 ) -> tuple[PlantState, WalkState]:
     """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin; ``now`` is then."""
-    free = ground.is_free(walk.contact)
-    predicted = bounded(plant, begun.free.free_angle)
+    free = ground.is_free(walk.contact, leg.keeps_gait)
+    predicted = clamp_angle(plant, begun.free.free_angle)
     # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
     foot = foot_direction(now.shank, predicted if free else begun.led.angle)
-    torque = leg_torque(leg, share, walk.contact, now, predicted, foot)
+    torque = leg_torque(leg, share, walk.contact, now, timing.ground_angle, predicted, foot)
     moved = end_free(plant, state, begun.free, torque, step)
     after = with_motion(
         state,
@@ -137,10 +138,10 @@ def end_walk(
     landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset)
     height = leg.toe_lever * (foot.sine - now.sine_healthy_foot)
     turned = after.angle - state.angle
-    return after, counted(timing, walk, after, now, foot, landed, given, height, follow_rate, turned, step)
+    return after, advance_walk(timing, walk, after, now, foot, landed, given, height, follow_rate, turned, step)
 
 
-def counted(
+def advance_walk(
     timing: GaitTiming,
     walk: WalkState,
     state: PlantState,
@@ -168,21 +169,29 @@ def counted(
     on_toes = walk.contact == ground.TOE
     # A foot that met the ground with its toes brings its heel down: that is no slap.
     slaps = landed.slaps > 0.5 and foot_rate < 0.0
+    slap_rate = foot_rate if slaps else walk.slap_rate
+    clearance = NO_CLEARANCE if strikes else lowest
+    landing = 1.0 if slaps else 0.0
+    toe_landing = 1.0 if strikes and touches_first else 0.0
+    counted_rate = foot_rate if slaps else 0.0
+    counted_clearance = lowest if strikes and lowest < NO_CLEARANCE else 0.0
+    work = 0.5 * (given + walk.external_torque) * turned if on_toes else 0.0
+    # Numba takes more than 15 keywords only where no choice stands among them.
     return WalkState(
-        landed.contact,
-        landed.offset,
-        now,
-        foot,
-        given,
-        walk.heel_force + (heel - walk.heel_force) * share,
-        walk.toe_force + (toe - walk.toe_force) * share,
-        toes_first,
-        foot_rate if slaps else walk.slap_rate,
-        NO_CLEARANCE if strikes else lowest,
-        walk.strides + landed.strikes,
-        walk.landings + (1.0 if slaps else 0.0),
-        walk.toe_landings + (1.0 if strikes and touches_first else 0.0),
-        walk.slap_rates + (foot_rate if slaps else 0.0),
-        walk.clearances + (lowest if strikes and lowest < NO_CLEARANCE else 0.0),
-        walk.push_off_work + (0.5 * (given + walk.external_torque) * turned if on_toes else 0.0),
+        contact=landed.contact,
+        offset=landed.offset,
+        now=now,
+        foot=foot,
+        external_torque=given,
+        heel_force=walk.heel_force + (heel - walk.heel_force) * share,
+        toe_force=walk.toe_force + (toe - walk.toe_force) * share,
+        toes_first=toes_first,
+        slap_rate=slap_rate,
+        clearance=clearance,
+        strides=walk.strides + landed.strikes,
+        landings=walk.landings + landing,
+        toe_landings=walk.toe_landings + toe_landing,
+        slap_rates=walk.slap_rates + counted_rate,
+        clearances=walk.clearances + counted_clearance,
+        push_off_work=walk.push_off_work + work,
     )

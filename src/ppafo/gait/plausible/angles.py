@@ -3,7 +3,9 @@
 import numpy as np
 
 from ppafo.errors import DataError
+from ppafo.gait.gait import Gait
 from ppafo.gait.plausible.checked import MeanStride, SignSource
+from ppafo.signals.recording import Floats
 
 SHANK_RANGE = (25.0, 120.0)
 ANKLE_RANGE = (5.0, 80.0)
@@ -11,7 +13,13 @@ ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
 """Percent of the stride in which the foot stands: the ankle then turns as the shank does."""
 _MINIMUM_SHANK_TRAVEL = 8.0
-_LARGEST_FOOT_ANGLE = 35.0
+REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
+"""Degrees that the standing foot may be tilted, on average over mid-stance, before it is remarked and refused.
+
+Recorded feet on level ground have 0.5 to 4.6: the sole of a shoe and the placing of markers. Nothing tilts a standing
+foot further than 20: a shoe with a heel of 6 cm on a foot of 17 cm from heel to ball, a walk on the toes, or a ramp of
+1 in 3. Beyond that the zero is another one.
+"""
 
 
 def check_shank(walk: MeanStride) -> None:
@@ -57,12 +65,41 @@ def check_ankle(walk: MeanStride) -> None:
             f"({slope:.2g} deg per deg, plausible is about 1): its sign is reversed; "
             f"{walk.other_sign('ankle_angle.positive', 'the other sign about 90 deg')}"
         )
-    foot = float(np.mean(stand - 90.0 - lean))
-    if abs(foot) > _LARGEST_FOOT_ANGLE or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
+    foot = standing_tilt(walk.curves["shank_angle"], walk.curves["ankle_angle"])
+    if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
         raise DataError(
-            f"{place} would tilt the standing foot by {foot:.0f} deg, plausible is within {_LARGEST_FOOT_ANGLE:g} deg "
+            f"{place} would tilt the standing foot by {foot:.0f} deg, plausible is within {REFUSED_TILT:g} deg "
             f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.signs_from]}"
         )
+
+
+def standing_tilt(shank: Floats, ankle: Floats) -> float:
+    """Return the mean tilt [deg] of the foot from 15 to 40 % of the stride, above 0 with the toes down.
+
+    ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package.
+    """
+    foot = np.degrees(ankle - shank)[MIDSTANCE] - 90.0
+    return float(np.mean(foot))
+
+
+def zero_remarks(tilt: float, correction: str) -> list[str]:
+    """Return what there is to say of the zero of an ankle whose standing foot is tilted [deg]."""
+    if abs(tilt) <= REMARKED_TILT:
+        return []
+    way = "toes down" if tilt > 0.0 else "toes up"
+    return [
+        f"the zero of ankle_angle seems to be off by {abs(tilt):.1f} deg: the standing foot would be tilted {way} "
+        f"by as much (mean from 15 to 40 % of the stride; up to {REMARKED_TILT:g} is usual); "
+        f"on level ground {correction}"
+    ]
+
+
+def gait_file_remarks(gait: Gait) -> list[str]:
+    """Return what there is to say of the ankle's zero in a finished gait, with the new mean of its series."""
+    percent = np.linspace(0.0, 1.0, 101)
+    tilt = standing_tilt(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
+    mean = float(np.degrees(gait.ankle_angle.mean)) - tilt
+    return zero_remarks(tilt, f"the mean of [ankle_angle] in gait '{gait.name}' would be {mean:.1f} deg")
 
 
 _NEUTRAL: dict[SignSource, str] = {

@@ -1,6 +1,8 @@
 """C3D files through ezc3d: markers, model outputs and force plates as columns. Needs the extra ``c3d``."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +16,59 @@ from ppafo.storage.trial_reading import check_can_be_read
 _AXES = "xyz"
 _MARK = b"\x50"
 """Second byte of every C3D file."""
-_UNITS = {"Nmm/kg": "N mm/kg", "Nmm": "N mm", "Nm": "N m", "Nm/kg": "N m/kg", "": ""}
+_UNITS = {
+    "Nmm/kg": "N mm/kg",
+    "N.mm/kg": "N mm/kg",
+    "Nmm": "N mm",
+    "N.mm": "N mm",
+    "Nm": "N m",
+    "N.m": "N m",
+    "Nm/kg": "N m/kg",
+    "N.m/kg": "N m/kg",
+    "degrees": "deg",
+    "": "",
+}
 _GROUPS = (("ANGLES", "ANGLE_UNITS"), ("MOMENTS", "MOMENT_UNITS"), ("FORCES", "FORCE_UNITS"))
+_BODY, _HEIGHT = ("Bodymass", "BODYMASS", "BodyMass"), ("Height", "HEIGHT")
+_STRIKE, _OFF = "foot strike", "foot off"
+PLATE = "force plate "
+"""Columns ``force plate 1.x``, ``.y``, ``.z`` [N]: what the plate's channels make in the axes of the laboratory."""
+
+Events = dict[tuple[str, str], list[float]]
 
 
-def read_c3d(path: str | Path) -> tuple[Floats, dict[str, Floats], dict[str, str]]:
-    """Return time [s], columns and their units: points as ``LABEL.x``, ``.y``, ``.z``, analog channels by label.
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """What a C3D file says beside its columns: subject (kg, m; None where not), events [s] by side and kind."""
 
-    Analog channels are faster; the samples at the times of the points are taken. A gap in a point is NaN here, and
-    refused by whoever uses the column. DataError where the file cannot be read.
+    body_mass: float | None = None
+    stature: float | None = None
+    events: Events = field(default_factory=dict)
+
+    def strikes(self, side: str) -> list[float]:
+        """Return the heel strikes of a foot."""
+        return self.events.get((side, _STRIKE), [])
+
+    def offs(self, side: str) -> list[float]:
+        """Return the toe-offs of a foot."""
+        return self.events.get((side, _OFF), [])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class C3dFile:
+    """Time [s], columns and their units: points as ``LABEL.x``, ``.y``, ``.z``, analog channels and plates."""
+
+    time: Floats
+    columns: dict[str, Floats]
+    units: dict[str, str]
+    trial: Trial
+
+
+def read_c3d(path: str | Path) -> C3dFile:
+    """Return the columns of a C3D file and what it says of subject and events.
+
+    Analog channels are faster; the samples at the times of the points are taken. Where a point was not seen it is NaN,
+    for whoever uses the column to fill or refuse. The clock is that of the trial, which may begin before the file.
     """
     _check_is_c3d(path)
     check_can_be_read(Path(path), __name__, "open_c3d", "ezc3d")
@@ -40,13 +86,12 @@ def read_c3d(path: str | Path) -> tuple[Floats, dict[str, Floats], dict[str, str
     units = _units(parameters["POINT"], labels)
     analogs: Floats = content["data"]["analogs"][0]
     if analogs.shape[0] and frames:
-        step = analogs.shape[1] // frames
-        names = _labels(parameters["ANALOG"], analogs.shape[0], path)
-        stated = _texts(parameters["ANALOG"], "UNITS")
-        for number, label in enumerate(names):
-            columns[label] = analogs[number, ::step][:frames]
-            units[label] = _unit_name(stated[number]) if number < len(stated) else ""
-    return np.arange(frames) / rate, columns, units
+        for name, values, unit in _channels(parameters["ANALOG"], analogs, frames):
+            columns[name], units[name] = values, unit
+    for name, values in _plates(content, frames):
+        columns[name], units[name] = values, "N"
+    first = max(0, int(content["header"]["points"].get("first_frame", 0)))
+    return C3dFile((first + np.arange(frames)) / rate, columns, units, _trial(parameters))
 
 
 def _check_is_c3d(path: str | Path) -> None:
@@ -59,14 +104,14 @@ def _check_is_c3d(path: str | Path) -> None:
 
 
 def open_c3d(path: str | Path) -> Any:
-    """Return what ezc3d makes of a file; a damaged one can bring down the process.
-
-    DataError where it cannot be read.
-    """
+    """Return what ezc3d makes of a file, with its force plates where it can; damage can bring down the process."""
     import ezc3d
 
     try:
-        return ezc3d.c3d(str(path))
+        try:
+            return ezc3d.c3d(str(path), extract_forceplat_data=True)
+        except (OSError, RuntimeError, ValueError, IndexError, KeyError):
+            return ezc3d.c3d(str(path))
     except (OSError, RuntimeError, ValueError, IndexError, KeyError) as error:
         raise DataError(f"{path}: ezc3d cannot read it: {one_line(error)}") from error
 
@@ -79,14 +124,41 @@ def _rate(parameters: Any, path: str | Path) -> float:
     return rate
 
 
-def _labels(group: Any, count: int, path: str | Path) -> list[str]:
+def _labels(group: Any, number: int, path: str | Path) -> list[str]:
     """Return the labels, without the subject's name before a colon."""
-    labels = [label.rpartition(":")[2].strip() for label in _texts(group, "LABELS")][:count]
+    labels = [_bare(label) for label in _texts(group, "LABELS")][:number]
     twice = first_twice(labels)
-    if twice is not None or len(labels) != count:
-        what = f"two of {twice!r}" if twice is not None else f"{len(labels)} labels for {count} columns"
+    if twice is not None or len(labels) != number:
+        what = f"two of {twice!r}" if twice is not None else f"{len(labels)} labels for {number} columns"
         raise DataError(f"{path}: there are {what}; every point and channel needs a label of its own")
     return labels
+
+
+def _bare(label: str) -> str:
+    return label.rpartition(":")[2].strip()
+
+
+def _channels(group: Any, analogs: Floats, frames: int) -> Iterator[tuple[str, Floats, str]]:
+    """Yield name, values at the times of the points and unit of each channel whose label is its own."""
+    step = analogs.shape[1] // frames
+    labels = [_bare(label) for label in _texts(group, "LABELS")][: analogs.shape[0]]
+    stated = _texts(group, "UNITS")
+    for number, label in enumerate(labels):
+        if label and labels.count(label) == 1:
+            yield label, analogs[number, ::step][:frames], _unit_name(stated[number]) if number < len(stated) else ""
+
+
+def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
+    """Yield the forces [N] of every plate in the axes of the laboratory, upwards above 0, as often as the points."""
+    for number, plate in enumerate(content["data"].get("platform", ()), start=1):
+        force: Floats = np.asarray(plate["force"], dtype=np.float64)
+        if frames == 0 or force.ndim != 2 or force.shape[1] < frames:
+            continue
+        # Some laboratories store what the plate feels, some what it gives back; a foot loads it downwards.
+        force = force[:, :: force.shape[1] // frames][:, :frames]
+        sign = -1.0 if np.nansum(force[2]) < 0.0 else 1.0
+        for row, axis in enumerate(_AXES):
+            yield f"{PLATE}{number}.{axis}", sign * force[row]
 
 
 def _units(group: Any, labels: Iterable[str]) -> dict[str, str]:
@@ -95,7 +167,7 @@ def _units(group: Any, labels: Iterable[str]) -> dict[str, str]:
     units = {label: usual for label in labels}
     for names, unit in _GROUPS:
         stated = _unit_name(next(iter(_texts(group, unit)), ""))
-        units.update({label.rpartition(":")[2].strip(): stated for label in _texts(group, names)})
+        units.update({_bare(label): stated for label in _texts(group, names)})
     return {f"{label}.{axis}": unit for label, unit in units.items() for axis in _AXES}
 
 
@@ -104,4 +176,47 @@ def _unit_name(unit: str) -> str:
 
 
 def _texts(group: Any, key: str) -> list[str]:
-    return [str(text) for text in group[key]["value"]] if key in group else []
+    """Return the texts of a parameter; one with more than 255 goes on in KEY2, KEY3 and so on."""
+    keys = [key]
+    for number in count(2):
+        if f"{key}{number}" not in group:
+            break
+        keys.append(f"{key}{number}")
+    return [str(text) for name in keys if name in group for text in group[name]["value"]]
+
+
+def _trial(parameters: Any) -> Trial:
+    """Return subject and events; those of other laboratories' spelling, or nonsense, are as if they were absent."""
+    group = parameters.get("PROCESSING", {})
+    mass, height = _number(group, _BODY), _number(group, _HEIGHT)
+    # Plug-in Gait keeps the height in mm.
+    stature = None if height is None else height / 1000.0 if height > 100.0 else height
+    return Trial(
+        mass if mass is not None and 1.0 <= mass <= 500.0 else None,
+        stature if stature is not None and 0.5 <= stature <= 2.5 else None,
+        _events(parameters.get("EVENT", {})),
+    )
+
+
+def _number(group: Any, names: Iterable[str]) -> float | None:
+    for name in names:
+        if name in group:
+            values = np.atleast_1d(group[name]["value"])
+            if values.size and values.dtype.kind in "fi" and np.isfinite(values[0]):
+                return float(values[0])
+    return None
+
+
+def _events(group: Any) -> Events:
+    """Return the times of strikes and offs; a time is stored as minutes and seconds."""
+    if any(name not in group for name in ("CONTEXTS", "LABELS", "TIMES")):
+        return {}
+    times = np.atleast_2d(np.asarray(group["TIMES"]["value"], dtype=np.float64))
+    if times.shape[0] != 2:
+        return {}
+    seconds = (60.0 * times[0] + times[1]).tolist()
+    found: Events = {}
+    for side, kind, time in zip(_texts(group, "CONTEXTS"), _texts(group, "LABELS"), seconds, strict=False):
+        if np.isfinite(time):
+            found.setdefault((side.strip().lower(), kind.strip().lower()), []).append(time)
+    return {key: sorted(found[key]) for key in found}

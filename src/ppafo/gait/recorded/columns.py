@@ -1,14 +1,19 @@
 """The columns that make a curve: the one table that has them, their signs and their unit."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ppafo.errors import DataError, UnitError, nearest_name, one_line
+from ppafo.gait.recorded.repairs import LONGEST_FILLED
 from ppafo.gait.recorded.table import OPENSIM, MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import to_si
+
+LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
+"""Where they were not measured, off a force plate, is no gap."""
 
 _KNEE = "knee_angle_"
 _LONGEST_SHOWN = 12
@@ -21,6 +26,7 @@ class CurveColumns:
     unit_key: str
     table: MotionTable
     terms: tuple[tuple[float, str], ...]
+    may_be_absent: bool = False
 
     def in_unit(self, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
         """Return the sum of the terms in the first SI unit that fits, and that unit. DataError where none fits."""
@@ -35,7 +41,8 @@ class CurveColumns:
         place = f"{self.table.file}: column {name!r}"
         unit = stated or self.table.units[name]
         values = self.table.columns[name]
-        check_finite(values, place, self.table.time)
+        if not self.may_be_absent:
+            check_finite(values, place, self.table.time)
         if not unit:
             raise DataError(f"{place}: the file does not state its unit; give {self.unit_key} in a gait map")
         given = "" if unit == "-" else unit
@@ -51,23 +58,33 @@ class CurveColumns:
 
 
 def check_finite(values: Floats, place: str, time: Floats) -> None:
-    """Raise DataError for a column with a gap; ``place`` is what the message calls it, ``time`` is in seconds [s]."""
-    bad = np.flatnonzero(~np.isfinite(values))
+    """Raise DataError for a column with a gap within its ``time`` [s]; ``place`` is what the message calls it."""
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size == 0:
+        raise DataError(f"{place} has no number at all; give a file or a gait map with another column")
+    first = int(known[0])
+    bad = first + np.flatnonzero(~np.isfinite(values[first : int(known[-1]) + 1]))
     if bad.size:
         row = int(bad[0])
         raise DataError(
             f"{place} has a gap of {bad.size} samples, the first in row {row + 1} at {time[row]:g} s; "
-            "fill it or cut the file there"
+            f"{_remedy(time, known)}"
         )
+
+
+def _remedy(time: Floats, known: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> str:
+    """Return how to get rid of gaps between the samples that are known: the longest decides."""
+    longest = float(np.max(np.diff(time[known])))
+    if longest > LONGEST_FILLED:
+        return f"fill it or cut the file there (--start, --end): {longest:.3g} s are too long to be filled here"
+    needed = math.ceil(100.0 * longest - 1e-6) / 100.0
+    return f"fill it or cut the file there (--fill-gaps '{needed:g} s', or --start, --end)"
 
 
 def find_columns(
     curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool
 ) -> CurveColumns | None:
-    """Return the one table that has every column of a curve; None where it may be missing and no table has one.
-
-    DataError where two tables have them, or none has.
-    """
+    """Return the one table that has every column of a curve; None where it may be missing and no table has one."""
     bare = [name.removeprefix("-") for name in names]
     holders = [table for table in tables if all(name in table.columns for name in bare)]
     if len(holders) > 1:
@@ -75,7 +92,8 @@ def find_columns(
         raise DataError(f"{curve}: both {files} have the column {bare[0]!r}; give one of them, or name another column")
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
-        return CurveColumns(f"{curve}.unit", holders[0], _detect_knee(holders[0], tuple(zip(signs, bare, strict=True))))
+        terms = _detect_knee(holders[0], tuple(zip(signs, bare, strict=True)))
+        return CurveColumns(f"{curve}.unit", holders[0], terms, curve in LOADS)
     if optional and not any(name in table.columns for name in bare for table in tables):
         return None
     known = [name for table in tables for name in table.columns]
@@ -100,4 +118,4 @@ def _detect_knee(table: MotionTable, terms: tuple[tuple[float, str], ...]) -> tu
 
 
 def _bends_above_zero(values: Floats) -> bool:
-    return float(np.max(values)) > -float(np.min(values))
+    return float(np.nanmax(values)) > -float(np.nanmin(values))

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ppafo.errors import DataError
+from ppafo.gait.recorded.columns import LOADS
 from ppafo.gait.recorded.events import Stride
 from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.table import MotionTable
@@ -13,8 +14,6 @@ from ppafo.signals.recording import Floats
 LONGEST_HELD = 0.1
 """Seconds that a column may keep one value within the strides."""
 
-_LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
-"""These rest while the foot is off the ground."""
 _ABOUT_STANCE = 0.05
 """Of the stride, at either end of the stance, in which a load may rest too."""
 _COARSE = 0.002
@@ -22,25 +21,38 @@ _COARSE = 0.002
 
 
 def check_constant(
-    walk: Mapping[str, Signal], tables: Sequence[MotionTable], strides: Sequence[Stride], left_out: Sequence[Stride]
+    walk: Mapping[str, Signal],
+    tables: Sequence[MotionTable],
+    strides: Sequence[Stride],
+    covered: Mapping[str, Sequence[Stride]],
+    left_out: Sequence[Stride],
 ) -> None:
     """Raise DataError for a column that keeps one value for more than 0.1 s within the strides; a load may in swing.
 
-    Motions are checked in strides that are left out too: a drop-out made those longer. A column that never
-    moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its smallest step is none either.
+    Loads are checked in the strides that they cover, motions in strides that are left out too: a drop-out made
+    those longer. A column that never moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its
+    smallest step is none either.
     """
     by_file = {table.file: table for table in tables}
     for name, signal in walk.items():
         table = by_file[signal.file]
-        spans = [_span(name, item) for item in (strides if name in _LOADS else [*strides, *left_out])]
-        for column in signal.columns:
-            found = constant_stretch(table.time, table.columns[column], spans)
+        spans = [_span(name, item) for item in (covered[name] if name in LOADS else [*strides, *left_out])]
+        for column, values in _series_of(name, signal, table):
+            found = constant_stretch(table.time, values, spans)
             if found is not None:
                 raise DataError(
                     f"{table.file}: column {column!r} of {name} keeps one value from {found[0]:.4g} to "
                     f"{found[1]:.4g} s while the wearer walks: a drop-out was filled with it; cut the file there and "
                     "give the longer part"
                 )
+
+
+def _series_of(name: str, signal: Signal, table: MotionTable) -> list[tuple[str, Floats]]:
+    """Return the columns of a curve; plates that are summed rest in turn, so their sum is looked at."""
+    columns = [(column, table.columns[column]) for column in signal.columns]
+    if name not in LOADS or len(columns) < 2:
+        return columns
+    return [(" + ".join(signal.columns), np.sum([np.abs(values) for _, values in columns], axis=0))]
 
 
 def constant_stretch(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
@@ -64,12 +76,12 @@ def _by_coarse_steps(values: Floats, first: int, last: int) -> bool:
     # Rounding makes equal steps of a sensor differ in the last digits.
     smallest = 1.001 * float(np.min(steps[steps > 0.0]))
     beside = [float(steps[place]) for place in (first - 1, last) if 0 <= place < steps.size]
-    return smallest > _COARSE * float(np.ptp(values)) and max(beside) <= smallest
+    return smallest > _COARSE * float(np.nanmax(values) - np.nanmin(values)) and max(beside) <= smallest
 
 
 def _span(name: str, stride: Stride) -> tuple[float, float]:
     """Return the times between which a column of this curve moves all the time."""
-    if name not in _LOADS:
+    if name not in LOADS:
         return stride.start, stride.end
     slack = _ABOUT_STANCE * stride.time
     return stride.start + slack, stride.toe_off - slack

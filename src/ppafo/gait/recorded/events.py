@@ -46,7 +46,7 @@ class Stride:
 
 def strides_from_force(force: Signal) -> list[Stride]:
     """Return the whole strides in a vertical force [body weights]; thresholds with hysteresis, interpolated in time."""
-    contacts = _contacts(force)
+    contacts = contacts_of(force)
     strides = []
     for (start, toe_off), (following, _) in pairwise(contacts):
         if start is not None and toe_off is not None and following is not None:
@@ -57,7 +57,7 @@ def strides_from_force(force: Signal) -> list[Stride]:
 Contact = tuple[float | None, float | None]
 
 
-def _contacts(force: Signal) -> list[Contact]:
+def contacts_of(force: Signal) -> list[Contact]:
     """Return heel strike and toe-off of every contact; None at an end of the record that cuts one."""
     loaded = _with_hysteresis(force.values)
     edges = [0, *(np.flatnonzero(np.diff(loaded.astype(int))) + 1).tolist(), loaded.size]

@@ -1,43 +1,42 @@
 """Gait maps: which columns of recorded files make the curves of a gait, in which unit and with which sign.
 
-A map is a TOML file or one of ``CONVENTIONS``. A term is the name of a column; ``-`` before it takes it away.
+A map is a TOML file, or what ``conventions`` finds for files without one. A term is the name of a column; ``-`` before
+it takes it away.
 """
 
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, model_validator
 
-from ppafo.documents.models import published_schema
-from ppafo.documents.problems import first_problem
-from ppafo.documents.regular_file import MOST_BYTES_TYPED, read_regular_file
+from ppafo.documents.models import STRICT, Text, make_schema, validate
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, reason
 
 _FILE = TomlKind("gait map", "gait-map", resources.files("ppafo.gait.recorded"), DataError)
-_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True)
-_Text = Annotated[str, Field(min_length=1)]
 _Terms = Annotated[
-    tuple[_Text, ...], Field(strict=False, min_length=1, description="columns to add; '-' before one subtracts it")
+    tuple[Text, ...], Field(strict=False, min_length=1, description="columns to add; '-' before one subtracts it")
 ]
-_Unit = Annotated[_Text | None, Field(description="unit of the columns, where the file does not state it")]
+_Unit = Annotated[Text | None, Field(description="unit of the columns, where the file does not state it")]
+_Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 _Flexion = Literal["plantarflexion", "dorsiflexion"]
 
 
 class ShankMap(BaseModel):
     """Shank angle: a sum of columns, or two markers and the axes of the laboratory."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     terms: _Terms | None = None
     unit: _Unit = None
     positive: Annotated[Literal["ankle_in_front", "ankle_behind"], Field(description="which lean is positive")] = (
         "ankle_in_front"
     )
-    knee: Annotated[_Text | None, Field(description="marker at the knee, instead of terms")] = None
-    ankle: Annotated[_Text | None, Field(description="marker at the ankle")] = None
-    forward: Annotated[Literal["x", "y", "z", "-x", "-y", "-z"], Field(description="axis along the walk")] = "x"
+    knee: Annotated[Text | None, Field(description="marker at the knee, instead of terms")] = None
+    ankle: Annotated[Text | None, Field(description="marker at the ankle")] = None
+    forward: Annotated[_Axis, Field(description="axis along the walk")] = "x"
     vertical: Annotated[Literal["x", "y", "z"], Field(description="axis upwards")] = "z"
 
     @model_validator(mode="after")
@@ -48,22 +47,35 @@ class ShankMap(BaseModel):
 
 
 class AngleMap(BaseModel):
-    """Ankle angle."""
+    """Ankle angle: a sum of columns, or two markers of the foot, whose line turns against the shank.
 
-    model_config = _STRICT
+    With markers the zero is the foot that stands flat, and ``neutral`` is added to it.
+    """
 
-    terms: _Terms
+    model_config = STRICT
+
+    terms: _Terms | None = None
+    heel: Annotated[Text | None, Field(description="marker at the heel, instead of terms")] = None
+    toe: Annotated[Text | None, Field(description="marker at the toes")] = None
+    forward: Annotated[_Axis, Field(description="axis along the walk, with markers")] = "x"
+    vertical: Annotated[Literal["x", "y", "z"], Field(description="axis upwards, with markers")] = "z"
     unit: _Unit = None
     positive: Annotated[_Flexion, Field(description="which motion is positive")]
     neutral: Annotated[
-        _Text, Field(description="the reading of the file when the foot is perpendicular to the shank")
+        Text, Field(description="the reading of the file when the foot is perpendicular to the shank")
     ] = "0 deg"
+
+    @model_validator(mode="after")
+    def _one_way(self) -> "AngleMap":
+        if (self.terms is None) == (self.heel is None) or (self.heel is None) != (self.toe is None):
+            raise ValueError("give either terms, or both heel and toe")
+        return self
 
 
 class MomentMap(BaseModel):
     """Ankle moment, in N m or N m/kg."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     terms: _Terms
     unit: _Unit = None
@@ -73,7 +85,7 @@ class MomentMap(BaseModel):
 class ForceMap(BaseModel):
     """Vertical ground reaction on this foot, in N or, as a plain number '-', in body weights."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     terms: _Terms
     unit: _Unit = None
@@ -83,7 +95,7 @@ class ForceMap(BaseModel):
 class PressureMap(BaseModel):
     """Centre of pressure along the foot, from the ankle."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     terms: _Terms
     unit: _Unit = None
@@ -93,7 +105,7 @@ class PressureMap(BaseModel):
 class KneeMap(BaseModel):
     """Knee in the sagittal plane: its position in m or its acceleration in m/s^2, or hip and thigh instead."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     forward: _Terms
     up: _Terms
@@ -102,9 +114,9 @@ class KneeMap(BaseModel):
         _Terms | None,
         Field(description="lean of the thigh, above 0 with the knee in front; forward and up then are of the hip"),
     ] = None
-    thigh_unit: Annotated[_Text | None, Field(description="unit of the lean, where the file does not state it")] = None
+    thigh_unit: Annotated[Text | None, Field(description="unit of the lean, where the file does not state it")] = None
     thigh_length: Annotated[
-        _Text | None, Field(description="hip to knee, such as '0.40 m'; default: a fraction of the stature")
+        Text | None, Field(description="hip to knee, such as '0.40 m'; default: a fraction of the stature")
     ] = None
 
     @model_validator(mode="after")
@@ -117,7 +129,7 @@ class KneeMap(BaseModel):
 class GaitMap(BaseModel):
     """What the columns of recorded files mean; a curve that is not named is not imported."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")] = 1
     shank_angle: ShankMap
@@ -160,34 +172,16 @@ def opensim_map(side: Side) -> GaitMap:
     )
 
 
-def plug_in_gait_map(side: Side) -> GaitMap:
-    """Return the map of C3D files with the markers and outputs of the Plug-in Gait model; the walk goes along x."""
-    foot = side[0].upper()
-    return GaitMap(
-        shank_angle=ShankMap(knee=f"{foot}KNE", ankle=f"{foot}ANK"),
-        ankle_angle=AngleMap(terms=(f"{foot}AnkleAngles.x",), positive="dorsiflexion", unit="deg"),
-        ankle_moment=MomentMap(terms=(f"{foot}AnkleMoment.x",), positive="plantarflexion", unit="N mm/kg"),
-        vertical_force=ForceMap(terms=(f"{foot}GroundReactionForce.z",), unit="N/kg"),
-        knee=KneeMap(forward=(f"{foot}KNE.x",), up=(f"{foot}KNE.z",)),
-    )
-
-
-CONVENTIONS = {"csv": package_map, "opensim": opensim_map, "c3d": plug_in_gait_map}
-"""The map of each form of file, for a side; taken where none is given."""
-
-
 def load_map(path: str | Path) -> GaitMap:
     """Return the map in a TOML file. DataError where it cannot be used."""
     file = label(str(path))
     try:
-        content = read_regular_file(Path(path), MOST_BYTES_TYPED)
-        return GaitMap.model_validate(_FILE.parse(content, file))
-    except ValidationError as error:
-        raise DataError(f"{file}: {first_problem(error.errors(include_url=False), GaitMap)}") from error
+        content = read_regular_file(Path(path), MAXIMUM_BYTES_TYPED)
     except (OSError, ValueError) as error:
         raise DataError(f"{file}: cannot be read: {reason(error)}") from error
+    return validate(GaitMap, _FILE.parse(content, file), file, DataError)
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a gait map."""
-    return published_schema(GaitMap, "ppafo gait map")
+    return make_schema(GaitMap, "ppafo gait map")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
@@ -18,7 +19,8 @@ class Signal:
     """Values over time [s], evenly enough sampled, of one file.
 
     ``is_position``: a position [m], of which the gait has the acceleration.
-    ``columns`` are those of the file behind it.
+    ``columns`` are those of the file behind it. ``absent`` tells where a load was not measured, and counts as 0; None
+    where it always was.
     """
 
     file: str
@@ -26,11 +28,25 @@ class Signal:
     values: Floats
     is_position: bool = False
     columns: tuple[str, ...] = ()
+    absent: NDArray[np.bool_] | None = None
 
     @property
     def rate(self) -> float:
         """Samples per second [Hz]."""
         return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
+
+
+def without_ends(signal: Signal) -> Signal:
+    """Return a motion from its first to its last number: a marker that comes into view or leaves it."""
+    known = np.flatnonzero(np.isfinite(signal.values))
+    inside = slice(int(known[0]), int(known[-1]) + 1)
+    return replace(signal, time=signal.time[inside], values=signal.values[inside])
+
+
+def with_absence(signal: Signal) -> Signal:
+    """Return a load that is 0 where it was not measured, and that says so."""
+    absent = ~np.isfinite(signal.values)
+    return signal if not absent.any() else replace(signal, values=np.where(absent, 0.0, signal.values), absent=absent)
 
 
 def low_pass(signal: Signal, cut_off: float) -> Signal:

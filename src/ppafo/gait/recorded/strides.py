@@ -62,12 +62,8 @@ def _over_strides(curves: Floats, strides: Sequence[Stride]) -> CurveStatistics:
     return CurveStatistics(curves, curves.mean(axis=0), deviation, tuple(strides))
 
 
-def mean_curve(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
-    """Return the curves of the strides that a signal covers.
-
-    DataError where it covers none.
-    """
-    inside = strides_within(signal, strides)
+def mean_curve(name: str, signal: Signal, strides: Sequence[Stride], inside: Sequence[Stride]) -> CurveStatistics:
+    """Return the curves of the strides ``inside``, which a signal covers; at least one of all ``strides`` has to be."""
     if not inside:
         raise DataError(
             f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no whole "

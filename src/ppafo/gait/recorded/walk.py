@@ -8,7 +8,9 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError, UnitError
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.recorded.columns import CurveColumns, check_finite, find_columns
+from ppafo.gait.recorded.columns import LOADS, CurveColumns, find_columns
+from ppafo.gait.recorded.conventions import column_names
+from ppafo.gait.recorded.foot_markers import between_markers, foot_markers_angle
 from ppafo.gait.recorded.knee import knee_signals
 from ppafo.gait.recorded.mapping import (
     AngleMap,
@@ -18,7 +20,7 @@ from ppafo.gait.recorded.mapping import (
     PressureMap,
     ShankMap,
 )
-from ppafo.gait.recorded.signal import Signal
+from ppafo.gait.recorded.signal import Signal, with_absence, without_ends
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity
@@ -40,28 +42,25 @@ def walk_signals(
     """Return the signals that a map finds in tables.
 
     With a convention of the package (``is_default``) only both angles have to be there; what a map of the user names
-    has to be there. DataError where one is missing.
+    has to be there. A motion goes from its first number to its last, a load is 0 where it was not measured.
     """
-    walk = {}
+    walk: dict[str, Signal] = {}
     for name, read in _READERS.items():
         mapped = getattr(columns, name)
         if mapped is None:
             continue
-        found = find_columns(name, _column_names(mapped), tables, optional=is_default and name not in REQUIRED)
+        found = find_columns(name, column_names(mapped), tables, optional=is_default and name not in REQUIRED)
         if found is not None:
-            signal = read(found, mapped, person.body_mass)
-            walk[name] = replace(signal, columns=tuple(column for _, column in found.terms))
+            if isinstance(mapped, AngleMap) and mapped.terms is None:
+                signal = foot_markers_angle(found, mapped, walk["shank_angle"])
+            else:
+                signal = read(found, mapped, person.body_mass)
+            signal = replace(signal, columns=tuple(column for _, column in found.terms))
+            walk[name] = with_absence(signal) if name in LOADS else without_ends(signal)
     if columns.knee is not None:
-        walk |= knee_signals(columns.knee, tables, person.stature, is_default)
+        knee = knee_signals(columns.knee, tables, person.stature, is_default)
+        walk |= {name: without_ends(signal) for name, signal in knee.items()}
     return walk
-
-
-def _column_names(mapped: object) -> tuple[str, ...]:
-    if isinstance(mapped, ShankMap) and mapped.terms is None:
-        axes = (mapped.forward.removeprefix("-"), mapped.vertical)
-        return tuple(f"{marker}.{axis}" for marker in (mapped.knee, mapped.ankle) for axis in axes)
-    terms: tuple[str, ...] = getattr(mapped, "terms")  # noqa: B009  # every map has them, by its own class
-    return terms
 
 
 def _shank(found: CurveColumns, mapped: ShankMap, _body_mass: float) -> Signal:
@@ -75,14 +74,8 @@ def _shank(found: CurveColumns, mapped: ShankMap, _body_mass: float) -> Signal:
 
 def _marker_angle(found: CurveColumns, mapped: ShankMap) -> Floats:
     """Return the lean of the line from knee to ankle, above 0 while the ankle is in front."""
-    place = {name: found.table.columns[name] for _, name in found.terms}
-    for name, values in place.items():
-        check_finite(values, f"{found.table.file}: column {name!r}", found.table.time)
-    axis = mapped.forward.removeprefix("-")
-    sign = -1.0 if mapped.forward.startswith("-") else 1.0
-    ahead = sign * (place[f"{mapped.ankle}.{axis}"] - place[f"{mapped.knee}.{axis}"])
-    below = place[f"{mapped.knee}.{mapped.vertical}"] - place[f"{mapped.ankle}.{mapped.vertical}"]
-    return np.asarray(np.arctan2(ahead, below), dtype=np.float64)
+    ahead, up = between_markers(found, mapped, str(mapped.knee), str(mapped.ankle))
+    return np.asarray(np.arctan2(ahead, -up), dtype=np.float64)
 
 
 def _ankle(found: CurveColumns, mapped: AngleMap, _body_mass: float) -> Signal:

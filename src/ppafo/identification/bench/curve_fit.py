@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Indices = NDArray[np.intp]
 
 _FEWEST_BLOCKS = 8
-_MOST_BLOCKS = 64
+_MAXIMUM_BLOCKS = 64
 """More would find what follows from sample to sample, for which there is an interval of its own."""
 
 _FEWEST_IN_A_BLOCK = 2
@@ -58,7 +58,7 @@ class LackOfFit:
 
 
 def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Sequence[Floats] = ()) -> LackOfFit:
-    """Return the lack of fit that widens intervals most, over numbers of blocks, in the order of samples and others.
+    """Return the lack of fit [-] that widens intervals most, over numbers of blocks, along samples and other orders.
 
     ``along`` are variables over which a misfit may run besides, such as a pressure. Readings that have some are steady
     ones, whose noise may differ from place to place; in a course of time a misfit may fill one block alone.
@@ -81,7 +81,7 @@ def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Se
 
 
 def quantile(confidence: float, freedom: int) -> float:
-    """Return the two-sided quantile of Student's distribution."""
+    """Return the two-sided quantile [-] of Student's distribution."""
     from scipy.stats import t
 
     return float(t.ppf(0.5 + confidence / 2.0, freedom))
@@ -95,7 +95,7 @@ def exceeds_chance(between: float, within: float, freedom: int, inner_freedom: i
 
 
 def jackknife(values_without: Sequence[Floats], confidence: float) -> Floats:
-    """Return half widths from the values that were fitted without each block in turn."""
+    """Return half widths (numbers,), in their units, from the values fitted without each block in turn."""
     stacked = np.array(values_without)
     count = stacked.shape[0]
     variance = (count - 1) / count * ((stacked - stacked.mean(axis=0)) ** 2).sum(axis=0)
@@ -106,7 +106,7 @@ def _block_counts(size: int, parameters: int) -> list[int]:
     """Return the numbers of blocks to try: from few to as many as leave two readings in each, and a limit."""
     counts: list[int] = []
     count = max(_FEWEST_BLOCKS, 2 * parameters)
-    while count * _FEWEST_IN_A_BLOCK <= size and (not counts or count <= _MOST_BLOCKS):
+    while count * _FEWEST_IN_A_BLOCK <= size and (not counts or count <= _MAXIMUM_BLOCKS):
         counts.append(count)
         count *= 2
     return counts
@@ -137,7 +137,7 @@ def _exceeds_uneven_noise(parts: list[Floats], chance: float) -> bool:
 CLEARLY_WORSE = 10.0
 """Difference in Akaike's criterion from which one law is refused in favour of another."""
 
-_MOST_CORRELATION = 0.999
+_MAXIMUM_CORRELATION = 0.999
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +194,7 @@ def fit_curve(
     confidence: float,
     along: Sequence[Floats] = (),
 ) -> CurveFit:
-    """Return the bounded least-squares fit with, for each value, the widest of three intervals.
+    """Return the bounded least-squares fit; for each value, in its unit, the widest of three intervals.
 
     1. The variance is that of as many samples as are worth one on their own, where each resembles the one before.
     Where the law misses the samples by more than they scatter, in their order or ``along`` other variables
@@ -208,7 +208,7 @@ def fit_curve(
 def solve_curve(
     residuals_of: Callable[[Floats], Floats], start: Floats, lower: Floats, upper: Floats, confidence: float
 ) -> CurveFit:
-    """Return the bounded least-squares fit with the first of these intervals; enough to compare laws with."""
+    """Return the bounded least-squares fit, each value in its unit with the first of these intervals."""
     found = _BoundedProblem(residuals_of, lower, upper).solve(start)
     residuals, inverse = np.asarray(found.fun), _inverse(np.asarray(found.jac))
     spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
@@ -249,12 +249,12 @@ def _widen(fit: CurveFit, problem: _BoundedProblem, missing: LackOfFit, confiden
 
 
 def effective_samples(residuals: Floats) -> float:
-    """Return how many independent samples the residuals are worth, from how much each resembles the one before."""
+    """Return the effective sample size [-] of residuals, from how much each resembles the one before."""
     total = float(residuals @ residuals)
     if residuals.size < 3 or total == 0.0:
         return float(residuals.size)
     likeness = float(residuals[1:] @ residuals[:-1]) / total
-    likeness = min(max(likeness, 0.0), _MOST_CORRELATION)
+    likeness = min(max(likeness, 0.0), _MAXIMUM_CORRELATION)
     return max(3.0, residuals.size * (1.0 - likeness) / (1.0 + likeness))
 
 

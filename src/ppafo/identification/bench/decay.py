@@ -62,10 +62,10 @@ VELOCITY = "angular_velocity"
 
 MINIMUM_SAMPLES = 20
 FEWEST_SMOOTHED = 5
-_SMOOTHED_SHARE = 0.04
+_SMOOTHED_FRACTION = 0.04
 _VELOCITY_MAY_DIFFER = 0.1
 _SMALLEST_NOISE = 1.0e-6
-_LEAST_OVER_NOISE = 20.0
+_MINIMUM_OVER_NOISE = 20.0
 
 
 class Decay(NamedTuple):
@@ -82,7 +82,10 @@ class Decay(NamedTuple):
 
 
 def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
-    """Return the decay in a recording between two times [s]; without a start it begins where the speed is largest."""
+    """Return the decay in a recording between two times [s]; without a start it begins where the speed is largest.
+
+    IdentificationError where too few samples are left.
+    """
     check_moves(source, PROCEDURE, "angle")
     part = window(source.recording, start, end)
     if len(part) < MINIMUM_SAMPLES:
@@ -107,16 +110,22 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
     time, angle = part.time[first:last], part["angle"][first:last]
     _check_not_at_limit(source, angle, skipped + first)
     if VELOCITY not in part:
-        return Decay(time - time[0], angle, sign, None, 0.0)
+        return Decay(time=time - time[0], angle=angle, sign=sign, velocity=None, velocity_weight=0.0)
     measured = part[VELOCITY][first:last]
     _check_velocity(source, time, angle, measured)
-    return Decay(time - time[0], angle, sign, measured, noise_of(angle) / noise_of(measured))
+    return Decay(
+        time=time - time[0],
+        angle=angle,
+        sign=sign,
+        velocity=measured,
+        velocity_weight=noise_of(angle) / noise_of(measured),
+    )
 
 
 def _check_course(source: Source, part: Recording) -> None:
     """Refuse a recording in which nothing moves by more than its noise."""
     swept, noise = float(np.ptp(part[ANGLE])), noise_of(part[ANGLE])
-    if swept < _LEAST_OVER_NOISE * noise:
+    if swept < _MINIMUM_OVER_NOISE * noise:
         raise IdentificationError(
             f"{source.name}: {PROCEDURE}: nothing moves: the angle changes by {swept:.3g} rad with a noise of "
             f"{noise:.3g} rad; push the vane"
@@ -147,7 +156,7 @@ def _check_velocity(source: Source, time: Floats, angle: Floats, measured: Float
 
 
 def noise_of(values: Floats) -> float:
-    """Return the scatter from sample to sample, from second differences; never nothing, so that it can be a weight."""
+    """Return the scatter, in the unit of the values, from second differences; never 0, so that it can be a weight."""
     return max(float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6.0)), _SMALLEST_NOISE * float(np.ptp(values)))
 
 
@@ -165,4 +174,4 @@ def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
 
 def smoothing_width(count: int) -> int:
     """Return an odd number of samples to smooth over."""
-    return max(FEWEST_SMOOTHED, int(_SMOOTHED_SHARE * count)) | 1
+    return max(FEWEST_SMOOTHED, int(_SMOOTHED_FRACTION * count)) | 1

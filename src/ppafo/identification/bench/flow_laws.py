@@ -45,7 +45,7 @@ class GasAt:
         """Choked mass flow over C times upstream pressure [kg/m^3], rho_0 sqrt(T_0 / T) of ISO 6358-1:2013."""
         return sonic_conductance_mass(1.0, self.specific_gas_constant, self.temperature)
 
-    def share_of_flow(self, calibration: float = 0.0) -> float:
+    def flow_uncertainty(self, calibration: float = 0.0) -> float:
         """Return the relative uncertainty [-] of an area or a conductance from a flow, with that of the sensors' gain.
 
         Mass flow goes with 1/sqrt(T), so an error of the temperature counts half; no residual shows it.
@@ -81,7 +81,7 @@ def _shape(pressure_a: Floats, pressure_b: Floats, flow_function: Callable[[floa
 
 Shape = Callable[[Floats, Floats], Floats]
 _POINTS = 1200
-_MOST_DECADES = 14.0
+_MAXIMUM_DECADES = 14.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class Chambers:
 
 def decay_times(law: Law, chambers: Chambers, start: float, lowest: float) -> tuple[Floats, Floats]:
     """Return k t and the difference [Pa] from ``start`` down past ``lowest``: the decay for a rate of 1."""
-    reach = min(2.0 * np.log(start / max(lowest, 1e-12 * start)) + 0.05, _MOST_DECADES)
+    reach = min(2.0 * np.log(start / max(lowest, 1e-12 * start)) + 0.05, _MAXIMUM_DECADES)
     logs = np.linspace(0.0, reach, _POINTS)
     difference = start * np.exp(-logs)
     first, second = chambers.pressures(difference)
@@ -165,12 +165,15 @@ class Opening:
         """
         if self.critical_ratio is not None:
             per = self.gas.flow_per_sonic_conductance
-            told = f"C of ISO 6358 with the set's b = {self.critical_ratio:g}. {text}"
-            return [Number(SONIC_PATH, self.unit, conductance / per, half_width / per, told, None, 0.0, widened)]
+            description = f"C of ISO 6358 with the set's b = {self.critical_ratio:g}. {text}"
+            return [Number(SONIC_PATH, self.unit, conductance / per, half_width / per, description, None, 0.0, widened)]
         area, half = conductance / self.gas.choked_flow_constant, half_width / self.gas.choked_flow_constant
         product = Number("vane_leak.effective_area", "m^2", area, half, f"Cd A. {text}", None, 0.0, widened)
         coefficient = self.discharge_coefficient
         if not coefficient:
             return [product]
-        told = f"With Cd = {coefficient:g}, of which only the product with the area counts. {text}"
-        return [Number(AREA_PATH, "m^2", area / coefficient, half / coefficient, told, None, 0.0, widened), product]
+        description = f"With Cd = {coefficient:g}, of which only the product with the area counts. {text}"
+        return [
+            Number(AREA_PATH, "m^2", area / coefficient, half / coefficient, description, None, 0.0, widened),
+            product,
+        ]

@@ -1,4 +1,4 @@
-"""Free decay after an impulse: viscous damping and Coulomb friction, told apart; figure 3, bottom, of the paper.
+"""Free decay after an impulse: viscous damping and Coulomb friction, separated; figure 3, bottom, of the paper.
 
 With no pressure and no gravity, equation (1) is I w' = -beta w - T_c sign(w). With b = beta/I and d = T_c/I it has the
 solution w(t) = (w_0 + d/b) exp(-b t) - d/b until w reaches zero, and then rest. Viscous damping bends the curve from
@@ -39,7 +39,7 @@ from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats
 
-_GOOD_SHARE = 0.0025
+_GOOD_FRACTION = 0.0025
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,12 +166,12 @@ def _estimates(evidence: Evidence, fit: CurveFit, settings: FreeDecaySettings) -
     inertia = settings.inertia
     if inertia is None:
         return tuple(evidence.at_or_above_zero(_without_inertia(item)) for item in (damping, friction))
-    share = settings.inertia_half_width / inertia
+    fraction = settings.inertia_half_width / inertia
     known = f"with an inertia of {inertia:.4g} kg m^2 ({settings.inertia_source}), "
-    known += "whose uncertainty is in the interval" if share else "taken as exact"
+    known += "whose uncertainty is in the interval" if fraction else "taken as exact"
     absolute = (
-        _times_inertia(damping, inertia, share, "friction.viscous_damping", "N m s/rad", f"beta {known}"),
-        _times_inertia(friction, inertia, share, "friction.dynamic_torque", "N m", f"T_c {known}"),
+        _times_inertia(damping, inertia, fraction, "friction.viscous_damping", "N m s/rad", f"beta {known}"),
+        _times_inertia(friction, inertia, fraction, "friction.dynamic_torque", "N m", f"T_c {known}"),
     )
     return tuple(evidence.at_or_above_zero(item) for item in (*absolute, damping, friction))
 
@@ -200,12 +200,12 @@ def _ratios(fit: CurveFit, evidence: Evidence) -> tuple[Number, Number]:
     )
 
 
-def _times_inertia(ratio: Number, inertia: float, share: float, path: str, unit: str, known: str) -> Number:
-    """Return a ratio times the inertia [kg m^2], whose relative uncertainty is ``share``."""
-    half_width = inertia * math.hypot(ratio.half_width, share * ratio.value)
-    told = f"{known}; {ratio.explanation.partition('; ')[2]}"
+def _times_inertia(ratio: Number, inertia: float, fraction: float, path: str, unit: str, known: str) -> Number:
+    """Return a ratio times the inertia [kg m^2], whose relative uncertainty is ``fraction``."""
+    half_width = inertia * math.hypot(ratio.half_width, fraction * ratio.value)
+    description = f"{known}; {ratio.explanation.partition('; ')[2]}"
     value = inertia * ratio.value
-    return replace(ratio, path=path, unit=unit, value=value, half_width=half_width, explanation=told)
+    return replace(ratio, path=path, unit=unit, value=value, half_width=half_width, explanation=description)
 
 
 def _without_inertia(ratio: Number) -> Number:
@@ -221,9 +221,9 @@ def _residual_check(decays: tuple[Decay, ...], fit: CurveFit) -> Check:
         for number, decay in enumerate(decays)
     ]
     missed = float(np.sqrt(np.mean(np.concatenate(misses) ** 2)))
-    share = missed / swept
-    holds = missed <= 3.0 * noise or share <= _GOOD_SHARE
-    text = f"the fitted decay misses the angle by {math.degrees(missed):.3g} deg rms, {share:.2%} of the swept range"
+    fraction = missed / swept
+    holds = missed <= 3.0 * noise or fraction <= _GOOD_FRACTION
+    text = f"the fitted decay misses the angle by {math.degrees(missed):.3g} deg rms, {fraction:.2%} of the swept range"
     return Check("residuals", holds, text if holds else f"{text}: another torque acts, such as gravity or an end stop")
 
 

@@ -15,13 +15,16 @@ _NO_SENSORS = ("command", "direction", "repetition")
 _COARSE = 0.02
 _SHARE_THAT_IS_CLIPPED = 0.05
 _FEWEST_CLIPPED = 4
-_SHARE_THAT_MOVES = 0.02
+_FRACTION_THAT_MOVES = 0.02
 _LARGEST_NUMBER = 1.0e12
 _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 
 
 def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterable[str], fewest: int) -> None:
-    """Refuse recordings that lack a channel or have fewer samples than the procedure needs."""
+    """Refuse recordings that lack a channel or have fewer samples than the procedure needs.
+
+    IdentificationError names the recording.
+    """
     if not sources:
         raise IdentificationError(f"{procedure}: no recording was given")
     for source in sources:
@@ -35,7 +38,7 @@ def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterabl
 
 
 def check_moves(source: Source, procedure: str, name: str) -> None:
-    """Refuse a channel that never changes: nothing can be learnt from it."""
+    """Refuse a channel that never changes: nothing can be learnt from it. IdentificationError names the recording."""
     values = source.recording[name]
     if values.max() == values.min():
         raise IdentificationError(
@@ -45,15 +48,16 @@ def check_moves(source: Source, procedure: str, name: str) -> None:
 
 
 def check_not_clipped(
-    source: Source, procedure: str, name: str, driver: str, driving: Floats, share: float = _SHARE_THAT_MOVES
+    source: Source, procedure: str, name: str, driver: str, driving: Floats, fraction: float = _FRACTION_THAT_MOVES
 ) -> None:
     """Refuse a channel that stays exactly at its largest value while what drives it moves: a saturated sensor.
 
-    ``driving`` are the values of that, ``driver`` its name; ``share`` of its largest value is how far it must move [-].
+    ``driving`` are the values of that, ``driver`` its name; it must move by ``fraction`` [-] of its largest value.
+    IdentificationError names the recording and the channel.
     """
     values = source.recording[name]
     longest, _ = plateaus(values)
-    moves = float(np.ptp(driving[longest.first : longest.last + 1])) > share * float(np.abs(driving).max())
+    moves = float(np.ptp(driving[longest.first : longest.last + 1])) > fraction * float(np.abs(driving).max())
     if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
         raise IdentificationError(
             f"{source.name}: {procedure}: channel '{name}' stays at {values.max():g} {source.recording.unit(name)} for "
@@ -63,7 +67,10 @@ def check_not_clipped(
 
 
 def check_absolute(source: Source, procedure: str, names: Iterable[str]) -> None:
-    """Refuse pressures that are zero or less: they were recorded as gauge."""
+    """Refuse pressures that are zero or less: they were recorded as gauge.
+
+    IdentificationError names the recording and the channel.
+    """
     for name in names:
         values = source.recording[name]
         low = int(np.argmin(values))
@@ -75,7 +82,10 @@ def check_absolute(source: Source, procedure: str, names: Iterable[str]) -> None
 
 
 def check_no_gap(source: Source, procedure: str, part: Recording) -> int:
-    """Return how many samples of a recording lie before a part of it; refuse a part with a gap."""
+    """Return how many samples of a recording lie before a part of it; refuse a part with a gap.
+
+    IdentificationError says where the gap is.
+    """
     skipped = int(np.searchsorted(source.recording.time, part.time[0]))
     gap = longest_gap(part.time)
     if gap is not None:
@@ -151,7 +161,7 @@ def _coarseness(values: Floats) -> float:
 
 
 def pool(sources: tuple[Source, ...], name: str) -> Floats:
-    """Return a channel of all recordings, one after the other."""
+    """Return a channel [SI] of all recordings, one after the other."""
     return np.concatenate([source.recording[name] for source in sources])
 
 

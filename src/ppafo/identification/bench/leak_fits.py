@@ -61,7 +61,7 @@ class FittedLaw:
 
 
 def smooth_curve(decay: Decay) -> Floats:
-    """Return a polynomial through the decay: what any smooth law could reach."""
+    """Return a polynomial [Pa] through the decay: what any smooth law could reach."""
     curve = np.polynomial.Chebyshev.fit(decay.time, decay.difference, _DEGREE)
     return np.asarray(curve(decay.time))
 
@@ -69,7 +69,7 @@ def smooth_curve(decay: Decay) -> Floats:
 def fit_law(
     law: Law, decays: tuple[Decay, ...], count: float, confidence: float, solve: Solve = fit_curve
 ) -> FittedLaw:
-    """Return a law of flow fitted to all decays with one rate; each decay has a start of its own."""
+    """Return a law of flow fitted to all decays with one rate [SI]; each decay has a start of its own."""
     starts = [float(np.mean(decay.difference[:EDGE])) for decay in decays]
     guesses = []
     for decay, start in zip(decays, starts, strict=True):
@@ -94,7 +94,7 @@ def fit_law(
 
 
 def fit_relaxation(decays: tuple[Decay, ...], count: float, confidence: float) -> FittedLaw:
-    """Fit an exponential towards a difference of its own: gas that cools, a wall that creeps, a seal that closes.
+    """Return exponentials towards a difference [Pa] of their own: cooling gas, a wall that creeps, a seal that closes.
 
     Values are the rate, then for each decay its start and its plateau, over how far it fell.
     """
@@ -168,6 +168,7 @@ def judge(fitted: list[FittedLaw], best: FittedLaw, noise: float, span: float, u
     """Return whether the orifice law, the first, describes the data: it must come close to what a smooth curve reaches.
 
     Where it is clearly the best law and misses by less than a hundredth of ``span``, the value is reported as weak.
+    ``noise`` and ``span`` are in ``unit``.
     """
     orifice = fitted[0]
     rivals = [item.name for item in fitted[1:] if item.criterion - orifice.criterion < CLEARLY_WORSE]
@@ -233,16 +234,17 @@ def leak_or_relaxation(
 ) -> tuple[Check, OffsetLeak | None]:
     """Return whether a plateau is the zero of a sensor that a linear leak runs towards, or that of a relaxation.
 
-    One decay cannot say: both are the same curve. Of several from different pressures the zero is the same in all,
-    the plateau of a relaxation goes with the pressure. Each is tested against plateaus of their own (F test).
+    One decay cannot say: both are the same curve. Of several from different pressures the zero is the same in all, the
+    plateau of a relaxation goes with the pressure. Each is tested against plateaus of their own (F test). The leak has
+    its rate [1/s] and the offset [Pa], each with a half width; None where it is none.
     """
     name, (plateau, _) = "leak or relaxation", relaxation.plateaus[0]
     if len(decays) == 1:
         rate = relaxation.rate / (1.0 + decays[0].chambers.volume_ratio)
         text = f"undecided: a linear leak of {rate:.3g} 1/s and a sensor offset of {plateau:.4g} Pa in the difference "
         return Check(name, False, f"{text}give the same curve; a decay from another pressure distinguishes them"), None
-    offset = _shared_plateau(decays, confidence, lambda shared, _top: shared)
-    share = _shared_plateau(decays, confidence, lambda shared, top: shared * top)
+    offset = _fit_shared_plateau(decays, confidence, lambda shared, _top: shared)
+    share = _fit_shared_plateau(decays, confidence, lambda shared, top: shared * top)
     freedom = max(1, int(count) - 1 - 2 * len(decays))
     own = relaxation.rms**2 * count / freedom
     scale, longest = _scales(decays)
@@ -268,7 +270,7 @@ def _scales(decays: tuple[Decay, ...]) -> tuple[float, float]:
     return max(float(decay.difference.max()) for decay in decays), max(float(decay.time[-1]) for decay in decays)
 
 
-def _shared_plateau(
+def _fit_shared_plateau(
     decays: tuple[Decay, ...], confidence: float, plateau_of: Callable[[float, float], float]
 ) -> CurveFit:
     """Return the exponentials whose plateaus follow from one number and their starts; values: rate, number, starts."""

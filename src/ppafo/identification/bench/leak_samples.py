@@ -83,7 +83,10 @@ class ClosedChambers(NamedTuple):
 
 
 def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChambers:
-    """Return the chambers of a recording between its start and equal pressures."""
+    """Return the chambers of a recording between its start and equal pressures.
+
+    IdentificationError where too few samples are left.
+    """
     check_moves(source, PROCEDURE, "pressure_1")
     part = window(source.recording, settings.start, settings.end)
     _check_samples(source, part)
@@ -101,7 +104,9 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
             f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
         )
     noise = float(np.std(np.diff(difference[:last]))) / np.sqrt(2.0)
-    return ClosedChambers(part.time[:last] - part.time[0], first[:last], second[:last], fuller, noise)
+    return ClosedChambers(
+        time=part.time[:last] - part.time[0], first=first[:last], second=second[:last], fuller=fuller, noise=noise
+    )
 
 
 def decay_in(closed: ClosedChambers, settings: VaneLeakSettings) -> Decay:
@@ -133,11 +138,11 @@ def _volume_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
     rise = float(np.mean(closed.second[-EDGE:]) - np.mean(closed.second[:EDGE]))
     if abs(rise) <= STANDS_STILL * abs(change):
         return 0.0
-    return given_ratio(closed, settings) or max(rise / change, 0.0)
+    return volume_ratio(closed, settings) or max(rise / change, 0.0)
 
 
-def given_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
-    """Return the volume of the fuller chamber over that of the other; 0 where one of them is not known."""
+def volume_ratio(closed: ClosedChambers, settings: VaneLeakSettings) -> float:
+    """Return the volume of the fuller chamber over that of the other [-]; 0 where one of them is not known."""
     if settings.volume_1 is None or settings.volume_2 is None:
         return 0.0
     ratio = settings.volume_1 / settings.volume_2

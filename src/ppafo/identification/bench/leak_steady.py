@@ -55,7 +55,7 @@ class _Readings(NamedTuple):
 def steady_leak(
     sources: tuple[Source, ...], opening: Opening, confidence: float, calibration: float = 0.0
 ) -> BenchResult:
-    """Return the leak's size where the law of an opening describes flow over pressures, else the law that does.
+    """Return the leak's size [SI] where the law of an opening describes flow over pressures, else the law that does.
 
     Where the pressures differ enough, the zero of the flow meter is fitted with the law and reported.
     """
@@ -64,7 +64,7 @@ def steady_leak(
     laws = [item.law for item in fitted]
     best, noise = best_law(laws), _noise(readings)
     judged = judge(laws, best, noise, float(np.ptp(readings.flow)), "kg/s")
-    evidence = Evidence(traces(sources), confidence, opening.gas.share_of_flow(calibration))
+    evidence = Evidence(traces(sources), confidence, opening.gas.flow_uncertainty(calibration))
     checks = law_checks(laws, best, judged, "kg/s")
     return BenchResult(
         PROCEDURE,
@@ -82,7 +82,9 @@ def _readings(sources: tuple[Source, ...]) -> _Readings:
     for source in sources:
         check_moves(source, PROCEDURE, "mass_flow")
         check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])
-    readings = _Readings(*(pool(sources, name) for name in CHANNELS))
+    readings = _Readings(
+        first=pool(sources, "pressure_1"), second=pool(sources, "pressure_2"), flow=pool(sources, "mass_flow")
+    )
     for source in sources:
         check_absolute(source, PROCEDURE, CHANNELS[:2])
     if float(readings.difference @ readings.flow) <= 0.0:

@@ -30,7 +30,7 @@ MINIMUM_SAMPLES = 5
 _FULLY_OPEN = 0.99
 _LARGEST_CRITICAL_RATIO = 0.95
 _SPREAD_OF_RATIOS = 0.15
-_GOOD_SHARE = 0.05
+_GOOD_FRACTION = 0.05
 _RATIO_STEP = 0.02
 
 Law = Literal["orifice", "iso6358"]
@@ -67,7 +67,7 @@ class OpenReadings:
 
     @property
     def steps(self) -> Floats:
-        """The ratio in coarse steps: sorted by its own noise, residuals would run with it where the law is right."""
+        """The ratio [-] in coarse steps: sorted by its own noise, residuals would follow it though the law is right."""
         return np.round(self.ratio / _RATIO_STEP)
 
 
@@ -87,7 +87,7 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
             f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
             f"{_SPREAD_OF_RATIOS:g} or more; these go from {points.ratio.min():.3g} to {points.ratio.max():.3g}"
         )
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow(settings.calibration))
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty(settings.calibration))
     estimates = _estimates(evidence, settings, orifice, sonic)
     checks = _checks(settings, orifice, sonic)
     one_ratio = "one pressure ratio, or choked flow alone: the orifice law and C with b cannot be distinguished"
@@ -125,7 +125,10 @@ def _check_source(source: Source, gas: GasAt) -> None:
 
 
 def open_readings(sources: tuple[Source, ...]) -> OpenReadings:
-    """Return the readings with the valve fully open; exchanged pressures and a valve that never was are refused."""
+    """Return the readings with the valve fully open; exchanged pressures and a valve that never was are refused.
+
+    IdentificationError says which.
+    """
     upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
     is_open = np.concatenate([_is_open(source) for source in sources])
     if is_open.sum() < MINIMUM_SAMPLES:
@@ -214,8 +217,8 @@ def _estimates(
         lowest=0.0,
         widened=orifice.widened[0],
     )
-    told = [evidence.with_calibration(number) for number in (*_coefficient(product, settings, given), product)]
-    return (*told, *_sonic_estimates(evidence, settings, sonic, given))
+    estimates = [evidence.with_calibration(number) for number in (*_coefficient(product, settings, given), product)]
+    return (*estimates, *_sonic_estimates(evidence, settings, sonic, given))
 
 
 def _coefficient(product: Number, settings: OpenValveFlowSettings, given: str) -> list[Number]:
@@ -252,7 +255,9 @@ def _checks(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit 
     reported = _law_to_report(settings, orifice, sonic)
     noise = "of the largest flow"
     listed = [
-        Check("residuals", reported.rms <= _GOOD_SHARE, f"the law misses the flow by {reported.rms:.2%} {noise} (rms)")
+        Check(
+            "residuals", reported.rms <= _GOOD_FRACTION, f"the law misses the flow by {reported.rms:.2%} {noise} (rms)"
+        )
     ]
     bound = float(np.mean(reported.residuals))
     drift = abs(bound) <= max(0.01, 2.0 * reported.rms / np.sqrt(reported.effective))
@@ -273,9 +278,9 @@ def _which_law(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveF
     better = (
         "ISO 6358" if gain > CLEARLY_WORSE else "the orifice law" if gain < -CLEARLY_WORSE else "neither law clearly"
     )
-    asked = "ISO 6358" if settings.law == "iso6358" else "the orifice law"
+    requested = "ISO 6358" if settings.law == "iso6358" else "the orifice law"
     text = f"AIC prefers {better} (difference {gain:+.1f}): rms {orifice.rms:.2%} orifice, {sonic.rms:.2%} ISO 6358"
-    holds = better in (asked, "neither law clearly")
+    holds = better in (requested, "neither law clearly")
     other = "iso6358" if settings.law == "orifice" else "orifice"
     return Check("which law", holds, text if holds else f"{text}; try law = '{other}'")
 

@@ -70,7 +70,7 @@ class BenchResult:
 
 
 def verdict_of(value: float, low: float, high: float, scale: float | None = None, is_capped: bool = False) -> Verdict:
-    """Return what an interval says of a value; ``scale`` stands in for a value that may well be zero.
+    """Return the verdict on a value and its interval, all in one unit; ``scale`` replaces a value that may be zero.
 
     ``is_capped`` says that the model does not explain the recordings, so that the value belongs to this model only.
     """
@@ -146,15 +146,15 @@ class Evidence:
         value, half = float(number.value), float(half_width)
         low, high = value - half, value + half
         is_missed = float(number.widened) >= WORTH_TELLING
-        told = verdict or verdict_of(value, low, high, number.scale, is_missed or bool(number.condition))
-        missed = f" {_MISSED}" if is_missed and told == _CAPPED else ""
+        final = verdict or verdict_of(value, low, high, number.scale, is_missed or bool(number.condition))
+        missed = f" {_MISSED}" if is_missed and final == _CAPPED else ""
         return Estimate(
             path=number.path,
             value=value,
             unit=number.unit,
             low=max(number.lowest, low),
             high=high,
-            verdict=told,
+            verdict=final,
             explanation=f"{number.explanation}{missed}",
             recordings=self.recordings,
             confidence=self.confidence,
@@ -171,10 +171,10 @@ class Evidence:
 
 
 def prospect_of(name: str, half_width: float, size: float, where: str) -> Prospect:
-    """Return whether a number can be had, from half the width that scatter and design alone would give it.
+    """Return whether a number can be identified, from half the width [in its unit] that scatter and design alone give.
 
     Slow disturbances and a law that misses widen an interval later; nothing makes it narrower.
     """
-    share = float(half_width) / abs(size) if size else math.inf
-    width = f"{share:.2g} times its size" if share >= 0.1 else f"{share:.2%}"
-    return Prospect(name, share < WEAK_WITHIN, f"expected within {width} at best; {where}")
+    fraction = float(half_width) / abs(size) if size else math.inf
+    width = f"{fraction:.2g} times its size" if fraction >= 0.1 else f"{fraction:.2%}"
+    return Prospect(name, fraction < WEAK_WITHIN, f"expected within {width} at best; {where}")

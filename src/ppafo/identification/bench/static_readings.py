@@ -47,7 +47,7 @@ class Regression:
 def regress(
     design: Floats, values: Floats, clusters: Labels, cells: Labels, confidence: float, judged_by: int = 0
 ) -> Regression:
-    """Return the least-squares fit with, for each coefficient, the widest of three intervals.
+    """Return the least-squares fit; for each coefficient, in its unit, the widest of three intervals.
 
     1. Readings independent of each other. 2. Readings of one cluster (a repetition, a stroke) share an error: the
     cluster-robust covariance, where there are three clusters or more. 3. Readings of one cell (a pressure, one
@@ -151,7 +151,7 @@ class Readings:
 
 
 def readings_of(sources: tuple[Source, ...]) -> Readings:
-    """Return the readings of all recordings; those that cannot tell slope from friction are refused."""
+    """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
     direction = pool(sources, "direction")
     for source in sources:
         _check_direction(source)

@@ -15,7 +15,7 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CHANCE, quantile
 from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pauses
-from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series, prospect_of
+from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Role, Series, prospect_of
 from ppafo.identification.bench.static_readings import PROCEDURE, Readings, Regression, labels_of, readings_of, regress
 from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
@@ -23,7 +23,7 @@ from ppafo.signals.recording import Floats
 
 CHANNELS = ("torque", "pressure_difference", "direction")
 _MORE_THAN_FRICTION = 0.3
-"""Share of its range by which the torque may move at one pressure, as friction turns round."""
+"""Fraction of its range by which the torque may move at one pressure, as friction turns round."""
 
 _SAG_THAT_HARMS_NOBODY = 0.02
 _SLOPE, _ZERO, _FRICTION, _GROWTH = range(4)
@@ -223,13 +223,13 @@ def _straight_check(readings: Readings, grows: bool, confidence: float) -> Check
     square = centred**2 - np.mean(centred**2)
     bent = _fit(readings, grows, confidence, square)
     sag = abs(bent.coefficients[-1]) * float(np.ptp(square))
-    share = sag / float(np.ptp(readings.torque))
-    holds = bool(not bent.differs_from_zero(bent.coefficients.size - 1) or share < _SAG_THAT_HARMS_NOBODY)
+    fraction = sag / float(np.ptp(readings.torque))
+    holds = bool(not bent.differs_from_zero(bent.coefficients.size - 1) or fraction < _SAG_THAT_HARMS_NOBODY)
     word = "straight" if holds else "bent"
     return Check(
         "straight line",
         holds,
-        f"the branches are {word}: a quadratic term would change the torque by {share:.1%} of its range",
+        f"the branches are {word}: a quadratic term would change the torque by {fraction:.1%} of its range",
     )
 
 
@@ -237,10 +237,10 @@ def _outliers(readings: Readings, fit: Regression) -> Check:
     spread = 1.4826 * float(np.median(np.abs(fit.residuals - np.median(fit.residuals))))
     worst = int(np.argmax(np.abs(fit.residuals)))
     count = int((np.abs(fit.residuals) > 6.0 * max(spread, 1e-300)).sum())
-    share = count / fit.residuals.size
+    fraction = count / fit.residuals.size
     text = f"{count} of {fit.residuals.size} readings lie more than six scatters off ({spread:.3g} N m each)"
     text += f"; the worst is {readings.places[worst]}, {fit.residuals[worst]:+.3g} N m" if count else ""
-    return Check("outliers", share <= 0.01, text)
+    return Check("outliers", fraction <= 0.01, text)
 
 
 def _growth_check(growing: Regression, readings: Readings, grows: bool) -> Check:
@@ -272,10 +272,12 @@ def _summary(readings: Readings, fit: Regression, grows: bool) -> str:
 def _panels(readings: Readings, fit: Regression) -> tuple[Panel, ...]:
     ends = np.array([readings.pressure.min(), readings.pressure.max()])
     nominal = fit.coefficients[_SLOPE] * ends + fit.coefficients[_ZERO]
-    branches = (("pressure rising", 1.0, "rising"), ("pressure falling", -1.0, "falling"))
-    chosen = [(name, readings.branch == sign, role) for name, sign, role in branches]
-    main = [Series(name, readings.pressure[on], readings.torque[on], role) for name, on, role in chosen]  # type: ignore[arg-type]
-    rest = [Series("", readings.pressure[on], fit.residuals[on], role) for _, on, role in chosen]  # type: ignore[arg-type]
+    branches: dict[Role, float] = {"rising": 1.0, "falling": -1.0}
+    main, rest = [], []
+    for role, sign in branches.items():
+        on = readings.branch == sign
+        main.append(Series(f"pressure {role}", readings.pressure[on], readings.torque[on], role))
+        rest.append(Series("", readings.pressure[on], fit.residuals[on], role))
     line = Series("nominal", ends, nominal, "law")
     zero = Series("", ends, np.zeros(2), "law")
     axis = ("Pressure difference", "Pa_d")

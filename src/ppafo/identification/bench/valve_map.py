@@ -17,7 +17,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
 from ppafo.identification.bench.flow_laws import GasAt, orifice_shape
 from ppafo.identification.bench.inputs import check_absolute, check_moves, check_sources, kind_of, pauses
-from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series
+from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Role, Series
 from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.signals.faults import FEWEST_AT_LIMIT, plateaus, scatters
@@ -31,7 +31,7 @@ MINIMUM_SAMPLES = 12
 _MINIMUM_RANGE = 0.5
 _SEEN_BEYOND = 0.02
 _SMALL_COMMAND = 0.2
-_GOOD_SHARE = 0.05
+_GOOD_FRACTION = 0.05
 _DEAD_BAND, _GAIN, _FULL, _HYSTERESIS = range(4)
 
 
@@ -83,7 +83,7 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     measured = _read_map(sources, settings.gas)
     fitted = _fit(measured, settings.confidence)
     fit, scale = fitted
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow(settings.calibration))
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty(settings.calibration))
     estimates = _estimates(evidence, measured, fitted, settings.path)
     checks = (*_checks(measured, fit), _meter_check(sources))
     remarks = (*_one_way_remark(measured), *pauses(sources))
@@ -218,14 +218,14 @@ def _saturation(fit: CurveFit) -> Number:
 
 def _checks(measured: _Map, fit: CurveFit) -> tuple[Check, ...]:
     fits = Check(
-        "residuals", fit.rms <= _GOOD_SHARE, f"the map misses the opening by {fit.rms:.2%} of the full one (rms)"
+        "residuals", fit.rms <= _GOOD_FRACTION, f"the map misses the opening by {fit.rms:.2%} of the full one (rms)"
     )
     listed = [fits]
     if not _one_way_remark(measured):
         sides = [float(np.mean(fit.residuals[sign * measured.command > 0.1])) * sign for sign in (1.0, -1.0)]
         apart = abs(sides[0] - sides[1])
         text = f"the two directions differ by {apart:.2%} of the full opening"
-        listed.append(Check("both ways alike", apart <= _GOOD_SHARE, text))
+        listed.append(Check("both ways alike", apart <= _GOOD_FRACTION, text))
     both_ways, one_way = "rising and falling commands were recorded", "the command went one way: hysteresis is unknown"
     text = both_ways if measured.is_two_way else one_way
     return (*listed, Check("hysteresis seen", measured.is_two_way, text))
@@ -258,10 +258,11 @@ def _meter_check(sources: tuple[Source, ...]) -> Check:
 def _panels(measured: _Map, fit: CurveFit, scale: float) -> tuple[Panel, ...]:
     command = np.linspace(float(measured.command.min()), float(measured.command.max()), 401)
     series = []
-    for name, sign, role in (("command rising", 1.0, "rising"), ("command falling", -1.0, "falling")):
+    branches: dict[Role, float] = {"rising": 1.0, "falling": -1.0}
+    for role, sign in branches.items():
         on = measured.branch == sign
         if on.any():
-            series.append(Series(name, measured.command[on], measured.area[on], role))  # type: ignore[arg-type]
+            series.append(Series(f"command {role}", measured.command[on], measured.area[on], role))
             law = scale * area_of_command(command, np.full_like(command, sign), *fit.values.tolist())
             series.append(Series("fitted" if sign > 0 else "", command, law, "law"))
     rest = fit.residuals * scale

@@ -36,7 +36,7 @@ from ppafo.identification.bench.leak_samples import (
     closed_chambers,
     decay_in,
     falling_decays,
-    given_ratio,
+    volume_ratio,
 )
 from ppafo.identification.bench.leak_steady import CHANNELS as STEADY
 from ppafo.identification.bench.leak_steady import steady_leak
@@ -136,20 +136,20 @@ def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], setti
     best, orifice = best_law(fitted), fitted[0]
     drop = max(float(np.ptp(decay.difference)) for decay in decays)
     judged = judge(fitted, best, noise, drop, "Pa")
-    checks = [*law_checks(fitted, best, judged, "Pa"), *_kept_check(decays)]
+    checks = [*law_checks(fitted, best, judged, "Pa"), *_conservation_check(decays)]
     # Only what is reported needs the intervals of a law that may miss, which take long.
-    told_laws = {
+    reported = {
         law.name: fit_law(law, decays, count, settings.confidence)
         for law in laws
         if law.name in _reported_laws(best, judged)
     }
-    orifice, best = told_laws.get(orifice.name, orifice), told_laws.get(best.name, best)
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow())
+    orifice, best = reported.get(orifice.name, orifice), reported.get(best.name, best)
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty())
     numbers = _numbers(settings, {decay.emptying for decay in decays}, orifice, f"{judged.reason}.")
     estimates = [*opening_estimates(evidence, settings.opening, numbers, judged)]
     if best is relaxation:
-        told, leak = leak_or_relaxation(decays, relaxation, count, settings.confidence)
-        checks.append(told)
+        check, leak = leak_or_relaxation(decays, relaxation, count, settings.confidence)
+        checks.append(check)
         estimates += [evidence.without_calibration(number) for number in _course(relaxation, leak)]
     elif best.name != orifice.name:
         estimates.append(evidence.without_calibration(replace(_rate(best), condition=condition_of(best, checks[1]))))
@@ -160,7 +160,7 @@ def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], setti
         tuple(checks),
         _panels(decays, orifice, best),
         kind_of(sources),
-        () if _kept_check(decays) else ("the pressure in chamber 2 is constant, so it is treated as a room",),
+        () if _conservation_check(decays) else ("the pressure in chamber 2 is constant, so it is treated as a room",),
     )
 
 
@@ -185,7 +185,7 @@ def _tight_leak(
     scale = max(float(np.mean(item.difference)) for item in closed)
     shape = settings.opening.law().shape
     falls = [
-        (1.0 + given_ratio(item, settings)) * float(shape(*(np.array([np.mean(p)]) for p in item[1:3]))[0]) / scale
+        (1.0 + volume_ratio(item, settings)) * float(shape(*(np.array([np.mean(p)]) for p in item[1:3]))[0]) / scale
         for item in closed
     ]
 
@@ -204,14 +204,14 @@ def _tight_leak(
     text = (
         f"No leak is visible in {longest:.4g} s; with {settings.confidence:.0%} confidence it is below the upper end."
     )
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.share_of_flow())
+    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty())
     estimates = tuple(
         replace(evidence.estimate(number, number.half_width * (1.0 + evidence.calibration), "upper bound"), low=0.0)
         for number in _numbers(settings, {item.fuller for item in closed}, most, text)
     )
     rises = slope + half < 0.0
-    told = "the pressure difference rises" if rises else "the pressure difference does not rise either"
-    check = Check("nothing flows in", not rises, f"{told}: {-slope * falls[0] * scale:+.3g} Pa/s at first sight")
+    slope_text = "the pressure difference rises" if rises else "the pressure difference does not rise either"
+    check = Check("nothing flows in", not rises, f"{slope_text}: {-slope * falls[0] * scale:+.3g} Pa/s at first sight")
     summary = (
         f"{count_of(len(closed), 'recording')} of closed chambers; no leak is visible, so there is only an upper bound"
     )
@@ -265,7 +265,7 @@ def _numbers(settings: VaneLeakSettings, emptying: set[int], orifice: FittedLaw,
     return settings.opening.numbers(conductance, half, text, orifice.widened)
 
 
-def _kept_check(decays: tuple[Decay, ...]) -> tuple[Check, ...]:
+def _conservation_check(decays: tuple[Decay, ...]) -> tuple[Check, ...]:
     """Return whether what one chamber loses the other gains; nothing to ask where the other is a room."""
     if all(decay.chambers.volume_ratio == 0.0 for decay in decays):
         return ()

@@ -1,6 +1,6 @@
 """Trajectory fit: any numbers of a device from any recordings of its motion, with intervals and verdicts.
 
-Rooms, each leaning on those before it: ``experiment`` and ``problem`` say what is asked, ``preparation`` and
+Rooms, each leaning on those before it: ``experiment`` and ``problem`` say what is requested, ``preparation`` and
 ``residuals`` run it, ``information`` and ``search`` find the least misfit. ``whitening`` and ``sensor_noise`` are the
 noise of a sensor, with which ``weighing`` searches on; ``posterior`` draws both, ``misfit`` tests the model against
 itself, ``uncertainty`` gives intervals and verdicts. ``fitting`` does all of it and returns ``result``, ``follow_up``

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import validate
 from ppafo.errors import IdentificationError
 from ppafo.identification.source import Source, common_use, source_of
 from ppafo.identification.trajectory.experiment import (
@@ -54,11 +53,7 @@ def trajectory_from_dict(
 
     Texts have their units, the problem is in SI. IdentificationError or DataError, one line that names ``file``.
     """
-    try:
-        section = TrajectorySection.model_validate(dict(content))
-    except ValidationError as error:
-        text = first_problem(error.errors(include_url=False), TrajectorySection)
-        raise IdentificationError(f"{file}: {text}") from error
+    section = validate(TrajectorySection, dict(content), file, IdentificationError)
     home = folder or Path()
 
     def read(item: ExperimentSection) -> Source:
@@ -68,7 +63,7 @@ def trajectory_from_dict(
 
 
 def trajectory_problem(section: TrajectorySection, setting: Setting) -> TrajectoryProblem:
-    """Return the problem of a section."""
+    """Return the problem of a section. IdentificationError where it repeats what the bench settles."""
     experiments = tuple(_experiment(item, setting) for item in section.experiments)
     scenarios = {item.label: item.scenario for item in experiments}
     twice = common_use(setting.used, map(use_of, experiments))
@@ -196,7 +191,10 @@ def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
 
 
 def experiment_without_scenario(item: ExperimentSection, source: Source, setting: Setting) -> Experiment:
-    """Return the experiment of a recording on the device of the set; it begins at the first sample unless told."""
+    """Return the experiment of a recording on the device of the set; it begins at the first sample by default.
+
+    IdentificationError where a scenario is needed.
+    """
     said = f"{setting.file}: experiment '{item.label}'"
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")
@@ -206,7 +204,7 @@ def experiment_without_scenario(item: ExperimentSection, source: Source, setting
     first = float(recording.time[0]) if item.start is None else quantity_of(f"{said}: start", item.start, "s")
     used = recording.between(first, float(recording.time[-1]))
     device = build_device(apply_overrides(setting.parameter_set, item.overrides, setting.valve), setting.valve)
-    device, fixed = _fixed(item, device, said)
+    device, fixed = _fix_vane(item, device, said)
     inputs = _inputs(item, recording, said)
     start = _start_of(used, device, fixed, said)
     motion = held_vane(start.angle) if fixed else None
@@ -221,11 +219,11 @@ def compared_channels(item: ExperimentSection) -> tuple[str, ...]:
         return item.channels
     if item.volume is not None:
         return ("pressure_1",)
-    is_led = item.held is not None or ANGLE in (item.inputs or ())
-    return FITTED_CHANNELS[1:] if is_led else FITTED_CHANNELS
+    is_prescribed = item.held is not None or ANGLE in (item.inputs or ())
+    return FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
 
 
-def _fixed(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:
+def _fix_vane(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:
     """Return the device and what of its state is known where the vane is held, or where there is none."""
     if (item.held is not None or item.volume is not None) and ANGLE in (item.inputs or ()):
         raise IdentificationError(f"{said}: the vane is held or absent, but inputs has '{ANGLE}': omit one of them")

@@ -55,7 +55,7 @@ class Experiment:
 
 
 def check_experiment(experiment: Experiment) -> None:
-    """Refuse an experiment that cannot be fitted; the message begins with its label."""
+    """Refuse an experiment that cannot be fitted; the message begins with its label. It is an IdentificationError."""
     said = f"experiment '{experiment.label}'"
     if len(experiment.recording) < 2:
         raise IdentificationError(f"{said}: {experiment.recording.label} has only one sample")
@@ -194,7 +194,7 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 
 def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
-    """Return the scenario with numbers replaced, by paths of ``declared_numbers``; a time offset is none of it."""
+    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``; a time offset is none of it."""
     return numbers.with_numbers(scenario, {path: number for path, number in changed.items() if path != TIME_OFFSET})
 
 
@@ -202,7 +202,7 @@ def _orifice_form(orifice: object) -> tuple[Quantity, ...]:
     return AREA_FORM if isinstance(orifice, Orifice) else SONIC_FORM
 
 
-def broken_order(device: Device) -> str:
+def broken_rule(device: Device) -> str:
     """Return which rule of a device a set of numbers breaks, as a parameter set would say it; empty for none."""
     if device.friction.dynamic_torque > device.friction.static_torque:
         return "friction.dynamic_torque came out above friction.static_torque"

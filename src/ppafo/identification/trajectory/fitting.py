@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ppafo.identification.trajectory.experiment import Experiment, broken_order, with_numbers
+from ppafo.identification.trajectory.experiment import Experiment, broken_rule, with_numbers
 from ppafo.identification.trajectory.information import correlation
 from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment, prepare, with_half_steps
 from ppafo.identification.trajectory.problem import Range, TrajectoryProblem, ranges_of, reach_of
@@ -36,7 +36,10 @@ LARGE = 0.3
 
 
 def step_remarks(residuals: Residuals, point: Floats, signals: list[dict[str, Floats]]) -> tuple[str, ...]:
-    """Return a sentence for each experiment whose steps are too long; ``signals`` are its runs by channel."""
+    """Return a sentence for each experiment whose steps are too long; ``signals`` are its runs by channel.
+
+    ``point`` is in coordinates, signals are in SI units.
+    """
     remarks = []
     for prepared, coarse in zip(residuals.experiments, signals, strict=True):
         finer = with_half_steps(prepared, numbers_in(prepared.label, residuals.ranges, point))
@@ -181,10 +184,10 @@ def _remarks(
     device: Device,
 ) -> tuple[str, ...]:
     stopped = (
-        f"the search stopped after {problem.search.most_evaluations} evaluations before it converged: "
+        f"the search stopped after {problem.search.maximum_evaluations} evaluations before it converged: "
         f"start closer to the solution, or allow more evaluations"
     )
-    broken = broken_order(device)
+    broken = broken_rule(device)
     misfit = (
         f"the model does not explain the recordings: {evidence.misfit}; what it determines holds for this model only"
     )

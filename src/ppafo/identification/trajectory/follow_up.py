@@ -77,9 +77,11 @@ def _held_coordinates(fit: TrajectoryFit, index: int) -> tuple[Floats, Floats]:
     at = float(fit.optimum.point[index])
     low, high = (float(side[index]) for side in coordinate_bounds(fit.optimum.residuals.ranges))
     error = float(np.sqrt(fit.uncertainty.covariance[index, index]))
-    shares = np.arange(1, POINTS_PER_SIDE + 1) / POINTS_PER_SIDE
+    fractions = np.arange(1, POINTS_PER_SIDE + 1) / POINTS_PER_SIDE
     down, up = min(REACH * error, at - low), min(REACH * error, high - at)
-    return (at - down * shares if down > 0.0 else shares[:0]), (at + up * shares if up > 0.0 else shares[:0])
+    return (at - down * fractions if down > 0.0 else fractions[:0]), (
+        at + up * fractions if up > 0.0 else fractions[:0]
+    )
 
 
 def _side(fit: TrajectoryFit, index: int, coordinates: Floats) -> list[tuple[float, float]]:
@@ -140,8 +142,8 @@ def _crossing(item: Range, places: Floats, heights: Floats, threshold: float) ->
     if not over.size or over[0] == 0:
         return None
     last = int(over[0])
-    share = (wanted - roots[last - 1]) / (roots[last] - roots[last - 1])
-    return item.number(float(places[last - 1] + share * (places[last] - places[last - 1])))
+    fraction = (wanted - roots[last - 1]) / (roots[last] - roots[last - 1])
+    return item.number(float(places[last - 1] + fraction * (places[last] - places[last - 1])))
 
 
 _WIDEST = math.log(100.0)
@@ -203,7 +205,7 @@ def _expect(fit: TrajectoryFit, known: Floats, candidate: Candidate, directions:
     after = known.copy()
     after[np.ix_(place, place)] += data_information(jacobian, np.ones(len(jacobian)))
     errors, errors_after = (np.sqrt(np.diag(covariance(matrix))) for matrix in (known, after))
-    shrinkage = {item.name: float(share) for item, share in zip(ranges, errors_after / errors, strict=True)}
+    shrinkage = {item.name: float(fraction) for item, fraction in zip(ranges, errors_after / errors, strict=True)}
     gain = 0.5 * float(np.linalg.slogdet(after)[1] - np.linalg.slogdet(known)[1])
     return Expected(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))
 

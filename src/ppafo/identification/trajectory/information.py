@@ -18,8 +18,8 @@ SMALLEST_STEP, LARGEST_STEP = 1.0e-6, 5.0e-2
 STEP_IN_ERRORS = 1.0
 """Step of a difference in standard errors, and its limits in coordinates."""
 
-SMALLEST_SHARE = 1.0e-12
-"""Eigenvalues of the scaled information below this share of the largest are noise of the differences."""
+SMALLEST_FRACTION = 1.0e-12
+"""Eigenvalues of the scaled information below this fraction of the largest are noise of the differences."""
 
 FIXED = 1.0e-9
 """Share below which an eigenvalue fixes nothing, so that a solution does not move along its direction."""
@@ -29,7 +29,7 @@ LEAST = 1.0e-12
 
 
 def principal_axes(information: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the scale of each coordinate, and eigenvalues (growing) and eigenvectors of the scaled information."""
+    """Return the scale [unit] of each coordinate, and eigenvalues (growing) and vectors of the scaled information."""
     scale = np.sqrt(np.maximum(np.diag(information), LEAST))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     return scale, values, vectors
@@ -46,24 +46,24 @@ def loss_weights(residuals: Floats, loss: str) -> Floats:
 
 
 def data_information(jacobian: Floats, weights: Floats) -> Floats:
-    """Return the information matrix of the samples."""
+    """Return the information matrix of the samples (coordinates, coordinates), in inverse squares of their units."""
     return np.asarray(jacobian.T @ (weights[:, None] * jacobian))
 
 
 def prior_information(residuals: Residuals) -> Floats:
-    """Return the information matrix of the priors."""
+    """Return the information matrix of the priors (coordinates, coordinates), in inverse squares of their units."""
     _, deviation, _ = prior_coordinates(residuals.ranges)
     return np.diag(1.0 / np.square(deviation))
 
 
 def precision(near: Neighbourhood, loss: str) -> Floats:
-    """Return the information of samples and priors together at a point."""
+    """Return the information of samples and priors together at a point, in inverse squares of the units."""
     weights = loss_weights(near.of_data, loss)
     return data_information(near.jacobian_of_data(), weights) + prior_information(near.residuals)
 
 
 def directions_for(information: Floats, is_fixed: Mask) -> Floats:
-    """Return steps of differences along the principal directions of an information matrix, as columns.
+    """Return steps of differences, in units of the coordinates, along the principal directions, as columns.
 
     Each step is one standard error in its direction, within limits. Where a vane breaks away or hits a stop the
     residual has kinks in time, and a step far below the standard error would ask whether a sample sits on a kink; one
@@ -75,7 +75,7 @@ def directions_for(information: Floats, is_fixed: Mask) -> Floats:
     free = np.flatnonzero(~is_fixed)
     part = information[np.ix_(free, free)]
     scale, values, vectors = principal_axes(part)
-    errors = 1.0 / np.sqrt(np.maximum(values, SMALLEST_SHARE * values[-1])) if free.size else values
+    errors = 1.0 / np.sqrt(np.maximum(values, SMALLEST_FRACTION * values[-1])) if free.size else values
     found = STEP_IN_ERRORS * errors * vectors / scale[:, None]
     size = np.max(np.abs(found), axis=0, initial=0.0)
     directions[np.ix_(free, free)] = found * (np.clip(size, SMALLEST_STEP, LARGEST_STEP) / size)
@@ -83,19 +83,19 @@ def directions_for(information: Floats, is_fixed: Mask) -> Floats:
 
 
 def covariance(information: Floats) -> Floats:
-    """Return the inverse of an information matrix; a direction without information gets a huge variance, not none."""
+    """Return the inverse of an information matrix [unit^2]; a direction without information gets a huge variance."""
     scale, values, vectors = principal_axes(information)
-    kept = np.maximum(values, SMALLEST_SHARE * values[-1])
+    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
     return np.asarray((vectors / kept) @ vectors.T / np.outer(scale, scale))
 
 
 def standard_errors(information: Floats) -> Floats:
-    """Return the standard errors that an information matrix stands for."""
+    """Return the standard errors, in units of the coordinates, that an information matrix stands for."""
     return np.asarray(np.sqrt(np.diag(covariance(information))))
 
 
 def correlation(matrix: Floats) -> Floats:
-    """Return the correlation matrix of a covariance matrix."""
+    """Return the correlation matrix [-] of a covariance matrix."""
     errors = np.sqrt(np.diag(matrix))
     return np.asarray(np.clip(matrix / np.outer(errors, errors), -1.0, 1.0))
 
@@ -121,12 +121,12 @@ class Mixture:
 
     @property
     def mean(self) -> Floats:
-        """Mean of all coordinates."""
+        """Mean of all coordinates, in their units."""
         return np.asarray(self.means.mean(axis=0))
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of all coordinates."""
+        """Covariance of all coordinates, in products of their units."""
         away = self.means - self.mean
         return np.asarray(self.covariances.mean(axis=0) + away.T @ away / len(away))
 
@@ -137,12 +137,12 @@ class Mixture:
         spread = np.sqrt(self.covariances[:, index, index])
         return np.asarray(ndtr((at[:, None] - self.means[:, index]) / spread).mean(axis=1))
 
-    def quantile(self, index: int, share: float, low: float = -math.inf, high: float = math.inf) -> float:
+    def quantile(self, index: int, fraction: float, low: float = -math.inf, high: float = math.inf) -> float:
         """Return the place below which a coordinate lies with a probability, given that it lies between two bounds."""
         from scipy.optimize import brentq
 
         first, last = self.below(index, np.array([low, high]))
-        wanted = first + share * (last - first)
+        wanted = first + fraction * (last - first)
         error = 12.0 * math.sqrt(float(self.covariance[index, index]))
         ends = max(low, float(self.mean[index]) - error), min(high, float(self.mean[index]) + error)
         if not ends[0] < ends[1] or last - first < LEAST:
@@ -157,16 +157,16 @@ class Mixture:
 
 
 def inverse_with_root(precision: Floats) -> tuple[Floats, Floats]:
-    """Return the inverse of a precision and a root of it; a direction that nothing fixes gets a huge variance."""
+    """Return the inverse of a precision [unit^2] and a root of it; huge along a direction that nothing fixes."""
     scale, values, vectors = principal_axes(precision)
-    kept = np.maximum(values, SMALLEST_SHARE * values[-1])
+    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
     root = vectors / np.sqrt(kept) / scale[:, None]
     return root @ root.T, root
 
 
 def solution(precision: Floats, product: Floats) -> Floats:
-    """Return the solution of a linear system that does not move along directions that nothing fixes."""
+    """Return the solution of a linear system, in units of the coordinates; it does not move where nothing fixes it."""
     scale, values, vectors = principal_axes(precision)
     is_fixed = values > FIXED * values[-1]
-    shares = np.where(is_fixed, 1.0 / np.where(is_fixed, values, 1.0), 0.0)
-    return np.asarray((vectors * shares) @ (vectors.T @ (product / scale)) / scale)
+    inverses = np.where(is_fixed, 1.0 / np.where(is_fixed, values, 1.0), 0.0)
+    return np.asarray((vectors * inverses) @ (vectors.T @ (product / scale)) / scale)

@@ -22,8 +22,8 @@ ALARM = 5.0e-4
 It is small because the chances are those of a linear model; an impact between two samples makes low ones more frequent.
 """
 
-_LEAST_SHARE = 0.02
-"""Directions of which a part knows less than this share are not compared: its own fit would leave the linear range."""
+_SMALLEST_FRACTION = 0.02
+"""Directions of which a part knows less than this fraction are not compared: its fit would leave the linear range."""
 _SEEN = 0.05
 _DRAWS = 60
 _HEAVY = 5.0
@@ -63,9 +63,11 @@ class Misfit:
         if not self.comparisons:
             return "there is one part only, so the model could not be tested against itself"
         one = min(self.comparisons, key=lambda item: item.chance)
-        told = f"{one.parts} fitted separately lower the misfit by {one.saved:.3g} where {one.freedom:.3g} is expected"
+        description = (
+            f"{one.parts} fitted separately lower the misfit by {one.saved:.3g} where {one.freedom:.3g} is expected"
+        )
         chance = f"chance {one.chance:.2g}" if one.chance >= 1.0e-6 else "chance below 1e-6"
-        return f"{told} ({chance}; most in {one.worst})" if self.is_found else f"{told} ({chance})"
+        return f"{description} ({chance}; most in {one.worst})" if self.is_found else f"{description} ({chance})"
 
 
 def misfit_of(found: WhitenedFit, together: Sequence[NoiseDraw], seed: int) -> Misfit:
@@ -119,7 +121,7 @@ def _fit_apart(
     blocks = []
     for _, _, place in labels:
         values, vectors = np.linalg.eigh(root.T @ (rows[place].T @ rows[place]) @ root)
-        is_known = values > _LEAST_SHARE
+        is_known = values > _SMALLEST_FRACTION
         block = np.zeros((len(rows), int(is_known.sum())))
         block[place] = model.columns[place, :kept] @ root @ vectors[:, is_known] / np.sqrt(values[is_known])
         blocks.append(block)
@@ -180,9 +182,9 @@ def _comparison(parts: str, keys: Sequence[str], atoms: Sequence[_Atoms], model:
         joined = [[index for index, key in enumerate(keys) if key == name] for name in names]
         information = np.array([one.information[places].sum(axis=0) for places in joined])
         pull = np.array([one.pull[places].sum(axis=0) for places in joined])
-        shares, mean, chance = _quadratic(information, pull, model.precision[:kept, :kept])
-        contributions += shares
-        saved.append(float(shares.sum()))
+        squares, mean, chance = _quadratic(information, pull, model.precision[:kept, :kept])
+        contributions += squares
+        saved.append(float(squares.sum()))
         freedom.append(mean)
         chances.append(chance)
     worst = names[int(np.argmax(contributions))]
@@ -199,10 +201,10 @@ def _quadratic(information: Floats, pull: Floats, prior: Floats) -> tuple[Floats
     steps, known = [], []
     for own, along in zip(information, pull, strict=True):
         values, vectors = np.linalg.eigh(root.T @ own @ root)
-        chosen = vectors[:, values > _LEAST_SHARE]
-        steps.append((root @ chosen).T @ along / np.sqrt(values[values > _LEAST_SHARE]))
-        known.append((root @ chosen) / np.sqrt(values[values > _LEAST_SHARE]))
-    shares = np.array([float(one @ one) for one in steps])
+        chosen = vectors[:, values > _SMALLEST_FRACTION]
+        steps.append((root @ chosen).T @ along / np.sqrt(values[values > _SMALLEST_FRACTION]))
+        known.append((root @ chosen) / np.sqrt(values[values > _SMALLEST_FRACTION]))
+    squares = np.array([float(one @ one) for one in steps])
     # The pulls of the parts at the joint optimum are those of independent noise less what the optimum took out.
     spread = np.zeros((count * width, count * width))
     for first in range(count):
@@ -219,19 +221,19 @@ def _quadratic(information: Floats, pull: Floats, prior: Floats) -> tuple[Floats
     matrix = whole.T @ spread @ whole
     mean, square = float(np.trace(matrix)), float(np.sum(matrix * matrix))
     if mean < 0.5:
-        return shares, mean, 1.0
+        return squares, mean, 1.0
     stretch = square / mean
-    return shares, mean, float(chi2.sf(shares.sum() / stretch, mean / stretch))
+    return squares, mean, float(chi2.sf(squares.sum() / stretch, mean / stretch))
 
 
 def _only_channels(labels: Sequence[tuple[str, str, slice]], atoms: Sequence[_Atoms]) -> tuple[str, ...]:
     """Return, for each coordinate, the channel of the recording that has nearly all that is known of it."""
     known = np.mean([np.einsum("aii->ai", one.information) for one in atoms], axis=0)
     pairs = known[0::2] + known[1::2]
-    shares = pairs / np.maximum(pairs.sum(axis=0), 1.0e-300)
+    fractions = pairs / np.maximum(pairs.sum(axis=0), 1.0e-300)
     found = []
-    for index in range(shares.shape[1]):
-        best = int(np.argmax(shares[:, index]))
+    for index in range(fractions.shape[1]):
+        best = int(np.argmax(fractions[:, index]))
         name = f"{labels[best][1]} of {labels[best][0]}"
-        found.append(name if shares[best, index] > 1.0 - _SEEN else "")
+        found.append(name if fractions[best, index] > 1.0 - _SEEN else "")
     return tuple(found)

@@ -9,7 +9,7 @@ from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.result import count_of
 from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.trajectory.document import candidates_of, trajectory_problem
-from ppafo.identification.trajectory.experiment import broken_order, full_path
+from ppafo.identification.trajectory.experiment import broken_rule, full_path
 from ppafo.identification.trajectory.fitting import fit, noise_in, residuals_of
 from ppafo.identification.trajectory.follow_up import Expected, Profile, expected_information, profile
 from ppafo.identification.trajectory.information import correlation, covariance, directions_for, precision
@@ -46,8 +46,10 @@ def _clocks(prepared: PreparedExperiment) -> list[Prospect]:
     if longest <= _GAP * usual:
         return []
     at = float(prepared.time[int(np.argmax(gaps))])
-    told = f"a gap of {longest:.3g} s at {at:.3g} s, where samples are {usual:.3g} s apart; what lies in it is not used"
-    return [Prospect(f"clock of {prepared.label}", True, told)]
+    description = (
+        f"a gap of {longest:.3g} s at {at:.3g} s, where samples are {usual:.3g} s apart; what lies in it is not used"
+    )
+    return [Prospect(f"clock of {prepared.label}", True, description)]
 
 
 def _channel(prepared: PreparedExperiment, channel: Measured) -> Prospect:
@@ -55,8 +57,10 @@ def _channel(prepared: PreparedExperiment, channel: Measured) -> Prospect:
     name, size = f"{channel.name} of {prepared.label}", float(np.ptp(channel.values)) / channel.noise
     held = _samples_at_limit(channel.values)
     if held > _HELD_SAMPLES:
-        told = f"{held} consecutive samples are exactly its maximum or minimum: the sensor is at its limit or stuck"
-        return Prospect(name, False, told)
+        description = (
+            f"{held} consecutive samples are exactly its maximum or minimum: the sensor is at its limit or stuck"
+        )
+        return Prospect(name, False, description)
     if size < EXCITED:
         return Prospect(name, False, f"its range is {size:.2g} times its noise: nothing happens in it")
     return Prospect(name, True, f"its range is {size:.3g} times its noise")
@@ -90,11 +94,11 @@ def _numbers(residuals: Residuals, search: Search) -> list[Prospect]:
 
 
 def _number(item: Range, error: float, prior: float, partners: str, search: Search) -> Prospect:
-    share = relative_to_number(item, item.coordinate(item.start), interval_factor(search.confidence) * error)
+    fraction = relative_to_number(item, item.coordinate(item.start), interval_factor(search.confidence) * error)
     if error > FROM_PRIOR * prior:
         return Prospect(item.name, False, "the recordings add little to its prior")
-    if share <= search.weak:
-        return Prospect(item.name, True, f"with white noise alone it would be known to {100.0 * share:.2g} %")
+    if fraction <= search.weak:
+        return Prospect(item.name, True, f"with white noise alone it would be known to {100.0 * fraction:.2g} %")
     against = f"it trades off against {partners}" if partners else "the recordings are hardly sensitive to it"
     return Prospect(item.name, False, f"{against}; fix it, give it a prior, or record something else")
 
@@ -104,7 +108,7 @@ def _partners(ranges: tuple[Range, ...], together: Floats, index: int) -> str:
     return ", ".join(ranges[other].name for other in range(len(ranges)) if other != index and abs(row[other]) >= STRONG)
 
 
-ACCEPTABLE_SHARE = 0.10
+ACCEPTABLE_FRACTION = 0.10
 """RMS of what is left, over the range of the samples, that the paper calls acceptable (page with figure 7)."""
 
 
@@ -182,10 +186,10 @@ def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list
 
 
 def _checks(found: TrajectoryFit) -> tuple[Check, ...]:
-    worst = max(found.channels, key=lambda channel: channel.share)
-    left, good = f"{100.0 * worst.share:.2g} %", f"{100.0 * ACCEPTABLE_SHARE:g} %"
-    told = f"RMS at most {left} of the range in {worst.channel} of {worst.experiment}; {good} is good"
-    broken = next((text for text in (broken_order(item.device) for item in found.scenarios) if text), "")
+    worst = max(found.channels, key=lambda channel: channel.fraction)
+    left, good = f"{100.0 * worst.fraction:.2g} %", f"{100.0 * ACCEPTABLE_FRACTION:g} %"
+    description = f"RMS at most {left} of the range in {worst.channel} of {worst.experiment}; {good} is good"
+    broken = next((text for text in (broken_rule(item.device) for item in found.scenarios) if text), "")
     settled = found.optimum.has_converged
     wrong = found.misfit
     return (
@@ -194,7 +198,7 @@ def _checks(found: TrajectoryFit) -> tuple[Check, ...]:
             settled,
             f"{found.evaluations} evaluations, {'converged' if settled else 'stopped before it converged'}",
         ),
-        Check("what is left", worst.share <= ACCEPTABLE_SHARE, told),
+        Check("what is left", worst.fraction <= ACCEPTABLE_FRACTION, description),
         Check("one model for all", not wrong, wrong or found.uncertainty.misfit.in_words),
         Check("numbers agree", not broken, broken or "no rule of a device is broken"),
     )

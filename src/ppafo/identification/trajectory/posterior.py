@@ -14,7 +14,7 @@ import numpy as np
 from ppafo.identification.trajectory.information import (
     FIXED,
     LEAST,
-    SMALLEST_SHARE,
+    SMALLEST_FRACTION,
     Mixture,
     inverse_with_root,
     principal_axes,
@@ -65,16 +65,16 @@ class LinearModel:
 
     @property
     def residuals(self) -> Floats:
-        """Residuals of the samples at the point."""
+        """Residuals [-] of the samples at the point, over their standard deviation."""
         return self.columns[:, -1]
 
     @property
     def slopes(self) -> Floats:
-        """Slopes of the residuals."""
+        """Slopes of the residuals [-] with respect to the coordinates."""
         return self.columns[:, :-1]
 
     def segments(self, values: Floats, sensor: int) -> list[Floats]:
-        """Return the samples of a sensor, recording by recording."""
+        """Return the samples of a sensor, recording by recording, in the unit of the values."""
         return [values[place] for place in self.sensors[sensor]]
 
 
@@ -120,7 +120,7 @@ def draw_posterior(
 
 
 def whiten(model: LinearModel, noises: Sequence[SensorNoise], weights: Sequence[Sequence[Floats]]) -> Floats:
-    """Return the columns whitened by the noise of the sensors, of variance 1 each."""
+    """Return the columns whitened by the noise of the sensors, of variance 1 [-] each."""
     found = np.zeros_like(model.columns)
     for places, noise, parts in zip(model.sensors, noises, weights, strict=True):
         for place, level, weight in zip(places, noise.levels, parts, strict=True):
@@ -266,7 +266,7 @@ def _without_columns(model: LinearModel, products: Floats) -> float:
     precision = products[:-1, :-1] + model.precision
     pull = products[:-1, -1] + model.pull
     scale, values, vectors = principal_axes(precision)
-    kept = np.maximum(values, SMALLEST_SHARE * values[-1])
+    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
     along = vectors.T @ (pull / scale)
     size = float(np.sum(np.where(values > FIXED * values[-1], along * along / kept, 0.0)))
     return 0.5 * (size - float(products[-1, -1]) - float(np.sum(np.log(kept)))) - float(np.sum(np.log(scale)))

@@ -34,7 +34,7 @@ _SHARE_OF_KEPT = 0.98658
 
 _READ_INTERVAL = 5.0e-5
 """Seconds between two records that samples lie in between: a chamber fills within milliseconds ..."""
-_MOST_RECORDS = 100_000
+_MAXIMUM_RECORDS = 100_000
 """... and more where a recording is so long that memory would run out."""
 
 _GAIN_OF_DIFFERENCES = math.sqrt(20.0)
@@ -63,8 +63,8 @@ class Samples:
 class PreparedExperiment:
     """An experiment by its label, with its scenario completed and its samples placed in the record of a run.
 
-    ``run`` has the step and the clock of all columns; a sample is ``share`` [-] of the way from record ``place`` to the
-    next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
+    ``run`` has the step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to
+    the next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
     nothing. ``time_offset`` [s] is how much later the samples are than the run, where it is not fitted.
     """
 
@@ -73,7 +73,7 @@ class PreparedExperiment:
     run: Run
     samples: Samples
     place: Indices
-    share: Floats
+    fraction: Floats
     recorded: RecordedInputs | None = None
     inputs: StepInputs | None = None
     time_offset: float = 0.0
@@ -115,19 +115,19 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
 
 
 def prepare_times(label: str, scenario: Scenario, samples: Samples, numbers: Mapping[str, float]) -> PreparedExperiment:
-    """Return samples of a scenario's run made ready, at ``numbers`` by path."""
+    """Return samples of a scenario's run made ready, at ``numbers`` [SI] by path."""
     return _plan(label, scenario, samples, numbers, None)
 
 
 def with_half_steps(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> PreparedExperiment:
-    """Return the experiment with steps half as long and a quarter of the allowed error."""
+    """Return the experiment at ``numbers`` [SI] with steps half as long and a quarter of the allowed error."""
     scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
     run = plan_run(with_numbers(scenario, numbers))
     return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
 def noise_of(values: Floats) -> float:
-    """Return the standard deviation of white noise on a smooth signal, from third differences that are not unusual.
+    """Return the standard deviation of white noise [unit of the signal], from third differences that are not unusual.
 
     What the signal itself does between four samples counts as noise where it is larger; a few jumps do not matter.
     """
@@ -160,19 +160,19 @@ def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment
     records = math.ceil((float(samples.time[-1]) + samples.reach) / (run.step * every) - _FITS)
     position = samples.time / (run.step * every)
     place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
-    share = np.maximum(position - place, 0.0)
-    share[share < _FITS] = 0.0
+    fraction = np.maximum(position - place, 0.0)
+    fraction[fraction < _FITS] = 0.0
     frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
     if recorded is not None and recorded.has(ANGLE) and isinstance(prepared.scenario.motion, FreeMotion):
         frozen = with_prescribed_angle(frozen, prepared.scenario.motion.angle)
     inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
-    return replace(prepared, run=frozen, place=place, share=share, inputs=inputs)
+    return replace(prepared, run=frozen, place=place, fraction=fraction, inputs=inputs)
 
 
 def _steps_between_samples(samples: Samples, step: float) -> float:
     """Return the steps between two records: as many as between two samples, fewer where these are read in between.
 
-    A share of a step where a whole one is too long to be read in between.
+    A fraction of a step where a whole one is too long to be read in between.
     """
     every = max(1, round(float(np.min(np.diff(samples.time))) / step))
     position = samples.time / (step * every)
@@ -187,7 +187,7 @@ def _steps_between_samples(samples: Samples, step: float) -> float:
 
 def _read_interval(samples: Samples) -> float:
     """Return the longest time [s] between two records that are read at any time."""
-    return max(_READ_INTERVAL, float(samples.time[-1]) / _MOST_RECORDS)
+    return max(_READ_INTERVAL, float(samples.time[-1]) / _MAXIMUM_RECORDS)
 
 
 def _measured_channel(experiment: Experiment, name: str, inside: NDArray[np.bool_]) -> Measured:

@@ -101,12 +101,15 @@ class Range:
         return math.exp(coordinate) if self.scale == "log" else float(coordinate * self.size)
 
     def slope(self, coordinate: float) -> float:
-        """Return the change of the number per change of its coordinate."""
+        """Return the change of the number [SI] per change of its coordinate."""
         return math.exp(coordinate) if self.scale == "log" else self.size
 
 
 def range_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Range:
-    """Return a parameter with all of it settled; ``experiments`` are those it acts in. Refuses what contradicts."""
+    """Return a parameter with all of it settled; ``experiments`` are those it acts in. Refuses what contradicts.
+
+    IdentificationError for a contradiction.
+    """
     scenarios = [item.scenario for item in experiments]
     paths = {full_path(parameter.path, scenario) for scenario in scenarios}
     if len(paths) > 1:
@@ -205,7 +208,7 @@ class Search:
     loss: Loss = "linear"
     other_starts: int = 0
     seed: int = 1
-    most_evaluations: int = 60
+    maximum_evaluations: int = 60
     confidence: float = 0.95
     identified: float = 0.2
     weak: float = 1.0

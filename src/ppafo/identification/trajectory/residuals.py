@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Batch, BatchResult, run_batch
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
-from ppafo.engine.scheme.pneumatics import supplied_range
+from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.experiment import TIME_OFFSET, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment
@@ -36,7 +36,7 @@ def numbers_in(label: str, ranges: Sequence[Range], point: Floats) -> dict[str, 
 def trajectories(
     experiments: Sequence[PreparedExperiment], ranges: Sequence[Range], points: Floats
 ) -> list[dict[str, Floats]]:
-    """Return, for each experiment, its channels (samples, points) at many points (points, coordinates).
+    """Return, for each experiment, its channels [SI] (samples, points) at many points (points, coordinates).
 
     A run that leaves what is possible is NaN throughout. Experiments run side by side, one thread each.
     """
@@ -52,7 +52,10 @@ def trajectories(
 
 
 def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
-    """Return the run of an experiment with other numbers, on the program and clock of all columns."""
+    """Return the run of an experiment with other numbers [SI], on the program and clock of all columns.
+
+    IdentificationError where a setting of the valve goes to or from 0.
+    """
     base = prepared.run
     scenario = with_numbers(prepared.scenario, numbers)
     device, motion = scenario.device, scenario.motion
@@ -66,8 +69,8 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
         )
     bare = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     plant = plant_behind_lines(bare, scenario.supply_lines)
-    # The engine allows a share of the supply pressure. Where that pressure is fitted, the error in pascals must stay.
-    allowed = supplied_range(base.plant) / supplied_range(plant)
+    # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
+    allowed = supply_range(base.plant) / supply_range(plant)
     return replace(
         base,
         plant=plant,
@@ -128,12 +131,12 @@ def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -
     """Return a state at the times of the samples, by straight lines between records; each run with its offset [s]."""
     if offsets.any():
         return _at_moved_samples(values, prepared, offsets)
-    place, share = prepared.place, prepared.share
+    place, fraction = prepared.place, prepared.fraction
     here = values[place]
-    if not share.any():
+    if not fraction.any():
         return here
     following = values[np.minimum(place + 1, len(values) - 1)]
-    return np.asarray(here + share[:, None] * (following - here))
+    return np.asarray(here + fraction[:, None] * (following - here))
 
 
 def _at_moved_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
@@ -148,7 +151,7 @@ def _at_moved_samples(values: Floats, prepared: PreparedExperiment, offsets: Flo
 Mask = NDArray[np.bool_]
 
 FIRST_STEP = 1.0e-3
-"""Step of a difference before standard errors are known: the share of a number by which it is moved."""
+"""Step of a difference before standard errors are known: the fraction of a number by which it is moved."""
 
 _TOUCH = 1.0e-9
 
@@ -157,7 +160,7 @@ class Whitens(Protocol):
     """A linear map that makes columns of residuals white."""
 
     def of(self, values: Floats) -> Floats:
-        """Return columns (samples, columns) whitened."""
+        """Return columns (samples, columns) whitened [-]."""
         ...
 
 
@@ -173,7 +176,7 @@ class Residuals:
     whitening: Whitens | None = None
 
     def of_data(self, points: Floats) -> Floats:
-        """Return the residuals of the samples (samples, points) at points (points, coordinates); NaN if a run fails."""
+        """Return the samples' residuals [-] (samples, points) at points (points, coordinates); NaN if a run fails."""
         signals = trajectories(self.experiments, self.ranges, points)
         parts = [
             (of_one[channel.name] - channel.values[:, None]) / channel.noise
@@ -184,7 +187,7 @@ class Residuals:
         return values if self.whitening is None else self.whitening.of(values)
 
     def of_priors(self, point: Floats) -> Floats:
-        """Return the residuals of the priors, one for each parameter that has one."""
+        """Return the residuals [-] of the priors, one for each parameter that has one."""
         mean, deviation, has = prior_coordinates(self.ranges)
         return (point[has] - mean[has]) / deviation[has]
 
@@ -195,12 +198,12 @@ class Residuals:
         return tuple(slice(end - length, end) for end, length in zip(ends, lengths, strict=True))
 
     def around(self, point: Floats, directions: Floats) -> "Neighbourhood":
-        """Return the residuals at a point and one step away from it along each direction (the columns), all at once."""
+        """Return the residuals [-] at a point and a step away from it along each direction (column), all at once."""
         values = self.of_data(np.vstack([point + directions.T, point - directions.T, point]))
         return Neighbourhood(self, point, directions, values)
 
     def hold(self, held: Mapping[int, float]) -> "Residuals":
-        """Return the residuals of the other parameters, some (by place) being held at a coordinate."""
+        """Return the residuals [-] of the other parameters, some (by place) being held at a coordinate."""
         names = {self.ranges[index]: self.ranges[index].number(at) for index, at in held.items()}
 
         def hold_in(prepared: PreparedExperiment) -> PreparedExperiment:
@@ -223,15 +226,15 @@ class Neighbourhood:
 
     @property
     def of_data(self) -> Floats:
-        """Residuals of the samples at the point."""
+        """Residuals [-] of the samples at the point."""
         return self.values[:, -1]
 
     def all_residuals(self) -> Floats:
-        """Return all residuals at the point, those of the priors last."""
+        """Return all residuals [-] at the point, those of the priors last."""
         return np.concatenate([self.of_data, self.residuals.of_priors(self.point)])
 
     def jacobian_of_data(self) -> Floats:
-        """Return the derivative of the residuals of the samples by the coordinates, by central differences.
+        """Return the derivative of the samples' residuals [-] with respect to the coordinates, by central differences.
 
         Where a step leaves the bounds on one side, or the run there fails, the difference is one-sided.
         """
@@ -244,7 +247,7 @@ class Neighbourhood:
         return np.asarray((change / (1.0 * use_above + use_below)) @ np.linalg.inv(self.directions))
 
     def jacobian(self) -> Floats:
-        """Return the derivative of ``all_residuals`` by the coordinates."""
+        """Return the derivative of ``all_residuals`` [-] with respect to the coordinates."""
         _, deviation, has = prior_coordinates(self.residuals.ranges)
         return np.concatenate([self.jacobian_of_data(), np.diag(1.0 / deviation)[has]])
 
@@ -265,13 +268,13 @@ class Neighbourhood:
 
 
 def coordinate_bounds(ranges: Sequence[Range]) -> tuple[Floats, Floats]:
-    """Return the bounds of all coordinates."""
+    """Return the lower and upper bounds of all coordinates, in their units."""
     low = np.array([item.coordinate(item.low) for item in ranges])
     return low, np.array([item.coordinate(item.high) for item in ranges])
 
 
 def prior_coordinates(ranges: Sequence[Range]) -> tuple[Floats, Floats, Mask]:
-    """Return mean and standard deviation of the priors in coordinates, infinitely wide without, and who has one."""
+    """Return mean and deviation of the priors [unit], infinitely wide without one, and which coordinates have one."""
     mean, deviation = np.zeros(len(ranges)), np.full(len(ranges), np.inf)
     for index, item in enumerate(ranges):
         if item.prior is not None:

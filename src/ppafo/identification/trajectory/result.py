@@ -29,7 +29,7 @@ _TOGETHER = 0.2
 _OF_NO_SENSOR = 10.0
 """What is left over the noise from sample to sample: more than an autoregression of 0.98 makes is no sensor's."""
 PREDICTED = 0.95
-"""Share of the samples of a new recording that a prediction holds."""
+"""Fraction of the samples of a new recording that a prediction holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +62,18 @@ class ChannelFit:
         return self.chi_square <= _MUCH**2 and self.autocorrelation <= _TOGETHER
 
     @property
-    def share(self) -> float:
+    def fraction(self) -> float:
         """RMS of what is left over the range that the samples cover [-]."""
         return self.rms / self.span if self.span > 0.0 else 0.0
 
 
 def channel_fits(
-    asked: Sequence[Experiment], experiments: Sequence[PreparedExperiment], signals: Sequence[dict[str, Floats]]
+    requested: Sequence[Experiment], experiments: Sequence[PreparedExperiment], signals: Sequence[dict[str, Floats]]
 ) -> tuple[ChannelFit, ...]:
-    """Return what is left in every channel; ``signals`` are those of the fitted runs, by channel."""
+    """Return what is left in every channel [SI]; ``signals`` are those of the fitted runs, by channel."""
     return tuple(
         _channel_fit(experiment, channel, values[channel.name] - channel.values)
-        for experiment, prepared, values in zip(asked, experiments, signals, strict=True)
+        for experiment, prepared, values in zip(requested, experiments, signals, strict=True)
         for channel in prepared.channels
     )
 
@@ -167,7 +167,10 @@ class TrajectoryFit:
     optimum: Optimum
 
     def estimate(self, name: str) -> Estimate:
-        """Return the estimate of a parameter by its path; ``valve.area`` means the valve of the first experiment."""
+        """Return the estimate of a parameter by its path; ``valve.area`` means the valve of the first experiment.
+
+        IdentificationError where it was not fitted.
+        """
         full = full_path(name, self.scenarios[0])
         for estimate in self.estimates:
             if estimate.path == full:

@@ -17,13 +17,13 @@ DRAWS_PER_START = 8
 STAGES = 3
 PASSES = 2
 AT_BOUND = 1.0e-4
-"""Share of a number, or of the way between its bounds if that is less, within which it counts as being at one."""
+"""Fraction of a number, or of the way between its bounds if that is less, within which it counts as being at one."""
 
 _TOLERANCES = (1.0e-4, 3.0e-8)
 """Of the first stage, which only comes near, and of the others."""
 
 _SETTLED = 0.05
-"""A further stage that moves no coordinate by more than this share of its standard error is the last."""
+"""A further stage that moves no coordinate by more than this fraction of its standard error is the last."""
 _WIDEST_DRAW = 1.5
 _NOTABLE = 1.0e-3
 _EXPLAINED = 1.5**2
@@ -43,7 +43,10 @@ class Optimum:
 
 
 def optimum(residuals: Residuals, search: Search, report: Report = report_nothing) -> Optimum:
-    """Return the best optimum of all starts; ``report`` hears what is being done."""
+    """Return the best optimum of all starts; ``report`` hears what is being done.
+
+    IdentificationError where the model diverges at every start.
+    """
     best: Optimum | None = None
     nested = _nested_descent(residuals, search, report)
     evaluations = 0 if nested is None else nested.evaluations
@@ -100,7 +103,10 @@ class Descent:
 def descend(
     residuals: Residuals, start: Floats, directions: Floats, search: Search, tolerance: float = _TOLERANCES[-1]
 ) -> Descent:
-    """Return where the trust region ends from one start, with fixed steps of differences."""
+    """Return where the trust region ends from one start, with fixed steps of differences.
+
+    Points and directions are in units of the coordinates, ``tolerance`` is relative [-].
+    """
     from scipy.optimize import least_squares
 
     low, high = coordinate_bounds(residuals.ranges)
@@ -126,7 +132,7 @@ def descend(
         xtol=tolerance,
         ftol=tolerance,
         gtol=tolerance,
-        max_nfev=search.most_evaluations,
+        max_nfev=search.maximum_evaluations,
     )
     return Descent(done.x, float(done.cost), int(done.nfev), done.status > 0)
 
@@ -158,7 +164,7 @@ def _descend_holding(residuals: Residuals, start: Floats, is_held: Mask, search:
 
 
 def is_at_bound(point: Floats, ranges: Sequence[Range]) -> Mask:
-    """Return which coordinates sit at a bound."""
+    """Return which coordinates, in their units, are at a bound."""
     low, high = coordinate_bounds(ranges)
     return np.asarray(np.minimum(point - low, high - point) <= AT_BOUND * np.minimum(high - low, 1.0))
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME
+from ppafo.documents.models import NAME, STRICT, Text, Texts
 from ppafo.errors import DataError, IdentificationError, UnitError, nearest_name
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source, Use
@@ -18,9 +18,6 @@ from ppafo.identification.trajectory.problem import Loss, Scale
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.units import parse_quantity
 
-STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-Text = Annotated[str, Field(min_length=1)]
-Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
 _Noise = dict[str, Text]
 
@@ -163,7 +160,10 @@ class Setting:
 
 @contextmanager
 def name_in_refusals(file: str) -> Iterator[None]:
-    """Begin the line of every refusal with the file, where it does not yet."""
+    """Begin the line of every refusal with the file, where it does not yet.
+
+    IdentificationError and DataError keep their kind.
+    """
     try:
         yield
     except (IdentificationError, DataError) as error:
@@ -173,7 +173,7 @@ def name_in_refusals(file: str) -> Iterator[None]:
 
 
 def quantity_of(said: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the number in a text in ``unit``, or refuse it; ``said`` is file and key."""
+    """Return the number in a text in ``unit``; IdentificationError where it is none. ``said`` is file and key."""
     try:
         return parse_quantity(text, unit, atmosphere)
     except UnitError as error:
@@ -181,7 +181,10 @@ def quantity_of(said: str, text: str, unit: str, atmosphere: float = STANDARD_AT
 
 
 def noise_of_channels(given: Mapping[str, str], said: str) -> dict[str, float]:
-    """Return the standard deviations [rad], [Pa] that are given by channel."""
+    """Return the standard deviations [rad], [Pa] that are given by channel.
+
+    IdentificationError for a channel that has none here.
+    """
     for name in given:
         if name not in _NOISE_UNITS:
             hint = nearest_name(name, _NOISE_UNITS)

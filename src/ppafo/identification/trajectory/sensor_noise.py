@@ -23,7 +23,7 @@ from ppafo.identification.trajectory.whitening import (
 FREEDOMS = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0])
 """Degrees of freedom of a t distribution that are tried; more cannot be distinguished from a normal one."""
 
-MOST_ORDER = 30
+MAXIMUM_ORDER = 30
 _HEAVY_ORDERS = (0, 1, 2, 3, 5, 8, 12, 20)
 _SAMPLES_FOR_EACH = 8
 _HEAVY = 4.0
@@ -64,12 +64,12 @@ class SensorNoise:
         if isinstance(self.shape, Drift):
             size, memory = math.sqrt(self.shape.stationary), -interval / math.log(self.shape.memory)
             return f"white and a drift of {size:.2g} times its size over {memory:.2g} s{tails}{unequal}"
-        told = "white" if self.shape.order == 0 else f"autoregression of {self.shape.order}"
-        return f"{told}{tails}{unequal}"
+        description = "white" if self.shape.order == 0 else f"autoregression of {self.shape.order}"
+        return f"{description}{tails}{unequal}"
 
 
 def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNoise:
-    """Return the noise that explains residuals of one sensor best; ``is_given`` says that its size is at least 1."""
+    """Return the noise [-] that explains a sensor's residuals best; ``is_given`` says that its size is at least 1."""
     whole = np.concatenate(segments)
     white = from_reflections(np.zeros(0))
     if float(np.mean(whole * whole)) < max(_LEAST, 1.0 if is_given else 0.0):
@@ -97,12 +97,12 @@ def sample_weights(noise: SensorNoise, segments: Sequence[Floats]) -> list[Float
 
 
 def errors_of(shape: Shape, segment: Floats) -> Floats:
-    """Return the whitened samples with all weights 1."""
+    """Return the whitened samples [-] with all weights 1."""
     return shape.rows(segment[:, None], np.ones(len(segment)))[0][:, 0]
 
 
 def t_likelihood(errors: Floats, freedoms: Floats) -> Floats:
-    """Return the log likelihood of errors under t distributions of scale 1, one for each of ``freedoms``."""
+    """Return the log likelihood [-] of errors under t distributions of scale 1, one for each of ``freedoms``."""
     from scipy.special import gammaln
 
     half = 0.5 * freedoms
@@ -112,13 +112,13 @@ def t_likelihood(errors: Floats, freedoms: Floats) -> Floats:
 
 
 def previous_samples(segment: Floats, order: int) -> Floats:
-    """Return what a sample is predicted from, (samples after the first ``order``, order), the latest first."""
+    """Return what predicts a sample [its unit], (samples after the first ``order``, order), the latest first."""
     windows = np.lib.stride_tricks.sliding_window_view(segment[:-1], order)
     return windows[:, ::-1]
 
 
 def profile_likelihood(shape: Shape, segments: Sequence[Floats], weights: Sequence[Floats]) -> tuple[float, float]:
-    """Return the log likelihood at the best common level, and that level."""
+    """Return the log likelihood [-] at the best common level, and that level."""
     squares, logs, count = 0.0, 0.0, 0
     for one, weight in zip(segments, weights, strict=True):
         whitened, spread = shape.rows(one[:, None], weight)
@@ -130,7 +130,7 @@ def profile_likelihood(shape: Shape, segments: Sequence[Floats], weights: Sequen
 
 
 def drift_of(numbers: Floats, is_zeroed: bool) -> Drift:
-    """Return the drift with these logarithms of ratio and of memory in samples."""
+    """Return the drift with these logarithms of the ratio [-] and of the memory in samples."""
     return Drift(math.exp(float(numbers[0])), math.exp(-math.exp(-float(numbers[1]))), is_zeroed)
 
 
@@ -164,7 +164,7 @@ def _relative_levels(segments: Sequence[Floats]) -> Floats:
 def _autoregression(segments: list[Floats]) -> SensorNoise:
     """Return the autoregression with normal innovations whose order has the least criterion."""
     count, shortest = sum(len(one) for one in segments), min(len(one) for one in segments)
-    most = max(0, min(MOST_ORDER, count // _SAMPLES_FOR_EACH, shortest - 2))
+    most = max(0, min(MAXIMUM_ORDER, count // _SAMPLES_FOR_EACH, shortest - 2))
     reflections, left = reflections_of(segments, most)
     scores = [_criterion(-0.5 * count * math.log(left[order]), order + 1, count) for order in range(most + 1)]
     shape = from_reflections(reflections[: int(np.argmin(scores))])
@@ -202,13 +202,13 @@ def _outside(numbers: Floats, longest: float) -> float:
 def _tails(noise: SensorNoise, segments: Sequence[Floats]) -> tuple[float, float]:
     """Return the best degrees of freedom of the innovations, and the log likelihood gained over normal ones."""
     errors = np.concatenate([errors_of(noise.shape, one) for one in segments]) / noise.levels[0]
-    likelihoods, _ = _scaled_t(errors)
+    likelihoods, _ = _fit_scaled_t(errors)
     best = int(np.argmax(likelihoods))
     normal = -0.5 * len(errors) * (math.log(2.0 * math.pi * float(np.mean(errors * errors))) + 1.0)
     return float(FREEDOMS[best]), float(likelihoods[best] - normal)
 
 
-def _scaled_t(errors: Floats) -> tuple[Floats, Floats]:
+def _fit_scaled_t(errors: Floats) -> tuple[Floats, Floats]:
     """Return log likelihood and best scale for each of the degrees of freedom that are tried."""
     squares = np.square(errors)[:, None]
     variances = np.full(len(FREEDOMS), float(np.median(squares)) / 0.45 + _LEAST)
@@ -234,7 +234,7 @@ def _heavy_of_order(segments: list[Floats], order: int) -> SensorNoise:
     reflections, _ = reflections_of(segments, order)
     shape = from_reflections(reflections)
     for _ in range(_REWEIGHED):
-        likelihoods, levels = _scaled_t(np.concatenate([errors_of(shape, one) for one in segments]))
+        likelihoods, levels = _fit_scaled_t(np.concatenate([errors_of(shape, one) for one in segments]))
         best = int(np.argmax(likelihoods))
         if order == 0:
             break
@@ -245,7 +245,7 @@ def _heavy_of_order(segments: list[Floats], order: int) -> SensorNoise:
 
 
 def regression_of(segments: Sequence[Floats], weights: Sequence[Floats], order: int) -> tuple[Floats, Floats]:
-    """Return the coefficients of an autoregression by weighted least squares, and their precision at level 1."""
+    """Return the coefficients [-] of an autoregression by weighted least squares, and their precision at level 1."""
     precision, product = np.zeros((order, order)), np.zeros(order)
     for one, weight in zip(segments, weights, strict=True):
         before, after = previous_samples(one, order), weight[order:]

@@ -19,12 +19,12 @@ from ppafo.identification.trajectory.weighing import Sensor, WhitenedFit
 STRONG = 0.8
 """Correlation from which two numbers are reported as trading off against each other."""
 
-_MOST_PARTNERS = 3
+_MAXIMUM_PARTNERS = 3
 _LARGEST_LOGARITHM = 300.0
 _FREED = 0.5
-"""An interval that would shrink below this share with all others known is wide because of a trade."""
+"""An interval that would shrink below this fraction with all others known is wide because of a trade."""
 FROM_PRIOR = 0.8
-"""A standard error above this share of the prior's says that the recordings added little to it."""
+"""A standard error above this fraction of the prior's says that the recordings added little to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +58,8 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
     half = half_width(evidence, index)
     furthest = _LARGEST_LOGARITHM if item.scale == "log" else math.inf
     low, high = (item.number(float(np.clip(end[index], -furthest, furthest))) for end in evidence.interval)
-    share = relative_half_width(evidence, index, half)
-    verdict = _verdict(evidence, index, share)
+    fraction = relative_half_width(evidence, index, half)
+    verdict = _verdict(evidence, index, fraction)
     return Estimate(
         path=item.name,
         value=item.number(at),
@@ -67,24 +67,24 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
         low=max(min(low, high), item.low),
         high=min(max(low, high), item.high),
         verdict=verdict,
-        explanation=_explanation(evidence, index, verdict, share),
+        explanation=_explanation(evidence, index, verdict, fraction),
         recordings=evidence.sources[index],
         confidence=evidence.search.confidence,
     )
 
 
 def half_width(evidence: Evidence, index: int) -> float:
-    """Return half the width of the interval, in coordinates."""
+    """Return half the width of the interval, in units of the coordinate."""
     return 0.5 * float(evidence.interval[1][index] - evidence.interval[0][index])
 
 
 def interval_factor(confidence: float) -> float:
-    """Return the standard errors on each side of an interval with this confidence, 1.96 for 95 %."""
+    """Return the standard errors [-] on each side of an interval with this confidence, 1.96 for 95 %."""
     return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
 def relative_half_width(evidence: Evidence, index: int, half: float) -> float:
-    """Return a half width in coordinates relative to the number; to its range where the search began at zero."""
+    """Return a half width in coordinates over the number [-]; over its range where the search began at zero."""
     return relative_to_number(evidence.ranges[index], float(evidence.point[index]), half)
 
 
@@ -98,28 +98,28 @@ def relative_to_number(item: Range, at: float, half: float) -> float:
 
 
 def partners(evidence: Evidence, index: int) -> list[tuple[str, float]]:
-    """Return the parameters that trade against one, with the correlation, strongest first."""
+    """Return the parameters that trade against one, with the correlation [-], strongest first."""
     row = evidence.correlation[index]
     order = [int(other) for other in np.argsort(-np.abs(row)) if other != index and abs(row[other]) >= STRONG]
-    return [(evidence.ranges[other].name, float(row[other])) for other in order[:_MOST_PARTNERS]]
+    return [(evidence.ranges[other].name, float(row[other])) for other in order[:_MAXIMUM_PARTNERS]]
 
 
 def half_width_alone(evidence: Evidence, index: int) -> float:
-    """Return half the width that the interval would have if all other parameters were known."""
+    """Return half the width of the interval, in units of the coordinate, if all other parameters were known."""
     information = float(evidence.information[index, index])
     factor = interval_factor(evidence.search.confidence)
     return factor * math.sqrt(evidence.inflation / information) if information > 0.0 else math.inf
 
 
-def _verdict(evidence: Evidence, index: int, share: float) -> Verdict:
+def _verdict(evidence: Evidence, index: int, fraction: float) -> Verdict:
     # A number that the data do not hold may end anywhere, at a bound too.
-    if _is_prior_alone(evidence, index) or share > evidence.search.weak:
+    if _is_prior_alone(evidence, index) or fraction > evidence.search.weak:
         return "not identifiable"
     if is_at_bound(evidence.point, evidence.ranges)[index]:
         return "at its bound"
     if evidence.misfit:
         return "holds for this model only"
-    return "identified" if share <= evidence.search.identified else "weak"
+    return "identified" if fraction <= evidence.search.identified else "weak"
 
 
 def _is_prior_alone(evidence: Evidence, index: int) -> bool:
@@ -128,7 +128,7 @@ def _is_prior_alone(evidence: Evidence, index: int) -> bool:
     return math.isfinite(deviation) and error > FROM_PRIOR * deviation
 
 
-def _explanation(evidence: Evidence, index: int, verdict: Verdict, share: float) -> str:
+def _explanation(evidence: Evidence, index: int, verdict: Verdict, fraction: float) -> str:
     sentences = {
         "identified": _explain_identified,
         "weak": _explain_loose,
@@ -136,37 +136,38 @@ def _explanation(evidence: Evidence, index: int, verdict: Verdict, share: float)
         "at its bound": _explain_at_bound,
         "holds for this model only": _explain_model_only,
     }
-    said = sentences[verdict](evidence, index, share)
+    said = sentences[verdict](evidence, index, fraction)
     return f"{said}." if verdict == "holds for this model only" else f"{said}; {evidence.residual_check}."
 
 
-def _explain_identified(evidence: Evidence, index: int, share: float) -> str:
+def _explain_identified(evidence: Evidence, index: int, fraction: float) -> str:
     others = partners(evidence, index)
     along = f", correlated with {_names(others)}" if others else ""
-    return f"The recordings determine it to {_percent(share)}{along}"
+    return f"The recordings determine it to {_percent(fraction)}{along}"
 
 
-def _explain_loose(evidence: Evidence, index: int, share: float) -> str:
+def _explain_loose(evidence: Evidence, index: int, fraction: float) -> str:
     if _is_prior_alone(evidence, index):
         return "The recordings add little to the prior, which decides the value"
     others, free = partners(evidence, index), relative_half_width(evidence, index, half_width_alone(evidence, index))
-    if free > _FREED * share:
-        prior = "; no residual shows it, so it needs a prior" if share > evidence.search.weak else ""
-        return f"The recordings are hardly sensitive to it: they determine it only to {_percent(share)}{prior}"
+    if free > _FREED * fraction:
+        prior = "; no residual shows it, so it needs a prior" if fraction > evidence.search.weak else ""
+        return f"The recordings are hardly sensitive to it: they determine it only to {_percent(fraction)}{prior}"
     against = _names(others) if others else "several others at once"
     return (
-        f"It trades off against {against}: determined to {_percent(share)}, and to {_percent(free)} if these were known"
+        f"It trades off against {against}: determined to {_percent(fraction)}, "
+        f"and to {_percent(free)} if these were known"
     )
 
 
-def _explain_model_only(evidence: Evidence, index: int, share: float) -> str:
-    told = f"Determined to {_percent(share)} if the model were right: {evidence.misfit}"
+def _explain_model_only(evidence: Evidence, index: int, fraction: float) -> str:
+    description = f"Determined to {_percent(fraction)} if the model were right: {evidence.misfit}"
     if not evidence.alone[index]:
-        return told
-    return f"{told}. Only {evidence.alone[index]} shows it, so nothing else here checks it: it needs a prior"
+        return description
+    return f"{description}. Only {evidence.alone[index]} shows it, so nothing else here checks it: it needs a prior"
 
 
-def _explain_at_bound(evidence: Evidence, index: int, _share: float) -> str:
+def _explain_at_bound(evidence: Evidence, index: int, _fraction: float) -> str:
     item, at = evidence.ranges[index], float(evidence.point[index])
     is_lower = at - evidence.low[index] < evidence.high[index] - at
     side, bound = ("lower", item.low) if is_lower else ("upper", item.high)
@@ -179,8 +180,8 @@ def _names(others: Sequence[tuple[str, float]]) -> str:
     return ", ".join(f"{name} (correlation {number:+.2f})" for name, number in others)
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %" if share < 10.0 else "no useful precision"
+def _percent(fraction: float) -> str:
+    return f"{100.0 * fraction:.2g} %" if fraction < 10.0 else "no useful precision"
 
 
 _TOLD = 1.5
@@ -211,14 +212,14 @@ class Uncertainty:
     def residual_check(self) -> str:
         """What the intervals rest on, in half a sentence."""
         names = dict.fromkeys(f"{one.channel} {one.in_words}" for one in self.sensors)
-        told = f"noise: {'; '.join(names)}"
+        description = f"noise: {'; '.join(names)}"
         if self.widening < _TOLD:
-            return told
-        return f"{told}; so the interval is {self.widening:.2g} times as wide as with white noise alone"
+            return description
+        return f"{description}; so the interval is {self.widening:.2g} times as wide as with white noise alone"
 
 
 def uncertainty_of(found: WhitenedFit, search: Search, low: Floats, high: Floats) -> Uncertainty:
-    """Return the uncertainty at an optimum whose noise is known; ``low`` and ``high`` bound the coordinates."""
+    """Return the uncertainty at an optimum of known noise; ``low`` and ``high`` [unit] bound the coordinates."""
     point = found.optimum.point
     kept = len(point)
     mixture, shown = draw_posterior(found.model, found.noises, kept, search.seed)
@@ -226,10 +227,10 @@ def uncertainty_of(found: WhitenedFit, search: Search, low: Floats, high: Floats
     tail = 0.5 - 0.5 * search.confidence
     ends = [
         [
-            point[index] + mixture.quantile(index, share, low[index] - point[index], high[index] - point[index])
+            point[index] + mixture.quantile(index, fraction, low[index] - point[index], high[index] - point[index])
             for index in range(kept)
         ]
-        for share in (tail, 1.0 - tail)
+        for fraction in (tail, 1.0 - tail)
     ]
     residuals = found.optimum.residuals
     slopes = found.model.slopes[:, :kept]

@@ -18,7 +18,7 @@ from ppafo.identification.trajectory.search import Optimum, is_at_bound
 from ppafo.identification.trajectory.sensor_noise import SensorNoise, errors_of, sample_weights, sensor_noise
 from ppafo.identification.trajectory.whitening import from_reflections, reflections_of
 
-MOST_LINES = 3
+MAXIMUM_LINES = 3
 CHANCE = 1.0e-4
 """Chance at which noise alone would be taken for hum, for each sensor."""
 
@@ -29,11 +29,11 @@ _FEWEST_SAMPLES = 64
 
 
 def hum_of(segments: Sequence[Floats]) -> tuple[float, ...]:
-    """Return the frequencies of hum in a sensor's recordings, in cycles per sample."""
+    """Return the frequencies of hum [cycles per sample] in a sensor's recordings."""
     found: list[float] = []
     if min(len(one) for one in segments) < _FEWEST_SAMPLES:
         return ()
-    for _ in range(MOST_LINES):
+    for _ in range(MAXIMUM_LINES):
         left = [without_hum(one, tuple(found)) for one in segments]
         line = _strongest_line(left)
         if line is None:
@@ -43,13 +43,13 @@ def hum_of(segments: Sequence[Floats]) -> tuple[float, ...]:
 
 
 def hum_columns(count: int, frequencies: Sequence[float]) -> Floats:
-    """Return a cosine and a sine of each frequency at ``count`` samples, (samples, columns)."""
+    """Return a cosine and a sine [-] of each frequency [cycles per sample] at ``count`` samples, (samples, columns)."""
     phases = 2.0 * math.pi * np.outer(np.arange(count), np.array(frequencies))
     return np.hstack([np.cos(phases), np.sin(phases)])
 
 
 def without_hum(segment: Floats, frequencies: Sequence[float]) -> Floats:
-    """Return the samples less what sinusoids of these frequencies explain."""
+    """Return the samples, in their unit, less what sinusoids of these frequencies [cycles per sample] explain."""
     if not frequencies:
         return segment
     columns = hum_columns(len(segment), frequencies)
@@ -83,19 +83,19 @@ def _refine_frequency(white: Sequence[Floats], frequency: float, reach: float) -
     """Return the frequency near one at which sinusoids explain most."""
     from scipy.optimize import minimize_scalar
 
-    def left(place: float) -> float:
+    def power_left(place: float) -> float:
         return sum(float(np.sum(np.square(without_hum(one, (place,))))) for one in white)
 
-    found = minimize_scalar(left, bounds=(frequency - reach, frequency + reach), method="bounded")
+    found = minimize_scalar(power_left, bounds=(frequency - reach, frequency + reach), method="bounded")
     return float(found.x)
 
 
-MOST_ROUNDS = 8
+MAXIMUM_ROUNDS = 8
 ESTIMATED_ROUNDS = 2
 """Rounds after which the noise stays as it is, so that the others can settle."""
 
 SETTLED = 0.03
-"""Share of a standard error below which a step is the last."""
+"""Fraction of a standard error below which a step is the last."""
 
 ROUGH = 0.5
 """The same where no step lowers the cost, although the slopes say so."""
@@ -135,7 +135,7 @@ class Whitening:
     sensors: tuple[Sensor, ...]
 
     def of(self, values: Floats) -> Floats:
-        """Return columns (samples, columns) whitened."""
+        """Return columns (samples, columns) whitened [-]."""
         found = np.zeros_like(values)
         for sensor in self.sensors:
             for place, level, weight in zip(sensor.places, sensor.noise.levels, sensor.weights, strict=True):
@@ -172,13 +172,13 @@ def weigh(found: Optimum, given: Sequence[frozenset[str]]) -> WhitenedFit:
     fixed = is_at_bound(point, residuals.ranges)
     near = residuals.around(point, directions_for(found.information, fixed))
     sensors = _sensors(residuals.experiments, given)
-    for number in range(1, MOST_ROUNDS + 1):
+    for number in range(1, MAXIMUM_ROUNDS + 1):
         sensors = tuple(_estimate_noise(one, near.of_data, number <= ESTIMATED_ROUNDS) for one in sensors)
         model = _linear_model(near, sensors)
         step, information = _step(near, model, sensors)
         errors = np.sqrt(np.diag(inverse_with_root(information)[0]))
         has_settled = bool(np.all(np.abs(step) <= SETTLED * errors))
-        if has_settled or number == MOST_ROUNDS:
+        if has_settled or number == MAXIMUM_ROUNDS:
             break
         directions = directions_for(information, is_at_bound(near.point + step, residuals.ranges))
         further = _damp_step(near, step, directions, Whitening(sensors))

@@ -36,7 +36,7 @@ class AutoRegression:
         return len(self.spreads) - 1
 
     def rows(self, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
-        """Return whitened columns (samples, columns) and the logarithm of the spread of each sample."""
+        """Return whitened columns [-] (samples, columns) and the logarithm of the spread of each sample."""
         roots = np.sqrt(weights)
         whitened = _prediction_errors(values, self.predictors, self.spreads) * roots[:, None]
         stages = np.minimum(np.arange(len(values)), self.order)
@@ -48,8 +48,8 @@ class Drift:
     """White noise of variance 1 upon an Ornstein-Uhlenbeck drift.
 
     ``ratio`` is the variance of the change of the drift from sample to sample over that of the white noise,
-    ``memory`` the share of it that is left after one sample. ``is_zeroed``: it begins at 0 in each recording, as that
-    of a sensor whose zero is set before; else anywhere.
+    ``memory`` the fraction of it that is left after one sample. ``is_zeroed``: it begins at 0 in each recording, as
+    that of a sensor whose zero is set before; else anywhere.
     """
 
     ratio: float
@@ -72,19 +72,19 @@ class Drift:
         return self.ratio if self.is_zeroed else self.stationary
 
     def rows(self, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
-        """Return whitened columns (samples, columns) and the logarithm of the spread of each sample."""
+        """Return whitened columns [-] (samples, columns) and the logarithm of the spread of each sample."""
         gains, spreads = _gains(1.0 / weights, self.memory, self.ratio, self.first)
         return _innovations(values, gains, spreads, self.memory), np.log(spreads)
 
     def path(self, values: Floats, weights: Floats, normals: Floats) -> tuple[Floats, Floats]:
-        """Return the drift, drawn given the samples, and its variance; normals of 0 give its mean."""
+        """Return the drift [unit of values], drawn given the samples, and its variance; normals of 0 give its mean."""
         drawn: tuple[Floats, Floats] = _smooth(values, 1.0 / weights, self.memory, self.ratio, self.first, normals)
         return drawn
 
     def heavy_likelihood(self, values: Floats, level: float, freedom: float) -> float:
-        """Return the log likelihood of samples whose white part has a t distribution, by a sum of normal ones."""
-        shares, nodes = t_nodes(freedom)
-        total: float = _mixture_likelihood(values / level, self.memory, self.ratio, self.first, shares, nodes)
+        """Return the log likelihood [-] of samples whose white part has a t distribution, by a sum of normal ones."""
+        weights, nodes = t_nodes(freedom)
+        total: float = _mixture_likelihood(values / level, self.memory, self.ratio, self.first, weights, nodes)
         return total - len(values) * math.log(level)
 
 
@@ -92,26 +92,26 @@ Shape = AutoRegression | Drift
 
 
 def t_nodes(freedom: float) -> tuple[Floats, Floats]:
-    """Return shares and precisions of normal distributions whose sum is a t distribution, nearly."""
-    shares, freedoms, logarithms = _table_of_nodes()
+    """Return weights [-] and precisions [-] of normal distributions whose sum is a t distribution, nearly."""
+    weights, freedoms, logarithms = _table_of_nodes()
     place = float(np.clip(np.interp(math.log(freedom), freedoms, np.arange(len(freedoms))), 0.0, len(freedoms) - 1.001))
     first = int(place)
-    return shares, np.exp(logarithms[first] + (place - first) * (logarithms[first + 1] - logarithms[first]))
+    return weights, np.exp(logarithms[first] + (place - first) * (logarithms[first + 1] - logarithms[first]))
 
 
 @cache
 def _table_of_nodes() -> tuple[Floats, Floats, Floats]:
-    """Return shares, logarithms of degrees of freedom, and logarithms of the precisions at each of them."""
+    """Return weights, logarithms of degrees of freedom, and logarithms of the precisions at each of them."""
     from scipy.stats import gamma
 
-    places, shares = np.polynomial.legendre.leggauss(_QUADRATURE)
+    places, weights = np.polynomial.legendre.leggauss(_QUADRATURE)
     freedoms = np.geomspace(*_TABLE)
     nodes = [gamma.ppf(0.5 + 0.5 * places, 0.5 * one) * 2.0 / one for one in freedoms]
-    return 0.5 * shares, np.log(freedoms), np.log(np.maximum(nodes, 1.0e-6))
+    return 0.5 * weights, np.log(freedoms), np.log(np.maximum(nodes, 1.0e-6))
 
 
 def from_reflections(reflections: Floats) -> AutoRegression:
-    """Return the autoregression with these reflection coefficients, all between -1 and 1 (Levinson's recursion)."""
+    """Return the autoregression with these reflection coefficients [-], all between -1 and 1 (Levinson's recursion)."""
     order = len(reflections)
     predictors = np.zeros((order + 1, max(order, 1)))
     for stage, reflection in enumerate(reflections, start=1):
@@ -123,13 +123,13 @@ def from_reflections(reflections: Floats) -> AutoRegression:
 
 
 def from_coefficients(coefficients: Floats) -> AutoRegression | None:
-    """Return the autoregression with these coefficients; None where noise like that would grow without end."""
+    """Return the autoregression with these coefficients [-]; None where noise like that would grow without end."""
     reflections: Floats = _step_down(np.array(coefficients))
     return None if np.any(np.abs(reflections) >= 1.0) else from_reflections(reflections)
 
 
 def reflections_of(segments: list[Floats], most: int) -> tuple[Floats, Floats]:
-    """Return reflection coefficients and the variance left after each, 0 to ``most`` (Burg's method, pooled)."""
+    """Return reflection coefficients [-] and the variance left after each, 0 to ``most`` (Burg's method, pooled)."""
     ahead, behind = [one[1:] for one in segments], [one[:-1] for one in segments]
     reflections, left = np.zeros(most), np.zeros(most + 1)
     left[0] = sum(float(one @ one) for one in segments) / sum(len(one) for one in segments)
@@ -157,9 +157,9 @@ def _prediction_errors(values: Any, predictors: Any, spreads: Any) -> Any:
         for column in range(width):
             out[sample, column] = values[sample, column]
         for back in range(stage):
-            share = predictors[stage, back]
+            coefficient = predictors[stage, back]
             for column in range(width):
-                out[sample, column] -= share * values[sample - 1 - back, column]
+                out[sample, column] -= coefficient * values[sample - 1 - back, column]
         for column in range(width):
             out[sample, column] /= spreads[stage]
     return out
@@ -231,14 +231,14 @@ def _smooth(values: Any, variances: Any, memory: float, change: float, first: fl
 
 
 @_compile
-def _mixture_likelihood(values: Any, memory: float, change: float, first: float, shares: Any, nodes: Any) -> float:
+def _mixture_likelihood(values: Any, memory: float, change: float, first: float, weights: Any, nodes: Any) -> float:
     expected, unknown, total = 0.0, first, 0.0
     for sample in range(len(values)):
         new = values[sample] - expected
         density, mean, square = 0.0, 0.0, 0.0
         for part in range(len(nodes)):
             spread = unknown + 1.0 / nodes[part]
-            chance = shares[part] * np.exp(-0.5 * new * new / spread) / np.sqrt(2.0 * np.pi * spread) + 1.0e-300
+            chance = weights[part] * np.exp(-0.5 * new * new / spread) / np.sqrt(2.0 * np.pi * spread) + 1.0e-300
             gain = unknown / spread
             density += chance
             mean += chance * gain * new

@@ -24,25 +24,25 @@ class DumpedOpening(NamedTuple):
 
 
 def spool_command(command: float) -> float:
-    """What the proportional valve is told: nothing while both chambers vent."""
+    """Command [-] of the proportional valve: 0 while both chambers vent."""
     return 0.0 if command > VENTS_ABOVE else command
 
 
-def vented(openings: Openings, command: float) -> Openings:
-    """Openings with both chambers vented where the command says so."""
+def vent_chambers(openings: Openings, command: float) -> Openings:
+    """Openings [-] with both chambers vented where the command says so."""
     vents = command > VENTS_ABOVE
     return Openings(
-        0.0 if vents else openings.source_1,
-        1.0 if vents else openings.vent_1,
-        0.0 if vents else openings.source_2,
-        1.0 if vents else openings.vent_2,
+        source_1=0.0 if vents else openings.source_1,
+        vent_1=1.0 if vents else openings.vent_1,
+        source_2=0.0 if vents else openings.source_2,
+        vent_2=1.0 if vents else openings.vent_2,
     )
 
 
 def advance_ideal(
     valve: IdealProportional, state: NoValveState, command: float, time: float, step: float
 ) -> tuple[DumpedOpening, NoValveState]:
-    """What the valves show during the step."""
+    """Opening [-] and venting during the step [s], and the state at its end."""
     opening, after = proportional.advance_ideal(valve, state, spool_command(command), time, step)
     return DumpedOpening(opening, 1.0 if command > VENTS_ABOVE else 0.0), after
 
@@ -54,55 +54,55 @@ def connect_ideal(plant: PlantParameters, shown: DumpedOpening) -> tuple[SingleP
     full, room = plant.valve_conductance, plant.atmospheric_pressure
     return (
         SinglePort(
-            full if vents else port_1.conductance,
-            room if vents else port_1.node_pressure,
-            0.0 if vents else port_1.source_share,
-            1.0 if vents else port_1.takes_back,
+            conductance=full if vents else port_1.conductance,
+            node_pressure=room if vents else port_1.node_pressure,
+            source_fraction=0.0 if vents else port_1.source_fraction,
+            takes_back=1.0 if vents else port_1.takes_back,
         ),
         SinglePort(
-            full if vents else port_2.conductance,
-            room if vents else port_2.node_pressure,
-            0.0 if vents else port_2.source_share,
-            1.0 if vents else port_2.takes_back,
+            conductance=full if vents else port_2.conductance,
+            node_pressure=room if vents else port_2.node_pressure,
+            source_fraction=0.0 if vents else port_2.source_fraction,
+            takes_back=1.0 if vents else port_2.takes_back,
         ),
     )
 
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
-    """Openings at an instant."""
-    return vented(proportional.instant_ideal(valve, state, spool_command(command)), command)
+    """Openings [-] at an instant."""
+    return vent_chambers(proportional.instant_ideal(valve, state, spool_command(command)), command)
 
 
 def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
-    """The opening that the command asks for."""
+    """Opening [-] that the command requests, taken at once."""
     return proportional.settle_ideal(valve, state, spool_command(command), time)
 
 
 def advance_moving(
     valve: MovingProportional, state: SpoolState, command: float, time: float, step: float
 ) -> tuple[Openings, SpoolState]:
-    """Mean openings during the step and the spool at its end."""
+    """Mean openings [-] during the step [s] and the spool at its end."""
     openings, after = proportional.advance_moving(valve, state, spool_command(command), time, step)
-    return vented(openings, command), after
+    return vent_chambers(openings, command), after
 
 
 def instant_moving(valve: MovingProportional, state: SpoolState, command: float) -> Openings:
-    """Openings at an instant."""
-    return vented(proportional.instant_moving(valve, state, spool_command(command)), command)
+    """Openings [-] at an instant."""
+    return vent_chambers(proportional.instant_moving(valve, state, spool_command(command)), command)
 
 
 def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -> SpoolState:
-    """Rates of the spool."""
+    """Rates [1/s] of the spool."""
     return proportional.rates_moving(valve, state, spool_command(command))
 
 
 def next_moving_event(valve: MovingProportional, state: SpoolState, command: float, time: float) -> float:
-    """Time [s] at which what is asked for arrives at the command."""
+    """Time [s] at which the requested opening arrives at the command."""
     return proportional.next_moving_event(valve, state, spool_command(command), time)
 
 
 def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
-    """The state with what is asked for at its target, where it has arrived."""
+    """The state with the requested opening [-] at its target, where it has arrived."""
     return proportional.settle_moving(valve, state, spool_command(command), time)
 
 
@@ -125,5 +125,5 @@ MOVING = replace(
 
 
 def choose(settings: Mapping[str, float]) -> ValveModel:
-    """The ideal model where nothing moves, else the moving one."""
+    """The ideal model where nothing moves, else the moving one, from ``settings`` [SI]."""
     return IDEAL if proportional.choose(settings) is proportional.IDEAL else MOVING

@@ -1,8 +1,8 @@
 """Proportional spool valve: ideal, or with dead band, dead time, slew limit and second-order spool, in that order.
 
-The opening that is asked for runs at most at the slew limit towards the command; the spool follows it with
+The requested opening runs at most at the slew limit towards the command; the spool follows it with
 x'' = w^2 (r - x) - 2 d w x'. A step of the spool, of any length, is exact; it ends
-where the opening that is asked for arrives.
+where the requested opening arrives.
 """
 
 import math
@@ -17,7 +17,7 @@ from ppafo.model.ports import (
     single_port_flow,
     single_port_flow_slopes,
 )
-from ppafo.model.turns import DOUBLINGS, SMALLEST_SHARE, TERMS
+from ppafo.model.turns import DOUBLINGS, SMALLEST_FRACTION, TERMS
 from ppafo.model.valves.kind import ValveKind, ValveModel
 
 NO_SLEW_LIMIT = 1.0e12
@@ -50,7 +50,7 @@ class MovingProportional(NamedTuple):
 
 
 class SpoolStep(NamedTuple):
-    """Next x, next x' and mean x of a free spool, by x and by x'; x is an offset from what is asked for."""
+    """Next x, next x' and mean x of a free spool, by x and by x'; x is an offset from the requested opening."""
 
     next_by_opening: float
     next_by_rate: float
@@ -61,9 +61,9 @@ class SpoolStep(NamedTuple):
 
 
 class SpoolState(NamedTuple):
-    """Opening asked for behind the slew limit, opening of the spool, both from -1 to 1, and its rate [1/s]."""
+    """Requested opening behind the slew limit, opening of the spool, both from -1 to 1, and its rate [1/s]."""
 
-    asked: float
+    requested: float
     opening: float
     rate: float
 
@@ -83,17 +83,17 @@ def advance_ideal(
     return opening, NoValveState(opening)
 
 
-def slewed(asked: float, target: float, slew_limit: float, step: float) -> tuple[float, float]:
-    """Opening asked for after a step [s], and its rate [1/s], on the way to a target at the slew limit [1/s]."""
-    distance = target - asked
+def slew_opening(requested: float, target: float, slew_limit: float, step: float) -> tuple[float, float]:
+    """Requested opening after a step [s], and its rate [1/s], on the way to a target at the slew limit [1/s]."""
+    distance = target - requested
     way = (1.0 if distance > 0.0 else 0.0) - (1.0 if distance < 0.0 else 0.0)
     arrives = abs(distance) <= slew_limit * step
     rate = way * slew_limit
-    return (target if arrives else asked + rate * step), rate
+    return (target if arrives else requested + rate * step), rate
 
 
 def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float:
-    """Mean over a step of the part of an opening that is above 0; exact where it runs straight or keeps its sign."""
+    """Mean over a step of the positive part of an opening [-]; exact where it runs straight or keeps its sign."""
     higher = max(opening, next_opening)
     lower = min(opening, next_opening)
     crosses = higher > 0.0 and lower < 0.0
@@ -104,25 +104,27 @@ def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float
 def advance_moving(
     valve: MovingProportional, state: SpoolState, command: float, time: float, step: float
 ) -> tuple[Openings, SpoolState]:
-    """Mean openings during the step and the spool at its end; what is asked for changes its rate at the begin only."""
+    """Mean openings [-] in a step [s] and the spool at its end; the request changes its rate at the beginning only."""
     settled = settle_moving(valve, state, command, time)
     target = opening_of_command(command, valve.dead_band)
-    asked, slew = slewed(settled.asked, target, valve.slew_limit, step)
-    asked_mean = 0.5 * (settled.asked + asked)
+    requested, slew = slew_opening(settled.requested, target, valve.slew_limit, step)
+    requested_mean = 0.5 * (settled.requested + requested)
     has_spool = valve.frequency > 0.0
     angular = 2.0 * math.pi * valve.frequency
     by = spool_step(angular, valve.damping_ratio, step)
     # A spool that follows a ramp stays behind it by this much, and moves freely about that.
     behind = 2.0 * valve.damping_ratio * slew / angular if has_spool else 0.0
-    away, rate_away = settled.opening - settled.asked + behind, settled.rate - slew
-    spool = asked - behind + by.next_by_opening * away + by.next_by_rate * rate_away
-    spool_mean = asked_mean - behind + by.mean_by_opening * away + by.mean_by_rate * rate_away
+    away, rate_away = settled.opening - settled.requested + behind, settled.rate - slew
+    spool = requested - behind + by.next_by_opening * away + by.next_by_rate * rate_away
+    spool_mean = requested_mean - behind + by.mean_by_opening * away + by.mean_by_rate * rate_away
     rate = slew + by.rate_by_opening * away + by.rate_by_rate * rate_away
-    opening = spool if has_spool else asked
-    mean = max(-1.0, min(1.0, spool_mean if has_spool else asked_mean))
+    opening = spool if has_spool else requested
+    mean = max(-1.0, min(1.0, spool_mean if has_spool else requested_mean))
     towards_1 = towards_chamber_1(settled.opening, opening, mean)
     towards_2 = towards_chamber_1(-settled.opening, -opening, -mean)
-    return Openings(towards_1, towards_2, towards_2, towards_1), SpoolState(asked, opening, rate)
+    return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1), SpoolState(
+        requested, opening, rate
+    )
 
 
 def spool_acceleration(opening: float, rate: float, target: float, frequency: float, damping_ratio: float) -> float:
@@ -138,58 +140,58 @@ def shift_of_spool(state: SpoolState, next_state: SpoolState) -> float:
 
 
 def openings_of(opening: float) -> Openings:
-    """Shares of the full area for an opening from -1 to 1 (clipped there); above 0 feeds chamber 1. Equation (8)."""
+    """Fractions [-] of the full area for an opening from -1 to 1 (clipped); above 0 feeds chamber 1. Equation (8)."""
     clipped = max(-1.0, min(1.0, opening))
     towards_1 = max(clipped, 0.0)
     towards_2 = max(-clipped, 0.0)
-    return Openings(towards_1, towards_2, towards_2, towards_1)
+    return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1)
 
 
 def instant_ideal(valve: IdealProportional, state: NoValveState, command: float) -> Openings:
-    """Openings at an instant of a valve that follows its command at once."""
+    """Openings [-] at an instant of a valve that follows its command at once."""
     return openings_of(opening_of_command(command, valve.dead_band))
 
 
 def rates_ideal(valve: IdealProportional, state: NoValveState, command: float) -> NoValveState:
-    """Nothing moves by itself."""
+    """Rates [1/s]: none, nothing moves by itself."""
     return NoValveState(0.0)
 
 
 def never_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> float:
-    """Nothing changes between two commands."""
+    """Time [s] of the next change: none between two commands."""
     return math.inf
 
 
 def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
-    """The opening that the command asks for."""
+    """Opening [-] that the command requests, taken at once."""
     return NoValveState(opening_of_command(command, valve.dead_band))
 
 
 def instant_moving(valve: MovingProportional, state: SpoolState, command: float) -> Openings:
-    """Openings at an instant."""
+    """Openings [-] at an instant."""
     return openings_of(state.opening)
 
 
 def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -> SpoolState:
-    """Rates of what is asked for and of the opening [1/s], and the second derivative of the opening [1/s^2]."""
+    """Rates of the requested and of the actual opening [1/s], and the second derivative of the opening [1/s^2]."""
     target = opening_of_command(command, valve.dead_band)
-    slew = 0.0 if target == state.asked else (valve.slew_limit if target > state.asked else -valve.slew_limit)
+    slew = 0.0 if target == state.requested else (valve.slew_limit if target > state.requested else -valve.slew_limit)
     if valve.frequency == 0.0:
         return SpoolState(slew, slew, 0.0)
-    acceleration = spool_acceleration(state.opening, state.rate, state.asked, valve.frequency, valve.damping_ratio)
+    acceleration = spool_acceleration(state.opening, state.rate, state.requested, valve.frequency, valve.damping_ratio)
     return SpoolState(slew, state.rate, acceleration)
 
 
 def next_moving_event(valve: MovingProportional, state: SpoolState, command: float, time: float) -> float:
-    """Time [s] at which what is asked for arrives at the command."""
+    """Time [s] at which the requested opening arrives at the command."""
     target = opening_of_command(command, valve.dead_band)
-    return math.inf if target == state.asked else time + abs(target - state.asked) / valve.slew_limit
+    return math.inf if target == state.requested else time + abs(target - state.requested) / valve.slew_limit
 
 
 def settle_moving(valve: MovingProportional, state: SpoolState, command: float, time: float) -> SpoolState:
-    """The state with what is asked for at its target, where it has arrived or no slew limit holds it."""
+    """The state with the requested opening [-] at its target, where it has arrived or no slew limit holds it."""
     target = opening_of_command(command, valve.dead_band)
-    if abs(target - state.asked) > SAME_INSTANT * valve.slew_limit:
+    if abs(target - state.requested) > SAME_INSTANT * valve.slew_limit:
         return state
     return SpoolState(target, target if valve.frequency == 0.0 else state.opening, state.rate)
 
@@ -197,14 +199,14 @@ def settle_moving(valve: MovingProportional, state: SpoolState, command: float, 
 def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
     """Exact step [s] of a free spool with an undamped angular frequency [rad/s], to rounding.
 
-    Series of exp and of its mean at a small share of the step, doubled until they are those of the whole. A function
+    Series of exp and of its mean at a small fraction of the step, doubled until they are those of the whole. A function
     of the matrix A of x and x'/w is ``p + q A``, so all of it is on pairs of numbers, without a library function.
     Where a spool has long arrived the series would not converge; the step ends there, and only the mean goes on.
     """
     slower = max(1.0 / damping_ratio, 2.0 * damping_ratio)
-    share = min(1.0, ARRIVAL * slower / max(angular * step, TINY))
-    moving = share * step
-    small = angular * moving * SMALLEST_SHARE
+    fraction = min(1.0, ARRIVAL * slower / max(angular * step, TINY))
+    moving = fraction * step
+    small = angular * moving * SMALLEST_FRACTION
     trace, determinant = -2.0 * damping_ratio * small, small * small
     # A^n = p + q A, term by term: the next is A times this one.
     p, q, exp_p, exp_q, mean_p, mean_q = 1.0, 0.0, 1.0, 0.0, 1.0, 0.0
@@ -222,37 +224,40 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
         squared = exp_q * exp_q
         exp_p, exp_q = exp_p * exp_p - determinant * squared, 2.0 * exp_p * exp_q + trace * squared
     # A is small times ((0, 1), (-1, -2 d)) for x and x'/w.
-    per_rate = moving * SMALLEST_SHARE
+    per_rate = moving * SMALLEST_FRACTION
     faster = angular * small
     return SpoolStep(
-        exp_p,
-        exp_q * per_rate,
-        -exp_q * faster,
-        exp_p + exp_q * trace,
-        mean_p * share,
-        mean_q * per_rate * share,
+        next_by_opening=exp_p,
+        next_by_rate=exp_q * per_rate,
+        rate_by_opening=-exp_q * faster,
+        rate_by_rate=exp_p + exp_q * trace,
+        mean_by_opening=mean_p * fraction,
+        mean_by_rate=mean_q * per_rate * fraction,
     )
 
 
 def prepare_ideal(settings: Mapping[str, float]) -> IdealProportional:
-    """Parameters of the ideal valve."""
+    """Parameters of the ideal valve from ``settings`` [SI]."""
     return IdealProportional(settings["dead_band"], 1.0 / (1.0 - settings["dead_band"]))
 
 
 def prepare_moving(settings: Mapping[str, float]) -> MovingProportional:
-    """Parameters of the moving valve."""
+    """Parameters of the moving valve from ``settings`` [SI]."""
     limit = settings["slew_limit"] or NO_SLEW_LIMIT
     return MovingProportional(
-        settings["dead_band"], limit, settings["spool_frequency"], settings["spool_damping_ratio"]
+        dead_band=settings["dead_band"],
+        slew_limit=limit,
+        frequency=settings["spool_frequency"],
+        damping_ratio=settings["spool_damping_ratio"],
     )
 
 
-def closed_at_rest() -> SpoolState:
+def spool_at_rest() -> SpoolState:
     """A spool at rest in the middle."""
     return SpoolState(0.0, 0.0, 0.0)
 
 
-def closed() -> NoValveState:
+def closed_valve() -> NoValveState:
     """An ideal valve that is closed."""
     return NoValveState(0.0)
 
@@ -266,7 +271,7 @@ IDEAL = ValveModel(
     parameters=IdealProportional,
     state=NoValveState,
     prepare=prepare_ideal,
-    initial=closed,
+    initial=closed_valve,
     advance=advance_ideal,
     connect=single_ports,
     port_flow=single_port_flow,
@@ -284,7 +289,7 @@ MOVING = ValveModel(
     parameters=MovingProportional,
     state=SpoolState,
     prepare=prepare_moving,
-    initial=closed_at_rest,
+    initial=spool_at_rest,
     advance=advance_moving,
     connect=blended_ports,
     port_flow=blended_port_flow,
@@ -300,7 +305,7 @@ MOVING = ValveModel(
 
 
 def choose(settings: Mapping[str, float]) -> ValveModel:
-    """The ideal model where nothing moves, else the moving one."""
+    """The ideal model where nothing moves, else the moving one, from ``settings`` [SI]."""
     at_once = settings["spool_frequency"] == 0.0 and settings["slew_limit"] == 0.0 and settings["delay"] == 0.0
     return IDEAL if at_once else MOVING
 

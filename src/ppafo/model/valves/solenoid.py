@@ -2,7 +2,7 @@
 
 A command above 0 energises valve A (chamber 1), below 0 valve B (chamber 2), 0 neither: both chambers vent and the
 foot moves freely. A coil accepts a change at most once in every switching interval; the change reaches the flow after
-the opening or closing delay, and is lost if the coil is told otherwise before that.
+the opening or closing delay, and is lost if the coil is commanded otherwise before that.
 """
 
 import math
@@ -40,7 +40,7 @@ class TimedSolenoid(NamedTuple):
 
 
 class Coil(NamedTuple):
-    """Where the flow is (0 or 1), where the coil was told to go, when it was told and when the flow follows [s]."""
+    """Where the flow is (0 or 1), where the coil was commanded to go, when, and when the flow follows [s]."""
 
     position: float
     target: float
@@ -55,16 +55,16 @@ class PairState(NamedTuple):
     coil_b: Coil
 
 
-def energised(command: float) -> tuple[float, float]:
-    """What a command asks of valves A and B: 1 energised, 0 not. Equation (14)'s two voltages."""
+def coil_commands(command: float) -> tuple[float, float]:
+    """Commands [-] of valves A and B: 1 energised, 0 not. Equation (14)'s two voltages."""
     return (1.0 if command > 0.0 and command < VENTS_ABOVE else 0.0), (1.0 if command < 0.0 else 0.0)
 
 
 def advance_ideal(
     valve: IdealSolenoid, state: PairPositions, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairPositions]:
-    """Positions during the step of a pair that follows its command at once."""
-    position_a, position_b = energised(command)
+    """Positions [-] during the step [s] of a pair that follows its command at once."""
+    position_a, position_b = coil_commands(command)
     positions = PairPositions(position_a, position_b)
     return positions, positions
 
@@ -77,8 +77,18 @@ def connect_positions(plant: PlantParameters, shown: PairPositions) -> tuple[Sin
     node_2 = plant.dorsiflexion_pressure if open_b else plant.atmospheric_pressure
     back_1 = plant.relieving if open_a else 1.0
     back_2 = plant.relieving if open_b else 1.0
-    port_1 = SinglePort(plant.valve_conductance, node_1, 1.0 if open_a else 0.0, back_1)
-    port_2 = SinglePort(plant.valve_conductance, node_2, 1.0 if open_b else 0.0, back_2)
+    port_1 = SinglePort(
+        conductance=plant.valve_conductance,
+        node_pressure=node_1,
+        source_fraction=1.0 if open_a else 0.0,
+        takes_back=back_1,
+    )
+    port_2 = SinglePort(
+        conductance=plant.valve_conductance,
+        node_pressure=node_2,
+        source_fraction=1.0 if open_b else 0.0,
+        takes_back=back_2,
+    )
     return port_1, port_2
 
 
@@ -87,25 +97,25 @@ def accept_time(coil: Coil, switching_interval: float, time: float) -> float:
     return max(time, coil.accepted_time + switching_interval)
 
 
-def moved(coil: Coil, time: float) -> float:
-    """Position [-] of the flow at ``time`` [s] of a coil that was told nothing new."""
+def flow_position(coil: Coil, time: float) -> float:
+    """Position [-] of the flow at ``time`` [s] of a coil that has no new command."""
     return coil.target if coil.change_time <= time + SAME_INSTANT else coil.position
 
 
-def told(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> Coil:
+def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> Coil:
     """A coil at ``time`` [s] with an order standing: the flow moves if it is due, then the order is taken if it may be.
 
-    A change that is still waiting when the coil is told otherwise is lost.
+    A change that is still waiting when the coil is commanded otherwise is lost.
     """
-    position = moved(coil, time)
+    position = flow_position(coil, time)
     accepts = wanted != coil.target and accept_time(coil, valve.switching_interval, time) <= time + SAME_INSTANT
     delay = valve.opening_delay if wanted > 0.5 else valve.closing_delay
     at_once = accepts and delay <= SAME_INSTANT
     return Coil(
-        wanted if at_once else position,
-        wanted if accepts else coil.target,
-        time if accepts else coil.accepted_time,
-        time + delay if accepts else coil.change_time,
+        position=wanted if at_once else position,
+        target=wanted if accepts else coil.target,
+        accepted_time=time if accepts else coil.accepted_time,
+        change_time=time + delay if accepts else coil.change_time,
     )
 
 
@@ -118,13 +128,15 @@ def next_coil_event(valve: TimedSolenoid, coil: Coil, wanted: float, time: float
 
 def settle_timed(valve: TimedSolenoid, state: PairState, command: float, time: float) -> PairState:
     """Both coils after the changes and orders that are due at ``time`` [s]."""
-    wanted_a, wanted_b = energised(command)
-    return PairState(told(valve, state.coil_a, wanted_a, time), told(valve, state.coil_b, wanted_b, time))
+    wanted_a, wanted_b = coil_commands(command)
+    return PairState(
+        command_coil(valve, state.coil_a, wanted_a, time), command_coil(valve, state.coil_b, wanted_b, time)
+    )
 
 
 def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, time: float) -> float:
     """Time [s] at which a coil next takes a waiting order or its flow changes; huge for never."""
-    wanted_a, wanted_b = energised(command)
+    wanted_a, wanted_b = coil_commands(command)
     event_a = next_coil_event(valve, state.coil_a, wanted_a, time)
     return min(event_a, next_coil_event(valve, state.coil_b, wanted_b, time))
 
@@ -132,51 +144,51 @@ def next_timed_event(valve: TimedSolenoid, state: PairState, command: float, tim
 def advance_timed(
     valve: TimedSolenoid, state: PairState, command: float, time: float, step: float
 ) -> tuple[PairPositions, PairState]:
-    """Positions during one part of a step, at whose beginning all that is due happens, and both coils."""
+    """Positions [-] during one part [s] of a step, at whose beginning all that is due happens, and both coils."""
     settled = settle_timed(valve, state, command, time)
     return PairPositions(settled.coil_a.position, settled.coil_b.position), settled
 
 
 def instant_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> Openings:
-    """Openings at an instant of a pair that follows its command at once."""
-    position_a, position_b = energised(command)
-    return Openings(position_a, 1.0 - position_a, position_b, 1.0 - position_b)
+    """Openings [-] at an instant of a pair that follows its command at once."""
+    position_a, position_b = coil_commands(command)
+    return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
 
 
 def rates_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> PairPositions:
-    """Nothing moves by itself."""
+    """Rates [1/s]: none, nothing moves by itself."""
     return PairPositions(0.0, 0.0)
 
 
 def never_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time: float) -> float:
-    """Nothing changes between two commands."""
+    """Time [s] of the next change: none between two commands."""
     return math.inf
 
 
 def settle_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time: float) -> PairPositions:
-    """The positions that the command asks for."""
-    return PairPositions(*energised(command))
+    """Positions [-] that the command requests, taken at once."""
+    return PairPositions(*coil_commands(command))
 
 
 def instant_timed(valve: TimedSolenoid, state: PairState, command: float) -> Openings:
-    """Openings at an instant."""
+    """Openings [-] at an instant."""
     position_a, position_b = state.coil_a.position, state.coil_b.position
-    return Openings(position_a, 1.0 - position_a, position_b, 1.0 - position_b)
+    return Openings(source_1=position_a, vent_1=1.0 - position_a, source_2=position_b, vent_2=1.0 - position_b)
 
 
 def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairState:
-    """Nothing moves between two events."""
-    still = Coil(0.0, 0.0, 0.0, 0.0)
+    """Rates [1/s]: none, nothing moves between two events."""
+    still = Coil(position=0.0, target=0.0, accepted_time=0.0, change_time=0.0)
     return PairState(still, still)
 
 
 def prepare_ideal(settings: Mapping[str, float]) -> IdealSolenoid:
-    """Parameters of the ideal pair."""
+    """Parameters of the ideal pair from ``settings`` [SI]."""
     return IdealSolenoid()
 
 
 def prepare_timed(settings: Mapping[str, float]) -> TimedSolenoid:
-    """Parameters of the pair with delays."""
+    """Parameters [s] of the pair with delays."""
     return TimedSolenoid(settings["opening_delay"], settings["closing_delay"], settings["switching_interval"])
 
 
@@ -187,7 +199,7 @@ def both_off() -> PairPositions:
 
 def both_off_long_ago() -> PairState:
     """Two coils that were switched off long ago."""
-    coil = Coil(0.0, 0.0, NEVER, NEVER)
+    coil = Coil(position=0.0, target=0.0, accepted_time=NEVER, change_time=NEVER)
     return PairState(coil, coil)
 
 
@@ -234,7 +246,7 @@ TIMED = ValveModel(
 
 
 def choose(settings: Mapping[str, float]) -> ValveModel:
-    """The ideal model where no time matters, else the timed one."""
+    """The ideal model where no time [s] matters, else the timed one."""
     return TIMED if any(value > 0.0 for value in settings.values()) else IDEAL
 
 

@@ -31,7 +31,7 @@ def check(evidence: Evidence) -> Iterator[Finding]:
     for flow in flows:
         if not flow.agrees:
             yield _contradiction(evidence, flow)
-    yield from _shared_coefficient(evidence, flows)
+    yield from _check_shared_coefficient(evidence, flows)
 
 
 def _paths(name: str) -> tuple[str, ...]:
@@ -87,7 +87,7 @@ def _contradiction(evidence: Evidence, flow: _ValveFlow) -> Finding:
     )
 
 
-def _shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> Iterator[Finding]:
+def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> Iterator[Finding]:
     """Compare the first valve with every other one that has the same Cd; then flows must be as areas."""
     for other in flows[1:]:
         first = flows[0]

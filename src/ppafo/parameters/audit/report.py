@@ -18,7 +18,7 @@ def audit(parameter_set: ParameterSet) -> list[Finding]:
     An error that the set accepts with a reason becomes a warning that shows the reason. A reason for something that
     is not found is a warning too, so that it does not outlive what it excuses.
     """
-    evidence = Evidence(parameter_set, parameter_set.declared())
+    evidence = Evidence(parameter_set, parameter_set.declarations())
     found = [finding for check in CHECKS.values() for finding in check(evidence)]
     changed = overridden_paths(parameter_set)
     judged = [_judge(finding, parameter_set, changed) for finding in found]

@@ -1,24 +1,73 @@
-"""From a name or a file to a catalogue of parts; every mistake in a file is one clear line."""
+"""The layout of a catalogue of parts, built from the declarations, and the way from a name or a file to one."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from types import GenericAlias
+from typing import Annotated, Any, Literal
 
-from pydantic import ValidationError
+from pydantic import BaseModel, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.declaration import Quantity
+from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within
-from ppafo.parameters.parts.declaration import GROUPS, figures_of
+from ppafo.parameters.parts.declaration import GROUPS, NEEDED, figures_of
 from ppafo.parameters.parts.part import Figure, Part
-from ppafo.parameters.parts.schema import CATALOGUE_FILE
 from ppafo.units import to_si
+
+_TITLES = {"valves": "Valve", "actuators": "Actuator", "regulators": "Regulator", "bottles": "Bottle"}
+_NAMES = Annotated[tuple[str, ...], Field(strict=False)]
+
+
+def _part_table(title: str, group: str, quantities: tuple[Quantity, ...], extra: dict[str, Any] | None = None) -> Any:
+    fields: dict[str, Any] = {
+        "maker": (str, Field(min_length=1, description="manufacturer or dealer")),
+        "model": (str, Field(min_length=1, description="designation given by the manufacturer")),
+        "document": (str, Field("", description="data sheet, catalogue or paper; empty where none is known")),
+        "note": (str, Field("", description="remark")),
+        "unknown": (_NAMES, Field(default=(), description="figures that are not known")),
+    }
+    for item in quantities:
+        text = f"{item.summary} [{item.unit or '-'}]"
+        fields[item.name] = (Figure, Field(description=text)) if item.name in NEEDED[group] else optional(Figure, text)
+    return table(title, fields | (extra or {}))
+
+
+def _valve_table(kind: str) -> Any:
+    own = {"kind": (Literal[kind], Field(description=VALVES[kind].summary))}
+    return _part_table(f"{kind.capitalize()}ValvePart", "valves", figures_of("valves", kind), own)
+
+
+def _catalogue_file() -> type[BaseModel]:
+    fields: dict[str, Any] = {
+        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "name": (str, Field(pattern=NAME)),
+        "title": (str, Field(min_length=1)),
+        "notes": (str, ""),
+    }
+    for group in GROUPS:
+        parts = (
+            one_of([_valve_table(kind) for kind in VALVES])
+            if group == "valves"
+            else _part_table(_TITLES[group], group, GROUPS[group])
+        )
+        fields[group] = (GenericAlias(dict, (str, parts)), Field(default_factory=dict, description=f"{group} by name"))
+    return table("CatalogueFile", fields)
+
+
+CATALOGUE_FILE = _catalogue_file()
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a catalogue of parts."""
+    return make_schema(CATALOGUE_FILE, "ppafo catalogue of parts")
+
 
 DEFAULT = "parts"
 """Name of the catalogue that comes with the package."""
@@ -40,12 +89,15 @@ class Catalogue:
     groups: Mapping[str, Mapping[str, Part]]
 
     def part(self, group: str, name: str) -> Part:
-        """Return a part by its group (``valves``, ``bottles``, ...) and name."""
+        """Return a part by its group (``valves``, ``bottles``, ...) and name.
+
+        ParameterError with the nearest name where there is none.
+        """
         parts = self.groups[group]
         if name not in parts:
             known = ", ".join(parts) or "none"
             hint = nearest_name(name, parts)
-            raise ParameterError(f"{self.file}: {group} has no part '{name}'{hint}; there are {known}")
+            raise ParameterError(f"{self.file}: {group} has no part '{name}'{hint}; available: {known}")
         return parts[name]
 
     @property
@@ -60,13 +112,11 @@ def load_catalogue(name_or_path: str | Path = DEFAULT) -> Catalogue:
 
 
 def parse_catalogue(content: bytes, file: str) -> Catalogue:
-    """Return the catalogue in the bytes of a TOML file; ``file`` is what messages call it."""
-    document = _FILE.parse(content, file)
-    try:
-        parsed: Any = CATALOGUE_FILE.model_validate(document)
-    except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), CATALOGUE_FILE)
-        raise ParameterError(f"{file}: {problem}") from error
+    """Return the catalogue in the bytes of a TOML file; ``file`` is what messages call it.
+
+    ParameterError for one that is not usable.
+    """
+    parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
     groups = {
         group: {name: _part(file, group, name, item) for name, item in getattr(parsed, group).items()}
         for group in GROUPS
@@ -94,7 +144,7 @@ def _check_unknown(
     for key in unknown:
         if key not in declared:
             hint = nearest_name(key, declared)
-            raise ParameterError(f"{place}.unknown: there is no figure '{key}'{hint}; there are {', '.join(declared)}")
+            raise ParameterError(f"{place}.unknown: there is no figure '{key}'{hint}; available: {', '.join(declared)}")
         if key in figures:
             raise ParameterError(f"{place}.unknown: '{key}' is given in the same part")
 

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
+from ppafo.documents.models import STRICT
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import ORIFICE
 
@@ -17,7 +18,7 @@ DOUBTFUL: tuple[Origin, ...] = ("quoted", "assumed")
 class Figure(BaseModel):
     """A figure of a part as it was given, in its own unit."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = STRICT
 
     value: Annotated[float, Field(description="the number, in the unit beside it")]
     unit: Annotated[str, Field(description="such as 'mm^2', 'g', 'bar_g'; '' for a number")]

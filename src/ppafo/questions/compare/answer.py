@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import display_difference, display_unit
 from ppafo.answers.shown_metrics import metric_column, metric_quantity
-from ppafo.answers.shown_units import shown_change, shown_unit
 from ppafo.questions.compare.figure import change_figure, has_changes, has_errors, pareto_figure
 from ppafo.questions.compare.paired import Paired, pareto_front
 from ppafo.questions.compare.solve import COMPARED, Case, Comparison
 from ppafo.simulation.document import plain
-from ppafo.studies.intervals import FEWEST_CARRYING, Interval, fraction_text
+from ppafo.studies.intervals import FEWEST_EFFECTIVE, Interval, fraction_text
 
 _PAIRED_HEAD = (
     "metric",
@@ -148,9 +148,10 @@ def best_sentences(comparison: Comparison, task: str) -> list[str]:
         (name, comparison.best(task, name)) for name in ("rms_error", "gas_supplied") if name in comparison.metrics
     ]
     return [
-        f"{name}: " + ", ".join(f"{configuration} {_probability(share)}" for configuration, share in shares.items())
-        for name, shares in found
-        if shares
+        f"{name}: "
+        + ", ".join(f"{configuration} {_probability(fraction)}" for configuration, fraction in fractions.items())
+        for name, fractions in found
+        if fractions
     ]
 
 
@@ -174,24 +175,24 @@ def _others(comparison: Comparison) -> list[str]:
 
 def _paired_row(item: Paired, baseline: float, other: float) -> list[str]:
     quantity = metric_quantity(item.metric)
-    difference = [shown_change(value, quantity) for value in _ends(item.difference)]
+    difference = [display_difference(value, quantity) for value in _ends(item.difference)]
     nominal = _percent((other - baseline) / abs(baseline)) if baseline else ""
     spread = f"{_percent(item.change)} ({_percent(item.change_low)} to {_percent(item.change_high)})"
     better = "" if item.better is None else "equal in all" if item.equal == 1.0 else _probability(item.better)
     shown = f"{difference[0]:+.3g} [{difference[1]:+.3g}, {difference[2]:+.3g}]"
-    return [item.metric, shown_unit(quantity), nominal, "" if math.isnan(item.change) else spread, shown, better]
+    return [item.metric, display_unit(quantity), nominal, "" if math.isnan(item.change) else spread, shown, better]
 
 
 def _ends(interval: Interval) -> Sequence[float]:
     return (interval.value, interval.low, interval.high)
 
 
-def _percent(share: float) -> str:
-    return "" if math.isnan(share) else f"{100.0 * share:+.3g} %"
+def _percent(fraction: float) -> str:
+    return "" if math.isnan(fraction) else f"{100.0 * fraction:+.3g} %"
 
 
-def _probability(share: Interval) -> str:
-    return f"{share.value:.4g} [{share.low:.4g}, {share.high:.4g}]"
+def _probability(fraction: Interval) -> str:
+    return f"{fraction.value:.4g} [{fraction.low:.4g}, {fraction.high:.4g}]"
 
 
 def _remarks(case: Case) -> list[str]:
@@ -206,8 +207,10 @@ def _remarks(case: Case) -> list[str]:
 
 def _task_mismatch(comparison: Comparison, task: str) -> str:
     """Return a warning where a task asks another thing of some configurations."""
-    asked = {case.configuration: (case.scenario.reference, case.scenario.duration) for case in comparison.of_task(task)}
-    others = [name for name, what in asked.items() if what != asked[comparison.baseline]]
+    references = {
+        case.configuration: (case.scenario.reference, case.scenario.duration) for case in comparison.of_task(task)
+    }
+    others = [name for name, what in references.items() if what != references[comparison.baseline]]
     if not others:
         return ""
     return (
@@ -223,11 +226,12 @@ def _has_noise(comparison: Comparison) -> bool:
 def _skewness_warnings(comparison: Comparison, task: str) -> list[str]:
     """Return a warning for each mean difference that a few draws decide."""
     return [
-        f"{name}, task '{task}': as few as {item.carrying:.3g} of {item.pairs:,} draws determine the mean difference "
-        f"of {item.metric}, so do not trust its interval; the probability of being better is not affected"
+        f"{name}, task '{task}': the mean difference of {item.metric} has an effective sample size of "
+        f"{item.effective_size:.3g} of {item.pairs:,} draws: do not trust its interval; the probability of being "
+        "better is not affected"
         for name in _others(comparison)
         for item in comparison.pairs(task, name)
-        if item.carrying < min(FEWEST_CARRYING, 0.5 * item.pairs)
+        if item.effective_size < min(FEWEST_EFFECTIVE, 0.5 * item.pairs)
     ]
 
 
@@ -240,7 +244,7 @@ def _task_document(comparison: Comparison, task: str) -> dict[str, Any]:
         "pareto_front": _front(cases),
         "pairs": {name: [plain(item) for item in comparison.pairs(task, name)] for name in _others(comparison)},
         "best": {
-            name: {key: plain(share) for key, share in comparison.best(task, name).items()}
+            name: {key: plain(fraction) for key, fraction in comparison.best(task, name).items()}
             for name in comparison.metrics
             if COMPARED[name] and comparison.draws
         },

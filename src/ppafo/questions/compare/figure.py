@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ppafo.answers.display_units import display_values
 from ppafo.answers.layout import Margins, figure_of_free_panels
 from ppafo.answers.shown_metrics import metric_quantity, metric_title, metric_words
-from ppafo.answers.shown_units import shown_values
 from ppafo.answers.style import BLACK, COLOURS, GREY, house_style, label_lines, mark_kind
 from ppafo.questions.compare.paired import pareto_front
 from ppafo.questions.compare.solve import Case, Comparison
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _MARKS = "osD^vP"
 _ERROR, _GAS = "rms_error", "gas_supplied"
-_MOST_DOTS = 1500
+_MAXIMUM_DOTS = 1500
 _WIDTH, _PANEL = 7.2, 2.9
 _MARGINS = Margins(left=0.75, right=0.2, top=0.55, bottom=0.55, row_gap=0.95, column_gap=0.6)
 _BINS = 40
@@ -68,8 +68,8 @@ def _draw_pareto(axes: "Axes", comparison: Comparison, task: str) -> None:
     for number, case in enumerate(cases):
         colour, mark = COLOURS[number % len(COLOURS)], _MARKS[number % len(_MARKS)]
         if case.outcomes is not None:
-            gas = _in_shown_unit(case.outcomes.metrics[_GAS][:_MOST_DOTS], _GAS)
-            error = _in_shown_unit(case.outcomes.metrics[_ERROR][:_MOST_DOTS], _ERROR)
+            gas = _in_display_unit(case.outcomes.metrics[_GAS][:_MAXIMUM_DOTS], _GAS)
+            error = _in_display_unit(case.outcomes.metrics[_ERROR][:_MAXIMUM_DOTS], _ERROR)
             axes.plot(gas, error, ".", color=colour, alpha=0.18, markersize=4, markeredgewidth=0)
         axes.plot(*points[number], mark, color=colour, markersize=8, markeredgecolor="white", label=case.configuration)
     front = points[pareto_front(points)]
@@ -83,12 +83,12 @@ def _draw_pareto(axes: "Axes", comparison: Comparison, task: str) -> None:
 
 
 def _point(case: Case) -> tuple[float, float]:
-    gas, error = (_in_shown_unit(np.array([case.metrics[name].value]), name)[0] for name in (_GAS, _ERROR))
+    gas, error = (_in_display_unit(np.array([case.metrics[name].value]), name)[0] for name in (_GAS, _ERROR))
     return float(gas), float(error)
 
 
-def _in_shown_unit(values: Floats, name: str) -> Floats:
-    return shown_values(values, metric_quantity(name))
+def _in_display_unit(values: Floats, name: str) -> Floats:
+    return display_values(values, metric_quantity(name))
 
 
 def _draw_change(axes: "Axes", comparison: Comparison, task: str, metric: str) -> None:

@@ -10,7 +10,7 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import REPLICATES
 from ppafo.studies.intervals import (
     Interval,
-    draws_that_carry,
+    effective_sample_size,
     fraction_interval,
     noise_interval,
     replicates_interval,
@@ -18,7 +18,7 @@ from ppafo.studies.intervals import (
 
 Masks = NDArray[np.bool_]
 
-OUTER_SHARES = (0.05, 0.95)
+OUTER_QUANTILES = (0.05, 0.95)
 """The quantiles over the draws that tables show beside a median."""
 
 
@@ -31,7 +31,7 @@ class Paired:
     its 5 and 95 % quantiles: how uncertain the change is, however many draws are made. ``better`` is the probability
     that the configuration is better in a draw, with its confidence interval: how well that is known from these draws;
     None where neither end of the metric is better. ``equal`` is the fraction of draws in which both are the same.
-    ``carrying`` is how many pairs determine the mean difference, ``noise`` the fraction of the variance of the
+    ``effective_size`` is how many pairs determine the mean difference, ``noise`` the fraction of the variance of the
     difference that is due to sensor noise, None where there is none.
     """
 
@@ -43,7 +43,7 @@ class Paired:
     change_high: float
     better: Interval | None
     equal: float
-    carrying: float
+    effective_size: float
     noise: Interval | None = None
 
 
@@ -66,7 +66,9 @@ def compare_pairs(
     if first.size == 0:
         return None
     change = (second - first)[first != 0.0] / np.abs(first[first != 0.0])
-    low, middle, high = np.quantile(change, (OUTER_SHARES[0], 0.5, OUTER_SHARES[1])) if change.size else (np.nan,) * 3
+    low, middle, high = (
+        np.quantile(change, (OUTER_QUANTILES[0], 0.5, OUTER_QUANTILES[1])) if change.size else (np.nan,) * 3
+    )
     difference = other - baseline
     noise = None
     if other_noise is not None:
@@ -82,12 +84,12 @@ def compare_pairs(
         change_high=float(high),
         better=fraction_interval(wins, first.size, confidence) if better else None,
         equal=float(np.mean(first == second)),
-        carrying=draws_that_carry(second - first),
+        effective_size=effective_sample_size(second - first),
         noise=noise,
     )
 
 
-def best_shares(values: Sequence[Floats], better: int, confidence: float) -> list[Interval]:
+def best_probabilities(values: Sequence[Floats], better: int, confidence: float) -> list[Interval]:
     """Return the probability of each configuration to be the best in a draw; ties count for all of them."""
     table = better * np.stack(values)
     table = table[:, np.all(np.isfinite(table), axis=0)]

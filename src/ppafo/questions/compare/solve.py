@@ -11,7 +11,7 @@ from ppafo.answers import Solved
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS, Metric
 from ppafo.progress import Report
-from ppafo.questions.compare.paired import Paired, best_shares, compare_pairs
+from ppafo.questions.compare.paired import Paired, best_probabilities, compare_pairs
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.result import Status
 from ppafo.simulation.scenario import Scenario
@@ -122,7 +122,9 @@ class Comparison(Solved):
         values: list[Floats] = [item.metrics[metric] for item in drawn if item is not None]
         if len(values) < len(drawn) or not COMPARED[metric]:
             return {}
-        return dict(zip(self.configurations, best_shares(values, COMPARED[metric], self.confidence), strict=False))
+        return dict(
+            zip(self.configurations, best_probabilities(values, COMPARED[metric], self.confidence), strict=False)
+        )
 
     def _case(self, task: str, configuration: str) -> Case:
         return next(case for case in self.of_task(task) if case.configuration == configuration)
@@ -163,7 +165,7 @@ def compare(
         for task, texts in wanted.items()
         for item in chosen
     ]
-    metrics = compared_metrics([place.scenario for place in placed])
+    metrics = common_metrics([place.scenario for place in placed])
     drawing = _drawing(known, placed, draws, seed, check_fraction(maximum_failed, "maximum_failed"))
     outcomes = (
         _outcomes(placed, metrics, drawing, threads, progress) if drawing is not None else [_UNDRAWN] * len(placed)
@@ -195,7 +197,7 @@ def _tasks(tasks: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str
     return {name: tuple(texts) for name, texts in pairs}
 
 
-def compared_metrics(scenarios: list[Scenario]) -> tuple[str, ...]:
+def common_metrics(scenarios: list[Scenario]) -> tuple[str, ...]:
     """Return those metrics of the table that all scenarios can have: without a reference there is no error."""
     has_reference = all(scenario.control.kind != OPEN_LOOP for scenario in scenarios)
     return tuple(name for name in COMPARED if has_reference or "reference" not in METRICS[name].channels)
@@ -214,7 +216,7 @@ class _Drawing:
     uncertainty: Uncertainty
     draws: int
     seed: int
-    most_failed: float
+    maximum_failed: float
 
     def varies(self, path: str, configuration: str) -> bool:
         """Tell whether a path is drawn in a configuration; the noise is in all of them."""
@@ -222,7 +224,7 @@ class _Drawing:
 
 
 def _drawing(
-    study: Study | None, placed: Sequence[ConfiguredTask], draws: int, seed: int | None, most_failed: float
+    study: Study | None, placed: Sequence[ConfiguredTask], draws: int, seed: int | None, maximum_failed: float
 ) -> _Drawing | None:
     """Return what is drawn; None without a study, or where nothing in it varies, if no controller receives noise."""
     known = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
@@ -230,7 +232,7 @@ def _drawing(
     if not uncertainty.drawn:
         return None
     usual = study.sample.seed if study is not None else DEFAULT_SEED
-    return _Drawing(study, uncertainty, draws, usual if seed is None else seed, most_failed)
+    return _Drawing(study, uncertainty, draws, usual if seed is None else seed, maximum_failed)
 
 
 def _check_set_or_drawn(placed: Sequence[ConfiguredTask], study: Study) -> None:
@@ -274,6 +276,6 @@ def _outcomes(
         own = {path: column for path, column in columns.items() if drawing.varies(path, name)}
         unchanged = {"supply.pressure": np.full(drawing.draws, place.scenario.device.supply.pressure)}
         outcomes = model(own or unchanged)
-        check_failures(outcomes, drawing.most_failed, f"configuration '{name}', task '{place.task}'")
+        check_failures(outcomes, drawing.maximum_failed, f"configuration '{name}', task '{place.task}'")
         found.append((outcomes, model({path: again[path] for path in own}) if again else None))
     return found

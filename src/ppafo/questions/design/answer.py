@@ -5,7 +5,7 @@ import io
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import quantity_of_unit
+from ppafo.answers.display_units import quantity_of_unit
 from ppafo.questions.design.figure import design_figure
 from ppafo.questions.design.search import PATIENCE
 from ppafo.questions.design.solve import SHOWN_OBJECTIVES, Design, DesignPoint
@@ -152,7 +152,7 @@ def _data(design: Design) -> dict[str, Any]:
             "failures": [{"reason": reason, "task": task} for reason, task in design.failures.items()],
             "seed": problem.search.seed,
             "settled": design.settled,
-            "hypervolume": [{"designs": count, "share": share} for count, share in design.growth],
+            "hypervolume": [{"designs": count, "share": fraction} for count, fraction in design.growth],
         },
         "doubtful": doubts_data(design.doubtful),
         "versions": {"ppafo": __version__},

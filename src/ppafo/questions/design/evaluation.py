@@ -17,7 +17,7 @@ from ppafo.simulation.scenario import Scenario
 
 Members = NDArray[np.intp]
 
-_MOST_REASONS = 20
+_MAXIMUM_REASONS = 20
 _CHUNK = 16_384
 """Runs handed to the lanes at once: enough to fill them, little enough memory."""
 
@@ -81,7 +81,7 @@ class Evaluation:
             found[name][members] = values
         self.runs += members.size
         self.failed += int(np.count_nonzero(result.status != COMPLETED))
-        for reason in list(result.reasons.values())[: _MOST_REASONS - len(self.reasons)]:
+        for reason in list(result.reasons.values())[: _MAXIMUM_REASONS - len(self.reasons)]:
             self.reasons.setdefault(reason, task.name)
 
     def _violation(self, candidates: Candidates, objectives: Floats, metrics: list[dict[str, Floats]]) -> Floats:

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.answers.shown_units import shown_values, titled
+from ppafo.answers.display_units import display_values, title_with_unit
 from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
 from ppafo.questions.design.front import Floats
 from ppafo.questions.design.solve import SHOWN_OBJECTIVES, Design, objective_table
@@ -26,7 +26,7 @@ _PANELS = (
     ("B", "Error against mass", 0, 2),
     ("C", "Gas per task against mass", 1, 2),
 )
-_MOST_TICKS_OF_ONE_DECADE = 1.5
+_MAXIMUM_TICKS_OF_ONE_DECADE = 1.5
 """Decades above which a logarithmic axis has ticks at powers of ten only."""
 
 
@@ -39,7 +39,7 @@ def design_figure(design: Design) -> "Figure":
         names = _names(design)
         figure.subplots_adjust(left=0.08, right=0.97, bottom=0.075, top=0.83, wspace=0.25, hspace=0.36)
         panels = figure.subplots(2, 2).ravel()
-        table = _objectives_in_shown_units(design)
+        table = _objectives_in_display_units(design)
         for axes, (letter, title, x, y) in zip(panels, _PANELS, strict=False):
             _view(axes, design, table, x, y)
             axes.set_title(f"$\\bf{{{letter}}}$   {title}", pad=8)
@@ -49,9 +49,9 @@ def design_figure(design: Design) -> "Figure":
     return figure
 
 
-def _objectives_in_shown_units(design: Design) -> Floats:
+def _objectives_in_display_units(design: Design) -> Floats:
     columns = zip(objective_table(design.front).T, SHOWN_OBJECTIVES.values(), strict=True)
-    return np.stack([shown_values(values, quantity) for values, quantity in columns], axis=1)
+    return np.stack([display_values(values, quantity) for values, quantity in columns], axis=1)
 
 
 def _names(design: Design) -> tuple[list[str], list[str]]:
@@ -85,8 +85,8 @@ def _view(axes: "Axes", design: Design, table: Floats, x: int, y: int) -> None:
             )
     knee = table[design.knee]
     axes.plot(knee[x], knee[y], marker="o", markersize=13, markerfacecolor="none", color=BLACK, markeredgewidth=1.4)
-    axes.set_xlabel(titled(*_AXES[x]))
-    axes.set_ylabel(titled(*_AXES[y]))
+    axes.set_xlabel(title_with_unit(*_AXES[x]))
+    axes.set_ylabel(title_with_unit(*_AXES[y]))
     _scale(axes.set_xscale, axes.xaxis, table[:, x])
     _scale(axes.set_yscale, axes.yaxis, table[:, y])
 
@@ -98,7 +98,7 @@ def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> 
     if not (values.min() > 0.0 and values.max() > _LOGARITHMIC_FROM * values.min()):
         return
     set_scale("log")
-    is_long = np.log10(values.max() / values.min()) > _MOST_TICKS_OF_ONE_DECADE
+    is_long = np.log10(values.max() / values.min()) > _MAXIMUM_TICKS_OF_ONE_DECADE
     axis.set_major_locator(LogLocator(subs=(1.0,) if is_long else (1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
@@ -106,8 +106,8 @@ def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> 
 
 def _growth(axes: "Axes", design: Design) -> None:
     designs = [count for count, _ in design.growth]
-    shares = [share for _, share in design.growth]
-    axes.plot(designs, shares, color=BLUE, marker="o", markersize=3)
+    fractions = [fraction for _, fraction in design.growth]
+    axes.plot(designs, fractions, color=BLUE, marker="o", markersize=3)
     axes.set_title("$\\bf{D}$   Hypervolume of the front", pad=8)
     axes.set_xlabel("Designs tried")
     axes.set_ylabel("Fraction of the box of the first designs")

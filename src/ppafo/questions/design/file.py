@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, STRICT, Text, Texts, published_schema, read_model
+from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics.catalog import METRICS
@@ -115,7 +115,7 @@ def read_design_file(name_or_path: str | Path) -> tuple[DesignFile, str]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a design file."""
-    return published_schema(DesignFile, "ppafo design")
+    return make_schema(DesignFile, "ppafo design")
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,7 +289,7 @@ def _constraints(document: DesignFile, file: str) -> tuple[Constraint, ...]:
         place = f"{file}: constraints.{name}"
         if name not in units:
             hint = nearest_name(name, units)
-            raise StudyError(f"{place}: there is no such metric{hint}; known are {', '.join(units)}")
+            raise StudyError(f"{place}: there is no such metric{hint}; available: {', '.join(units)}")
         least, most = (
             None if text is None else _limit(text, units[name], f"{place}.{key}")
             for key, text in (("least", table.least), ("most", table.most))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Choices = NDArray[np.int64]
 
-MOST_SHOWN = 12
+MAXIMUM_SHOWN = 12
 _CHUNK = 512
 
 
@@ -194,7 +194,7 @@ def knee(objectives: Floats) -> int:
     return int(np.argmin(fractions(objectives).sum(axis=1)))
 
 
-def representatives(objectives: Floats, most: int = MOST_SHOWN) -> tuple[int, ...]:
+def representatives(objectives: Floats, most: int = MAXIMUM_SHOWN) -> tuple[int, ...]:
     """Return places of designs that stand for the front, in its order.
 
     The best of each objective and the knee first, then always the one farthest from all that are there.

@@ -92,9 +92,9 @@ def search_front(
 
 
 def _progress(growth: list[tuple[int, float]], settings: SearchSettings, elapsed: float) -> Progress:
-    designs, share = growth[-1]
+    designs, fraction = growth[-1]
     most = settings.screening + settings.generations * settings.population
-    return Progress(f"hypervolume {share:.2f}", designs, most, elapsed=elapsed, noun="designs")
+    return Progress(f"hypervolume {fraction:.2f}", designs, most, elapsed=elapsed, noun="designs")
 
 
 def survivors_of_many(worth: Worth, count: int) -> NDArray[np.intp]:

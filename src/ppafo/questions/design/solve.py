@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.answers import Solved
-from ppafo.answers.shown_units import change_text
+from ppafo.answers.display_units import change_text
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
 from ppafo.progress import Report, report_nothing

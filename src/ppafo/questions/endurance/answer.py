@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import quantity_text, shown
+from ppafo.answers.display_units import display_value, quantity_text
 from ppafo.questions.endurance.discharge import Discharge
 from ppafo.questions.endurance.figure import endurance_figure
 from ppafo.questions.endurance.reuse import GIVEN, Reuse
@@ -219,7 +219,7 @@ def _bottle_data(found: Endurance) -> dict[str, Any]:
 
 def _minutes(seconds: float) -> str:
     """Return minutes with three digits, and whole ones where there are more."""
-    return quantity_text(seconds, "duration", ".0f" if shown(seconds, "duration") >= 999.5 else ".3g")
+    return quantity_text(seconds, "duration", ".0f" if display_value(seconds, "duration") >= 999.5 else ".3g")
 
 
 def _gas(mass: float) -> str:

@@ -24,7 +24,7 @@ from ppafo.questions.endurance.file import Bottle
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 
-MOST_STRETCHES = 2000
+MAXIMUM_STRETCHES = 2000
 SAMPLES = 1001
 _RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
 _ABOVE_FREEZING = 0.02
@@ -102,10 +102,10 @@ def _check(schedule: Schedule) -> None:
             raise ParameterError(f"{name} must be at least {least:g} s and finite, it is {value:g} s")
     if not 0.0 <= schedule.rest < float("inf"):
         raise ParameterError(f"rest must be at least 0 s and finite, it is {schedule.rest:g} s")
-    if schedule.rest > 0.0 and 2.0 * schedule.longest / (schedule.walk + schedule.rest) > MOST_STRETCHES:
+    if schedule.rest > 0.0 and 2.0 * schedule.longest / (schedule.walk + schedule.rest) > MAXIMUM_STRETCHES:
         raise ParameterError(
             f"walking {schedule.walk:g} s and resting {schedule.rest:g} s over {schedule.longest:g} s are more "
-            f"than {MOST_STRETCHES} periods: choose longer periods, or a smaller longest time"
+            f"than {MAXIMUM_STRETCHES} periods: choose longer periods, or a smaller longest time"
         )
 
 

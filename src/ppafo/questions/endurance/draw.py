@@ -23,7 +23,7 @@ from ppafo.walking.strides import SETTLING
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
 
-_MOST_FALLEN = 0.1
+_MAXIMUM_FALLEN = 0.1
 """Fraction of the gas used that may flow back: it waits in the line before the valve, and the next step takes it."""
 
 WALK_FILE = "walk.json"
@@ -67,9 +67,9 @@ class Schedule:
 
 def draw_of_numbers(mass_per_step: float, step_time: float, peak_flow: float | None) -> Draw:
     """Return the draw of given numbers [kg, s, kg/s]; without a largest flow the mean one is taken for it."""
-    for name, value in (("gas per step", mass_per_step), ("step time", step_time)):
+    for name, value, unit in (("gas per step", mass_per_step, "kg"), ("step time", step_time, "s")):
         if not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(f"{name} must be above 0, it is {value:g}")
+            raise ParameterError(f"{name} must be above 0, it is {value:g} {unit}")
     mean = mass_per_step / step_time
     if peak_flow is not None and not (math.isfinite(peak_flow) and peak_flow >= mean):
         raise ParameterError(
@@ -82,13 +82,13 @@ def draw_of_numbers(mass_per_step: float, step_time: float, peak_flow: float | N
 def draw_of_recording(recording: Recording, step_time: float | None) -> Draw:
     """Return the draw of a recording with ``supplied_mass``, repeated for ever; all of it is one step by default."""
     if "supplied_mass" not in recording:
-        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; there are {', '.join(recording.names)}")
+        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; available: {', '.join(recording.names)}")
     supplied = _gas_use(recording)
     gain = float(supplied[-1] - supplied[0])
     if recording.duration <= 0.0 or gain <= 0.0:
         raise DataError(f"{recording.label}: no gas was taken from the supply, so a bottle would never be empty")
     fallen = -float(np.minimum(np.diff(supplied), 0.0).sum())
-    if fallen > _MOST_FALLEN * gain:
+    if fallen > _MAXIMUM_FALLEN * gain:
         raise DataError(
             f"{recording.label}: supplied_mass falls by {fallen * GRAMS_PER_KILOGRAM:.3g} g in total while it "
             f"gains {gain * GRAMS_PER_KILOGRAM:.3g} g; it must be cumulative from the start of the recording to "

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
 from ppafo.answers.layout import Margins, figure_of_panels
-from ppafo.answers.shown_units import drawn_unit, quantity_text, shown, shown_values
 from ppafo.answers.style import BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, label_lines, mark_kind
 from ppafo.questions.endurance.solve import Endurance
 from ppafo.signals.recording import Floats
@@ -27,7 +27,7 @@ _PANELS = 3
 def endurance_figure(found: Endurance) -> "Figure":
     """Return the figure of the requested course; below it stands how it ended."""
     recording = found.discharge.recording
-    minutes = shown_values(recording.time, "duration")
+    minutes = display_values(recording.time, "duration")
     remarks = textwrap.wrap(f"End: {found.discharge.ending.message}.", _REMARK_WIDTH)
     bottom = _BOTTOM + _REMARK_LINE * len(remarks)
     height = _TOP + _PANELS * _PANEL + (_PANELS - 1) * _GAP + bottom
@@ -39,7 +39,7 @@ def endurance_figure(found: Endurance) -> "Figure":
         _draw_mass(grid[2], found, minutes)
         for axes in grid:
             axes.locator_params(axis="y", nbins=5)
-        grid[-1].set_xlabel(f"Time ({drawn_unit('duration')})")
+        grid[-1].set_xlabel(f"Time ({axis_unit('duration')})")
         grid[-1].set_xlim(0.0, float(minutes[-1]))
         figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, _title(found), va="top", fontsize=13, fontweight="bold")
         figure.text(0.12 / _WIDTH, 0.1 / height, "\n".join(remarks), va="bottom", fontsize=9, color=VERMILION)
@@ -55,11 +55,15 @@ def _title(found: Endurance) -> str:
 def _draw_temperature(axes: "Axes", found: Endurance, minutes: Floats) -> None:
     recording = found.discharge.recording
     axes.axhline(
-        shown(found.bottle.room_temperature, "temperature"), color=GREY, linestyle=":", linewidth=1.2, label="room"
+        display_value(found.bottle.room_temperature, "temperature"),
+        color=GREY,
+        linestyle=":",
+        linewidth=1.2,
+        label="room",
     )
-    axes.plot(minutes, shown_values(recording["wall_temperature"], "temperature"), color=ORANGE, label="wall")
-    axes.plot(minutes, shown_values(recording["bottle_temperature"], "temperature"), color=BLUE, label="content")
-    axes.set_title(f"Temperature of the bottle ({drawn_unit('temperature')})")
+    axes.plot(minutes, display_values(recording["wall_temperature"], "temperature"), color=ORANGE, label="wall")
+    axes.plot(minutes, display_values(recording["bottle_temperature"], "temperature"), color=BLUE, label="content")
+    axes.set_title(f"Temperature of the bottle ({axis_unit('temperature')})")
     label_lines(axes)
 
 
@@ -67,10 +71,10 @@ def _draw_bottle_pressure(axes: "Axes", found: Endurance, minutes: Floats) -> No
     regulator = found.bottle.regulator
     pressure = found.discharge.recording["bottle_pressure"]
     needed = regulator.set_pressure + regulator.pressure_margin
-    axes.axhline(shown(needed, "pressure"), color=VERMILION, linestyle="--", linewidth=1.2, label="needed")
-    axes.plot(minutes, shown_values(pressure, "pressure"), color=BLUE, label="bottle")
-    axes.set_ylim(0.0, 1.06 * shown(float(np.max(pressure)), "pressure"))
-    axes.set_title(f"Pressure in the bottle ({drawn_unit('pressure')})")
+    axes.axhline(display_value(needed, "pressure"), color=VERMILION, linestyle="--", linewidth=1.2, label="needed")
+    axes.plot(minutes, display_values(pressure, "pressure"), color=BLUE, label="bottle")
+    axes.set_ylim(0.0, 1.06 * display_value(float(np.max(pressure)), "pressure"))
+    axes.set_title(f"Pressure in the bottle ({axis_unit('pressure')})")
     label_lines(axes)
 
 
@@ -82,7 +86,7 @@ def _draw_mass(axes: "Axes", found: Endurance, minutes: Floats) -> None:
     )
     for name, label, colour in names:
         if name in recording:
-            axes.plot(minutes, shown_values(recording[name], "gas mass"), color=colour, label=label)
-    axes.set_ylim(0.0, 1.06 * shown(found.bottle.mass, "gas mass"))
-    axes.set_title(f"Left in the bottle ({drawn_unit('gas mass')})")
+            axes.plot(minutes, display_values(recording[name], "gas mass"), color=colour, label=label)
+    axes.set_ylim(0.0, 1.06 * display_value(found.bottle.mass, "gas mass"))
+    axes.set_title(f"Left in the bottle ({axis_unit('gas mass')})")
     label_lines(axes)

@@ -8,11 +8,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, optional, published_schema, table
-from ppafo.documents.problems import first_problem
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.models import NAME, make_schema, optional, read_model, table
+from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.model.fluid_table import densest_gas, fluid_pressure, has_liquid, liquid_density
@@ -93,7 +92,7 @@ def bottle_file() -> type[BaseModel]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a file of a bottle."""
-    return published_schema(bottle_file(), "ppafo bottle")
+    return make_schema(bottle_file(), "ppafo bottle")
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,12 +124,7 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
 
     ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
-    file = label(str(name_or_path))
-    try:
-        parsed = bottle_file().model_validate(FILE.parse(FILE.read(name_or_path), file))
-    except ValidationError as error:
-        problem = first_problem(error.errors(include_url=False), bottle_file())
-        raise ParameterError(f"{file}: {problem}") from error
+    parsed, file = read_model(FILE, bottle_file(), name_or_path)
     given = {section: getattr(parsed, section) for section in SECTIONS}
     entries = {path: getattr(given[path.partition(".")[0]], path.partition(".")[2]) for path in PATHS}
     found = {path: entry for path, entry in entries.items() if entry is not None}
@@ -173,7 +167,7 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
         heat_capacity_ratio=SPECIES[fluid.name].heat_capacity_ratio,
         volume=values["bottle.volume"],
         mass=_mass_of_fill(values, fluid, file),
-        wall=BottleWall(*(values[f"bottle.{name}"] for name in BottleWall._fields)),
+        wall=BottleWall(**{name: values[f"bottle.{name}"] for name in BottleWall._fields}),
         regulator=Regulator(
             set_pressure=values["regulator.set_pressure"],
             droop=values["regulator.droop"],

@@ -32,13 +32,13 @@ def load_fluid(name: str) -> Fluid:
     known = list_fluids()
     if name not in known:
         raise ParameterError(
-            f"there is no property table of '{name}'{nearest_name(name, known)}; known are {', '.join(known)}"
+            f"there is no property table of '{name}'{nearest_name(name, known)}; available: {', '.join(known)}"
         )
     content = json.loads((_FOLDER / f"{name}{_SUFFIX}").read_text(encoding="utf-8"))
     table = FluidTable(
         gas_constant=content["gas_constant"],
         temperatures=tuple(content["temperatures"]),
-        shares=tuple(content["shares"]),
+        fractions=tuple(content["shares"]),
         densest=tuple(content["densest"]),
         liquid_densities=tuple(content.get("liquid_densities", ())),
         liquid_energies=tuple(content.get("liquid_energies", ())),

@@ -78,8 +78,7 @@ def endurance(
     [s]. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``, ``overrides`` such as ``room.temperature=5 degC``.
     ParameterError or DataError for bad input, SimulationError where the solver fails.
     """
-    is_one = isinstance(recordings, str | Path | Recording | WalkResult)
-    given: tuple[GasUse, ...] = (recordings,) if is_one else tuple(recordings)  # type: ignore[assignment, arg-type]
+    given = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
     if bool(given) == (gas_per_step is not None):
         raise ParameterError("give either a recording or --gas-per-step, for example --gas-per-step '0.3 g'")
     full, schedule, changes = load_bottle(bottle, overrides), Schedule(walk, rest, longest), tuple(reuse)

@@ -5,25 +5,25 @@ from ppafo.questions.question import SET, THREADS, Argument, Question, counting_
 QUESTION = Question(
     solve="ppafo.questions.find.solve:find",
     arguments=(
-        Argument(("SCENARIO",), "scenario", "a scenario: a name, or a .toml file", "SCENARIO"),
+        Argument(("SCENARIO",), "scenario", "name of a scenario, or a .toml file", "SCENARIO"),
         Argument(
             ("--vary",),
             "vary",
-            "the number of the scenario or its device, and its range, for example 'supply.pressure=20..90 psi_g'",
+            "a number of the scenario or its device, and its range, for example 'supply.pressure=20..90 psi_g'",
             metavar="PATH=LOW..HIGH",
             is_required=True,
         ),
         Argument(
             ("--such-that",),
             "such_that",
-            "the condition: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m'",
+            "a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m'",
             metavar="CONDITION",
             is_required=True,
         ),
-        Argument(("--lowest",), "highest", "the lowest value, as by default", action="store_false", default=False),
-        Argument(("--highest",), "highest", "the highest value", action="store_true", default=False),
+        Argument(("--lowest",), "highest", "find the lowest value (default)", action="store_false", default=False),
+        Argument(("--highest",), "highest", "find the highest value", action="store_true", default=False),
         Argument(
-            ("--grid",), "grid", "values tried first, evenly over the range; default 64", "N", counting_number, 64
+            ("--grid",), "grid", "number of evenly spaced values to try first; default 64", "N", counting_number, 64
         ),
         SET,
         THREADS,

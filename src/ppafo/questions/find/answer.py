@@ -5,9 +5,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import (
+    axis_unit,
+    change_text,
+    display_value,
+    display_values,
+    quantity_of_unit,
+    quantity_text,
+)
 from ppafo.answers.layout import Margins, figure_of_panels
 from ppafo.answers.shown_metrics import metric_quantity, metric_title
-from ppafo.answers.shown_units import change_text, drawn_unit, quantity_of_unit, quantity_text, shown, shown_values
 from ppafo.answers.style import BLACK, BLUE, GREEN, VERMILION, house_style, mark_kind
 from ppafo.questions.find.solve import Found
 from ppafo.simulation.document import plain
@@ -85,15 +92,17 @@ def find_figure(found: Found) -> "matplotlib.figure.Figure":
     quantity, metric = quantity_of_unit(found.path.quantity.unit), metric_quantity(found.condition.metric)
     with house_style():
         figure, ((axes,),) = figure_of_panels(_SIZE, _MARGINS, 1)
-        values = shown_values(found.values, quantity)
-        axes.plot(values, shown_values(found.metrics, metric), color=BLUE)
-        axes.plot(values[found.grid], shown_values(found.metrics[found.grid], metric), "o", color=BLUE, markersize=3)
-        axes.axhline(shown(found.condition.limit, metric), color=BLACK, linestyle="--", linewidth=1.0)
+        values = display_values(found.values, quantity)
+        axes.plot(values, display_values(found.metrics, metric), color=BLUE)
+        axes.plot(values[found.grid], display_values(found.metrics[found.grid], metric), "o", color=BLUE, markersize=3)
+        axes.axhline(display_value(found.condition.limit, metric), color=BLACK, linestyle="--", linewidth=1.0)
         for low, high in stretches(found):
-            axes.axvspan(shown(low, quantity), shown(high, quantity), color=GREEN, alpha=0.12, linewidth=0)
+            axes.axvspan(
+                display_value(low, quantity), display_value(high, quantity), color=GREEN, alpha=0.12, linewidth=0
+            )
         if found.value is not None:
-            axes.axvline(shown(found.value, quantity), color=VERMILION, linewidth=1.4)
-        unit = drawn_unit(quantity) if quantity else found.path.quantity.unit
+            axes.axvline(display_value(found.value, quantity), color=VERMILION, linewidth=1.4)
+        unit = axis_unit(quantity) if quantity else found.path.quantity.unit
         axes.set_xlabel(f"{found.path.path} ({unit})" if unit else found.path.path)
         axes.set_ylabel(metric_title(found.condition.metric))
         mark_kind(figure, "simulated")

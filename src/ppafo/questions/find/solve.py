@@ -109,7 +109,7 @@ def find(
     search.run(np.linspace(low, high, grid))
     if not np.isfinite(search.metrics).any():
         raise StudyError(
-            f"scenario '{base.name}': no run from {path.shown(low)} to {path.shown(high)} has a "
+            f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
             f"'{condition.metric}'{search.reason and '; the first: '}{search.reason}"
         )
     value, beyond = search.ends(highest)
@@ -163,7 +163,9 @@ class _Search:
 def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
     parts = _RANGE.fullmatch(text)
     if parts is None:
-        raise StudyError(f"'{one_line(text)}' is not of the form PATH=LOW..HIGH, as 'supply.pressure=20..90 psi_g' is")
+        raise StudyError(
+            f"'{one_line(text)}' is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'"
+        )
     try:
         path = varied_path(parts[1], base)
         unit = split_quantity(parts[3])[1]
@@ -172,7 +174,7 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
     except (ScenarioError, UnitError) as error:
         raise StudyError(f"'{one_line(text)}': {error}") from error
     if not low < high:
-        raise StudyError(f"'{one_line(text)}': the range must begin below its end")
+        raise StudyError(f"'{one_line(text)}': the low end must be below the high end")
     return path, low, high
 
 
@@ -180,7 +182,8 @@ def _condition(text: str, base: Scenario) -> Condition:
     parts = _CONDITION.fullmatch(text)
     if parts is None:
         raise StudyError(
-            f"'{one_line(text)}' is not of the form METRIC <= LIMIT or METRIC >= LIMIT, as 'final_error <= 0.3 N m' is"
+            f"'{one_line(text)}' is not of the form METRIC <= LIMIT or METRIC >= LIMIT, "
+            "for example 'final_error <= 0.3 N m'"
         )
     check_metrics([parts[1]], base)
     return Condition(

@@ -6,5 +6,7 @@ from ppafo.questions.question import Argument, Question
 
 QUESTION = Question(
     solve="ppafo.questions.identify.solve:identify",
-    arguments=(Argument(("PROBLEM",), "problem", "a .toml file; 'ppafo schema identification'", "PROBLEM", Path),),
+    arguments=(
+        Argument(("PROBLEM",), "problem", "a problem file (.toml); see 'ppafo schema identification'", "PROBLEM", Path),
+    ),
 )

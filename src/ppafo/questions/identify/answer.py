@@ -128,9 +128,10 @@ def _profile(one: Profile, before: ParameterSet) -> str:
 
 
 def _candidate(one: Expected) -> str:
-    share = 1.0 - one.shrinkage[one.most_helped]
+    fraction = 1.0 - one.shrinkage[one.most_helped]
     return (
-        f"{one.label}: gain {one.gain:.2f}; largest for {one.most_helped}, whose interval would shrink by {share:.0%}"
+        f"{one.label}: gain {one.gain:.2f}; largest for {one.most_helped}, "
+        f"whose interval would shrink by {fraction:.0%}"
     )
 
 

@@ -20,7 +20,7 @@ _COLUMNS = 3
 _WIDTH, _HEIGHT = 2.75, 2.35
 _LEFT, _RIGHT, _TOP, _BOTTOM, _COLUMN_GAP, _ROW_GAP = 0.62, 0.25, 0.82, 0.55, 0.5, 0.85
 """Inches."""
-_MOST_SHOWN = 1.9
+_MAXIMUM_SHOWN = 1.9
 """Largest rise that a panel shows, in thresholds."""
 
 
@@ -59,7 +59,7 @@ def _draw(axes: "Axes", one: Profile, estimate: Estimate, before: ParameterSet) 
         if side is not None:
             axes.axvline(in_set_unit(side, one.path, one.unit, before)[0], color=VERMILION, linewidth=1.0)
     axes.plot([value], [0.0], "|", color=BLACK, markersize=12)
-    axes.set_ylim(0.0, _MOST_SHOWN * one.threshold)
+    axes.set_ylim(0.0, _MAXIMUM_SHOWN * one.threshold)
     axes.set_title(one.path, fontsize=9.5)
     axes.set_xlabel(f"({unit})" if unit not in ("", "-") else "")
     axes.locator_params(axis="x", nbins=3)

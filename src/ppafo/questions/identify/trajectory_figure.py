@@ -23,7 +23,7 @@ _MATRIX_CELL, _LETTER, _MATRIX_TOP = 0.62, 0.08, 0.5
 """Inches."""
 
 _DOT, _SAMPLE = 1.6, 3.6
-_MOST_DOTS = 90
+_MAXIMUM_DOTS = 90
 """Samples shown beside the line; what is left is shown of all."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
 _NAMED = 0.3
@@ -115,7 +115,7 @@ def _channels(atmosphere: float) -> tuple[_ChannelPanel, ...]:
 def _draw(one: _ChannelPanel, panels: "tuple[Axes, Axes]", measurement: Recording, model: Recording) -> None:
     values, left = panels
     samples, fitted = (one.factor * (recording[one.channel] - one.zero) for recording in (measurement, model))
-    some = slice(None, None, -(-measurement.time.size // _MOST_DOTS))
+    some = slice(None, None, -(-measurement.time.size // _MAXIMUM_DOTS))
     times, word = measurement.time[some], _KIND_WORDS[measurement.kind]
     values.plot(
         times,

@@ -3,7 +3,7 @@
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import shown
+from ppafo.answers.display_units import display_value
 from ppafo.questions.league.draws import UNCERTAINTIES
 from ppafo.questions.league.figure import league_figure
 from ppafo.questions.league.presentation import Presentation
@@ -65,7 +65,7 @@ def league_remarks(league: League) -> list[str]:
     remarks += [shown_as.bound_sentence(valve, bounded) for valve, bounded in league.bounds.items()]
     remarks += [f"no lower bound: {league.without_bound}"] if league.without_bound else []
     if league.draws:
-        spread = ", ".join(f"{item.name} {shown(item.share, 'fraction'):.0f} %" for item in UNCERTAINTIES)
+        spread = ", ".join(f"{item.name} {display_value(item.fraction, 'fraction'):.0f} %" for item in UNCERTAINTIES)
         remarks.append(shown_as.draws_remark.format(draws=f"{league.draws:,}", spread=spread))
     remarks += _noise_remarks(league)
     for standing in league.standings:
@@ -77,12 +77,14 @@ def league_remarks(league: League) -> list[str]:
 
 def _noise_remarks(league: League) -> list[str]:
     """Return what fraction of the spread of each entrant's error over the draws is noise; nothing without noise."""
-    shares = {
+    fractions = {
         item.entrant.name: item.robustness.noise(league.contest.error)
         for item in league.standings
         if item.robustness is not None
     }
-    known = ", ".join(f"{name} {fraction_text(share)}" for name, share in shares.items() if share is not None)
+    known = ", ".join(
+        f"{name} {fraction_text(fraction)}" for name, fraction in fractions.items() if fraction is not None
+    )
     words = "fraction of the error's variance over the draws that is due to sensor noise"
     return [f"{words}: {known}"] if known else []
 
@@ -105,7 +107,7 @@ def _data(league: League) -> dict[str, Any]:
         **shown_as.task_data(league),
         "draws": league.draws,
         "seed": league.seed,
-        "uncertainties": {item.name: item.share for item in UNCERTAINTIES},
+        "uncertainties": {item.name: item.fraction for item in UNCERTAINTIES},
         "standings": [_standing_data(league, standing) for standing in league.standings],
         "absent": dict(league.absent),
         "lower_bounds": {valve: shown_as.bound_data(bounded) for valve, bounded in league.bounds.items()},

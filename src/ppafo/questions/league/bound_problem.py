@@ -69,7 +69,7 @@ def smooth_flow(pressure_a: Any, pressure_b: Any, conductance: float, curve: Flo
     gap = (pressure_a - pressure_b) / upstream
     size = casadi.fabs(gap)
     polynomial: Any = 0.0
-    for coefficient in (curve.c6, curve.c5, curve.c4, curve.c3, curve.c2, curve.c1, curve.c0):
+    for coefficient in reversed(curve.coefficients):
         polynomial = polynomial * size + coefficient
     # Half the gap of the straight line: the flow near equal pressures is then hardly ever below the engine's, and a
     # bound may have too much flow but not too little.

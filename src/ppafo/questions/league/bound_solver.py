@@ -111,14 +111,14 @@ class BoundSolver:
                 found[place] = min(here, again, key=lambda optimum: optimum.gas)
         return found
 
-    def _solve(self, weights: tuple[float, float], most_square: float) -> Optimum:
+    def _solve(self, weights: tuple[float, float], maximum_square: float) -> Optimum:
         built = self._programme
-        zeros, shares = built.equal_to_zero.numel(), built.openings_sum.numel()
+        zeros, sums = built.equal_to_zero.numel(), built.openings_sum.numel()
         limits: dict[str, Any] = {
             "lbx": built.lowest,
             "ubx": built.highest,
-            "lbg": [0.0] * zeros + [-np.inf] * (shares + 1),
-            "ubg": [0.0] * zeros + [1.0] * shares + [most_square],
+            "lbg": [0.0] * zeros + [-np.inf] * (sums + 1),
+            "ubg": [0.0] * zeros + [1.0] * sums + [maximum_square],
         }
         ended = ""
         for start in (self._near, self._first):

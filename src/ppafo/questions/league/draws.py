@@ -20,7 +20,7 @@ class Uncertainty:
     """A value of the device that is uncertain: by what fraction either way, and the device with it times a factor."""
 
     name: str
-    share: float
+    fraction: float
     scaled: Callable[[Device, float], Device]
 
 
@@ -93,9 +93,9 @@ def scale_device(device: Device, factors: Sequence[float]) -> Device:
 
 def draw_factors(draws: int, seed: int = SEED) -> Floats:
     """Factors (draws, uncertainties), the same for every controller."""
-    shares = np.array([item.share for item in UNCERTAINTIES])
-    even = np.random.default_rng(seed).uniform(-1.0, 1.0, (draws, shares.size))
-    return np.asarray(1.0 + shares * even)
+    fractions = np.array([item.fraction for item in UNCERTAINTIES])
+    even = np.random.default_rng(seed).uniform(-1.0, 1.0, (draws, fractions.size))
+    return np.asarray(1.0 + fractions * even)
 
 
 def draw_seeds(draws: int, seed: int = SEED) -> Floats:

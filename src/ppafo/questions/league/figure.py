@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.answers.shown_units import shown
+from ppafo.answers.display_units import display_value
 from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.questions.league.presentation import Look
 from ppafo.questions.league.solve import League
@@ -56,7 +56,9 @@ def league_figure(league: League, look: Look) -> "Figure":
 def _points(bounded: Bounded[Bound]) -> tuple[list[float], list[float]]:
     """Return errors and gas of a bound as they are shown."""
     points = bounded.points
-    return [shown(item.rms_error, "torque") for item in points], [shown(item.gas, "gas mass") for item in points]
+    return [display_value(item.rms_error, "torque") for item in points], [
+        display_value(item.gas, "gas mass") for item in points
+    ]
 
 
 def _scale(axes: "Axes") -> None:
@@ -80,7 +82,7 @@ def _name_numbers(axis: "Axis") -> None:
 
 
 def _draw_end(axes: "Axes", bounded: Bounded[Bound], colour: str) -> None:
-    """Draw how a bound goes on from its minimum error: upwards, or to the left where that error counts as none."""
+    """Draw how a bound continues from its minimum error: upwards, or to the left where that error counts as none."""
     (error, *_), (gas, *_) = _points(bounded)
     left, top = axes.get_xlim()[0], axes.get_ylim()[1]
     end = ([left, error], [gas, gas]) if bounded.bound.is_attainable else ([error, error], [gas, top])
@@ -99,13 +101,13 @@ def _draw_standing(axes: "Axes", league: League, standing: Standing, look: Look,
     error, taken = standing.measures.get(look.error), standing.measures.get(league.contest.gas)
     if error is None or taken is None:
         return
-    gas, colour = shown(taken, "gas mass"), _COLOURS.get(standing.entrant.valve, BLACK)
+    gas, colour = display_value(taken, "gas mass"), _COLOURS.get(standing.entrant.valve, BLACK)
     robust, least = standing.robustness, league.least_gas(standing)
     if robust is not None and not robust.failed:
         across = [robust.not_exceeded(look.error, fraction) for fraction in (0.05, 0.95)]
         axes.plot(across, [gas] * 2, color=colour, linewidth=0.9, alpha=0.6)
     if least is not None and not look.is_logarithmic:
-        axes.plot([error] * 2, [shown(least, "gas mass"), gas], color=colour, linewidth=0.8, linestyle=":")
+        axes.plot([error] * 2, [display_value(least, "gas mass"), gas], color=colour, linewidth=0.8, linestyle=":")
     axes.plot(
         [error],
         [gas],

@@ -29,14 +29,14 @@ from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMoti
 
 MISSING_EXTRA = "the lower bound needs CasADi: pip install ppafo[optimal]"
 FIRST_INTERVALS = 75
-MOST_INTERVALS = 1200
+MAXIMUM_INTERVALS = 1200
 NEARLY = 1.01
 """Factor within which the minimum error is the one that counts as none."""
 CLOSED = 1.0e-6
 """An opening below this is none."""
 REFERENCE_POINTS = 1001
 CURVE_POINTS = 12
-CURVE_SHARES = (0.003, 0.4)
+CURVE_FRACTIONS = (0.003, 0.4)
 """First and last point of the curve: error above the minimum, over the error of doing nothing."""
 FINE_ENOUGH = 0.01
 """Fraction by which minimum error and minimum gas may move when the grid is made twice as fine."""
@@ -109,7 +109,7 @@ def lower_bound(scenario: Scenario, errors: Sequence[float] = (), progress: Repo
     intervals, moved = FIRST_INTERVALS, np.inf
     solver = BoundSolver(scenario, intervals)
     before = _probe(solver)
-    while moved > FINE_ENOUGH and 2 * intervals <= MOST_INTERVALS:
+    while moved > FINE_ENOUGH and 2 * intervals <= MAXIMUM_INTERVALS:
         intervals *= 2
         progress(Progress(f"lower bound with {intervals} intervals"))
         solver = BoundSolver(scenario, intervals)
@@ -177,5 +177,5 @@ def _probe(solver: BoundSolver) -> tuple[float, ...]:
 
 def _curve_errors(solver: BoundSolver, least: Optimum) -> list[float]:
     """Errors [N m] above the minimum, near it close together, up to a fraction of the error of doing nothing."""
-    excess = solver.idle_error * np.geomspace(*CURVE_SHARES, CURVE_POINTS)
+    excess = solver.idle_error * np.geomspace(*CURVE_FRACTIONS, CURVE_POINTS)
     return [least.rms_error + float(value) for value in excess]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ppafo.answers import Column
-from ppafo.answers.shown_units import quantity_text, shown, titled
+from ppafo.answers.display_units import display_value, quantity_text, title_with_unit
 from ppafo.metrics import METRICS
 from ppafo.questions.league.lower_bound import LowerBound
 from ppafo.questions.league.presentation import Look, Presentation, TableColumn, measure, of_draws
@@ -32,7 +32,7 @@ def bound_sentence(valve: str, bounded: Bounded[LowerBound]) -> str:
     )
     if not bounded.played:
         return f"{text}; for a valve that switches infinitely fast, so no run can confirm it"
-    error, gas = (quantity_text(share, "fraction", ".2g") for share in disagreement(bounded))
+    error, gas = (quantity_text(fraction, "fraction", ".2g") for fraction in disagreement(bounded))
     return f"{text}; in the simulation the error agrees within {error}, the gas within {gas}"
 
 
@@ -90,8 +90,8 @@ def _learning_remarks(_league: League, standing: Standing) -> Sequence[str]:
     if learning is None:
         return ()
     ended = "stopped improving" if learning.is_converged else "was still improving"
-    first, best = (shown(learning.errors[place], "torque") for place in (0, learning.best))
-    unit = titled("", "torque").strip(" ()")
+    first, best = (display_value(learning.errors[place], "torque") for place in (0, learning.best))
+    unit = title_with_unit("", "torque").strip(" ()")
     return (
         f"{standing.entrant.name}: RMS error {first:.4f} {unit} in the first repetition, {best:.4f} {unit} in "
         f"repetition {learning.best + 1}; after {len(learning.errors)} it {ended}",
@@ -117,8 +117,8 @@ TORQUE = Presentation(
         size=(8.0, 5.4),
         right=0.66,
         error=_ERROR,
-        error_label=titled("RMS torque error", "torque"),
-        gas_label=titled("Gas taken from the supply", "gas mass"),
+        error_label=title_with_unit("RMS torque error", "torque"),
+        gas_label=title_with_unit("Gas taken from the supply", "gas mass"),
         title="Error against gas: nothing below and left of a line is possible",
         is_logarithmic=True,
     ),

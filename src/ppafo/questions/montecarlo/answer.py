@@ -3,8 +3,8 @@
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import change_text, display_unit, display_value
 from ppafo.answers.shown_metrics import metric_quantity
-from ppafo.answers.shown_units import change_text, shown, shown_unit
 from ppafo.questions.montecarlo.estimate import Look, MonteCarlo
 from ppafo.questions.montecarlo.figure import monte_carlo_figure
 from ppafo.simulation.document import plain
@@ -35,8 +35,8 @@ def verdict(estimate: MonteCarlo) -> str:
     interval, rule = estimate.last.interval, estimate.rule
     numbers = [_level(estimate, value) for value in (interval.value, interval.low, interval.high)]
     is_narrow = rule.is_narrow(interval)
-    ending = "" if is_narrow else f"; the target width was not reached with the maximum of {rule.most:,} draws"
-    what = "" if estimate.statistic.unit == "-" else f" {shown_unit(metric_quantity(estimate.metric))}"
+    ending = "" if is_narrow else f"; the target width was not reached with the maximum of {rule.maximum:,} draws"
+    what = "" if estimate.statistic.unit == "-" else f" {display_unit(metric_quantity(estimate.metric))}"
     return (
         f"{estimate.statistic.label} of {estimate.metric}: {numbers[0]} [{numbers[1]}, {numbers[2]}]{what} "
         f"after {estimate.last.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
@@ -49,9 +49,9 @@ def remarks(estimate: MonteCarlo) -> list[str]:
     last = estimate.last
     if not last.is_carried:
         said.append(
-            f"do not trust this interval: as few as {last.carrying:.3g} of {last.draws - last.missing:,} draws "
-            "determine the mean, so that the true value lies outside more often than stated; request a quantile "
-            "or a probability"
+            f"do not trust this interval: the mean has an effective sample size of {last.effective_size:.3g} of "
+            f"{last.draws - last.missing:,} draws, so that the true value lies outside more often than stated; request "
+            "a quantile or a probability"
         )
     if estimate.noise is not None:
         said.append(f"sensor noise causes {fraction_text(estimate.noise)} of the variance over the draws")
@@ -94,14 +94,14 @@ def _data(estimate: MonteCarlo) -> dict[str, Any]:
 def _row(estimate: MonteCarlo, look: Look) -> list[str]:
     interval = look.interval
     met = "narrow enough" if estimate.rule.is_narrow(interval) else ""
-    met = met if look.is_carried else f"{met}{', but ' if met else ''}few draws determine it"
+    met = met if look.is_carried else f"{met}{', but ' if met else ''}its effective sample size is small"
     levels = [_level(estimate, value) for value in (interval.value, interval.low, interval.high)]
     return [f"{look.draws:,}", f"{look.missing:,}", *levels, _difference(estimate, interval.width), met]
 
 
 def _level(estimate: MonteCarlo, value: float) -> str:
     quantity = "" if estimate.statistic.unit == "-" else metric_quantity(estimate.metric)
-    return f"{shown(value, quantity):.5g}"
+    return f"{display_value(value, quantity):.5g}"
 
 
 def _difference(estimate: MonteCarlo, value: float) -> str:

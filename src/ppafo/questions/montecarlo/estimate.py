@@ -14,8 +14,8 @@ from ppafo.answers import Solved
 from ppafo.errors import StudyError
 from ppafo.questions.montecarlo.statistic import Statistic
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import MOST_DRAWS, Columns, Uncertainty, with_new_noise
-from ppafo.studies.intervals import FEWEST_CARRYING, Interval, noise_interval
+from ppafo.studies.draws import MAXIMUM_DRAWS, Columns, Uncertainty, with_new_noise
+from ppafo.studies.intervals import FEWEST_EFFECTIVE, Interval, noise_interval
 from ppafo.studies.outcomes import Model, Outcomes, check_confidence, check_failures, check_fraction, join
 
 FEWEST_DRAWS = 32
@@ -25,38 +25,38 @@ NOISE_DRAWS = 512
 
 @dataclass(frozen=True, slots=True)
 class StoppingRule:
-    """When to stop: at an interval of this width, or after ``most`` draws.
+    """When to stop: at an interval of this width, or after ``maximum`` draws.
 
     ``width`` is in the SI unit of the statistic, or a fraction of its value where ``is_relative``. The first look is
     after ``first`` draws, each later one after twice as many; ``confidence`` holds for all looks together. Draws are
-    refused where more than the fraction ``most_failed`` of them fails.
+    refused where more than the fraction ``maximum_failed`` of them fails.
     """
 
     width: float
     is_relative: bool
     first: int = 256
-    most: int = 2**20
+    maximum: int = 2**20
     confidence: float = 0.95
-    most_failed: float = 0.01
+    maximum_failed: float = 0.01
 
     def __post_init__(self) -> None:
         """Refuse a rule that can never be met or that asks for nothing."""
         if not (math.isfinite(self.width) and self.width > 0.0):
             raise StudyError(f"width = {self.width!r}: must be more than 0")
-        if not FEWEST_DRAWS <= self.first <= self.most <= MOST_DRAWS:
+        if not FEWEST_DRAWS <= self.first <= self.maximum <= MAXIMUM_DRAWS:
             raise StudyError(
-                f"first = {self.first!r} and maximum = {self.most!r} draws: must be at least {FEWEST_DRAWS}, the "
-                f"first not more than the maximum, and the maximum not above {MOST_DRAWS:,}"
+                f"first = {self.first!r} and maximum = {self.maximum!r} draws: must be at least {FEWEST_DRAWS}, the "
+                f"first not more than the maximum, and the maximum not above {MAXIMUM_DRAWS:,}"
             )
         check_confidence(self.confidence)
-        check_fraction(self.most_failed, "most_failed")
+        check_fraction(self.maximum_failed, "maximum_failed")
 
     @property
     def sizes(self) -> tuple[int, ...]:
         """The numbers of draws at which it is looked at the interval, at most."""
         found = [self.first]
-        while found[-1] < self.most:
-            found.append(min(2 * found[-1], self.most))
+        while found[-1] < self.maximum:
+            found.append(min(2 * found[-1], self.maximum))
         return tuple(found)
 
     @property
@@ -73,18 +73,18 @@ class StoppingRule:
 class Look:
     """What was seen after some draws: how many, how many of them without a value, and the interval [SI].
 
-    ``carrying`` is how many of them determine the estimate: fewer than there are where a few large values decide.
+    ``effective_size`` is how many of them determine the estimate: fewer than there are where a few large values decide.
     """
 
     draws: int
     missing: int
     interval: Interval
-    carrying: float
+    effective_size: float
 
     @property
     def is_carried(self) -> bool:
         """Tell whether enough draws determine the estimate; an interval without width is carried by all."""
-        return self.carrying >= min(FEWEST_CARRYING, 0.5 * (self.draws - self.missing))
+        return self.effective_size >= min(FEWEST_EFFECTIVE, 0.5 * (self.draws - self.missing))
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,13 +148,13 @@ def draw_until(
 
 
 def _look(outcomes: Outcomes, metric: str, statistic: Statistic, rule: StoppingRule) -> Look:
-    check_failures(outcomes, rule.most_failed, "Monte Carlo")
+    check_failures(outcomes, rule.maximum_failed, "Monte Carlo")
     found = outcomes.metrics[metric]
     values = found[np.isfinite(found)]
     missing = outcomes.runs - values.size
-    if missing > rule.most_failed * outcomes.runs:
+    if missing > rule.maximum_failed * outcomes.runs:
         raise StudyError(
             f"Monte Carlo: {missing:,} of {outcomes.runs:,} runs have no '{metric}'; choose another metric"
         )
     interval = statistic.estimate(found, rule.confidence_of_look)
-    return Look(outcomes.runs, missing, interval, statistic.carrying(found))
+    return Look(outcomes.runs, missing, interval, statistic.effective_size(found))

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ppafo.answers.display_units import display_difference, display_value, display_values
 from ppafo.answers.layout import Margins, figure_of_free_panels
 from ppafo.answers.shown_metrics import metric_quantity, metric_title
-from ppafo.answers.shown_units import shown, shown_change, shown_values
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.questions.montecarlo.estimate import MonteCarlo
 from ppafo.studies.distributions import Floats
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _SIZE = (8.4, 3.5)
 _MARGINS = Margins(left=0.85, right=0.2, top=0.55, bottom=0.55, row_gap=0.0, column_gap=0.95)
-_MOST_BINS = 80
+_MAXIMUM_BINS = 80
 
 
 def monte_carlo_figure(estimate: MonteCarlo) -> "Figure":
@@ -33,7 +33,7 @@ def monte_carlo_figure(estimate: MonteCarlo) -> "Figure":
 def _draw_trace(axes: "Axes", estimate: MonteCarlo) -> None:
     draws = [look.draws for look in estimate.looks]
     rows = [(look.interval.value, look.interval.low, look.interval.high) for look in estimate.looks]
-    values = _in_shown_unit(estimate, np.array(rows))
+    values = _in_display_unit(estimate, np.array(rows))
     known = np.isfinite(values).all(axis=1)
     axes.vlines(np.array(draws)[known], values[known, 1], values[known, 2], color=BLUE, linewidth=3, alpha=0.45)
     axes.plot(draws, values[:, 0], "o-", color=BLUE, markersize=5, linewidth=1.0)
@@ -46,25 +46,25 @@ def _draw_trace(axes: "Axes", estimate: MonteCarlo) -> None:
 
 
 def _draw_values(axes: "Axes", estimate: MonteCarlo) -> None:
-    values = shown_values(estimate.values, metric_quantity(estimate.metric))
-    axes.hist(values, bins=min(_MOST_BINS, max(10, int(np.sqrt(values.size)))), color=BLUE, alpha=0.55)
+    values = display_values(estimate.values, metric_quantity(estimate.metric))
+    axes.hist(values, bins=min(_MAXIMUM_BINS, max(10, int(np.sqrt(values.size)))), color=BLUE, alpha=0.55)
     threshold = getattr(estimate.statistic, "threshold", None)
     if estimate.statistic.unit != "-" or threshold is None:
         axes.axvline(
-            float(_in_shown_unit(estimate, np.array(estimate.last.interval.value))), color=VERMILION, linewidth=1.4
+            float(_in_display_unit(estimate, np.array(estimate.last.interval.value))), color=VERMILION, linewidth=1.4
         )
     else:
-        axes.axvline(shown(threshold, metric_quantity(estimate.metric)), color=VERMILION, linewidth=1.4)
+        axes.axvline(display_value(threshold, metric_quantity(estimate.metric)), color=VERMILION, linewidth=1.4)
     axes.set_xlabel(metric_title(estimate.metric))
     axes.set_ylabel("Draws")
     axes.set_title(f"{values.size:,} values")
 
 
-def _in_shown_unit(estimate: MonteCarlo, values: Floats) -> Floats:
+def _in_display_unit(estimate: MonteCarlo, values: Floats) -> Floats:
     if estimate.statistic.unit == "-":
         return values
-    return shown_values(values, metric_quantity(estimate.metric))
+    return display_values(values, metric_quantity(estimate.metric))
 
 
 def _scale(estimate: MonteCarlo) -> float:
-    return 1.0 if estimate.statistic.unit == "-" else shown_change(1.0, metric_quantity(estimate.metric))
+    return 1.0 if estimate.statistic.unit == "-" else display_difference(1.0, metric_quantity(estimate.metric))

@@ -16,7 +16,7 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty
 from ppafo.studies.intervals import (
     Interval,
-    draws_that_carry,
+    effective_sample_size,
     fraction_interval,
     quantile_interval,
     replicates_interval,
@@ -50,7 +50,7 @@ class Statistic(Protocol):
         """Return estimate and interval from the values (draws,) of the metric [SI] at these draws; nan has no value."""
         ...
 
-    def carrying(self, values: Floats) -> float:
+    def effective_size(self, values: Floats) -> float:
         """Return how many of the values determine the estimate; all where its interval is exact."""
         ...
 
@@ -70,9 +70,9 @@ class Mean:
         """Return estimate and interval [SI]."""
         return replicates_interval(values, REPLICATES, confidence)
 
-    def carrying(self, values: Floats) -> float:
+    def effective_size(self, values: Floats) -> float:
         """Return how many of the values determine the mean."""
-        return draws_that_carry(values[np.isfinite(values)])
+        return effective_sample_size(values[np.isfinite(values)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +80,12 @@ class Quantile:
     """The value of a metric below which a fraction of the runs lies."""
 
     unit: str
-    share: float
+    fraction: float
 
     @property
     def label(self) -> str:
         """The statistic in words."""
-        return f"quantile {self.share:g}"
+        return f"quantile {self.fraction:g}"
 
     def columns(self, uncertainty: Uncertainty, first: int, count: int, seed: int) -> Columns:
         """Return independent draws."""
@@ -93,9 +93,9 @@ class Quantile:
 
     def estimate(self, values: Floats, confidence: float) -> Interval:
         """Return estimate and interval [SI]."""
-        return quantile_interval(values[np.isfinite(values)], self.share, confidence)
+        return quantile_interval(values[np.isfinite(values)], self.fraction, confidence)
 
-    def carrying(self, values: Floats) -> float:
+    def effective_size(self, values: Floats) -> float:
         """Return the number of values: the interval is exact."""
         return float(np.count_nonzero(np.isfinite(values)))
 
@@ -124,7 +124,7 @@ class Probability:
         hits = known > self.threshold if self.is_above else known < self.threshold
         return fraction_interval(int(np.count_nonzero(hits)), known.size, confidence)
 
-    def carrying(self, values: Floats) -> float:
+    def effective_size(self, values: Floats) -> float:
         """Return the number of values: the interval is exact."""
         return float(np.count_nonzero(np.isfinite(values)))
 

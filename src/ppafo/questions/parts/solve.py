@@ -26,6 +26,6 @@ def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Parts:
     named = {item.name: item for item in loaded.parts}
     if part is not None and part not in named:
         raise ParameterError(
-            f"{loaded.file}: there is no part '{part}'{nearest_name(part, named)}; there are {', '.join(named)}"
+            f"{loaded.file}: there is no part '{part}'{nearest_name(part, named)}; available: {', '.join(named)}"
         )
     return Parts(loaded, None if part is None else named[part])

@@ -5,7 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.typesetting import printed_quantity, quantity
+from ppafo.answers.typesetting import format_printed_quantity, quantity
 from ppafo.identification.bench_figures import synthetic_figure_3
 from ppafo.questions.reproduce.claim import count_sentence, verdict_counts
 from ppafo.questions.reproduce.page import holding_torque, reproduction_page
@@ -35,7 +35,7 @@ def answer_of(reproduction: Reproduction) -> Answer:
     rows = tuple(
         (
             claim.id,
-            printed_quantity(claim.paper, claim.unit),
+            format_printed_quantity(claim.paper, claim.unit),
             None if claim.value is None else quantity(claim.value, claim.unit),
             claim.verdict_words,
         )

@@ -69,11 +69,11 @@ def _product(printed: Printed, identifier: str, path: str, rate_path: str, rate_
     value = printed.in_printed_unit(path, printed.in_si(_INERTIA) * abs(printed.in_si(rate_path)))
     rate = f"{abs(printed.number(rate_path)):g} {printed.unit(rate_path)}"
     implied = printed.in_printed_unit(_INERTIA, printed.in_si(path) / abs(printed.in_si(rate_path)))
-    statement = f"The {name} is the inertia, {printed.written(_INERTIA)}, times the measured {rate_name}, {rate}."
+    statement = f"The {name} is the inertia, {printed.quotation(_INERTIA)}, times the measured {rate_name}, {rate}."
     note = (
         f"The printed product holds {_DIGITS}."
         if holds
-        else f"The product is {value:.3g} {printed.unit(path)}; the printed {printed.written(path)} would need an "
+        else f"The product is {value:.3g} {printed.unit(path)}; the printed {printed.quotation(path)} would need an "
         f"inertia of {implied:.2g} {printed.unit(_INERTIA)}. The measured {rate_name} itself cannot be tested here."
     )
     return _claim(printed, identifier, statement, path, value, holds, note)
@@ -88,7 +88,7 @@ def _coefficient(printed: Printed, valve: str) -> Claim:
     needed = printed.range(flow).over(printed.range(area)).over(Interval(per_area, per_area))
     holds = needed.meets(printed.range(coefficient))
     stated = 1e3 * printed.in_si(coefficient) * printed.in_si(area) * per_area
-    through = f"{printed.written(area)} and {printed.written(flow)} at {printed.written(pressure)}"
+    through = f"{printed.quotation(area)} and {printed.quotation(flow)} at {printed.quotation(pressure)}"
     statement = f"The discharge coefficient of the {valve} valve follows from its area and flow: {through}."
     note = (
         f"Agrees {_DIGITS}."

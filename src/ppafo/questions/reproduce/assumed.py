@@ -47,7 +47,7 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
     return tuple(merged.values())
 
 
-def used_by(values: Sequence[AssumedValue], *names: str) -> tuple[AssumedValue, ...]:
+def values_used_by(values: Sequence[AssumedValue], *names: str) -> tuple[AssumedValue, ...]:
     """Return the values that at least one of the named experiments uses."""
     return tuple(value for value in values if set(names) & set(value.used_by))
 
@@ -58,7 +58,7 @@ def _of_scenario(scenario: Scenario, name: str) -> list[AssumedValue]:
     of_file = _set_of_file(scenario)
     in_force = apply_to_set(of_file, changed.device, scenario.origin.valve)
     summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
-    summaries |= {path: quantity.summary for path, quantity in in_force.declared().items()}
+    summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
     own = [
         AssumedValue(item.path, summaries.get(item.path, ""), item.value, "assumed", item.note, "", (name,))
         for item in scenario.assumptions

@@ -48,8 +48,8 @@ class Claim:
     def verdict_words(self) -> str:
         """The verdict in words, and that it rests on a synthetic measurement where the verdict does not say so."""
         words = VERDICTS[self.verdict]
-        is_told = not self.is_synthetic or self.verdict == "shown_on_synthetic"
-        return words if is_told else f"{words}, synthetic"
+        is_plain = not self.is_synthetic or self.verdict == "shown_on_synthetic"
+        return words if is_plain else f"{words}, synthetic"
 
     @property
     def is_missed(self) -> bool:

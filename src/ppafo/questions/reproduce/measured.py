@@ -162,14 +162,14 @@ def _step_error(item: _StepError, agreement: RecordingAgreement, rests_on: tuple
     """Judge an RMS error by the range that the paper calls acceptable."""
     channel = next(channel for channel in agreement.channels if channel.channel == item.channel)
     value, plain = channel.rms / item.scale, channel.rms_unaligned / item.scale
-    share, plain_share = value / item.full_range, plain / item.full_range
-    holds = share <= ACCEPTABLE
+    fraction, plain_fraction = value / item.full_range, plain / item.full_range
+    holds = fraction <= ACCEPTABLE
     delay = f"{1e3 * agreement.delay.correction:.1f} ms"
     note = (
-        f"{_ONLY_THE_PROCEDURE} behaved so. Model against the virtual rig (preset {STEP_PRESET}): {share:.1%} of "
+        f"{_ONLY_THE_PROCEDURE} behaved so. Model against the virtual rig (preset {STEP_PRESET}): {fraction:.1%} of "
         f"the full range of {item.full_range:g} {item.unit}, {'within' if holds else 'beyond'} the {ACCEPTABLE:.0%} "
         f"that the paper calls acceptable. The rig's delay of {delay} was removed; with it the error is {plain:.2g} "
-        f"{item.unit}, {plain_share:.1%}{'' if plain_share <= ACCEPTABLE else ', which is beyond'}."
+        f"{item.unit}, {plain_fraction:.1%}{'' if plain_fraction <= ACCEPTABLE else ', which is beyond'}."
     )
     return Claim(
         id=item.id,

@@ -4,9 +4,9 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ppafo.answers.page import inline_figure, rendered_page
+from ppafo.answers.page import inline_figure, render_page
 from ppafo.answers.shown_metrics import metric_level
-from ppafo.answers.typesetting import printed_quantity, quantity, sentence
+from ppafo.answers.typesetting import format_printed_quantity, quantity, sentence
 from ppafo.identification.estimate import Estimate
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
@@ -68,7 +68,7 @@ def reproduction_page(
         "steps": _steps((reproduction.step, reproduction.solenoid, reproduction.proportional)),
         "command": shlex.join(_command(reproduction.overrides)),
     }
-    return rendered_page(TEMPLATE, values, "ppafo.questions.reproduce")
+    return render_page(TEMPLATE, values, "ppafo.questions.reproduce")
 
 
 def holding_torque(result: Result) -> float:
@@ -113,7 +113,7 @@ def _claim_row(claim: Claim) -> dict[str, Any]:
         "id": claim.id,
         "statement": claim.statement,
         "source": claim.source,
-        "paper": printed_quantity(claim.paper, claim.unit),
+        "paper": format_printed_quantity(claim.paper, claim.unit),
         "ours": quantity(claim.value, claim.unit),
         "verdict": claim.verdict,
         "word": claim.verdict_words,

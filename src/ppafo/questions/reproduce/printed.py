@@ -30,7 +30,7 @@ class Printed:
         self._entry_of(path)
         return self.parameter_set.numbers[path].source
 
-    def written(self, path: str) -> str:
+    def quotation(self, path: str) -> str:
         """Return number and unit for a sentence, for example ``8.4 g m^2``."""
         number, unit = self._entry_of(path)
         return f"{number:g} {unit}".rstrip()
@@ -73,4 +73,4 @@ class Printed:
 def load_printed() -> Printed:
     """Return the paper's numbers, exactly as printed."""
     parameter_set = load_parameter_set(PRINTED_SET)
-    return Printed(parameter_set, Evidence(parameter_set, parameter_set.declared()))
+    return Printed(parameter_set, Evidence(parameter_set, parameter_set.declarations()))

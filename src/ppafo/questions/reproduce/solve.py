@@ -10,7 +10,7 @@ from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding, audit
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.reproduce.arithmetic import arithmetic_claims
-from ppafo.questions.reproduce.assumed import AssumedValue, assumed_values, used_by
+from ppafo.questions.reproduce.assumed import AssumedValue, assumed_values, values_used_by
 from ppafo.questions.reproduce.claim import Claim, Observation
 from ppafo.questions.reproduce.measured import measured_claims
 from ppafo.questions.reproduce.printed import load_printed
@@ -108,8 +108,8 @@ def reproduce(
     assumed = assumed_values(scenarios)
     claims = [
         *arithmetic_claims(printed),
-        *measured_claims(printed, synthetic, used_by(assumed, STEP)),
-        *torque_task_claims(solenoid, proportional, used_by(assumed, SOLENOID, PROPORTIONAL)),
+        *measured_claims(printed, synthetic, values_used_by(assumed, STEP)),
+        *torque_task_claims(solenoid, proportional, values_used_by(assumed, SOLENOID, PROPORTIONAL)),
     ]
     events = step_events(step.recording)
     return Reproduction(

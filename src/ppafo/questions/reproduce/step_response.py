@@ -23,7 +23,7 @@ _FIRST_ANGLE, _LAST_ANGLE, _SAME_ANGLE = 20.0, 130.0, 0.5
 _CLEAR = 0.05
 _SAME = 0.01
 _NOTABLE_TIME = 2.0e-3
-"""Shares of the pressure range: a change has to be clear, a level that is reached or kept may be off by the second."""
+"""Fractions of the pressure range: a change has to be clear, a level reached or kept may be off by the second."""
 _SLOWED = 0.5
 """The fall has slowed where its rate is at most this fraction of the steepest before and after."""
 
@@ -97,7 +97,7 @@ class _Sentence:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """What the sentences are held against."""
+    """The values with which the sentences are compared."""
 
     recording: Recording
     levels: Levels
@@ -165,11 +165,11 @@ def _turns(step: _Step) -> tuple[bool, str]:
 def _rises(step: _Step) -> tuple[bool, str]:
     before, breakaway = step.standing("pressure_1"), step.events.breakaway
     holds = step.only_rises(before) and before[-1] - before[0] > _CLEAR * step.levels.range
-    share = (before[-1] - step.levels.atmosphere) / step.levels.range
+    fraction = (before[-1] - step.levels.atmosphere) / step.levels.range
     has_torque = "torque" in step.recording
     torque = f", at a torque of {step.recording['torque'][breakaway]:.2f} N m" if has_torque else ""
     return bool(holds), (
-        f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig, {100.0 * share:.0f} % of the supply; "
+        f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig, {100.0 * fraction:.0f} % of the supply; "
         f"the vane breaks away after {step.milliseconds(breakaway)}{torque}"
     )
 

@@ -19,7 +19,7 @@ TASK_PRESET = IDEAL
 
 @dataclass(frozen=True, slots=True)
 class SyntheticEvidence:
-    """Parameters identified on the rig, the step response held against the model, and both torque tasks."""
+    """Parameters identified on the rig, the step response compared with the model, and both torque tasks."""
 
     bench: BenchStudy
     step: RecordingAgreement

@@ -17,7 +17,7 @@ _SIZE = (7.6, 8.5)
 _MARGINS = Margins(left=0.68, right=0.15, top=0.42, bottom=0.52, row_gap=0.36)
 """Inches."""
 _HEIGHTS = (3.0, 0.9, 3.0, 0.9, 2.0)
-_MOST_POINTS = 1000
+_MAXIMUM_POINTS = 1000
 _SOLENOID, _PROPORTIONAL = VERMILION, BLUE
 
 
@@ -56,7 +56,7 @@ def torque_task_figure(
 
 def _add_synthetic(axes: "Axes", recording: Recording) -> None:
     """Draw the torque of a synthetic experiment as a thin line, beside which that of the simulation shows."""
-    thin = slice(None, None, max(1, len(recording) // _MOST_POINTS))
+    thin = slice(None, None, max(1, len(recording) // _MAXIMUM_POINTS))
     times, torque = recording.time[thin], recording["torque"][thin]
     axes.plot(times, torque, color=BLACK, linewidth=0.6, zorder=3, label="torque, synthetic experiment")
     axes.legend(loc="lower right")

@@ -34,7 +34,7 @@ class Settings:
     samples: int
     seed: int = 1
     confidence: float = 0.95
-    most_failed: float = 0.02
+    maximum_failed: float = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +103,10 @@ def analyse(
     design = method.design(uncertainty, settings.samples, settings.seed)
     columns = uncertainty.columns(design)
     outcomes = model(columns)
-    check_failures(outcomes, settings.most_failed, "sensitivity")
-    ends = [np.array([item.distribution.values(np.array(share)) for item in uncertainty.drawn]) for share in _ENDS]
+    check_failures(outcomes, settings.maximum_failed, "sensitivity")
+    ends = [
+        np.array([item.distribution.values(np.array(fraction)) for item in uncertainty.drawn]) for fraction in _ENDS
+    ]
     inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
     rows = design.shape[0] // settings.samples
     blocks = np.repeat(np.arange(settings.samples), rows)
@@ -118,7 +120,7 @@ def _check(uncertainty: Uncertainty, method: Method, settings: Settings) -> None
     if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(
             f"sensitivity: the indices of {method.name} need values that are independent, and the study has "
-            "[[correlations]]; take '--method shapley', or treat the values as independent (--independent)"
+            "[[correlations]]; use '--method shapley', or treat the values as independent (--independent)"
         )
     if len(uncertainty.drawn) - (uncertainty.has_noise and not method.follows_noise) < 2:
         raise StudyError("sensitivity: there is only one uncertain value; vary two or more")
@@ -129,14 +131,14 @@ def _check(uncertainty: Uncertainty, method: Method, settings: Settings) -> None
     if settings.seed < 1:
         raise StudyError(f"seed = {settings.seed}: must be 1 or more")
     check_confidence(settings.confidence)
-    check_fraction(settings.most_failed, "most_failed")
+    check_fraction(settings.maximum_failed, "maximum_failed")
 
 
 def _of_metric(name: str, outcomes: Outcomes, design: Evaluated, method: Method, settings: Settings) -> OfMetric:
     values = outcomes.metrics[name]
     known = np.isfinite(values)
     missing = int(np.count_nonzero(~known))
-    if missing > settings.most_failed * values.size:
+    if missing > settings.maximum_failed * values.size:
         raise StudyError(f"sensitivity: {missing:,} of {values.size:,} runs have no '{name}'; choose another metric")
     if float(np.ptp(values[known])) == 0.0:
         raise StudyError(f"sensitivity: '{name}' is {values[known][0]:g} in every run, so no value influences it")
@@ -146,7 +148,7 @@ def _of_metric(name: str, outcomes: Outcomes, design: Evaluated, method: Method,
     if whole.size not in sizes:
         raise StudyError(
             f"sensitivity: {int(np.count_nonzero(whole)):,} of {whole.size:,} {method.sizes_label} have '{name}' in "
-            "all their runs, which is too few; take more samples, or mend what makes the runs fail"
+            "all their runs, which is too few; use more samples, or fix what makes the runs fail"
         )
     return OfMetric(
         name,
@@ -173,5 +175,5 @@ def _settling(
 ) -> Settling:
     kept = np.flatnonzero(whole[:size])
     rows = np.flatnonzero(np.isin(design.blocks, kept))
-    found = Evaluated(design.shares[rows], design.inputs[rows], values[rows], kept, design.ranges, design.seed)
+    found = Evaluated(design.fractions[rows], design.inputs[rows], values[rows], kept, design.ranges, design.seed)
     return Settling(size, kept.size, method.indices(found, settings.confidence))

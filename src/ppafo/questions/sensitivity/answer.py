@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import change_text, display_difference, display_unit
 from ppafo.answers.shown_metrics import metric_quantity
-from ppafo.answers.shown_units import change_text, shown_change, shown_unit
 from ppafo.questions.sensitivity.analyse import OfMetric, Sensitivity
 from ppafo.questions.sensitivity.figure import sensitivity_figure
 from ppafo.simulation.document import plain
@@ -52,7 +52,7 @@ def lead(found: Sensitivity) -> list[str]:
     return [
         f"{found.name}: {method.name}, {settings.samples:,} {method.sizes_label}, {found.runs:,} runs of "
         f"{len(found.paths)} uncertain values; bands with {100.0 * settings.confidence:g} % confidence",
-        f"{found.failures:,} runs failed; up to {100.0 * settings.most_failed:g} % are allowed, and every "
+        f"{found.failures:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
         f"{method.block_label} with a failed run is left out",
     ]
 
@@ -66,7 +66,7 @@ def heading(found: Sensitivity, metric: OfMetric) -> str:
 
 def table_head(found: Sensitivity, metric: OfMetric) -> list[str]:
     """Return the head of the table of a metric."""
-    unit = shown_unit(metric_quantity(metric.metric)) if found.method.name == "morris" else ""
+    unit = display_unit(metric_quantity(metric.metric)) if found.method.name == "morris" else ""
     names = []
     for name in metric.indices.values:
         names.append(f"{_TITLES[name]} ({unit})" if unit else _TITLES[name])
@@ -124,15 +124,15 @@ def _data(found: Sensitivity) -> dict[str, Any]:
 
 
 def _cells(found: Sensitivity, metric: OfMetric, row: int) -> list[str]:
-    def shown(value: float) -> float:
-        return shown_change(value, metric_quantity(metric.metric)) if found.method.name == "morris" else value
+    def to_display(value: float) -> float:
+        return display_difference(value, metric_quantity(metric.metric)) if found.method.name == "morris" else value
 
     cells = []
     for name, values in metric.indices.values.items():
-        value = shown(values[row])
+        value = to_display(values[row])
         cells.append(f"{value:.3g}" if found.method.name == "morris" else f"{round(value, 3) + 0.0:.3f}")
         band = metric.indices.bands.get(name)
         if band is not None:
-            reach = shown(band[row])
+            reach = to_display(band[row])
             cells.append(f"± {reach:.2g}" if found.method.name == "morris" else f"± {reach:.3f}")
     return cells

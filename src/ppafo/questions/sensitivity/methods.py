@@ -46,7 +46,7 @@ class Evaluated:
     ``ranges`` (paths,) [SI] is how far each input goes from its 0.5 to its 99.5 % quantile; ``seed`` made the design.
     """
 
-    shares: Floats
+    fractions: Floats
     inputs: Floats
     values: Floats
     blocks: NDArray[np.intp]
@@ -102,7 +102,7 @@ class Method(Protocol):
         ...
 
     def design(self, uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-        """Return shares in (0, 1), shape (blocks * block_rows, paths), block after block."""
+        """Return fractions in (0, 1), shape (blocks * block_rows, paths), block after block."""
         ...
 
     def indices(self, found: Evaluated, confidence: float) -> Indices:
@@ -112,7 +112,7 @@ class Method(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Sobol:
-    """Shares of the variance: first-order (each value alone) and total (with all its interactions).
+    """Fractions of the variance: first-order (each value alone) and total (with all its interactions).
 
     Saltelli's design as SALib makes it, on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
     (2010) and Jansen (1999). The bands come from the spread between the scrambles, because the points of one sequence
@@ -133,7 +133,7 @@ class Sobol:
         return dimensions + 2
 
     def design(self, uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-        """Return shares in (0, 1) for a power of 2 of blocks; block b is of scramble b % SCRAMBLES."""
+        """Return fractions in (0, 1) for a power of 2 of blocks; block b is of scramble b % SCRAMBLES."""
         if blocks & (blocks - 1):
             raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, such as {1 << blocks.bit_length()}")
         _check_salib()
@@ -143,8 +143,8 @@ class Sobol:
         design = np.empty((each, SCRAMBLES, dimensions + 2, dimensions))
         for number in range(SCRAMBLES):
             own = replicate_seed(seed, number) % 2**32
-            shares = sobol.sample(_problem(dimensions), each, calc_second_order=False, seed=own)
-            design[:, number] = shares.reshape(each, dimensions + 2, dimensions)
+            fractions = sobol.sample(_problem(dimensions), each, calc_second_order=False, seed=own)
+            design[:, number] = fractions.reshape(each, dimensions + 2, dimensions)
         return np.clip(design.reshape(-1, dimensions), _SMALLEST, 1.0 - _SMALLEST)
 
     def indices(self, found: Evaluated, confidence: float) -> Indices:
@@ -197,20 +197,20 @@ class Morris:
 
         moved = len(uncertainty.drawn) - uncertainty.has_noise
         design = morris.sample(_problem(moved), blocks, num_levels=_LEVELS, seed=seed)
-        shares = np.asarray(TAIL + (1.0 - 2.0 * TAIL) * design)
+        fractions = np.asarray(TAIL + (1.0 - 2.0 * TAIL) * design)
         if not uncertainty.has_noise:
-            return shares
+            return fractions
         held = np.repeat(np.random.default_rng([seed, 1]).random(blocks), self.block_rows(moved))
-        return np.insert(shares, uncertainty.paths.index(NOISE), held, axis=1)
+        return np.insert(fractions, uncertainty.paths.index(NOISE), held, axis=1)
 
     def indices(self, found: Evaluated, confidence: float) -> Indices:
         """Return ``mean_effect`` with a band, and ``spread`` [unit of the metric]."""
         from scipy.special import stdtrit
 
-        blocks, paths = found.blocks.size, found.shares.shape[1]
-        shares, inputs = (table.reshape(blocks, -1, paths) for table in (found.shares, found.inputs))
+        blocks, paths = found.blocks.size, found.fractions.shape[1]
+        fractions, inputs = (table.reshape(blocks, -1, paths) for table in (found.fractions, found.inputs))
         change = np.diff(found.values.reshape(blocks, -1), axis=1)
-        moves = np.diff(shares, axis=1) != 0.0
+        moves = np.diff(fractions, axis=1) != 0.0
         way = np.sum(np.diff(inputs, axis=1) * moves, axis=1)
         climb = np.sum(change[:, :, None] * moves, axis=1)
         # Where a value takes few levels, a step may not change it: that says nothing.
@@ -231,7 +231,7 @@ def _deviation(effects: Floats, known: NDArray[np.intp]) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Shapley:
-    """Shares of the variance that add up to 1 whether the values depend on each other or not.
+    """Fractions of the variance that add up to 1 whether the values depend on each other or not.
 
     What two values explain together, because they act together or because they are correlated, is divided between
     them (Owen, 2014). By random orders: each value gets what it adds to the variance that the values before it leave
@@ -252,7 +252,7 @@ class Shapley:
         return _INNER * (dimensions - 1)
 
     def design(self, uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-        """Return shares in (0, 1): in each block, for ever more values of its order, some draws with the rest held."""
+        """Return fractions in (0, 1): in each block, for ever more values of its order, draws with the rest held."""
         from scipy.special import ndtr
 
         count = len(uncertainty.drawn)
@@ -277,7 +277,7 @@ class Shapley:
         """Return ``shapley`` with bands, by the delta method over the orders."""
         from scipy.special import stdtrit
 
-        blocks, count = found.blocks.size, found.shares.shape[1]
+        blocks, count = found.blocks.size, found.fractions.shape[1]
         table = found.values.reshape(blocks, count - 1, _INNER)
         whole = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
         left = np.var(table, axis=2, ddof=1)
@@ -286,10 +286,10 @@ class Shapley:
         orders = _orders(count, int(found.blocks.max()) + 1, found.seed)[found.blocks]
         effects = np.take_along_axis(gains, np.argsort(orders, axis=1), axis=1)
         variance = float(np.mean(whole))
-        shares = np.mean(effects, axis=0) / variance
-        away = (effects - shares * whole[:, None]) / variance
+        fractions = np.mean(effects, axis=0) / variance
+        away = (effects - fractions * whole[:, None]) / variance
         reach = float(stdtrit(blocks - 1, 0.5 + 0.5 * confidence)) * np.std(away, axis=0, ddof=1) / math.sqrt(blocks)
-        return Indices({"shapley": shares}, {"shapley": reach})
+        return Indices({"shapley": fractions}, {"shapley": reach})
 
 
 def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:

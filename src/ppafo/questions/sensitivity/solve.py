@@ -40,18 +40,18 @@ def sensitivity(
     """
     if method is not None and method not in METHODS:
         raise StudyError(
-            f"there is no method '{method}'{nearest_name(method, METHODS)}; known are {', '.join(METHODS)}"
+            f"there is no method '{method}'{nearest_name(method, METHODS)}; available: {', '.join(METHODS)}"
         )
     chosen = study_of(study, overrides)
     base = choose_configuration(chosen, configuration)
     known = uncertainty_in(chosen, base)
     used = (replace(known, scores=None) if independent else known).with_noise_of([base.scenario])
     by = METHODS[method or ("sobol" if used.scores is None else "shapley")]
-    asked = tuple(metrics) or chosen.outputs.metrics
-    if not asked:
+    requested = tuple(metrics) or chosen.outputs.metrics
+    if not requested:
         raise StudyError(f"study '{chosen.name}' keeps no metrics; name the metric to analyse")
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
     settings = Settings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
     tally = Tally(count * by.block_rows(len(used.drawn)), progress)
-    model = scenario_model(base.scenario, asked, threads, tally.add)
-    return replace(analyse(model, used, asked, by, settings), name=f"{chosen.name}, {base.name}")
+    model = scenario_model(base.scenario, requested, threads, tally.add)
+    return replace(analyse(model, used, requested, by, settings), name=f"{chosen.name}, {base.name}")

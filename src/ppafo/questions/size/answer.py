@@ -3,7 +3,7 @@
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import quantity_text, shown
+from ppafo.answers.display_units import display_value, quantity_text
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.questions.parts.answer import doubts_data, doubts_sections, titles_section
 from ppafo.questions.size.figure import sizing_figure
@@ -105,7 +105,7 @@ def _profile_sentence(problem: SizingProblem) -> str:
 
 def _row(item: SizedValve) -> tuple[str | float | None, ...]:
     if not item.works:
-        error = f"{shown(item.error, 'torque'):.3g} at best"
+        error = f"{display_value(item.error, 'torque'):.3g} at best"
         return item.valve.name, None, None, error, None, None, None, None, item.limit
     bottle = "none" if item.bottle is None else item.bottle.name
     lowest = item.lowest_pressure or item.pressure

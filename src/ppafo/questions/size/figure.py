@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.answers.shown_units import drawn_unit, shown, shown_values
+from ppafo.answers.display_units import axis_unit, display_value, display_values
 from ppafo.answers.style import ACTUAL, BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, WANTED, house_style, mark_kind
 from ppafo.questions.size.solve import SizedValve, Sizing
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _SIZE = (9.0, 6.6)
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9")
-_MOST_OF_LIMIT = 4.0
+_MAXIMUM_OF_LIMIT = 4.0
 
 
 def sizing_figure(sizing: Sizing) -> "Figure":
@@ -39,9 +39,8 @@ def _torque(axes: "Axes", sizing: Sizing) -> None:
     title = "Torque (N m)"
     if sizing.recording is not None and sizing.choice is not None:
         axes.plot(sizing.recording.time, sizing.recording["torque"], color=ACTUAL, label=sizing.choice.valve.name)
-        title += (
-            f", {sizing.choice.valve.name} at {shown(sizing.choice.pressure, 'pressure'):.1f} {drawn_unit('pressure')}"
-        )
+        pressure = display_value(sizing.choice.pressure, "pressure")
+        title += f", {sizing.choice.valve.name} at {pressure:.1f} {axis_unit('pressure')}"
     axes.set_title(f"$\\bf{{A}}$   {title}", pad=18)
     axes.set_xlabel("Time (s)")
     axes.margins(x=0.0)
@@ -54,13 +53,13 @@ def _errors(axes: "Axes", sizing: Sizing) -> None:
         pressure, error, _ = item.curve
         colour = _COLOURS[number % len(_COLOURS)]
         axes.plot(
-            shown_values(pressure, "pressure"), error, color=colour, marker=".", markersize=4, label=item.valve.name
+            display_values(pressure, "pressure"), error, color=colour, marker=".", markersize=4, label=item.valve.name
         )
         _mark(axes, item, item.error, colour)
     axes.axhline(limit, color=BLACK, linewidth=1.0, linestyle="--")
-    axes.set_ylim(0.0, _MOST_OF_LIMIT * limit)
+    axes.set_ylim(0.0, _MAXIMUM_OF_LIMIT * limit)
     axes.set_title("$\\bf{B}$   RMS error (N m), limit dashed", pad=8)
-    axes.set_xlabel(f"Supply pressure ({drawn_unit('pressure')})")
+    axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
     axes.legend(loc="upper right", fontsize=8)
 
 
@@ -70,16 +69,16 @@ def _gas(axes: "Axes", sizing: Sizing) -> None:
         keeps = error <= sizing.problem.largest_error
         colour = _COLOURS[number % len(_COLOURS)]
         axes.plot(
-            shown_values(pressure[keeps], "pressure"),
-            shown_values(gas[keeps], "gas mass"),
+            display_values(pressure[keeps], "pressure"),
+            display_values(gas[keeps], "gas mass"),
             color=colour,
             marker=".",
             markersize=4,
         )
-        _mark(axes, item, shown(item.gas, "gas mass"), colour)
+        _mark(axes, item, display_value(item.gas, "gas mass"), colour)
     axes.set_ylim(bottom=0.0)
     axes.set_title("$\\bf{C}$   Gas per repetition (g) within the limit", pad=8)
-    axes.set_xlabel(f"Supply pressure ({drawn_unit('pressure')})")
+    axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
     if not any(item.works for item in sizing.valves):
         axes.text(0.5, 0.5, "no valve keeps the limit", transform=axes.transAxes, ha="center", color=GREY)
 
@@ -88,7 +87,7 @@ def _mark(axes: "Axes", item: SizedValve, value: float, colour: str) -> None:
     """Ring the pressure that was chosen for a valve."""
     if item.works:
         axes.plot(
-            shown(item.pressure, "pressure"),
+            display_value(item.pressure, "pressure"),
             value,
             marker="o",
             markersize=9,

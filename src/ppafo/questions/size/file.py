@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.documents.models import NAME, STRICT, Text, Texts, published_schema, read_model
+from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import StudyError, UnitError
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
@@ -110,7 +110,7 @@ def read_sizing_file(name_or_path: str | Path) -> tuple[SizingFile, str]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a sizing file."""
-    return published_schema(SizingFile, "ppafo sizing")
+    return make_schema(SizingFile, "ppafo sizing")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from ppafo.control.profiles.tabulated import KNOTS
+from ppafo.control.tabulated import KNOTS
 from ppafo.documents.models import STRICT, Text, Texts
 from ppafo.errors import DataError, StudyError, UnitError
 from ppafo.storage.recordings import read_recording
@@ -91,8 +91,8 @@ def read_profile(table: ProfileTable, folder: Path, file: str) -> TorqueProfile:
     time, torque, kind = _profile_of_table(table, place) if is_typed else _profile_of_recording(table, folder, place)
     if not np.any(torque):
         raise StudyError(f"{place}: is 0 {_TORQUE} throughout; there is nothing to size for")
-    knots = choose_knots(*_open_end(time, torque))
-    return TorqueProfile(time, torque, kind, *knots)
+    knot_times, knot_values = choose_knots(*_open_end(time, torque))
+    return TorqueProfile(time=time, torque=torque, kind=kind, knot_times=knot_times, knot_values=knot_values)
 
 
 def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:

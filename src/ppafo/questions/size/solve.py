@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.answers import Solved
-from ppafo.answers.shown_units import quantity_text
+from ppafo.answers.display_units import quantity_text
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.size.file import SizingProblem, load_sizing

@@ -1,6 +1,6 @@
 """How are the metrics of a study distributed over many runs, and how do they depend on what varies?"""
 
-from ppafo.questions.question import SET, THREADS, Argument, Question, counting_number
+from ppafo.questions.question import SEED, SET, THREADS, Argument, Question, counting_number
 
 QUESTION = Question(
     solve="ppafo.questions.sweep.solve:sweep_into_folder",
@@ -10,7 +10,8 @@ QUESTION = Question(
             ("--out",), "out", "folder or address for the results; default out/NAME with the name of the study", "DIR"
         ),
         SET,
-        Argument(("--runs",), "runs", "number of draws, instead of the number in the file", "N", counting_number),
+        Argument(("--draws",), "draws", "number of draws, instead of the number in the file", "N", counting_number),
+        SEED,
         THREADS,
         Argument(
             ("--scheduler",), "scheduler", "address of a Dask scheduler whose workers compute the chunks", "ADDRESS"
@@ -18,7 +19,7 @@ QUESTION = Question(
         Argument(
             ("--yes",),
             "agreed",
-            "start even if the results will take much of the disk",
+            "start even if the results will fill much of the disk",
             action="store_true",
             default=False,
         ),

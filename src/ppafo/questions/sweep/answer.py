@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import display_difference, display_value
 from ppafo.answers.shown_metrics import metric_quantity, metric_unit
-from ppafo.answers.shown_units import shown, shown_change
 from ppafo.answers.writing import files_of
 from ppafo.questions.sweep.figure import study_figure
 from ppafo.questions.sweep.results import SUMMARY, StudyResults
@@ -66,9 +66,9 @@ def metric_cells(name: str, item: Mapping[str, Any], columns: int) -> tuple[str,
     first = (name, metric_unit(name), f"{item['count']:,}")
     if item["count"] == 0:
         return (*first, *[""] * (columns - len(first)))
-    deviation = f"{shown_change(item['sd'], quantity):.3g}" if "sd" in item else ""
-    quantiles = (f"{shown(value, quantity):.4g}" for value in item["quantiles"].values())
-    return (*first, f"{shown(item['mean'], quantity):.4g}", deviation, *quantiles)
+    deviation = f"{display_difference(item['sd'], quantity):.3g}" if "sd" in item else ""
+    quantiles = (f"{display_value(value, quantity):.4g}" for value in item["quantiles"].values())
+    return (*first, f"{display_value(item['mean'], quantity):.4g}", deviation, *quantiles)
 
 
 def _failure_remarks(results: StudyResults) -> list[str]:

@@ -16,11 +16,11 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.sampling import correlate, uniform_numbers
 from ppafo.studies.study import Configuration, Study, with_followers
 
-MOST_RUNS_OF_CHUNK = 65_536
+MAXIMUM_RUNS_OF_CHUNK = 65_536
 _FEWEST_RUNS_OF_CHUNK = 512
 _SLOW_RUNS_OF_CHUNK = 64
 """Where a Python object controls: some seconds, after which progress is said and nothing of it is lost."""
-_MOST_BYTES_OF_TRACES = 48_000_000
+_MAXIMUM_BYTES_OF_TRACES = 48_000_000
 
 ASKED_ABOVE = 10_000_000_000
 """Bytes above which a study is only started with ``--yes``."""
@@ -46,14 +46,14 @@ def chunk_size(study: Study) -> int:
         return study.runs_of_chunk
     if any(item.scenario.control.custom is not None for item in study.configurations):
         return _SLOW_RUNS_OF_CHUNK
-    bytes_of_run = 8 * len(study.outputs.traces) * most_samples(study)
-    size = MOST_RUNS_OF_CHUNK
-    while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MOST_BYTES_OF_TRACES:
+    bytes_of_run = 8 * len(study.outputs.traces) * maximum_samples(study)
+    size = MAXIMUM_RUNS_OF_CHUNK
+    while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:
         size //= 2
     return size
 
 
-def most_samples(study: Study) -> int:
+def maximum_samples(study: Study) -> int:
     """Return how many samples a channel over time has, in the longest configuration."""
     longest = max(configuration.scenario.duration for configuration in study.configurations)
     return int(longest / study.outputs.every + 1.0e-9) + 1
@@ -102,7 +102,7 @@ def _random_values(study: Study, draws: NDArray[np.int64]) -> dict[str, Floats]:
 def _uniform_numbers(study: Study, draws: NDArray[np.int64]) -> Floats:
     """Return the uniform numbers of some draws: of a small sample all and from these, of a large one in stretches."""
     dimensions = len(study.drawn)
-    if study.sample.runs <= MOST_RUNS_OF_CHUNK:
+    if study.sample.runs <= MAXIMUM_RUNS_OF_CHUNK:
         return uniform_numbers(study.sample, dimensions, 0, study.sample.runs)[draws]
     starts = np.flatnonzero(np.diff(draws, prepend=draws[0] - 2) != 1)
     stretches = np.split(draws, starts[1:])
@@ -111,7 +111,7 @@ def _uniform_numbers(study: Study, draws: NDArray[np.int64]) -> Floats:
 
 def estimate_bytes(study: Study) -> int:
     """Return an upper estimate of the bytes on disk: as if nothing could be compressed."""
-    outputs, samples = study.outputs, most_samples(study)
+    outputs, samples = study.outputs, maximum_samples(study)
     numbers = 2 + len(study.paths) + len(outputs.metrics)
     row = _FIXED_BYTES_OF_ROW + _BYTES_OF_NUMBER * numbers + _BYTES_OF_SAMPLE * samples * len(outputs.trajectories)
     counts = _BYTES_OF_COUNT * samples * len(outputs.bands) * BINS // 2
@@ -124,7 +124,7 @@ def check_room(study: Study, place: Place, agreed: bool) -> None:
     size = f"{study.runs:,} runs of '{study.name}' need about {_bytes_text(needed)}"
     if free is not None and needed > free:
         raise StudyError(
-            f"{place.address}: {size}, but only {_bytes_text(free)} are free: take fewer runs, metrics or trajectories"
+            f"{place.address}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or trajectories"
         )
     if needed > ASKED_ABOVE and not agreed:
         raise StudyError(f"{place.address}: {size}; give --yes to start it anyway")

@@ -28,8 +28,8 @@ def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish:
 def _work_through(client: Any, task: Task, numbers: Any, finish: Callable[[Finished], None], distributed: Any) -> None:
     queue = distributed.as_completed(loop=client.loop)
 
-    def submit(most: int) -> None:
-        for _, number in zip(range(most), numbers, strict=False):
+    def submit(count: int) -> None:
+        for _, number in zip(range(count), numbers, strict=False):
             queue.add(client.submit(work_on_chunk, task, number, key=f"{task.study.name}-{number}", pure=False))
 
     submit(max(4, _TASKS_PER_THREAD * sum(client.nthreads().values())))

@@ -17,7 +17,7 @@ from ppafo.questions.sweep.manifest import BinsOf
 from ppafo.signals.channels import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.scenario import Scenario
-from ppafo.storage.parquet import TableColumn, coded_texts, lists_of, parquet_bytes, table_of, texts_of_some
+from ppafo.storage.parquet import TableColumn, encode_texts, lists_of, parquet_bytes, table_of, texts_of_some
 from ppafo.storage.places import Place, place_at, read_document
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Study
@@ -62,7 +62,7 @@ def folders(study: Study) -> tuple[str, ...]:
     """Return the folders in which every chunk has a table."""
     outputs = study.outputs
     kept = [(TRAJECTORIES_FOLDER, outputs.trajectories), (COUNTS_FOLDER, outputs.bands)]
-    return (*(folder for folder, asked in kept if asked), RUNS_FOLDER)
+    return (*(folder for folder, is_requested in kept if is_requested), RUNS_FOLDER)
 
 
 def compute_chunk(task: Task, number: int) -> tuple[Finished, Files]:
@@ -172,13 +172,13 @@ def runs_table(study: Study, chunk: Chunk, values: Mapping[str, Floats], result:
     columns = {
         "run": TableColumn(_numbers(study, chunk), _PLAIN, "number of the run in the study"),
         "configuration": TableColumn(
-            coded_texts(np.full(chunk.runs, chunk.configuration), names), _PLAIN, "name of the base scenario"
+            encode_texts(np.full(chunk.runs, chunk.configuration), names), _PLAIN, "name of the base scenario"
         ),
     }
     for path, column in values.items():
         given = column if study.varies(path, name) else np.full(chunk.runs, np.nan)
         columns[path] = TableColumn(given, study.units[path], "varied value")
-    columns["status"] = TableColumn(coded_texts(result.status, STATUSES), _PLAIN, "how the run ended")
+    columns["status"] = TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended")
     columns["failure_time"] = TableColumn(result.failure_time, "s", "time at which the run diverged")
     columns["reason"] = TableColumn(texts_of_some(result.reasons, chunk.runs), _PLAIN, "why the run has no metrics")
     for metric in study.outputs.metrics:
@@ -204,7 +204,7 @@ def counts_table(study: Study, chunk: Chunk, bins: Mapping[str, Bins], result: E
     places = {name: np.nonzero(counts) for name, counts in parts.items()}
     channel = np.concatenate([np.full(place[0].size, number) for number, place in enumerate(places.values())])
     columns = {
-        "channel": TableColumn(coded_texts(channel, study.outputs.bands), _PLAIN, "name of the channel"),
+        "channel": TableColumn(encode_texts(channel, study.outputs.bands), _PLAIN, "name of the channel"),
         "sample": TableColumn(_join([place[0] for place in places.values()]), _PLAIN, "number of the sample in time"),
         "bin": TableColumn(_join([place[1] for place in places.values()]), _PLAIN, f"from 0 to {BINS + 1}"),
         "count": TableColumn(_join([parts[name][place] for name, place in places.items()]), _PLAIN, "runs in it"),

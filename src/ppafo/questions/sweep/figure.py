@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ppafo.answers.display_units import axis_unit, display_values, quantity_of_unit
 from ppafo.answers.shown_metrics import metric_quantity, metric_title
-from ppafo.answers.shown_units import drawn_unit, quantity_of_unit, shown_values
 from ppafo.answers.style import BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
 from ppafo.questions.sweep.results import StudyResults
 from ppafo.signals.channels import CHANNELS
@@ -23,10 +23,10 @@ COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
 MOST_METRICS, MOST_CONFIGURATIONS = 9, len(COLOURS)
 _COLUMNS, _PANEL = 3, (3.5, 2.7)
 _HISTOGRAM_BINS = 60
-_MOST_POINTS = 3000
+_MAXIMUM_POINTS = 3000
 _MEDIAN = 0.5
 _OPACITIES = (0.18, 0.32, 0.45)
-MOST_DRAWN = 4_000_000
+MAXIMUM_DRAWN = 4_000_000
 """Runs from which a figure is drawn, spread evenly over all; the numbers beside it are from all of them."""
 
 _GRIDDED = ("grid", "list")
@@ -76,7 +76,7 @@ def _draw_metrics(places: "list[Axes]", panels: list[tuple[str, str]], results: 
 
 def _draw_histogram(axes: "Axes", results: StudyResults, metric: str) -> None:
     """Draw how often each value came, for every configuration."""
-    parts = {name: _metric_values(metric, values) for name, values in results.thin(metric, MOST_DRAWN).items()}
+    parts = {name: _metric_values(metric, values) for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
     parts = {name: values[np.isfinite(values)] for name, values in parts.items()}
     axes.set_xlabel(metric_title(metric))
     axes.set_yticks([])
@@ -101,13 +101,13 @@ def _edges(parts: list[Floats]) -> Floats:
 
 def _draw_over(axes: "Axes", results: StudyResults, path: str, metric: str) -> None:
     """Draw a metric over the one path that varies."""
-    across, values = results.thin(path, MOST_DRAWN), results.thin(metric, MOST_DRAWN)
+    across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
     for name, colour in zip(results.configurations, COLOURS, strict=False):
         order = np.argsort(across[name], kind="stable")
-        order = order[:: max(1, order.size // _MOST_POINTS)]
-        shown = _shown_path(results, path, across[name][order])[1]
+        order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
+        shown = _path_for_display(results, path, across[name][order])[1]
         axes.plot(shown, _metric_values(metric, values[name])[order], ".-", color=colour, label=name)
-    axes.set_xlabel(_shown_path(results, path, np.zeros(1))[0])
+    axes.set_xlabel(_path_for_display(results, path, np.zeros(1))[0])
     axes.set_ylabel(metric_title(metric))
 
 
@@ -124,17 +124,17 @@ def _finish(figure: "Figure", results: StudyResults, names: tuple[str, ...], is_
 
 def _is_map(results: StudyResults) -> bool:
     """Tell whether exactly two paths vary over a grid or list."""
-    return len(_gridded_paths(results)) == 2
+    return len(_grid_paths(results)) == 2
 
 
 def _draw_map(axes: "Axes", results: StudyResults, name: str, metric: str) -> None:
     """Draw the mean of a metric over the two paths, for one configuration; white where no run completed."""
-    across, upward = _gridded_paths(results)
-    columns, column = np.unique(results.thin(across, MOST_DRAWN)[name], return_inverse=True)
-    rows, row = np.unique(results.thin(upward, MOST_DRAWN)[name], return_inverse=True)
-    values = _metric_values(metric, results.thin(metric, MOST_DRAWN)[name])
+    across, upward = _grid_paths(results)
+    columns, column = np.unique(results.thin(across, MAXIMUM_DRAWN)[name], return_inverse=True)
+    rows, row = np.unique(results.thin(upward, MAXIMUM_DRAWN)[name], return_inverse=True)
+    values = _metric_values(metric, results.thin(metric, MAXIMUM_DRAWN)[name])
     mean = _means(values, row * columns.size + column, rows.size * columns.size).reshape(rows.size, columns.size)
-    (x_label, x), (y_label, y) = _shown_path(results, across, columns), _shown_path(results, upward, rows)
+    (x_label, x), (y_label, y) = _path_for_display(results, across, columns), _path_for_display(results, upward, rows)
     mesh = axes.pcolormesh(x, y, mean, shading="nearest", rasterized=True, cmap="cividis")
     axes.figure.colorbar(mesh, ax=axes, pad=0.02)
     axes.grid(visible=False)
@@ -150,7 +150,7 @@ def _draw_map(axes: "Axes", results: StudyResults, name: str, metric: str) -> No
     axes.set_title(label if len(results.configurations) == 1 else f"{label}, {name}")
 
 
-def _gridded_paths(results: StudyResults) -> list[str]:
+def _grid_paths(results: StudyResults) -> list[str]:
     return [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
 
 
@@ -180,7 +180,7 @@ def _draw_bands(axes: "Axes", results: StudyResults, channel: str, colours: Mapp
     """Draw the bands of a channel for every configuration: the outermost pair of quantiles light, the next darker."""
     table, unit = results.bands(), CHANNELS[channel].unit
     quantity = quantity_of_unit(unit)
-    levels = {name: shown_values(values, quantity) for name, values in table.items() if name.startswith("q")}
+    levels = {name: display_values(values, quantity) for name, values in table.items() if name.startswith("q")}
     fractions = sorted(float(name[1:]) for name in levels)
     pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
     for name, colour in colours.items():
@@ -200,17 +200,17 @@ def _draw_bands(axes: "Axes", results: StudyResults, channel: str, colours: Mapp
 
 
 def _metric_values(name: str, values: Floats) -> Floats:
-    return shown_values(values, metric_quantity(name))
+    return display_values(values, metric_quantity(name))
 
 
-def _shown_path(results: StudyResults, path: str, values: Floats) -> tuple[str, Floats]:
+def _path_for_display(results: StudyResults, path: str, values: Floats) -> tuple[str, Floats]:
     """Return label and values of a varied path [SI] in the units of the field."""
     unit = results.document["varied"][path]["unit"]
     quantity = quantity_of_unit(unit)
-    return _axis_label(path.replace(".", " ").replace("_", " "), quantity, unit), shown_values(values, quantity)
+    return _axis_label(path.replace(".", " ").replace("_", " "), quantity, unit), display_values(values, quantity)
 
 
 def _axis_label(name: str, quantity: str, unit: str) -> str:
     """Return a name with the unit in which it is drawn: that of its quantity, else its own."""
-    drawn = drawn_unit(quantity) if quantity else unit.removeprefix("-")
+    drawn = axis_unit(quantity) if quantity else unit.removeprefix("-")
     return f"{name} ({drawn})" if drawn else name

@@ -5,10 +5,11 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from ppafo.documents.json_text import json_text
-from ppafo.documents.problems import first_problem, shown
+from ppafo.documents.models import validate
+from ppafo.documents.problems import quote
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.questions.sweep.bands import Bins
@@ -32,12 +33,12 @@ BinsOf = Mapping[str, Mapping[str, Bins]]
 def manifest(study: Study, bins: BinsOf) -> dict[str, Any]:
     """Return the document: study, base scenarios in SI units, runs, columns with units; no time and no machine."""
     scenarios = {item.name: _without_origin(item.scenario) for item in study.configurations}
-    asked = {"ppafo": __version__, "study": _plain(study.document), "scenarios": scenarios}
+    requested = {"ppafo": __version__, "study": _plain(study.document), "scenarios": scenarios}
     return {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
-        **asked,
-        "sha256": hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest(),
+        **requested,
+        "sha256": hashlib.sha256(json.dumps(requested, sort_keys=True).encode()).hexdigest(),
         "runs": study.runs,
         "runs_of_configuration": study.runs_of_configuration,
         "chunks": chunk_count(study),
@@ -63,14 +64,10 @@ def read_manifest(place: Place) -> dict[str, Any]:
         raise DataError(f"{place.address}: {MANIFEST} is not a manifest of study results")
     if document.get("schema_version") != SCHEMA_VERSION:
         raise DataError(
-            f"{place.address}: has schema_version {shown(document.get('schema_version'))}, "
+            f"{place.address}: has schema_version {quote(document.get('schema_version'))}, "
             f"this version of ppafo reads {SCHEMA_VERSION}"
         )
-    try:
-        _Stored.model_validate(document)
-    except ValidationError as error:
-        text = first_problem(error.errors(include_url=False), _Stored)
-        raise DataError(f"{place.address}: {MANIFEST}: {text}") from error
+    validate(_Stored, document, f"{place.address}: {MANIFEST}", DataError)
     return document
 
 
@@ -102,15 +99,15 @@ def stored_bins(document: Mapping[str, Any]) -> BinsOf:
     }
 
 
-def check_same_study(place: Place, stored: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
+def check_same_study(place: Place, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> None:
     """Refuse to go on with the results of another study, or of this one before it was changed."""
-    before, now = stored.get("study", {}), asked["study"]
+    before, now = stored.get("study", {}), requested["study"]
     if before.get("name") != now["name"]:
         raise StudyError(
             f"{place.address}: contains the results of the study '{before.get('name')}', not of '{now['name']}'; "
             "choose another folder"
         )
-    changed = [line for key in _COMPARED for line in _differences(key, stored.get(key), asked[key])]
+    changed = [line for key in _COMPARED for line in _differences(key, stored.get(key), requested[key])]
     if changed:
         named = "; ".join(changed[:_NAMED]) + (f"; and {len(changed) - _NAMED} more" if len(changed) > _NAMED else "")
         raise StudyError(
@@ -145,4 +142,4 @@ def _differences(path: str, before: Any, now: Any) -> Iterator[str]:
             label = new.get("path", new.get("name", number)) if isinstance(new, dict) else number
             yield from _differences(f"{path}[{label}]", old, new)
     elif before != now:
-        yield f"{path.removeprefix('study.')} was {shown(before)} and is now {shown(now)}"
+        yield f"{path.removeprefix('study.')} was {quote(before)} and is now {quote(now)}"

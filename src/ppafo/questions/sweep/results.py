@@ -81,7 +81,9 @@ class StudyResults(Solved):
         """Return a kept channel of all runs, shape (runs, samples), nan where a run failed."""
         kept = self.document["study"]["outputs"].get("trajectories", ())
         if channel not in kept:
-            raise StudyError(f"no trajectories of '{channel}' were kept{nearest_name(channel, kept)}; there are {kept}")
+            raise StudyError(
+                f"no trajectories of '{channel}' were kept{nearest_name(channel, kept)}; available: {kept}"
+            )
         rows = [row for part in self.chunks(TRAJECTORIES_FOLDER, [channel]) for row in part.column(channel).to_numpy()]
         return np.stack(rows)
 
@@ -89,9 +91,9 @@ class StudyResults(Solved):
         """Return the bands: configuration, channel, time and a column for each quantile."""
         return as_numpy(read_parquet(self.place.open(BANDS), BANDS))
 
-    def thin(self, column: str, most: int) -> dict[str, np.ndarray[Any, Any]]:
-        """Return a column by name of the configuration, of about ``most`` runs in all: every so many of them."""
-        step = -(-int(self.document["runs"]) // most) | 1
+    def thin(self, column: str, maximum: int) -> dict[str, np.ndarray[Any, Any]]:
+        """Return a column by name of the configuration, of about ``maximum`` runs in all: every so many of them."""
+        step = -(-int(self.document["runs"]) // maximum) | 1
         return {name: self._every(name, column, step) for name in self.configurations}
 
     def _every(self, configuration: str, column: str, step: int) -> np.ndarray[Any, Any]:

@@ -63,7 +63,8 @@ def sweep(
     study: Study | str | Path | Mapping[str, Any],
     out: str | Path | None = None,
     overrides: Sequence[str] = (),
-    runs: int | None = None,
+    draws: int | None = None,
+    seed: int | None = None,
     threads: int | None = None,
     scheduler: str | None = None,
     agreed: bool = False,
@@ -72,36 +73,37 @@ def sweep(
     """Return the results of a study: a name, a TOML file, data laid out as one, or a Study.
 
     ``out`` is a folder, or an address that fsspec knows; a study that was begun there resumes. Without it the results
-    live in a temporary folder as long as the returned object. ``overrides`` change every configuration, ``runs`` is the
-    number of draws in place of the file's. ``threads`` are those of this process, all cores by default;
-    ``scheduler`` is the address of a Dask scheduler whose workers do the work, ``agreed`` the consent to a folder that
-    takes much of the disk, and ``progress`` hears of every finished chunk.
+    live in a temporary folder as long as the returned object. ``overrides`` change every configuration, ``draws``
+    and ``seed`` replace the number of draws and the random seed of the file. ``threads`` are those of this process, all
+    cores by default; ``scheduler`` is the address of a Dask scheduler whose workers do the work, ``agreed`` the consent
+    to a folder that takes much of the disk, and ``progress`` hears of every finished chunk.
 
     Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute;
     nan where a run failed, which is a row that says so. StudyError for a study that cannot be used or does not fit onto
     the disk, and where the folder has results of another one; DataError for a folder that cannot be used.
     """
     means = Means(threads, scheduler, agreed, progress)
-    chosen = study if isinstance(study, Study) else load_study(study, overrides, runs)
+    chosen = _study_of(study, overrides, draws, seed)
     kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
     place = place_at(kept.name if kept is not None else str(out))
     bins = _claim(chosen, place, means)
     _work(Task(chosen, bins, place.address, means.threads), place, means)
-    return replace(finished_results(chosen, place, bins), kept=kept)
+    return replace(finish_results(chosen, place, bins), kept=kept)
 
 
 def sweep_into_folder(
     study: Study | str | Path | Mapping[str, Any],
     out: str | Path | None = None,
     overrides: Sequence[str] = (),
-    runs: int | None = None,
+    draws: int | None = None,
+    seed: int | None = None,
     threads: int | None = None,
     scheduler: str | None = None,
     agreed: bool = False,
     progress: Report | None = None,
 ) -> StudyResults:
     """Return the results of ``sweep`` in ``out``, ``out/NAME`` by default, with figure, page and text beside them."""
-    chosen = study if isinstance(study, Study) else load_study(study, overrides, runs)
+    chosen = _study_of(study, overrides, draws, seed)
     place = out or Path("out") / chosen.name
     try:
         results = sweep(chosen, place, threads=threads, scheduler=scheduler, agreed=agreed, progress=progress)
@@ -113,13 +115,24 @@ def sweep_into_folder(
     return results
 
 
+def _study_of(
+    study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str], draws: int | None, seed: int | None
+) -> Study:
+    """Return the study; StudyError where one that is loaded already comes with what only loading can change."""
+    if not isinstance(study, Study):
+        return load_study(study, overrides, draws, seed)
+    if overrides or draws is not None or seed is not None:
+        raise StudyError("a loaded Study takes no overrides, draws or seed; give them to load_study")
+    return study
+
+
 def studies_of_the_package() -> list[dict[str, Any]]:
     """Return name, number of runs and description of each study that comes with the package."""
     studies = [load_study(name) for name in list_studies()]
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
 
 
-def finished_results(study: Study, place: Place, bins: BinsOf) -> StudyResults:
+def finish_results(study: Study, place: Place, bins: BinsOf) -> StudyResults:
     """Write summary and bands of a study all of whose chunks are there, and return its results."""
     results = StudyResults(place, read_manifest(place), {})
     summary = summary_of(study, results)

@@ -19,7 +19,7 @@ from ppafo.questions.sweep.compute import COUNTS_FOLDER, RUNS_FOLDER, STATUSES, 
 from ppafo.questions.sweep.manifest import BinsOf
 from ppafo.questions.sweep.results import Columns, StudyResults
 from ppafo.signals.channels import CHANNELS
-from ppafo.storage.parquet import TableColumn, coded_texts, parquet_bytes, table_of
+from ppafo.storage.parquet import TableColumn, encode_texts, parquet_bytes, table_of
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Study
 
@@ -27,7 +27,7 @@ _EXAMPLES = 5
 QUANTILE_DEFINITION = (
     "value at place (n - 1) q of the n sorted values, on a line between neighbours (Hyndman and Fan 1996, definition 7)"
 )
-MOST_IN_MEMORY = 16_000_000
+MAXIMUM_IN_MEMORY = 16_000_000
 """Values up to which a column is sorted in memory; beyond, order statistics are looked up digit by digit."""
 
 _DIGIT_BITS, _DIGITS = 16, 4
@@ -91,8 +91,10 @@ def bands_file(study: Study, results: StudyResults, bins: BinsOf) -> tuple[bytes
     joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     names = [item.name for item in study.configurations]
     columns = {
-        "configuration": TableColumn(coded_texts(joined.pop("configuration"), names), "-", "name of the base scenario"),
-        "channel": TableColumn(coded_texts(joined.pop("channel"), study.outputs.bands), "-", "name of the channel"),
+        "configuration": TableColumn(
+            encode_texts(joined.pop("configuration"), names), "-", "name of the base scenario"
+        ),
+        "channel": TableColumn(encode_texts(joined.pop("channel"), study.outputs.bands), "-", "name of the channel"),
         "time": TableColumn(joined.pop("time"), "s", "time since the start"),
         "runs": TableColumn(joined.pop("runs"), "-", "completed runs"),
         **{name: TableColumn(values, _si_of_channel(study), "quantile over runs") for name, values in joined.items()},
@@ -153,7 +155,7 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
 
 def quantiles(parts: Parts, count: int, fractions: Sequence[float]) -> dict[float, float]:
     """Return the quantile of each fraction."""
-    if count <= MOST_IN_MEMORY:
+    if count <= MAXIMUM_IN_MEMORY:
         values = np.quantile(np.concatenate(list(parts())), fractions, method="linear", overwrite_input=True)
         return dict(zip(fractions, values.tolist(), strict=True))
     places = {fraction: divmod((count - 1) * fraction, 1.0) for fraction in fractions}

@@ -1,4 +1,4 @@
-"""Which gains are best? A search over bounds, for a weighted objective with constraints, robust where asked."""
+"""Which gains are best? A search over bounds, for a weighted objective with constraints, robust where requested."""
 
 from ppafo.questions.question import SEED, SET, THREADS, Argument, Question
 

@@ -4,8 +4,8 @@ import math
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.answers.shown_metrics import metric_quantity
-from ppafo.answers.shown_units import shown, titled
 from ppafo.questions.tune.figure import search_figure, task_figure
 from ppafo.questions.tune.problem import Constraint
 from ppafo.questions.tune.search import agreement, keeps
@@ -67,7 +67,7 @@ def _by_ceiling(tuning: Tuning) -> str:
     ceiling = tuning.after.ceiling
     if not ceiling.explains:
         return ""
-    where = "" if tuning.problem.spread is None else f" in {100.0 * ceiling.share:.2g} % of the draws"
+    where = "" if tuning.problem.spread is None else f" in {100.0 * ceiling.fraction:.2g} % of the draws"
     return (
         "; the torque ceiling is the cause: the reference requires more than the torque constant times the gauge "
         f"pressure of the supply{where}, which no gains can change"
@@ -80,7 +80,7 @@ def _gains(tuning: Tuning) -> Table:
     rows = [
         (
             item.path,
-            *map(item.place.shown, (item.before, tuning.after.gains[item.path], item.minimum, item.maximum)),
+            *map(item.place.quote, (item.before, tuning.after.gains[item.path], item.minimum, item.maximum)),
             f"at its {reached[item.path]}" if item.path in reached else "",
         )
         for item in tuning.problem.searched
@@ -126,8 +126,10 @@ def remarks(tuning: Tuning) -> list[str]:
             f"every candidate ran over the same {spread.draws} draws of {over}; 'fresh' is over {FRESH_DRAWS:,} "
             "draws that the search did not use"
         )
-    shares = ", ".join(f"{name} {fraction_text(share)}" for name, share in tuning.after.noise.items())
-    said += [f"fraction of the variance over the fresh draws that is due to sensor noise: {shares}"] if shares else []
+    fractions = ", ".join(f"{name} {fraction_text(fraction)}" for name, fraction in tuning.after.noise.items())
+    said += (
+        [f"fraction of the variance over the fresh draws that is due to sensor noise: {fractions}"] if fractions else []
+    )
     return [*said, *(f"violated on fresh draws: {text}" for text in _violations_on_fresh(tuning))]
 
 
@@ -185,7 +187,7 @@ def _data(tuning: Tuning) -> dict[str, Any]:
 def _metric_row(tuning: Tuning, name: str) -> tuple[str, ...]:
     sides = (tuning.before, tuning.after)
     limits = ", ".join(_limit(item) for item in tuning.problem.constraints if item.metric == name)
-    first = [titled(name, metric_quantity(name)), *(_number(name, side.values.get(name)) for side in sides)]
+    first = [title_with_unit(name, metric_quantity(name)), *(_number(name, side.values.get(name)) for side in sides)]
     if tuning.problem.spread is None:
         return (*first, limits)
     nominal = [side.result.metrics.get(name) for side in sides]
@@ -194,7 +196,7 @@ def _metric_row(tuning: Tuning, name: str) -> tuple[str, ...]:
 
 
 def _number(name: str, value: float | None) -> str:
-    return "" if value is None or math.isnan(value) else f"{shown(value, metric_quantity(name)):.4g}"
+    return "" if value is None or math.isnan(value) else f"{display_value(value, metric_quantity(name)):.4g}"
 
 
 def _limit(item: Constraint) -> str:
@@ -212,6 +214,6 @@ def _setting_data(setting: Setting) -> dict[str, Any]:
         "fresh_violation": setting.violation[1],
         "fresh_share_without_value": setting.without_value[1],
         "torque_ceiling": plain(setting.ceiling),
-        "share_of_noise": {name: plain(share) for name, share in setting.noise.items()},
+        "share_of_noise": {name: plain(fraction) for name, fraction in setting.noise.items()},
         "metrics": {name: plain(metric) for name, metric in setting.result.metrics.items()},
     }

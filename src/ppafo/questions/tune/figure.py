@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ppafo.answers.display_units import display_values, title_with_unit
 from ppafo.answers.layout import Margins, figure_of_free_panels, figure_of_panels
-from ppafo.answers.shown_units import shown_values, titled
 from ppafo.answers.style import BLACK, BLUE, COLOURS, GREY, VERMILION, house_style, label_lines, mark_kind
 from ppafo.questions.tune.search import INFEASIBLE
 from ppafo.questions.tune.solve import Tuning
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 _WIDTH, _PANEL, _LETTER = 7.2, 1.7, 0.083
 _MARGINS = Margins(left=0.75, right=0.2, top=0.55, bottom=0.55, row_gap=0.45)
 _PANELS = (
-    ("torque", titled("Actuator torque", "torque"), "torque"),
+    ("torque", title_with_unit("Actuator torque", "torque"), "torque"),
     ("command", "Valve command (-1 to 1)", ""),
-    ("supplied_mass", titled("Gas supplied", "gas mass"), "gas mass"),
+    ("supplied_mass", title_with_unit("Gas supplied", "gas mass"), "gas mass"),
 )
 
 
@@ -34,7 +34,7 @@ def task_figure(tuning: Tuning) -> "Figure":
                 steps = "steps-post" if channel == "command" else "default"
                 axes.plot(
                     recording.time,
-                    shown_values(np.asarray(recording[channel]), quantity),
+                    display_values(np.asarray(recording[channel]), quantity),
                     color=colour,
                     label=name,
                     linewidth=1.3,
@@ -84,16 +84,16 @@ def _draw_places(axes: "Axes", tuning: Tuning) -> None:
         axes.plot([0.0, 1.0], [row, row], "-", color=GREY, linewidth=1.0)
         for start in tuning.starts:
             axes.plot(
-                item.share(float(item.value(np.array(start.shares[searched.index(item)])))),
+                item.fraction(float(item.value(np.array(start.fractions[searched.index(item)])))),
                 row,
                 "|",
                 color=GREY,
                 markersize=11,
             )
         axes.plot(
-            np.clip(item.share(item.before), -0.05, 1.05), row, "o", color=VERMILION, markersize=7, label="before"
+            np.clip(item.fraction(item.before), -0.05, 1.05), row, "o", color=VERMILION, markersize=7, label="before"
         )
-        axes.plot(item.share(tuning.after.gains[item.path]), row, "o", color=BLUE, markersize=7, label="after")
+        axes.plot(item.fraction(tuning.after.gains[item.path]), row, "o", color=BLUE, markersize=7, label="after")
     axes.set_yticks(rows, [item.path for item in searched])
     axes.set_ylim(-0.6, len(searched) - 0.4)
     axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])

@@ -6,10 +6,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, published_schema
-from ppafo.documents.problems import first_problem
+from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice
 from ppafo.questions.tune import problem as values
@@ -24,21 +23,18 @@ from ppafo.studies.outcomes import check_metrics, difference_of, level_of
 from ppafo.studies.varying import varied_path
 
 LARGEST_SEED = 2**32 - 1
-MOST_DRAWS = 4096
+MAXIMUM_DRAWS = 4096
 
-_STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-_Text = Annotated[str, Field(min_length=1)]
-_Texts = Annotated[tuple[_Text, ...], Field(strict=False)]
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
-_Metric = Annotated[_Text, Field(description="name of a metric, such as 'rms_error'")]
+_Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_error'")]
 
 
-class Searched(BaseModel):
+class SearchRange(BaseModel):
     """A number that is searched, with the bounds between which it may lie."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    path: Annotated[_Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
+    path: Annotated[Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
     minimum: _Value
     maximum: _Value
     spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
@@ -47,11 +43,11 @@ class Searched(BaseModel):
 class Goal(BaseModel):
     """A term of the objective: weight times metric over scale; less is better, with a weight below 0 more is."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     metric: _Metric
     weight: float = 1.0
-    scale: Annotated[_Text | None, Field(description="value that is scaled to 1; default: the value before tuning")] = (
+    scale: Annotated[Text | None, Field(description="value that is scaled to 1; default: the value before tuning")] = (
         None
     )
 
@@ -59,32 +55,32 @@ class Goal(BaseModel):
 class Constraint(BaseModel):
     """A metric that must not be above, or below, a value."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     metric: _Metric
-    at_most: Annotated[_Text | None, Field(description="largest value with its unit")] = None
-    at_least: Annotated[_Text | None, Field(description="smallest value with its unit")] = None
+    at_most: Annotated[Text | None, Field(description="largest value with its unit")] = None
+    at_least: Annotated[Text | None, Field(description="smallest value with its unit")] = None
 
 
 class Robust(BaseModel):
     """Every candidate is run over the same draws from a study, and judged by the bad end of what comes from it."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
-    study: Annotated[_Text, Field(description="name of a study, or a path relative to this file")]
+    study: Annotated[Text, Field(description="name of a study, or a path relative to this file")]
     measure: Annotated[
         Literal["mean_and_deviations", "quantile"],
         Field(description="mean plus 'deviations' standard deviations, or the 'share' quantile"),
     ] = "mean_and_deviations"
     deviations: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
     share: Annotated[float, Field(ge=0.5, lt=1.0)] = 0.9
-    draws: Annotated[int, Field(ge=8, le=MOST_DRAWS)] = 64
+    draws: Annotated[int, Field(ge=8, le=MAXIMUM_DRAWS)] = 64
 
 
 class Effort(BaseModel):
     """How long is searched: independent starts, generations of each at most, candidates of a generation per gain."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     starts: Annotated[int, Field(ge=1, le=100)] = 3
     generations: Annotated[int, Field(ge=1, le=100_000)] = 100
@@ -95,14 +91,14 @@ class Effort(BaseModel):
 class TuningFile(BaseModel):
     """A tuning file, as it is written."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
     description: str = ""
-    scenario: Annotated[_Text, Field(description="name of a scenario, or a path relative to this file")]
-    overrides: Annotated[_Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
-    search: Annotated[tuple[Searched, ...], Field(strict=False, min_length=1)]
+    scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
+    overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
+    search: Annotated[tuple[SearchRange, ...], Field(strict=False, min_length=1)]
     objective: Annotated[tuple[Goal, ...], Field(strict=False, min_length=1)]
     constraints: Annotated[tuple[Constraint, ...], Field(strict=False)] = ()
     robust: Annotated[
@@ -113,7 +109,7 @@ class TuningFile(BaseModel):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a tuning file."""
-    return published_schema(TuningFile, "ppafo tuning")
+    return make_schema(TuningFile, "ppafo tuning")
 
 
 TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "questions" / "tune" / "library", StudyError)
@@ -145,10 +141,7 @@ def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Seque
     def refusal(text: object) -> StudyError:
         return StudyError(f"{file}: {text}")
 
-    try:
-        parsed = TuningFile.model_validate(document)
-    except ValidationError as error:
-        raise refusal(first_problem(error.errors(include_url=False), TuningFile)) from error
+    parsed = validate(TuningFile, document, file, StudyError)
     try:
         scenario = load_scenario(_resolve(parsed.scenario, list_scenarios(), folder), (*parsed.overrides, *overrides))
         check_metrics(_once([*parsed.objective, *parsed.constraints]), scenario)
@@ -177,7 +170,7 @@ def _once(items: Sequence[Goal | Constraint]) -> list[str]:
     return list(dict.fromkeys(item.metric for item in items))
 
 
-def _search_variables(parsed: TuningFile, scenario: Scenario, refusal: Refusal) -> tuple[values.Searched, ...]:
+def _search_variables(parsed: TuningFile, scenario: Scenario, refusal: Refusal) -> tuple[values.SearchRange, ...]:
     paths = [item.path for item in parsed.search]
     repeated = first_twice(paths)
     if repeated is not None:
@@ -185,7 +178,7 @@ def _search_variables(parsed: TuningFile, scenario: Scenario, refusal: Refusal) 
     return tuple(_search_variable(item, scenario, refusal) for item in parsed.search)
 
 
-def _search_variable(item: Searched, scenario: Scenario, refusal: Refusal) -> values.Searched:
+def _search_variable(item: SearchRange, scenario: Scenario, refusal: Refusal) -> values.SearchRange:
     try:
         place = varied_path(item.path, scenario)
         minimum, maximum = place.level(item.minimum), place.level(item.maximum)
@@ -199,7 +192,7 @@ def _search_variable(item: Searched, scenario: Scenario, refusal: Refusal) -> va
     is_logarithmic = item.spacing == "logarithmic"
     if is_logarithmic and minimum <= 0.0:
         raise refusal(f"search '{item.path}': spacing = 'logarithmic' needs a minimum above 0, not {item.minimum!r}")
-    return values.Searched(item.path, minimum, maximum, is_logarithmic, before, place)
+    return values.SearchRange(item.path, minimum, maximum, is_logarithmic, before, place)
 
 
 def _goal(item: Goal, refusal: Refusal) -> values.Goal:

@@ -19,7 +19,7 @@ Gains = Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Searched:
+class SearchRange:
     """A path, its bounds [SI], whether its logarithm is searched, its value before [SI], and how it is written."""
 
     path: str
@@ -29,13 +29,13 @@ class Searched:
     before: float
     place: VariedPath
 
-    def value(self, share: Floats) -> Floats:
+    def value(self, fraction: Floats) -> Floats:
         """Return values [SI] at fractions of the way from the minimum to the maximum."""
         if self.is_logarithmic:
-            return self.minimum * np.exp(math.log(self.maximum / self.minimum) * share)
-        return self.minimum + (self.maximum - self.minimum) * share
+            return self.minimum * np.exp(math.log(self.maximum / self.minimum) * fraction)
+        return self.minimum + (self.maximum - self.minimum) * fraction
 
-    def share(self, value: float) -> float:
+    def fraction(self, value: float) -> float:
         """Return the fraction of the way at which a value lies; outside 0 to 1 beyond the bounds."""
         if self.is_logarithmic:
             return math.log(value / self.minimum) / math.log(self.maximum / self.minimum) if value > 0.0 else -math.inf
@@ -43,10 +43,10 @@ class Searched:
 
     def bound_reached(self, value: float) -> Literal["minimum", "maximum"] | None:
         """Return the bound at which a value lies, None where it is between them."""
-        share = self.share(value)
-        if share <= AT_BOUND:
+        fraction = self.fraction(value)
+        if fraction <= AT_BOUND:
             return "minimum"
-        return "maximum" if share >= 1.0 - AT_BOUND else None
+        return "maximum" if fraction >= 1.0 - AT_BOUND else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Constraint:
 class Spread:
     """Draws over which a candidate is judged: distributions, how many, their seed, and the bad end of the result.
 
-    The bad end is the quantile at ``share``, or where that is None the mean and ``deviations`` standard deviations.
+    The bad end is the quantile at ``fraction``, or where that is None the mean and ``deviations`` standard deviations.
     ``study`` is empty where the noise of the sensors is all that is drawn.
     """
 
@@ -81,21 +81,21 @@ class Spread:
     draws: int
     seed: int
     deviations: float
-    share: float | None
+    fraction: float | None
 
     @property
     def measure(self) -> str:
         """The measure by which candidates are judged, in words."""
-        if self.share is not None:
-            return f"{100.0 * self.share:g} % quantile"
+        if self.fraction is not None:
+            return f"{100.0 * self.fraction:g} % quantile"
         if self.deviations == 0.0:
             return "mean"
         return f"mean and {self.deviations:g} standard deviation{'' if self.deviations == 1.0 else 's'}"
 
     def bad_end(self, values: Floats, is_high: bool) -> Floats:
         """Return the high, or low, end of values (candidates, draws) [SI], shape (candidates,)."""
-        if self.share is not None:
-            return np.asarray(np.quantile(values, self.share if is_high else 1.0 - self.share, axis=1))
+        if self.fraction is not None:
+            return np.asarray(np.quantile(values, self.fraction if is_high else 1.0 - self.fraction, axis=1))
         spread = self.deviations * np.std(values, axis=1, ddof=1)
         return np.asarray(np.mean(values, axis=1) + (spread if is_high else -spread))
 
@@ -121,7 +121,7 @@ class Problem:
     description: str
     scenario: Scenario
     overrides: tuple[str, ...]
-    searched: tuple[Searched, ...]
+    searched: tuple[SearchRange, ...]
     goals: tuple[Goal, ...]
     constraints: tuple[Constraint, ...]
     spread: Spread | None
@@ -142,13 +142,14 @@ class Problem:
         """The values before tuning [SI]."""
         return {item.path: item.before for item in self.searched}
 
-    def gains(self, shares: Sequence[float]) -> Gains:
+    def gains(self, fractions: Sequence[float]) -> Gains:
         """Return the values [SI] at fractions of the way, rounded as written: what is pasted is what was run."""
         values = {
-            item.path: float(item.value(np.asarray(share))) for item, share in zip(self.searched, shares, strict=True)
+            item.path: float(item.value(np.asarray(fraction)))
+            for item, fraction in zip(self.searched, fractions, strict=True)
         }
-        return {item.path: item.place.level(item.place.shown(values[item.path])) for item in self.searched}
+        return {item.path: item.place.level(item.place.quote(values[item.path])) for item in self.searched}
 
     def lines(self, gains: Gains) -> list[str]:
         """Return gains as overrides, ``PATH=VALUE``."""
-        return [f"{item.path}={item.place.shown(gains[item.path])}" for item in self.searched]
+        return [f"{item.path}={item.place.quote(gains[item.path])}" for item in self.searched]

@@ -100,7 +100,7 @@ def _excess(item: Constraint, values: Mapping[str, Floats], spread: Spread | Non
 
 
 Costs = Callable[[Floats], Floats]
-"""Shares of the way (candidates, gains) in, costs (candidates,) out."""
+"""Fractions of the way (candidates, gains) in, costs (candidates,) out."""
 
 _TOLERANCE = 1.0e-3
 """A start has ended where the costs of its candidates differ by no more than this fraction of their mean."""
@@ -113,7 +113,7 @@ class Start:
     ``is_settled`` says whether its candidates had come together, or whether it ran out of generations.
     """
 
-    shares: tuple[float, ...]
+    fractions: tuple[float, ...]
     cost: float
     candidates: int
     generations: tuple[float, ...]
@@ -139,9 +139,9 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
 
     def generation(columns: Floats) -> Floats:
         nonlocal tried
-        shares = np.clip(np.atleast_2d(columns.T), 0.0, 1.0)
-        found = costs(shares)
-        tried += len(shares)
+        fractions = np.clip(np.atleast_2d(columns.T), 0.0, 1.0)
+        found = costs(fractions)
+        tried += len(fractions)
         course.append(min([float(np.min(found)), *course[-1:]]))
         return found
 
@@ -152,7 +152,7 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
         is_settled = have_come_together(intermediate_result.population_energies)
         return is_settled
 
-    is_within = all(0.0 <= share <= 1.0 for share in before)
+    is_within = all(0.0 <= fraction <= 1.0 for fraction in before)
     result = differential_evolution(
         generation,
         [(0.0, 1.0)] * len(before),
@@ -186,4 +186,4 @@ def agreement(starts: Sequence[Start]) -> float:
     best = starts[0]
     beyond = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
     as_good = [item for item in starts if item.cost <= best.cost + 0.01 * abs(beyond)]
-    return max(float(np.max(np.abs(np.subtract(item.shares, best.shares)))) for item in as_good)
+    return max(float(np.max(np.abs(np.subtract(item.fractions, best.fractions)))) for item in as_good)

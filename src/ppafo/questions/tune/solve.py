@@ -26,7 +26,7 @@ from ppafo.studies.outcomes import Model, Outcomes, Tally, scenario_model
 
 FRESH_DRAWS = 1024
 """Draws that the search never saw, over which the result is judged in the end."""
-LEAST_ERRORS = ("peak_error", "rms_error_hold")
+MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
 """Metrics that are never below what the supply lacks of the largest reference."""
 _NOISE_DRAWS = 512
 """Fresh draws that are run once more with other noise."""
@@ -35,13 +35,13 @@ _NOISE_CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class Ceiling:
-    """Draws in which the reference asks for more torque than the supply can hold, whatever the gains.
+    """Draws in which the reference needs more torque than the supply can hold, whatever the gains.
 
-    ``share`` is theirs of all; ``explains`` are the metrics of the constraints that they alone break: no gains can keep
-    them, or the other draws do.
+    ``fraction`` is theirs of all; ``explains`` are the metrics of the constraints that they alone break: no gains can
+    keep them, or the other draws do.
     """
 
-    share: float
+    fraction: float
     explains: tuple[str, ...]
 
 
@@ -121,13 +121,15 @@ def tune(
     fixed = _draws(problem, 0, 1 if problem.spread is None else problem.spread.draws)
     scales = _scales(problem, _runs(model, problem, [problem.before], fixed))
 
-    def costs(shares: Floats) -> Floats:
-        values = {item.path: item.value(shares[:, column]) for column, item in enumerate(problem.searched)}
+    def costs(fractions: Floats) -> Floats:
+        values = {item.path: item.value(fractions[:, column]) for column, item in enumerate(problem.searched)}
         return judge(_run_crossed(model, values, fixed), problem, scales).cost
 
-    before = [item.share(item.before) for item in problem.searched]
+    before = [item.fraction(item.before) for item in problem.searched]
     starts = tuple(search(costs, before, problem.effort))
-    settings = [_setting(model, problem, scales, gains) for gains in (problem.before, problem.gains(starts[0].shares))]
+    settings = [
+        _setting(model, problem, scales, gains) for gains in (problem.before, problem.gains(starts[0].fractions))
+    ]
     return Tuning(problem, scales, settings[0], settings[1], starts, tally.done)
 
 
@@ -217,7 +219,7 @@ def _noise(runs: Runs, other: Runs) -> dict[str, Interval]:
     found = {
         name: noise_interval(first[: second.size], second, _NOISE_CONFIDENCE) for name, (first, second) in pairs.items()
     }
-    return {name: share for name, share in found.items() if share is not None}
+    return {name: fraction for name, fraction in found.items() if fraction is not None}
 
 
 def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: Runs) -> Ceiling:
@@ -240,8 +242,8 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
 
 def _is_explained(item: Constraint, spread: Spread | None, values: Floats, lacking: Floats) -> bool:
     """Tell whether the draws below the ceiling alone break a constraint: no gains can, or the others keep it."""
-    if item.metric in LEAST_ERRORS and item.is_most:
-        least = np.mean(lacking, axis=1) if spread is None or spread.share is None else spread.bad_end(lacking, True)
+    if item.metric in MINIMUM_ERRORS and item.is_most:
+        least = np.mean(lacking, axis=1) if spread is None or spread.fraction is None else spread.bad_end(lacking, True)
         if not keeps(item, float(least[0])):
             return True
     rest = values[:, lacking[0] == 0.0]

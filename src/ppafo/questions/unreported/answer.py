@@ -78,8 +78,8 @@ def posterior_text(item: Implication) -> str:
     setting = item.setting
     if setting.choices:
         names = setting.words or [f"{choice:g} {setting.unit}" for choice in setting.choices]
-        rows = sorted(zip(item.shares, item.error["shares"], names, strict=True), reverse=True)
-        return ", ".join(f"{name} {_percent(share, error, 0)}" for share, error, name in rows if share > 0.005)
+        rows = sorted(zip(item.fractions, item.error["shares"], names, strict=True), reverse=True)
+        return ", ".join(f"{name} {_percent(fraction, error, 0)}" for fraction, error, name in rows if fraction > 0.005)
     if not math.isfinite(item.median):
         return "no completion agrees"
     median, low, high = (f"{getattr(item, name):.3g} ± {item.error[name][0]:.2g}" for name in ("median", "low", "high"))
@@ -99,9 +99,9 @@ def conclusion_rows(found: Sequence[Conclusion]) -> list[tuple[str, str, str, st
     ]
 
 
-def _percent(share: float, error: float, digits: int) -> str:
+def _percent(fraction: float, error: float, digits: int) -> str:
     reach = f"{100.0 * error:.2g}" if error >= 0.01 else f"{100.0 * error:.2f}"
-    return f"{100.0 * share:.{digits}f} ± {reach} %"
+    return f"{100.0 * fraction:.{digits}f} ± {reach} %"
 
 
 def count_sentence(family: Family) -> str:
@@ -112,7 +112,7 @@ def count_sentence(family: Family) -> str:
     )
 
 
-_SHARES = ("share_of_all", "share_of_those_that_agree", "share_by_the_other_results_alone")
+_FRACTIONS = ("share_of_all", "share_of_those_that_agree", "share_by_the_other_results_alone")
 
 
 def _data(family: Family) -> dict[str, Any]:
@@ -126,7 +126,7 @@ def _data(family: Family) -> dict[str, Any]:
                 "share_of_those_that_agree": item.of_weight,
                 "share_by_the_other_results_alone": item.by_the_rest,
                 "effective_of_the_other_results": item.rest_effective,
-                "error": dict(zip(_SHARES, plain(list(item.error)), strict=True)),
+                "error": dict(zip(_FRACTIONS, plain(list(item.error)), strict=True)),
             }
             for item in conclusions(family)
         ],
@@ -155,7 +155,7 @@ def _setting(item: Implication) -> dict[str, Any]:
     if setting.choices:
         names = setting.words or tuple(f"{choice:g}" for choice in setting.choices)
         errors = dict(zip(names, plain(list(item.error["shares"])), strict=True))
-        return described | {"shares": dict(zip(names, item.shares, strict=True)), "error": errors}
+        return described | {"shares": dict(zip(names, item.fractions, strict=True)), "error": errors}
     return described | {
         "allowed": [setting.low, setting.high],
         "median": item.median,

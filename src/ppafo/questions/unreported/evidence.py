@@ -16,7 +16,7 @@ Metrics = Mapping[str, Mapping[str, Floats]]
 METRICS = ("rms_error", "gas_supplied", "oscillations_ramp", "oscillations_hold")
 FEWEST_REVERSALS = 4.0
 """Fewer reversals on the ramp are an overshoot, not an oscillation, as in the reproduction report."""
-MOST_REVERSALS = 1.0
+MAXIMUM_REVERSALS = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ def grams(valve: str) -> Callable[[Metrics], Floats]:
 
 def _oscillates_on_ramp_only(metrics: Metrics) -> NDArray[np.bool_]:
     solenoid = metrics[SOLENOID]
-    return (solenoid["oscillations_ramp"] >= FEWEST_REVERSALS) & (solenoid["oscillations_hold"] <= MOST_REVERSALS)
+    return (solenoid["oscillations_ramp"] >= FEWEST_REVERSALS) & (solenoid["oscillations_hold"] <= MAXIMUM_REVERSALS)
 
 
 def _is_quiet(metrics: Metrics) -> NDArray[np.bool_]:

@@ -53,7 +53,7 @@ def _setting(axes: "Axes", setting: Setting, values: Floats, weights: Floats, re
     if setting.choices:
         places = np.arange(len(setting.choices))
         axes.bar(places, np.full(places.size, 1.0 / places.size), width=0.85, color=GREY, alpha=0.3)
-        axes.bar(places, result.shares, width=0.5, color=BLUE)
+        axes.bar(places, result.fractions, width=0.5, color=BLUE)
         names = setting.words or [f"{choice:g}" for choice in setting.choices]
         axes.set_xticks(places, [_short(name) for name in names], fontsize=7.5)
         return

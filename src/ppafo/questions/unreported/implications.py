@@ -22,8 +22,8 @@ IMPLIED, NARROWED = 0.5, 0.8
 class Implication:
     """What the results say about one setting: its median and 90 % interval, what is left of its range, in words.
 
-    For a choice, ``shares`` are the weights of the choices and the numbers are nan. ``error`` is the half width of the
-    95 % interval of each number, by its name, from the spread between the replicates.
+    For a choice, ``fractions`` are the weights of the choices and the numbers are nan. ``error`` is the half width of
+    the 95 % interval of each number, by its name, from the spread between the replicates.
     """
 
     setting: Setting
@@ -31,7 +31,7 @@ class Implication:
     low: float
     high: float
     left: float
-    shares: tuple[float, ...]
+    fractions: tuple[float, ...]
     verdict: str
     error: Mapping[str, tuple[float, ...]]
 
@@ -42,7 +42,7 @@ class Conclusion:
 
     ``by_the_rest`` is the fraction of the weight that follows without the results that already say it, and
     ``rest_effective`` the number of completions that equal weights would need to say as much about that. ``error`` are
-    the half widths of the 95 % intervals of the three shares, from the spread between the replicates.
+    the half widths of the 95 % intervals of the three fractions, from the spread between the replicates.
     """
 
     statement: str
@@ -63,7 +63,7 @@ def implications_of(family: Family) -> list[Implication]:
         error = {
             name: _error([_numbers(each, name) for each in left_out]) for name in ("median", "low", "high", "left")
         }
-        error["shares"] = _error([each.shares for each in left_out])
+        error["shares"] = _error([each.fractions for each in left_out])
         ends = [_verdict(item.left + sign * error["left"][0]) for sign in (-1.0, 1.0)]
         verdict = item.verdict if len(set(ends)) == 1 else " or ".join(ends)
         found.append(replace(item, verdict=verdict if family.is_enough else TOO_FEW, error=error))
@@ -85,21 +85,21 @@ def _error(left_out: Sequence[Sequence[float]]) -> tuple[float, ...]:
 def _implication(setting: Setting, family: Family) -> Implication:
     values, weight = family.draws[setting.name], family.weights
     if setting.choices:
-        shares = tuple(float(weight[values == choice].sum()) for choice in setting.choices)
-        left = spread_of(shares)
-        return Implication(setting, np.nan, np.nan, np.nan, left, shares, _verdict(left), {})
+        fractions = tuple(float(weight[values == choice].sum()) for choice in setting.choices)
+        left = spread_of(fractions)
+        return Implication(setting, np.nan, np.nan, np.nan, left, fractions, _verdict(left), {})
     low, median, high = weighted_quantiles(values, weight, (0.05, 0.5, 0.95))
     scale = np.log if setting.is_logarithmic else np.asarray
     left = float((scale(high) - scale(low)) / (0.9 * (scale(setting.high) - scale(setting.low))))
     return Implication(setting, median, low, high, left, (), _verdict(left), {})
 
 
-def spread_of(shares: Sequence[float]) -> float:
+def spread_of(fractions: Sequence[float]) -> float:
     """How far weights spread over choices, 0 for one alone to 1 for all alike, by their perplexity; nan for none."""
-    if not sum(shares) > 0.0:
+    if not sum(fractions) > 0.0:
         return float("nan")
-    entropy = -sum(share * math.log(share) for share in shares if share > 0.0)
-    return (math.exp(entropy) - 1.0) / (len(shares) - 1)
+    entropy = -sum(fraction * math.log(fraction) for fraction in fractions if fraction > 0.0)
+    return (math.exp(entropy) - 1.0) / (len(fractions) - 1)
 
 
 def _verdict(left: float) -> str:
@@ -125,10 +125,10 @@ def conclusions(family: Family) -> list[Conclusion]:
     others = family.without_each()
     found = []
     for statement, left_out in _STATEMENTS.items():
-        shares = _shares(family, statement, left_out)
-        error = _error([_shares(other, statement, left_out) for other in others])
+        fractions = _fractions(family, statement, left_out)
+        error = _error([_fractions(other, statement, left_out) for other in others])
         rest = effective(family.weights_without(left_out))
-        found.append(Conclusion(statement, *shares, rest, (error[0], error[1], error[2])))
+        found.append(Conclusion(statement, *fractions, rest, (error[0], error[1], error[2])))
     return found
 
 
@@ -141,7 +141,7 @@ _STATEMENTS: dict[str, tuple[str, ...]] = {
 """What the paper concludes, and the results that already say it."""
 
 
-def _shares(family: Family, statement: str, left_out: Collection[str]) -> tuple[float, float, float]:
+def _fractions(family: Family, statement: str, left_out: Collection[str]) -> tuple[float, float, float]:
     """In which fraction of all completions, of the weight, and of that without some results a statement holds [-]."""
     better, less = improvement(family.metrics) > 0.0, saving(family.metrics) > 0.0
     holds = {_BETTER: better, _LESS: less}.get(statement, better & less)

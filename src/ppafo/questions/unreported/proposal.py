@@ -41,7 +41,7 @@ class Proposal:
         """Columns that are numbers, not choices."""
         return [column for column, cells in enumerate(self.cells) if not cells]
 
-    def drawn(self, count: int, chance: np.random.Generator) -> Floats:
+    def draw(self, count: int, chance: np.random.Generator) -> Floats:
         """Those of ``count`` drawn points that lie in the cube (points, dimensions)."""
         chosen = self.centres[chance.integers(len(self.centres), size=count)]
         near = chosen.copy()

@@ -40,14 +40,14 @@ class Setting:
     choices: tuple[float, ...] = ()
     words: tuple[str, ...] = ()
 
-    def drawn(self, shares: Floats) -> Floats:
+    def values_at(self, fractions: Floats) -> Floats:
         """Values for fractions from 0 to 1, evenly spread."""
         if self.choices:
-            places = np.minimum((shares * len(self.choices)).astype(np.intp), len(self.choices) - 1)
+            places = np.minimum((fractions * len(self.choices)).astype(np.intp), len(self.choices) - 1)
             return np.array(self.choices)[places]
         if self.is_logarithmic:
-            return np.asarray(self.low * (self.high / self.low) ** shares)
-        return np.asarray(self.low + shares * (self.high - self.low))
+            return np.asarray(self.low * (self.high / self.low) ** fractions)
+        return np.asarray(self.low + fractions * (self.high - self.low))
 
 
 SETTINGS: tuple[Setting, ...] = (
@@ -95,7 +95,7 @@ def spread(count: int, seed: int) -> Floats:
 
 def values_of(points: Floats) -> Draws:
     """Settings of completions that are points in the unit cube."""
-    return {setting.name: setting.drawn(points[:, column]) for column, setting in enumerate(SETTINGS)}
+    return {setting.name: setting.values_at(points[:, column]) for column, setting in enumerate(SETTINGS)}
 
 
 def in_si(values: Floats, unit: str) -> Floats:

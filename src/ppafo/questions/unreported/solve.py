@@ -158,7 +158,7 @@ class _Search:
         proposal = next_proposal(self.points, agrees / _mixture(self.known, self.rounds), CELLS, self.chance)
         if proposal is None or len(self.proposals) < number:
             return np.empty((0, self.points.shape[1]))
-        added = proposal.drawn(self.rounds[number], self.chance)
+        added = proposal.draw(self.rounds[number], self.chance)
         earlier = zip(self.known, self.proposals, strict=True)
         self.known = [np.concatenate([known, _density(one, added)]) for known, one in earlier]
         self.points = np.concatenate([self.points, added])

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import shown, shown_unit
+from ppafo.answers.display_units import display_unit, display_value
 from ppafo.questions.validate.figure import KIND_WORDS, agreement_figure
 from ppafo.questions.validate.solve import Validation
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -60,7 +60,7 @@ def verdict(validation: Validation) -> str:
     if validation.passes:
         return f"{validation.device.name} agrees with {count} {noun}: every RMS error is within its limit"
     failed = [
-        f"{channel.channel} in {agreement.file} ({100 * channel.share:.3g} %, limit {100 * channel.limit:.3g} %)"
+        f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
         for agreement in validation.recordings
         for channel in agreement.channels
         if not channel.passes
@@ -114,7 +114,7 @@ def _origins(validation: Validation) -> Section:
 
 
 def _replay_csv(agreement: RecordingAgreement) -> bytes:
-    return marked_csv_bytes(agreement.model.resampled(agreement.measured.time))
+    return marked_csv_bytes(agreement.model.resample(agreement.measured.time))
 
 
 def replay_sentence(agreement: RecordingAgreement) -> str:
@@ -132,7 +132,7 @@ def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
     return (
         channel.channel,
         _error(channel, channel.rms),
-        f"{_number(100 * channel.share)} %",
+        f"{_number(100 * channel.fraction)} %",
         f"{_number(100 * channel.limit)} %",
         _error(channel, channel.bias),
         _error(channel, channel.largest),
@@ -144,7 +144,7 @@ def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
 
 def _error(channel: ChannelAgreement, value: float) -> str:
     quantity = COMPARED[channel.channel].quantity
-    return f"{_number(shown(value, quantity))} {shown_unit(quantity)}"
+    return f"{_number(display_value(value, quantity))} {display_unit(quantity)}"
 
 
 def _number(value: float) -> str:
@@ -192,7 +192,7 @@ def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
     return {
         "unit": channel.unit,
         "rms": channel.rms,
-        "rms_share": channel.share,
+        "rms_share": channel.fraction,
         "limit_share": channel.limit,
         "passes": channel.passes,
         "full_range": channel.full_range,
@@ -202,5 +202,5 @@ def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
         "largest_time": channel.largest_time,
         "delay": channel.delay,
         "delay_is_at_limit": channel.delay_is_at_limit,
-        "shown": {"unit": shown_unit(quantity), "rms": shown(channel.rms, quantity)},
+        "shown": {"unit": display_unit(quantity), "rms": display_value(channel.rms, quantity)},
     }

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ppafo.answers.display_units import axis_unit, display_value, display_values
 from ppafo.answers.layout import Margins, figure_of_panels
-from ppafo.answers.shown_units import drawn_unit, shown, shown_values
 from ppafo.answers.style import ACTUAL, BLACK, CHAMBER_1, CHAMBER_2, GREY, house_style, mark_kind
 from ppafo.signals.recording import Floats
 from ppafo.validation import ChannelAgreement, RecordingAgreement
@@ -25,7 +25,7 @@ _MARGINS = Margins(left=0.68, right=0.15, top=0.72, bottom=0.52, row_gap=0.44, c
 """Inches."""
 _HEIGHTS = (2.4, 1.0)
 _COLOURS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
-_MOST_DOTS = 400
+_MAXIMUM_DOTS = 400
 _NEAR_LIMIT = 0.25
 _SHORT = 3.0
 """Recordings shorter than this [s] have an axis in milliseconds."""
@@ -70,25 +70,25 @@ def _draw_channel(
         return
     colour = _COLOURS.get(name, ACTUAL)
     line = np.interp(times - agreement.delay.correction, model.time, model[name])
-    every = -(-times.size // _MOST_DOTS)
+    every = -(-times.size // _MAXIMUM_DOTS)
     upper.plot(
         scale * times[::every],
-        _level_in_shown_unit(given, name, atmosphere)[::every],
+        _level_in_display_unit(given, name, atmosphere)[::every],
         ".",
         color=BLACK,
         markersize=2.6,
         zorder=2,
     )
-    upper.plot(scale * times, _level_in_shown_unit(line, name, atmosphere), color=colour, linewidth=1.3, zorder=3)
-    upper.set_title(f"{COMPARED[name].title}: RMS {100 * channel.share:.2g} %", color=BLACK)
+    upper.plot(scale * times, _level_in_display_unit(line, name, atmosphere), color=colour, linewidth=1.3, zorder=3)
+    upper.set_title(f"{COMPARED[name].title}: RMS {100 * channel.fraction:.2g} %", color=BLACK)
     upper.set_ylabel(_level_unit(name))
     upper.margins(y=0.06)
-    residual = shown_values(line - given, quantity)
-    limit = shown(channel.limit * channel.full_range, quantity)
+    residual = display_values(line - given, quantity)
+    limit = display_value(channel.limit * channel.full_range, quantity)
     lower.plot(scale * times, residual, color=colour, linewidth=0.9)
     lower.axhline(0.0, color=GREY, linewidth=0.8)
     _mark_limit(lower, limit, float(np.abs(residual).max()))
-    lower.set_ylabel(drawn_unit(quantity))
+    lower.set_ylabel(axis_unit(quantity))
 
 
 def _mark_limit(axes: "Axes", limit: float, largest: float) -> None:
@@ -115,11 +115,11 @@ def _label(figure: "Figure", axes: "Axes", agreement: RecordingAgreement) -> Non
     mark_kind(figure, agreement.measured.kind)
 
 
-def _level_in_shown_unit(values: Floats, name: str, atmosphere: float) -> Floats:
+def _level_in_display_unit(values: Floats, name: str, atmosphere: float) -> Floats:
     """Return the values of a channel as they are drawn; a chamber's gauge pressure counts from the atmosphere there."""
     above = atmosphere if name in (PRESSURE_1, PRESSURE_2) else 0.0
-    return shown_values(values - above, COMPARED[name].quantity)
+    return display_values(values - above, COMPARED[name].quantity)
 
 
 def _level_unit(name: str) -> str:
-    return drawn_unit("pressure" if name in (PRESSURE_1, PRESSURE_2) else COMPARED[name].quantity)
+    return axis_unit("pressure" if name in (PRESSURE_1, PRESSURE_2) else COMPARED[name].quantity)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import shown, titled
+from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.metrics import Metric
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.endurance.solve import Endurance
@@ -24,6 +24,7 @@ from ppafo.walking.figures.course import course_figure, failures
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.phases import strip_figure
+from ppafo.walking.gait_subject import person_remarks
 from ppafo.walking.safety_events import event_lines
 from ppafo.walking.strides import PER_STRIDE, PHASES
 from ppafo.walking.walk import WalkResult
@@ -32,6 +33,7 @@ SCHEMA_VERSION = 1
 _HEAD = ("", "with", "without", "healthy")
 _VENTED = "vented"
 _ROWS = (
+    ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
     ("total_gas", "Gas of the whole walk", "gas mass", 2),
     ("push_off_work", "Work on the wearer in push-off", "energy", 2),
@@ -39,6 +41,7 @@ _ROWS = (
     ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
     ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
+    ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
     ("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
     ("counted_strides", "Strides with these means", "", 0),
 )
@@ -80,7 +83,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
     worn, bare = comparison.with_device, comparison.without_device
     configuration = worn.configuration
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    remarks = [_bottle(pair.life), *_safety(worn)]
+    remarks = [*person_remarks(configuration), _bottle(pair.life), *_safety(worn)]
     remarks += [
         f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
     ]
@@ -128,14 +131,14 @@ def comparison_table(comparison: Comparison) -> Table:
     if "push_off_work" in healthy:
         healthy["push_off_share"] = Metric(1.0, "-", "")
     worn, bare = comparison.with_device, comparison.without_device
-    columns: list[Mapping[str, Metric]] = [worn.metrics, bare.metrics, healthy]
-    head = list(_HEAD)
-    if worn.vented_metrics:
-        columns.insert(1, worn.vented_metrics)
-        head.insert(2, _VENTED)
+    person = {"body_mass": Metric(worn.configuration.wearer.body_mass, "kg", "who walks")}
+    vented = (worn.vented_metrics,) if worn.vented_metrics else ()
+    columns = tuple(person | dict(metrics) for metrics in (worn.metrics, *vented, bare.metrics, healthy))
+    head = (*_HEAD[:2], *(_VENTED,) * len(vented), *_HEAD[2:])
     rows = [
-        (titled(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
+        (title_with_unit(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
         for name, title, quantity, digits in _ROWS
+        if any(name in metrics for metrics in columns)
     ]
     return Table(tuple(map(Column, head)), tuple(rows))
 
@@ -144,7 +147,7 @@ def _cell(metric: Metric | None, quantity: str, digits: int) -> str | None:
     """Return a cell, without the sign of a number that is rounded to zero."""
     if metric is None:
         return None
-    text = f"{shown(metric.value, quantity):.{digits}f}"
+    text = f"{display_value(metric.value, quantity):.{digits}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 

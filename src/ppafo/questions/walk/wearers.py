@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.shown_units import shown, titled
+from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.signals.recording import Floats
 from ppafo.simulation.document import UNITS, plain
 from ppafo.version import __version__
 from ppafo.walking.anthropometry import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 from ppafo.walking.figures.wearers import SHOWN, population_figure
+from ppafo.walking.gait_subject import person_remarks
 from ppafo.walking.population import OUTCOMES, TRAITS, Number, Population
 from ppafo.walking.wearers_rows import START_VARIATION, THRESHOLD_VARIATION
 
@@ -31,13 +32,17 @@ def wearers_answer(population: Population) -> Answer:
     tables = {**population.outcomes, **population.traits}
     head = (Column(""), *(Column(f"{100.0 * fraction:.0f} %") for fraction in QUANTILES))
     rows = [
-        (titled(title, quantity), *_cells(tables[name], quantity, digits))
+        (title_with_unit(title, quantity), *_cells(tables[name], quantity, digits))
         for name, (title, quantity, digits) in SHOWN.items()
     ]
     figure = Figure("wearers", _CAPTION, lambda: population_figure(population))
     stopped = f"safe state: the controllers of {population.vented} wearers vented both chambers permanently"
     paused = f"paused: the controllers of {population.paused} wearers vented both chambers for some strides"
-    remarks = [stopped] * bool(population.vented) + [paused] * bool(population.paused)
+    remarks = [
+        *person_remarks(configuration),
+        *[stopped] * bool(population.vented),
+        *[paused] * bool(population.paused),
+    ]
     remarks += [population.message] * bool(population.diverged)
     return Answer(
         name="wearers",
@@ -56,7 +61,7 @@ def wearers_answer(population: Population) -> Answer:
 
 
 def _cells(values: Floats, quantity: str, digits: int) -> list[str | None]:
-    texts = [f"{shown(value, quantity):.{digits}f}" for value in _values(values).tolist()]
+    texts = [f"{display_value(value, quantity):.{digits}f}" for value in _values(values).tolist()]
     return [text.removeprefix("-") if float(text) == 0.0 else text for text in texts] or [None] * len(QUANTILES)
 
 

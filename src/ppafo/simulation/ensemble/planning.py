@@ -1,17 +1,139 @@
-"""From columns to batches for the lanes, without a loop over runs."""
+"""From columns to batches for the lanes, without a loop over runs: the checks of a single scenario, then the rows."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lanes import Batch
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.engine.lanes import Batch, Floats
 from ppafo.engine.run import Members, batches_of
-from ppafo.simulation.ensemble.columns import Columns
-from ppafo.simulation.ensemble.screening import Screen, screen_columns
-from ppafo.simulation.plan import plan_runs
+from ppafo.errors import ScenarioError
+from ppafo.model.declaration import Quantity
+from ppafo.simulation.clock import Clock
+from ppafo.simulation.ensemble.columns import Columns, TimeTexts, clock_of, clock_with, time_texts, varied_scenario
+from ppafo.simulation.ensemble.rules import RULES, Rule
+from ppafo.simulation.numbers import TIMES
+from ppafo.simulation.plan import Problem, plan_runs
+from ppafo.simulation.reading import limits
 from ppafo.simulation.scenario import Scenario
+
+_SEED = "sensors.seed"
+
+
+@final
+class Screen:
+    """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not."""
+
+    def __init__(self, columns: Columns) -> None:
+        self.columns = columns
+        self.members = np.arange(columns.runs)
+        self.clock: Clock | None = None
+        self.reasons: dict[int, str] = {}
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario that represents the runs that are left. ScenarioError before the times are read."""
+        if self.clock is None:
+            raise ScenarioError("the times of an ensemble are not read yet")
+        return varied_scenario(self.columns, self.clock)
+
+    def at(self, places: Members) -> "Screen":
+        """The screen of some of these runs, which writes its reasons to the same place."""
+        part = Screen(self.columns.only(places))
+        part.members, part.reasons = self.members[places], self.reasons
+        part.clock = None if self.clock is None else _clock_of(self.clock, places)
+        return part
+
+    def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
+        """Drop runs, by a mask over those left or one truth value for all; ``line(place)`` says why."""
+        bad = np.broadcast_to(np.asarray(is_bad, dtype=bool), self.members.shape)
+        if not bad.any():
+            return
+        for place in np.flatnonzero(bad):
+            self.reasons[int(self.members[place])] = line(int(place))
+        self.members = self.members[~bad]
+        self.columns = self.columns.only(~bad)
+        self.clock = None if self.clock is None else _clock_of(self.clock, ~bad)
+
+
+def screen_columns(columns: Columns) -> Screen:
+    """The runs whose values are in range and fit together."""
+    screen = Screen(columns)
+    for path in columns.values:
+        screen.refuse(*_out_of_range(screen.columns, path))
+    if screen.members.size:
+        _read_clocks(screen)
+    for rule in RULES:
+        _keep(screen, rule)
+    return screen
+
+
+def _within(values: Floats, quantity: Quantity) -> Any:
+    """Which values are finite and keep the limits of their declaration."""
+    above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
+    return np.isfinite(values) & above & (values <= quantity.maximum)
+
+
+def _out_of_range(columns: Columns, path: str) -> Problem:
+    values, quantity = columns.values[path], columns.declared[path]
+    unit = quantity.unit
+
+    def line(run: int) -> str:
+        given = f"{path} = {values[run]:.9g} {unit}".rstrip()
+        if not np.isfinite(values[run]):
+            return f"{given}: is not a finite number"
+        if path == _SEED and values[run] != np.floor(values[run]):
+            return f"{given}: must be a whole number"
+        return f"{given}: {quantity.summary or quantity.name} must be {limits(quantity, STANDARD_ATMOSPHERE)}"
+
+    is_good = _within(values, quantity)
+    return ~(is_good & (values == np.floor(values)) if path == _SEED else is_good), line
+
+
+def _read_clocks(screen: Screen) -> None:
+    """Read the clock once for each combination of times; drop the runs of those that do not fit."""
+    times = {path: column for path, column in screen.columns.values.items() if path in TIMES}
+    if not times:
+        screen.clock = clock_of(screen.columns.base)
+        return
+    base = screen.columns.base
+    given = time_texts(base)
+    rows, places = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
+    places = places.reshape(-1)
+    found = [_clock_or_reason(base.name, given, dict(zip(times, row, strict=True))) for row in rows.tolist()]
+    refused = np.array([isinstance(item, str) for item in found])[places]
+    table = np.array(
+        [
+            (np.nan,) * 4 if isinstance(item, str) else (item.duration, item.step, item.output_interval, item.period)
+            for item in found
+        ]
+    )
+    screen.clock = Clock(*table[places].T.copy())
+    screen.refuse(refused, lambda run: str(found[places[run]]))
+
+
+def _clock_or_reason(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock | str:
+    try:
+        return clock_with(name, given, times)
+    except ScenarioError as error:
+        return str(error)
+
+
+def _clock_of(clock: Clock, kept: Any) -> Clock:
+    numbers: list[Any] = [clock.duration, clock.step, clock.output_interval, clock.period]
+    return Clock(*(number[kept] if isinstance(number, np.ndarray) else number for number in numbers))
+
+
+def _keep(screen: Screen, rule: Rule) -> None:
+    """Drop the runs that break a rule; after each problem that some have, the others are checked again."""
+    while screen.members.size:
+        found = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
+        if not found:
+            return
+        screen.refuse(*found[0])
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Which numbers of a run contradict each other: the rules of a single scenario, over columns."""
 
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -79,10 +80,8 @@ def _too_late(scenario: Scenario) -> tuple[Problem, ...]:
 
 
 def _number(scenario: Scenario, path: str) -> Floats | float:
-    node: Any = scenario.device
-    for part in path.split("."):
-        node = getattr(node, part)
-    return node  # type: ignore[no-any-return]
+    number: Floats | float = operator.attrgetter(path)(scenario.device)
+    return number
 
 
 def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]:

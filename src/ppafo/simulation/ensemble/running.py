@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
-from ppafo.engine.metering import group_of, metered, meters_of
+from ppafo.engine.metering import add_meters, group_of, meters_of
 from ppafo.engine.program import Program
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
@@ -155,7 +155,7 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     stride = _stride(interval, request) if request.bands else 1
     traced = sorted({*read_from_traces, *request.bands})
     trace_every = 0 if not traced else 1 if read_from_traces else stride
-    batch = metered(plain, [meter for _, meter in meters], traced, trace_every)
+    batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every)
     return _MeteredBatch(batch, available, interval, samples_of(plain), stride if read_from_traces else 1)
 
 

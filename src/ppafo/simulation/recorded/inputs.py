@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.engine.replay import StepInputs, led_by_recording
+from ppafo.engine.replay import StepInputs, prescribe_recorded_angle
 from ppafo.engine.run import Run
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
@@ -79,7 +79,7 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
 
 def with_prescribed_angle(run: Run, angle: float) -> Run:
     """Return the run with the vane on a recorded angle, which is ``angle`` [rad] at the start."""
-    return replace(run, program=led_by_recording(run.program), path=(0.0, angle, 0.0), needs_parts=True)
+    return replace(run, program=prescribe_recorded_angle(run.program), path=(0.0, angle, 0.0), needs_parts=True)
 
 
 def _path(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:

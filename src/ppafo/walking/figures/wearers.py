@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.answers.shown_units import shown_values, titled
+from ppafo.answers.display_units import display_values, title_with_unit
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.walking.population import Population
 
@@ -56,23 +56,23 @@ def population_figure(population: Population) -> "Figure":
 
 def _histogram(axes: "Axes", population: Population, name: str) -> None:
     title, quantity, _ = SHOWN[name]
-    values = shown_values(population.outcomes[name], quantity)
+    values = display_values(population.outcomes[name], quantity)
     axes.hist(values, bins=_BINS, color=BLUE, alpha=0.55)
     for fraction in _DRAWN_QUANTILES:
         axes.axvline(float(np.quantile(values, fraction)), color=GREY, linewidth=1.4 if fraction == 0.5 else 0.9)
     axes.plot(values[0], 0.0, "o", color=VERMILION, markersize=6, clip_on=False, zorder=5)
-    axes.set_xlabel(titled(title, quantity), fontsize=9)
+    axes.set_xlabel(title_with_unit(title, quantity), fontsize=9)
     axes.set_ylabel("Wearers", fontsize=9)
     axes.locator_params(nbins=5)
 
 
 def _scatter(axes: "Axes", population: Population, trait: str, outcome: str) -> None:
     (across, across_quantity, _), (up, up_quantity, _) = SHOWN[trait], SHOWN[outcome]
-    x = shown_values(population.traits[trait], across_quantity)
-    y = shown_values(population.outcomes[outcome], up_quantity)
+    x = display_values(population.traits[trait], across_quantity)
+    y = display_values(population.outcomes[outcome], up_quantity)
     thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
     axes.plot(x[thin], y[thin], ".", color=BLUE, markersize=2.5, alpha=0.35, markeredgewidth=0.0)
     axes.plot(x[0], y[0], "o", color=VERMILION, markersize=6)
-    axes.set_ylabel(titled(up, up_quantity), fontsize=9)
-    axes.set_xlabel(titled(across, across_quantity), fontsize=9)
+    axes.set_ylabel(title_with_unit(up, up_quantity), fontsize=9)
+    axes.set_xlabel(title_with_unit(across, across_quantity), fontsize=9)
     axes.locator_params(nbins=5)

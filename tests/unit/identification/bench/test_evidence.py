@@ -38,7 +38,7 @@ def test_a_number_that_the_fit_holds_at_zero_is_at_its_bound() -> None:
 
 def test_a_temperature_that_is_not_known_well_counts_half() -> None:
     gas = GasAt(0.044, 1.3, 300.0, 6.0)
-    assert gas.share_of_flow() == pytest.approx(0.01)
-    assert gas.share_of_flow(0.02) == pytest.approx(math.hypot(0.01, 0.02))
+    assert gas.flow_uncertainty() == pytest.approx(0.01)
+    assert gas.flow_uncertainty(0.02) == pytest.approx(math.hypot(0.01, 0.02))
     assert gas.temperature_text == "Gas at 300 K, known to 6 K"
     assert GasAt(0.044, 1.3, 300.0).temperature_text == "Gas at 300 K, taken as exact"

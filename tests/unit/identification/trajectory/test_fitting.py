@@ -228,7 +228,7 @@ def test_the_same_problem_gives_the_same_numbers(experiment: Experiment) -> None
 
 
 def test_a_search_that_is_cut_short_says_so(experiment: Experiment) -> None:
-    found = fitted(experiment, FLOW, INERTIA, DAMPING, search=Search(most_evaluations=2))
+    found = fitted(experiment, FLOW, INERTIA, DAMPING, search=Search(maximum_evaluations=2))
     assert any("before it converged" in remark for remark in found.remarks)
 
 

@@ -3,7 +3,7 @@ import pytest
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.experiment import (
     TIME_OFFSET,
-    broken_order,
+    broken_rule,
     declaration_of,
     declared_numbers,
     full_path,
@@ -46,6 +46,6 @@ def test_a_misspelt_path_is_answered_with_the_nearest_one(step: Scenario) -> Non
 
 
 def test_dynamic_friction_above_static_friction_is_named(step: Scenario) -> None:
-    assert broken_order(step.device) == ""
+    assert broken_rule(step.device) == ""
     above = with_numbers(step, {"friction.dynamic_torque": 0.5})
-    assert "friction.dynamic_torque" in broken_order(above.device)
+    assert "friction.dynamic_torque" in broken_rule(above.device)

@@ -96,16 +96,16 @@ def test_too_few_samples_after_the_start_are_refused(experiment: Experiment) -> 
 
 def test_samples_on_the_grid_are_taken_from_the_record_as_they_are(experiment: Experiment) -> None:
     prepared = prepare(experiment, {})
-    assert not prepared.share.any()
+    assert not prepared.fraction.any()
     assert prepared.run.record_every == prepared.run.steps_per_sample
     assert len(prepared.time) == len(experiment.recording)
 
 
 def test_samples_off_the_grid_lie_between_two_records(experiment: Experiment) -> None:
-    recording = experiment.recording.resampled(np.linspace(0.0, 0.35, 223))
+    recording = experiment.recording.resample(np.linspace(0.0, 0.35, 223))
     prepared = prepare(dataclasses.replace(experiment, recording=recording), {})
-    assert prepared.share.any()
-    at = (prepared.place + prepared.share) * prepared.run.step * prepared.run.record_every
+    assert prepared.fraction.any()
+    at = (prepared.place + prepared.fraction) * prepared.run.step * prepared.run.record_every
     assert at == pytest.approx(recording.time, abs=1e-9)
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.questions.compare.paired import best_shares, compare_pairs, pareto_front
+from ppafo.questions.compare.paired import best_probabilities, compare_pairs, pareto_front
 from ppafo.studies.distributions import NormalAround
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.study import Drawn
@@ -77,7 +77,7 @@ def test_no_pair_gives_nothing() -> None:
 
 def test_the_best_of_several_is_counted_with_ties_for_all() -> None:
     values = [np.array([1.0, 3.0, 2.0, np.nan]), np.array([2.0, 1.0, 2.0, 0.0]), np.array([3.0, 4.0, 5.0, 1.0])]
-    assert [share.value for share in best_shares(values, -1, 0.95)] == pytest.approx([2 / 3, 2 / 3, 0.0])
+    assert [share.value for share in best_probabilities(values, -1, 0.95)] == pytest.approx([2 / 3, 2 / 3, 0.0])
 
 
 def test_the_front_has_what_nothing_beats_in_all_goals() -> None:

@@ -77,7 +77,7 @@ def test_every_standing_is_above_the_bound_of_its_valve(small: League) -> None:
 def test_draws_are_the_same_for_all_and_within_their_shares() -> None:
     factors = draw_factors(200)
     assert np.array_equal(factors, draw_factors(200))
-    shares = np.array([item.share for item in UNCERTAINTIES])
+    shares = np.array([item.fraction for item in UNCERTAINTIES])
     assert (np.abs(factors - 1.0) <= shares).all()
     assert (np.abs(factors - 1.0).max(axis=0) > 0.9 * shares).all()
 

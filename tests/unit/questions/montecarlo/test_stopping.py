@@ -40,7 +40,7 @@ def failing(share: float) -> Model:
 
 
 def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
-    rule = StoppingRule(0.05, is_relative=False, first=64, most=2**16)
+    rule = StoppingRule(0.05, is_relative=False, first=64, maximum=2**16)
     found = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), rule, 1)
     widths = [look.interval.width for look in found.looks]
     assert found.is_met
@@ -51,7 +51,7 @@ def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
 
 
 def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
-    rule = StoppingRule(1e-6, is_relative=True, first=64, most=200)
+    rule = StoppingRule(1e-6, is_relative=True, first=64, maximum=200)
     found = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), rule, 1)
     assert not found.is_met
     assert [look.draws for look in found.looks] == [64, 128, 200]
@@ -68,7 +68,7 @@ def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
 def test_all_looks_together_hold_the_truth_as_often_as_is_said(
     statistic: Mean | Quantile | Probability, truth: float, width: float
 ) -> None:
-    rule = StoppingRule(width, is_relative=False, first=64, most=8192, confidence=0.9)
+    rule = StoppingRule(width, is_relative=False, first=64, maximum=8192, confidence=0.9)
     found = [draw_until(value, UNCERTAIN, METRIC, statistic, rule, seed) for seed in range(300)]
     held = [all(look.interval.low <= truth <= look.interval.high for look in item.looks) for item in found]
     assert all(item.is_met for item in found)
@@ -77,7 +77,7 @@ def test_all_looks_together_hold_the_truth_as_often_as_is_said(
 
 
 def test_without_the_correction_they_would_not() -> None:
-    rule = StoppingRule(0.08, is_relative=False, first=64, most=8192, confidence=0.9)
+    rule = StoppingRule(0.08, is_relative=False, first=64, maximum=8192, confidence=0.9)
     held = []
     for seed in range(300):
         looks = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), rule, seed).looks
@@ -95,7 +95,7 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
         values = np.exp(2.0 * sum(columns[path] for path in NORMALS.paths) / math.sqrt(6.0))
         return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
 
-    rule = StoppingRule(0.5, is_relative=True, first=64, most=4096)
+    rule = StoppingRule(0.5, is_relative=True, first=64, maximum=4096)
     found = [draw_until(heavy, NORMALS, METRIC, Mean("N m"), rule, seed) for seed in range(60)]
     wrong = [not item.last.interval.low <= math.exp(2.0) <= item.last.interval.high for item in found]
     narrow = [any(rule.is_narrow(look.interval) for look in item.looks) for item in found]
@@ -130,7 +130,7 @@ def test_replicates_in_pieces_are_those_of_the_whole() -> None:
 
 
 def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
-    rule = StoppingRule(0.1, is_relative=False, first=1024, most=2048, most_failed=0.02)
+    rule = StoppingRule(0.1, is_relative=False, first=1024, maximum=2048, maximum_failed=0.02)
     found = draw_until(failing(0.005), UNCERTAIN, METRIC, Mean("N m"), rule, 1)
     assert 0 < found.last.missing <= 0.02 * found.last.draws
     assert found.values.size == found.last.draws - found.last.missing
@@ -144,7 +144,7 @@ def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
         (lambda: StoppingRule(0.0, False), "width = 0.0"),
         (lambda: StoppingRule(math.nan, False), "width = nan"),
         (lambda: StoppingRule(1.0, False, first=4), "must be at least 32"),
-        (lambda: StoppingRule(1.0, False, first=512, most=256), "not more than the maximum"),
+        (lambda: StoppingRule(1.0, False, first=512, maximum=256), "not more than the maximum"),
         (lambda: StoppingRule(1.0, False, confidence=0.2), "confidence = 0.2"),
         (lambda: parse_statistic("median", METRIC), "statistic 'median' is not known"),
         (lambda: parse_statistic("quantile 1.5", METRIC), "a fraction above 0 and below 1"),

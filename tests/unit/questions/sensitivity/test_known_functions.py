@@ -105,7 +105,7 @@ def test_a_distribution_without_ends_has_finite_effects() -> None:
 
 @pytest.mark.parametrize("method", ["sobol", "morris"])
 def test_a_failed_run_takes_its_whole_block_with_it(method: str) -> None:
-    settings = Settings(128, most_failed=0.02)
+    settings = Settings(128, maximum_failed=0.02)
     rows = METHODS[method].block_rows(3)
     broken = np.array([0, 5 * rows + 1, 5 * rows + 2, 127 * rows + rows - 1])
     found = analyse(failing(ishigami, broken), ANGLES, [METRIC], METHODS[method], settings)
@@ -128,7 +128,7 @@ def test_a_sample_with_hardly_a_whole_block_says_nothing() -> None:
     rows = METHODS["sobol"].block_rows(3)
     model = failing(ishigami, np.arange(62) * rows)
     with pytest.raises(StudyError, match=r"2 of 64 base points have 'rms_error' in all their runs, which is too few"):
-        analyse(model, ANGLES, [METRIC], METHODS["sobol"], Settings(64, most_failed=0.5))
+        analyse(model, ANGLES, [METRIC], METHODS["sobol"], Settings(64, maximum_failed=0.5))
 
 
 def test_too_many_failed_runs_are_refused() -> None:
@@ -162,7 +162,7 @@ def test_bad_settings_are_one_line() -> None:
 
     assert "need a power of 2, such as 128" in refused(ANGLES, "sobol", Settings(100))
     assert "morris needs 8 to" in refused(ANGLES, "morris", Settings(2))
-    assert "most_failed = 1.0" in refused(ANGLES, "morris", Settings(16, most_failed=1.0))
+    assert "maximum_failed = 1.0" in refused(ANGLES, "morris", Settings(16, maximum_failed=1.0))
     assert "seed = 0" in refused(ANGLES, "sobol", Settings(64, seed=0))
     assert "vary two or more" in refused(Uncertainty(ANGLES.drawn[:1]), "sobol", Settings(64))
     correlated = Uncertainty(ANGLES.drawn[:2], ((1.0, 0.0), (0.6, 0.8)))

@@ -52,5 +52,5 @@ def test_mistakes_are_one_line() -> None:
         sensitivity(STUDY)
     with pytest.raises(StudyError, match=r"--method shapley.*--independent"):
         sensitivity(STUDY, "sobol", configuration="solenoid", samples=64)
-    with pytest.raises(StudyError, match="no metric 'gas'; known are rms_error"):
+    with pytest.raises(StudyError, match="no metric 'gas'; available: rms_error"):
         sensitivity(STUDY, metrics=["gas"], configuration="solenoid")

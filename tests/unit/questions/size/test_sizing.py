@@ -9,7 +9,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from ppafo.control.profiles.tabulated import KNOTS
+from ppafo.control.tabulated import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.size.file import json_schema, load_sizing

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.answers.style import rendered
+from ppafo.answers.style import render_figure
 from ppafo.questions.sweep.figure import study_figure
 from ppafo.questions.sweep.solve import sweep
 
@@ -52,7 +52,7 @@ def test_there_is_a_panel_for_everything_that_was_asked(document: dict[str, Any]
     figure = study_figure(sweep(document))
     shown = [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
     assert [axes.get_xlabel() for axes in shown] == panels
-    assert rendered(figure, ["png"])["png"].startswith(b"\x89PNG")
+    assert render_figure(figure, ["png"])["png"].startswith(b"\x89PNG")
     assert any("simulated" in text.get_text() for text in figure.texts)
 
 
@@ -71,5 +71,5 @@ def test_a_map_shows_the_mean_over_the_draws_where_it_belongs() -> None:
 
 def test_the_same_results_give_the_same_figure() -> None:
     results = sweep(study(DRAWN, LEAK, names=BOTH))
-    one, other = (rendered(results.plot(), ["svg", "png"]) for _ in range(2))
+    one, other = (render_figure(results.plot(), ["svg", "png"]) for _ in range(2))
     assert one == other

@@ -46,7 +46,7 @@ def test_results_do_what_everything_solved_does(small_results: StudyResults, tmp
     page = (tmp_path / "saved" / "report.html").read_text(encoding="utf-8")
     assert "of their normal scores" in page
     assert "Sampled by sobol: 8 draws, seed 3." in page
-    with pytest.raises(LookupError, match="there is no figure 'pareto'; there are figure"):
+    with pytest.raises(LookupError, match="there is no figure 'pareto'; available: figure"):
         small_results.plot("pareto")
 
 

@@ -375,3 +375,16 @@ def test_results_go_to_any_address_of_fsspec(small_results: StudyResults, small:
 
 def test_a_study_object_can_be_run_as_it_is(small: Any, small_results: StudyResults) -> None:
     assert sweep(load_study(small)).summary == small_results.summary
+
+
+def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any]) -> None:
+    document = varying(AREA, runs=4)
+    seeds = (None, document["sample"]["seed"], document["sample"]["seed"] + 1)
+    first, same, other = (sweep(document, seed=seed).table(["valve.area"])["valve.area"] for seed in seeds)
+    assert (first == same).all()
+    assert (first != other).all()
+
+
+def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> None:
+    with pytest.raises(StudyError, match="a loaded Study takes no overrides, draws or seed; give them to load_study"):
+        sweep(load_study(small), draws=3)

@@ -24,7 +24,7 @@ COLUMNS = {
 @pytest.mark.parametrize("in_memory", [0, 16_000_000])
 def test_statistics_are_those_of_numpy(name: str, in_memory: int, monkeypatch: pytest.MonkeyPatch) -> None:
     values = COLUMNS[name]
-    monkeypatch.setattr(statistics, "MOST_IN_MEMORY", in_memory)
+    monkeypatch.setattr(statistics, "MAXIMUM_IN_MEMORY", in_memory)
     said = describe(lambda: iter(np.array_split(values, 7)), SHARES)
     assert said["count"] == values.size
     assert said["mean"] == pytest.approx(values.mean(), rel=1e-12)

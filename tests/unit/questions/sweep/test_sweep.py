@@ -81,7 +81,7 @@ def test_a_study_is_run_printed_and_written(study: Path, tmp_path: Path, capsys:
 
 
 def test_json_has_the_summary(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert swept(study, tmp_path / "out", "--json", "--threads", "1", "--runs", "3") == 0
+    assert swept(study, tmp_path / "out", "--json", "--threads", "1", "--draws", "3") == 0
     document = json.loads(capsys.readouterr().out)
     assert document["completed"] == 3
     assert document["configurations"]["base"]["rms_error"]["count"] == 3
@@ -116,8 +116,8 @@ def test_failed_runs_are_told_and_only_all_of_them_are_a_failure(
     [
         (["sweep"], "no study was given"),
         (["sweep", "torque-task-uncertanty"], "did you mean 'torque-task-uncertainty'?"),
-        (["sweep", "pressure-and-area", "--runs", "5"], "the number of runs is that of its grid"),
-        (["sweep", "torque-task-uncertainty", "--runs", "0"], "--runs 0: must be a whole number, 1 or more"),
+        (["sweep", "pressure-and-area", "--draws", "5"], "the number of runs is that of its grid"),
+        (["sweep", "torque-task-uncertainty", "--draws", "0"], "--draws 0: must be a whole number, 1 or more"),
         (["sweep", "torque-task-uncertainty", "--threads", "x"], "--threads x: must be a whole number"),
         (["sweep", "torque-task-uncertainty", "--set", "valve.aera=1 mm^2"], "did you mean 'valve.area'?"),
         (["sweep", "torque-task-uncertainty", "--set", "run.duration=-1 s"], "run.duration"),

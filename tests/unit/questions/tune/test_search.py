@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.questions.tune.problem import Constraint, Effort, Goal, Problem, Searched, Spread
+from ppafo.questions.tune.problem import Constraint, Effort, Goal, Problem, SearchRange, Spread
 from ppafo.questions.tune.search import FAILED, INFEASIBLE, Runs, agreement, judge, search
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats, NormalAround
@@ -57,7 +57,7 @@ def test_the_least_of_many_valleys_is_found_from_every_start() -> None:
     starts = search(bowl(best), [0.9, 0.9, 0.9], EFFORT)
     assert len(starts) == 3
     for start in starts:
-        assert start.shares == pytest.approx(best, abs=5e-3)
+        assert start.fractions == pytest.approx(best, abs=5e-3)
         assert list(start.generations) == sorted(start.generations, reverse=True)
         assert start.is_settled
     assert [start.cost for start in starts] == sorted(start.cost for start in starts)
@@ -135,10 +135,10 @@ def test_candidates_are_judged_by_their_bad_end(share: float | None, deviations:
 def test_logarithmic_bounds_and_what_lies_at_them() -> None:
     scenario = load_scenario("torque-task-proportional")
     place = varied_path("controller.proportional_gain", scenario)
-    item = Searched("controller.proportional_gain", 0.01, 1.0, True, 0.1, place)
+    item = SearchRange("controller.proportional_gain", 0.01, 1.0, True, 0.1, place)
     assert item.value(np.array([0.0, 0.5, 1.0])) == pytest.approx([0.01, 0.1, 1.0])
-    assert item.share(0.1) == pytest.approx(0.5)
-    assert item.share(2.0) > 1.0
+    assert item.fraction(0.1) == pytest.approx(0.5)
+    assert item.fraction(2.0) > 1.0
     assert (item.bound_reached(0.0101), item.bound_reached(0.1), item.bound_reached(0.99)) == (
         "minimum",
         None,
@@ -149,7 +149,7 @@ def test_logarithmic_bounds_and_what_lies_at_them() -> None:
 def test_the_gains_that_are_run_are_those_that_are_written() -> None:
     scenario = load_scenario("torque-task-proportional")
     place = varied_path("controller.proportional_gain", scenario)
-    trial = problem(searched=(Searched("controller.proportional_gain", 0.01, 1.0, True, 0.095, place),))
+    trial = problem(searched=(SearchRange("controller.proportional_gain", 0.01, 1.0, True, 0.095, place),))
     gains = trial.gains([0.123456789])
     line = trial.lines(gains)[0]
     assert load_scenario("torque-task-proportional", [line]).control.settings["proportional_gain"] == gains[place.path]

@@ -91,11 +91,11 @@ def held_by(level: str, share: float) -> Tuning:
 def test_a_goal_above_the_ceiling_of_some_draws_is_missed_and_the_ceiling_is_named() -> None:
     never, always = held_by("5 N m", 0.9), held_by("3.5 N m", 0.9)
     assert not never.after.is_feasible
-    assert 0.3 < never.after.ceiling.share < 0.7
+    assert 0.3 < never.after.ceiling.fraction < 0.7
     assert never.after.ceiling.explains == ("rms_error_hold",)
     assert CEILING in verdict(never)
     assert always.after.is_feasible
-    assert always.after.ceiling.share == 0.0
+    assert always.after.ceiling.fraction == 0.0
     assert CEILING not in verdict(always)
 
 

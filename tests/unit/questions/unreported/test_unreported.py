@@ -95,7 +95,7 @@ def test_a_proposal_has_the_density_that_it_draws_from() -> None:
     chance = np.random.default_rng(5)
     cells = (0, 3)
     proposal = Proposal(np.array([[0.3, 0.1], [0.9, 0.9]]), np.array([[0.1]]), cells)
-    points = proposal.drawn(200_000, chance)
+    points = proposal.draw(200_000, chance)
     even = chance.random((200_000, 2))
     for low, high in ((0.0, 0.1), (0.1, 0.5), (0.9, 1.0)):
         share = ((points[:, 0] >= low) & (points[:, 0] < high)).sum() / 200_000

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ppafo.engine.metering import metered
+from ppafo.engine.metering import add_meters
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.simulation.ensemble import COMPLETED, DIVERGED, REFUSED, EnsembleResult, run_ensemble, running
@@ -156,7 +156,7 @@ def test_metrics_and_traces_in_another_order_are_the_same_program_and_numbers(mo
     monkeypatch.setattr(
         running,
         "metered",
-        lambda *given: programs.append((batch := metered(*given)).program) or batch,  # type: ignore[func-returns-value]
+        lambda *given: programs.append((batch := add_meters(*given)).program) or batch,  # type: ignore[func-returns-value]
     )
     base = load_scenario(TASK, ["run.duration=0.1 s"])
     columns = {"valve.area": np.array([1e-5, 2e-5])}

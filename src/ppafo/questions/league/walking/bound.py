@@ -1,8 +1,8 @@
 """Minimum error and gas of any control of a valve on the walking task, by optimal control of one stride.
 
-Isothermal gas, the gait, wearer and device of the task, a periodic stride. On the ground the ankle is led as in the
-engine; from toe-off until the foot is flat it moves by the engine's own torques. When the foot lands is a phase that is
-tried out. Sampling, sensors, dead band, delays, spool and recognition of phases are left out: each can only make the
+Isothermal gas, the gait, wearer and device of the task, a periodic stride. On the ground the ankle is prescribed as in
+the engine; from toe-off until the foot is flat it moves by the engine's own torques. The phase in which the foot lands
+is tried out. Sampling, sensors, dead band, delays, spool and recognition of phases are left out: each can only make the
 task harder. What the optimiser finds is a local optimum; that nothing is better is checked only by every controller
 staying above it.
 """
@@ -77,7 +77,7 @@ class BoundSearch:
         assert self._run.walk is not None, "a league walks"
         rise = self._run.walk.timing.heel_off
         grid = self.grid
-        found = [self.at_landing(share * rise, grid.coarse) for share in grid.landings]
+        found = [self.at_landing(fraction * rise, grid.coarse) for fraction in grid.landings]
         for step in grid.refinements:
             about = self._thriftiest(found).landing
             found += [self.at_landing(about + way * step * rise, grid.coarse) for way in (-1.0, 1.0)]

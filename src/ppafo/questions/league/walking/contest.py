@@ -53,7 +53,7 @@ class WalkingContest:
 
     def bound(self, valve: str, standings: Sequence[Standing], progress: Report) -> Bounded[WalkingBound]:
         """Return the bound of a valve, also simulated; SimulationError or ScenarioError where there is none."""
-        reached = {item.entrant.name: _reached(item.measures) for item in standings if _is_bounded(item.measures)}
+        reached = {item.entrant.name: _reach(item.measures) for item in standings if _is_bounded(item.measures)}
         bound = walking_bound(self.task, valve, reached, progress)
         progress(Progress(f"lower bound, {valve}: simulating the optimum"))
         played = tuple(play_stride(self.task, valve, optimum) for optimum in (bound.least_error, *bound.curve))
@@ -69,9 +69,13 @@ class WalkingContest:
         return shlex.join([*words, *(word for override in overrides for word in ("--set", override))])
 
 
-def _reached(measures: Measures) -> Reached:
-    names = ("lagged_error", "toe_height", "torque_lag", "mid_stance_torque")
-    return Reached(*(measures[name] for name in names))
+def _reach(measures: Measures) -> Reached:
+    return Reached(
+        rms_error=measures["lagged_error"],
+        height=measures["toe_height"],
+        lag=measures["torque_lag"],
+        resistance=measures["mid_stance_torque"],
+    )
 
 
 def _is_bounded(measures: Measures) -> bool:

@@ -92,8 +92,8 @@ class Toes:
         The healthy toes are at the same fraction of the swing as high as those of the gait that is varied; ``angles``
         are the ankle's and the healthy one [rad].
         """
-        share = (phase - timing.toe_off) / (1.0 - timing.toe_off)
-        healthy = np.interp(self.toe_off + share * (1.0 - self.toe_off), _PHASES, self.healthy)
+        fraction = (phase - timing.toe_off) / (1.0 - timing.toe_off)
+        healthy = np.interp(self.toe_off + fraction * (1.0 - self.toe_off), _PHASES, self.healthy)
         path = replace(
             self.path,
             toe_lever=stature * self.path.toe_lever,

@@ -68,11 +68,11 @@ def stride_command(optimum: StrideOptimum, valve: str, step: float, step_count: 
     """
     period = optimum.period
     times = (step * (np.arange(step_count) + 0.5) + start) % period
-    shares = optimum.openings[np.searchsorted(optimum.times, times, side="right") - 1]
+    fractions = optimum.openings[np.searchsorted(optimum.times, times, side="right") - 1]
     owed, command = np.zeros(MODES), np.empty(step_count)
     turn = _solenoid_turn if valve == "solenoid" else _proportional_turn
-    for place, share in enumerate(shares):
-        command[place], owed = turn(owed + share)
+    for place, fraction in enumerate(fractions):
+        command[place], owed = turn(owed + fraction)
     return command
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import Column
-from ppafo.answers.shown_units import quantity_text, titled
+from ppafo.answers.display_units import quantity_text, title_with_unit
 from ppafo.questions.league.presentation import Look, Presentation, TableColumn, measure, of_draws
 from ppafo.questions.league.solve import League
 from ppafo.questions.league.standing import Bounded, Robustness, Standing
@@ -150,8 +150,8 @@ WALKING = Presentation(
         size=(8.4, 5.6),
         right=0.62,
         error="lagged_error",
-        error_label=titled("RMS torque error in push-off, lag removed", "torque"),
-        gas_label=titled("Gas taken from the supply per stride", "gas mass"),
+        error_label=title_with_unit("RMS torque error in push-off, lag removed", "torque"),
+        gas_label=title_with_unit("Gas taken from the supply per stride", "gas mass"),
         title="Error against gas; lines: minimum gas with toes above the ground and no lag",
         is_logarithmic=False,
     ),

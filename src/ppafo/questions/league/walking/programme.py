@@ -104,7 +104,7 @@ def programme(run: Run, valve: str, stride: Stride, path: AnklePath) -> Programm
         casadi.vec(_residuals(grid, motion, casadi.DM(stride.begin[:2]), turning)),
         unknowns.angle[-1] - flat[-1],
     ]
-    asked = np.flatnonzero(stride.asks_height).tolist()
+    places = np.flatnonzero(stride.asks_height).tolist()
     error = casadi.DM(stride.wanted).T - torque
     weights, free_weights = grid.weights * stride.asks_torque, grid.weights * stride.asks_freedom
     lowest, highest = _limits(plant, grid, scale)
@@ -115,7 +115,7 @@ def programme(run: Run, valve: str, stride: Stride, path: AnklePath) -> Programm
         sticking=sticking,
         equal_to_zero=casadi.vertcat(*left),
         openings_sum=casadi.vec(casadi.sum1(unknowns.openings)),
-        heights=casadi.vertcat(*[_toe_height(path, stride, place, unknowns.angle[place]) for place in asked]),
+        heights=casadi.vertcat(*[_toe_height(path, stride, place, unknowns.angle[place]) for place in places]),
         landed=casadi.vertcat(*[unknowns.angle[place] - flat[place] for place in stride.before_landing]),
         mean_square=casadi.mtimes(error * error, casadi.DM(weights)) / float(np.sum(weights)),
         free_square=casadi.mtimes(torque * torque, casadi.DM(free_weights)) / max(float(np.sum(free_weights)), TINY),
@@ -154,8 +154,8 @@ def _chamber_rates(
     """Rates of both chambers at every point, as rows; their volumes run with the free foot or with the ground."""
     import casadi
 
-    angle = casadi.horzcat(unknowns.angle, casadi.DM([item.angle for item in stride.led]).T)
-    rate = casadi.horzcat(unknowns.rate, casadi.DM([item.rate for item in stride.led]).T)
+    angle = casadi.horzcat(unknowns.angle, casadi.DM([item.angle for item in stride.prescribed]).T)
+    rate = casadi.horzcat(unknowns.rate, casadi.DM([item.rate for item in stride.prescribed]).T)
     volumes = Volumes(*chamber_volumes(plant, angle), plant.volume_per_angle * rate)
     here = casadi.reshape(casadi.repmat(unknowns.openings, DEGREE, 1), MODES, stride.grid.times.size)
     pressures = (scale * unknowns.pressures[0, :], scale * unknowns.pressures[1, :])
@@ -173,7 +173,8 @@ def _accelerations(
         angle, rate, now = unknowns.angle[place], unknowns.rate[place], stride.now[place]
         standing = foot_angle(now.shank, angle)
         foot = Direction(casadi.sin(standing), casadi.cos(standing))
-        added = leg_torque(walk.leg, walk.share, stride.contacts[place], now, angle, foot)
+        level = walk.timing.ground_angle
+        added = leg_torque(walk.leg, walk.share, stride.contacts[place], now, level, angle, foot)
         largest = plant.dynamic_torque + breakaway * casadi.exp(-((rate / STICKING_SPEED) ** 2))
         slowed = unknowns.friction[place] * largest + plant.viscous_damping * rate
         found.append((torque[place] + added - slowed) / plant.inertia)

@@ -17,7 +17,7 @@ from ppafo.questions.league.walking.task import PROFILE_KIND, PROFILE_VALVE, Wal
 from ppafo.walking.posture import AnklePath
 from ppafo.walking.walk import walk
 
-MOST_ITERATIONS = 600
+MAXIMUM_ITERATIONS = 600
 FREE = 0.1
 """RMS torque [N m] in mid-stance that counts as free."""
 
@@ -130,7 +130,7 @@ class StrideSolver:
             "f": weights[0] * built.mean_square + weights[1] * built.gas,
             "g": casadi.vertcat(*limited),
         }
-        options = OPTIONS | {"ipopt.max_iter": MOST_ITERATIONS}
+        options = OPTIONS | {"ipopt.max_iter": MAXIMUM_ITERATIONS}
         self._solver = casadi.nlpsol("stride", "ipopt", problem, options | STRATEGIES[0])
         self._measures = casadi.Function("measures", [built.unknowns], [built.mean_square, built.gas])
         self._counts = tuple(item.numel() for item in limited)
@@ -138,8 +138,8 @@ class StrideSolver:
         self._first = guess.unknowns(built, stride)
         self._near: Any = self._first
         self.unmeasurable = MEASURABLE * float(np.max(np.abs(stride.wanted * stride.asks_torque)))
-        asked = stride.grid.weights * stride.asks_torque
-        self.idle_error = float(np.sqrt(np.sum(stride.wanted**2 * asked) / np.sum(asked)))
+        torque_weights = stride.grid.weights * stride.asks_torque
+        self.idle_error = float(np.sqrt(np.sum(stride.wanted**2 * torque_weights) / np.sum(torque_weights)))
 
     def start_from(self, guess: Guess) -> None:
         """Start the next search near a stride."""
@@ -160,7 +160,7 @@ class StrideSolver:
         return self._solve((TIE_BREAK, 1.0), rms_error * rms_error, height, resistance)
 
     def _solve(
-        self, weights: tuple[float, float], most_square: float, height: float, resistance: float
+        self, weights: tuple[float, float], maximum_square: float, height: float, resistance: float
     ) -> StrideOptimum | None:
         built = self._programme
         zeros, sums, landed, heights, _, _ = self._counts
@@ -172,7 +172,7 @@ class StrideSolver:
             + [1.0] * sums
             + [0.0] * landed
             + [np.inf] * heights
-            + [most_square, resistance * resistance],
+            + [maximum_square, resistance * resistance],
         }
         found = self._stepwise(weights, limits)
         optima = [self._optimum(solution, height) for solution in found]
@@ -211,8 +211,8 @@ class StrideSolver:
 
     def _guess(self, pressures: Floats, motion: Floats, openings: Floats) -> Guess:
         stride = self._stride
-        led = np.array([item[:2] for item in stride.led]).T
-        angle, rate = np.concatenate([motion, led], axis=1)
+        prescribed = np.array([item[:2] for item in stride.prescribed]).T
+        angle, rate = np.concatenate([motion, prescribed], axis=1)
         phases, middles = stride.phases % 1.0, stride.middle_phases % 1.0
         order, held = np.argsort(phases), np.argsort(middles)
         first, second = pressures[order].T

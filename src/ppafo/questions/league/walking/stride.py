@@ -41,8 +41,8 @@ class Grid:
 class Stride:
     """A stride whose foot comes down flat at the phase ``landing``, with the gait and what is requested at every point.
 
-    ``wanted`` [N m], ``asks_torque`` and ``asks_freedom`` for each point; ``asks_height`` for each free point; ``led``
-    are the angles [rad] and rates [rad/s] of the points with the foot on the ground; ``begin`` those at toe-off.
+    ``wanted`` [N m], ``asks_torque`` and ``asks_freedom`` for each point; ``asks_height`` for each free point;
+    ``prescribed`` are the angles [rad] and rates [rad/s] of the points on the ground; ``begin`` those at toe-off.
     ``phases`` of the points and ``middle_phases`` of the intervals count on from the heel strike before the toe-off.
     """
 
@@ -50,7 +50,7 @@ class Stride:
     landing: float
     now: tuple[GaitNow, ...]
     contacts: tuple[float, ...]
-    led: tuple[ground.Ankle, ...]
+    prescribed: tuple[ground.Ankle, ...]
     begin: ground.Ankle
     wanted: Floats
     asks_torque: Floats
@@ -94,14 +94,16 @@ def stride_of(walk: Walk, profile: TorqueProfile, landing: float, intervals: int
     now = [_gait(walk, time) for time in grid.times]
     phases = timing.toe_off + timing.frequency * grid.times
     contacts = [_contact(timing, landing, phase) for phase in phases.tolist()]
-    led = [_prescribed_ankle(walk, contact, phase) for contact, phase in zip(contacts, phases.tolist(), strict=True)]
+    prescribed = [
+        _prescribed_ankle(walk, contact, phase) for contact, phase in zip(contacts, phases.tolist(), strict=True)
+    ]
     first, last, free_first, free_last = (1.0 + phase for phase in windows)
     return Stride(
         grid,
         landing,
         tuple(now),
         tuple(contacts),
-        tuple(led[grid.free_points :]),
+        tuple(prescribed[grid.free_points :]),
         _prescribed_ankle(walk, ground.TOE, 1.0 + timing.toe_off),
         np.array([profile_torque(late, phase - 1.0) for phase in phases.tolist()]),
         ((phases > first) & (phases < last + 1.0e-9)).astype(np.float64),

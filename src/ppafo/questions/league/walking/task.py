@@ -20,7 +20,7 @@ SHORTEST, LONGEST = 0.1, 1.0
 """Minutes: enough strides to learn from, and few enough to record every sample of."""
 
 PROFILE_KIND, PROFILE_VALVE = "event_proportional", "proportional"
-"""The controller whose settings say what is desired, on the valve that suits it; every other is told the same."""
+"""The controller whose settings say what is desired, on the valve that suits it; every other gets the same."""
 SWING_ANGLE = "swing_angle"
 COMMON = (*PUSH_OFF_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES, RATE, PERIOD)
 SHORTEST_PUSH_OFF = 0.1
@@ -76,7 +76,7 @@ def walking_task(
     for override in overrides:
         _check(override)
     judged = load_walk(file, [f"controller.kind={PROFILE_KIND}", f"device.valve={PROFILE_VALVE}", *overrides], gait)
-    profile = TorqueProfile(*(judged.settings[name] for name in TorqueProfile._fields))
+    profile = TorqueProfile(**{name: judged.settings[name] for name in TorqueProfile._fields})
     if profile.peak_torque <= 0.0:
         raise ScenarioError("controller.peak_torque: a league needs a desired torque; give one above 0 N m")
     latest = judged.gait.stance_share - SHORTEST_PUSH_OFF

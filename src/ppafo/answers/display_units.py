@@ -57,47 +57,47 @@ def quantity_of_unit(si_unit: str) -> str:
     return _OF_UNIT.get(si_unit, "")
 
 
-def shown_unit(quantity: str) -> str:
+def display_unit(quantity: str) -> str:
     """Return the unit in which a quantity is shown, as a table writes it; empty for a plain number."""
     return QUANTITIES[quantity][1].removesuffix("_d") if quantity else ""
 
 
-def drawn_unit(quantity: str) -> str:
+def axis_unit(quantity: str) -> str:
     """Return the unit in which a quantity is shown, as the label of an axis writes it."""
     words = {"psi_g": "psi gauge", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
-    unit = shown_unit(quantity)
+    unit = display_unit(quantity)
     return words.get(unit, unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$"))
 
 
-def shown(value: float, quantity: str) -> float:
+def display_value(value: float, quantity: str) -> float:
     """Return a value in SI in the unit in which it is shown."""
     si, unit = QUANTITIES.get(quantity, ("", ""))
     return float(value) if si == unit or not math.isfinite(value) else from_si(float(value), unit, si)
 
 
-def shown_change(value: float, quantity: str) -> float:
+def display_difference(value: float, quantity: str) -> float:
     """Return a difference of two values in SI in the unit in which it is shown."""
-    return shown(value, quantity) - shown(0.0, quantity)
+    return display_value(value, quantity) - display_value(0.0, quantity)
 
 
-def shown_values(values: Floats, quantity: str) -> Floats:
+def display_values(values: Floats, quantity: str) -> Floats:
     """Return values in SI (any shape) in the unit in which they are shown."""
-    zero, one = shown(0.0, quantity), shown(1.0, quantity)
+    zero, one = display_value(0.0, quantity), display_value(1.0, quantity)
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 
 
-def titled(words: str, quantity: str) -> str:
+def title_with_unit(words: str, quantity: str) -> str:
     """Return a name with the unit in which its quantity is shown: ``Gas supplied (g)``."""
-    unit = shown_unit(quantity)
+    unit = display_unit(quantity)
     return f"{words} ({unit})" if unit else words
 
 
 def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
     """Return a value in SI as text with the unit in which it is shown."""
-    return f"{shown(value, quantity):{form}} {shown_unit(quantity)}".rstrip()
+    return f"{display_value(value, quantity):{form}} {display_unit(quantity)}".rstrip()
 
 
 def change_text(value: float, quantity: str, form: str = ".3g") -> str:
     """Return a difference of two values in SI as text with the unit in which it is shown."""
-    unit = "psi" if quantity == "pressure" else shown_unit(quantity)
-    return f"{shown_change(value, quantity):{form}} {unit}".rstrip()
+    unit = "psi" if quantity == "pressure" else display_unit(quantity)
+    return f"{display_difference(value, quantity):{form}} {unit}".rstrip()

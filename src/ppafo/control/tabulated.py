@@ -43,25 +43,25 @@ def next_segment(segment: Segment, place: float, time: float, value: float) -> S
     """The segment, or the next one, to the knot at ``time`` [s], where ``place`` [s] has passed its end."""
     passed = place >= segment.end
     return Segment(
-        segment.end if passed else segment.start,
-        segment.last if passed else segment.first,
-        time if passed else segment.end,
-        value if passed else segment.last,
+        start=segment.end if passed else segment.start,
+        first=segment.last if passed else segment.first,
+        end=time if passed else segment.end,
+        last=value if passed else segment.last,
     )
 
 
 def segment_at(profile: Tabulated, place: float) -> Segment:
     """The segment in which a place [s] of a repetition lies; its end is later than the place."""
-    segment = Segment(0.0, profile.value_01, profile.knots[0].time, profile.knots[0].value)
+    segment = Segment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
     for knot in profile.knots[1:]:
         segment = next_segment(segment, place, knot.time, knot.value)
     segment = next_segment(segment, place, profile.period, profile.value_01)
     is_last = segment.end >= profile.period
     return Segment(
-        segment.start,
-        segment.first,
-        profile.period if is_last else segment.end,
-        profile.value_01 if is_last else segment.last,
+        start=segment.start,
+        first=segment.first,
+        end=profile.period if is_last else segment.end,
+        last=profile.value_01 if is_last else segment.last,
     )
 
 

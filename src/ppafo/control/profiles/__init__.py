@@ -1,1 +1,0 @@
-"""Functions of time that a reference or a prescribed angle can follow, one module each."""

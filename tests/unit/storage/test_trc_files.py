@@ -1,0 +1,66 @@
+"""Markers in .trc files: read with empty cells as gaps, and refused in one line where they are damaged."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.storage.trc import read_trc
+
+HEAD = (
+    "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n100\t100\t3\t2\tmm\n"
+    "Frame#\tTime\tRKNE\t\t\tR.Ankle\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n"
+)
+ROWS = "1\t0.00\t1\t2\t3\t4\t5\t6\n2\t0.01\t\t\t\t4\t5\t6\n3\t0.02\t1\t2\tnan\n"
+
+
+def table(text: str, folder: Path) -> Path:
+    path = folder / "walk.trc"
+    path.write_bytes(text.encode())
+    return path
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_markers_are_read_and_what_was_not_seen_is_a_gap(tmp_path: Path, end: str) -> None:
+    found = read_trc(table((HEAD + ROWS).replace("\n", end), tmp_path))
+    assert (found.unit, list(found.markers), found.time.tolist()) == ("mm", ["RKNE", "R.Ankle"], [0.0, 0.01, 0.02])
+    assert np.isnan(found.markers["RKNE"][:, 1]).all()
+    assert found.markers["RKNE"][:2, 2].tolist() == [1.0, 2.0]
+    assert np.isnan(found.markers["R.Ankle"][:, 2]).all()
+    assert found.markers["R.Ankle"][:, 1].tolist() == [4.0, 5.0, 6.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time,angle\n0,1\n", "is not a .trc file: its first line begins with 'PathFileType'"),
+        (HEAD, "has no rows"),
+        (HEAD.replace("\tmm\n", "\tinch\n") + ROWS, "line 3: Units is 'inch'; allowed are mm, cm, m"),
+        (HEAD.replace("\tUnits", "") + ROWS, "line 3: Units is ''; allowed are mm, cm, m"),
+        (HEAD.replace("Time", "Clock") + ROWS, "line 4: must begin with 'Frame#', 'Time'"),
+        (HEAD.replace("R.Ankle", "RKNE") + ROWS, "line 4: names two markers 'RKNE'; every marker needs a name"),
+        (HEAD.replace("RKNE", "").replace("R.Ankle", "") + ROWS, "line 4: names no marker"),
+        (HEAD + ROWS.replace("\t6\n2", "\t6\t7\n2"), "line 7 has 9 values for 8 columns"),
+        (HEAD + ROWS.replace("\t4\t", "\tfour\t", 1), "line 7: 'four' is not a number, or not a finite one"),
+        (HEAD + ROWS.replace("0.01", "nan"), "line 8: 'nan' is not a number, or not a finite one"),
+        (HEAD + ROWS.replace("0.02", "0.01"), "line 9: the time 0.01 s follows 0.01 s; it must increase"),
+        (HEAD + ROWS.replace("\t4\t", "\t1e999\t", 1), "line 7: '1e999' is not a number, or not a finite one"),
+        (HEAD + ROWS + "\0", "is not a text file (byte"),
+        ("\xff", "is not a .trc file"),
+    ],
+)
+def test_a_damaged_table_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:
+    path = table(text, tmp_path)
+    with pytest.raises(DataError) as refused:
+        read_trc(path)
+    assert message in str(refused.value)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "walk.trc"
+    path.write_bytes(b"PathFileType\xff\xfe\n" * 8)
+    with pytest.raises(DataError, match="is not a text file in UTF-8"):
+        read_trc(path)

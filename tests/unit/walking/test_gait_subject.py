@@ -1,0 +1,80 @@
+"""The wearer comes with the gait that is named; what a walk file states wins, and a difference is said."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from ppafo.errors import ScenarioError
+from ppafo.gait import load_gait
+from ppafo.gait.writing import gait_toml
+from ppafo.walking import load_walk
+from ppafo.walking.gait_subject import person_remarks
+from ppafo.walking.wearer import paper_subject
+
+
+def gait_file(folder: Path, body_mass: float, stature: float | None = None, tilt: float = 0.0) -> Path:
+    gait = load_gait()
+    ankle = replace(gait.ankle_angle, mean=gait.ankle_angle.mean + tilt)
+    path = folder / "mine.toml"
+    path.write_text(gait_toml(replace(gait, name="mine", body_mass=body_mass, stature=stature, ankle_angle=ankle)))
+    return path
+
+
+def test_the_subject_of_a_named_gait_walks(tmp_path: Path) -> None:
+    found = load_walk("solenoid", gait=gait_file(tmp_path, 85.07))
+    paper = paper_subject()
+    assert found.wearer.body_mass == pytest.approx(85.07)
+    assert found.wearer.foot_mass == pytest.approx(paper.foot_mass * 85.07 / 72.5)
+    assert found.wearer.shank_length == paper.shank_length, "no stature: lengths stay"
+    assert person_remarks(found) == ["wearer: 85.07 kg, the subject of gait 'mine'"]
+
+
+def test_a_stature_scales_lengths_and_inertias(tmp_path: Path) -> None:
+    found = load_walk("solenoid", gait=gait_file(tmp_path, 85.07, 1.70)).wearer
+    paper, taller = paper_subject(), 0.246 * 1.70 / 0.46
+    assert found.shank_length == pytest.approx(0.246 * 1.70)
+    assert found.toe_lever == pytest.approx(paper.toe_lever * taller)
+    assert found.foot_inertia == pytest.approx(paper.foot_inertia * 85.07 / 72.5 * taller**2)
+    assert found.ankle_stiffness == paper.ankle_stiffness
+
+
+def test_without_a_named_gait_the_papers_subject_walks_and_the_difference_is_said() -> None:
+    found = load_walk("solenoid")
+    assert found.wearer == paper_subject()
+    (line,) = person_remarks(found)
+    assert line.startswith("wearer: 72.5 kg, the paper's subject; the subject of gait 'falisse2019-subject1' has 62 kg")
+    assert load_walk("solenoid", gait="falisse2019-subject1").wearer.body_mass == 62.0
+
+
+def test_a_gait_that_the_walk_file_names_brings_its_subject_too(tmp_path: Path) -> None:
+    gait_file(tmp_path, 90.0)
+    path = tmp_path / "walk.toml"
+    device = "[device]\nset = 'ppafo2011'\nvalve = 'solenoid'\n[controller]\nkind = 'event_on_off'\n"
+    path.write_text("schema_version = 1\nname = 'own'\ngait = 'mine.toml'\n" + device)
+    assert load_walk(path).wearer.body_mass == 90.0
+    path.write_text("schema_version = 1\nname = 'own'\n" + device + "[wearer]\nbody_mass = '75 kg'\n")
+    assert load_walk(path).wearer == replace(paper_subject(), body_mass=75.0)
+
+
+def test_a_stated_body_mass_wins_and_the_difference_is_said(tmp_path: Path) -> None:
+    path = gait_file(tmp_path, 85.07)
+    found = load_walk("solenoid", ["wearer.body_mass=90 kg"], gait=path)
+    assert found.wearer.body_mass == 90.0
+    assert person_remarks(found) == [
+        "wearer: 90 kg, as wearer.body_mass states; the subject of gait 'mine' has 85.07 kg: moment and force of the "
+        "gait are scaled by body mass"
+    ]
+    same = load_walk("solenoid", ["wearer.body_mass=85.07 kg"], gait=path)
+    assert person_remarks(same) == ["wearer: 85.07 kg, as wearer.body_mass states"]
+
+
+def test_a_subject_who_cannot_wear_the_device_is_refused_with_the_key(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"is of a subject of 6 kg, .*a wearer has 10 to 300 kg: give wearer.body"):
+        load_walk("solenoid", gait=gait_file(tmp_path, 6.0))
+
+
+def test_a_tilted_foot_is_remarked_where_it_walks(tmp_path: Path) -> None:
+    straight, tilted = (load_walk("off", gait=gait_file(tmp_path, 62.0, tilt=tilt)) for tilt in (0.0, 0.1))
+    assert len(person_remarks(straight)) == 1
+    assert "the zero of ankle_angle seems to be off by 10.3 deg" in person_remarks(tilted)[1]

@@ -1,0 +1,64 @@
+"""Wearers with more or less of their own muscles, slow walks and poor sensors: nothing of it is a fault."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from ppafo.gait import load_gait
+from ppafo.walking.comparison import compare_walks
+from ppafo.walking.loading import load_walk
+from ppafo.walking.walk import walk
+
+MINUTES = 0.25
+SLOW = 0.99
+"""Walking speed [m/s]; the built-in gait was recorded at 1.33."""
+
+SENSORS = {
+    "ideal": (),
+    "coarse": (
+        "sensors.force_resolution=20 N",
+        "sensors.angle_resolution=0.5 deg",
+        "sensors.pressure_resolution=1 psi_d",
+    ),
+    "noisy": ("sensors.force_noise=10 N", "sensors.angle_noise=0.2 deg", "sensors.pressure_noise=0.3 psi_d"),
+}
+
+
+@pytest.mark.parametrize("valve", ["solenoid", "proportional"])
+@pytest.mark.parametrize("sensors", SENSORS)
+def test_a_wearer_with_any_part_of_the_healthy_moment_is_helped_without_alarm(valve: str, sensors: str) -> None:
+    for fraction in (0.0, 0.4, 0.8, 0.9, 1.0):
+        result = walk(load_walk(valve, [f"wearer.residual_share={fraction}", *SENSORS[sensors]]), MINUTES)
+        assert result.status.is_completed
+        assert "safe_state_time" not in result.metrics
+        assert result.metrics["push_off_work"].value > 1.0
+
+
+@pytest.mark.parametrize("valve", ["solenoid", "proportional"])
+def test_a_slow_walk_is_helped_without_alarm(valve: str) -> None:
+    gait = load_gait("falisse2019-subject1")
+    assert gait.walking_speed is not None
+    slow = replace(gait, stride_time=gait.stride_time * math.sqrt(gait.walking_speed / SLOW), walking_speed=SLOW)
+    for fraction in (0.0, 0.8, 1.0):
+        configuration = replace(load_walk(valve, [f"wearer.residual_share={fraction}"]), gait=slow)
+        result = walk(configuration, MINUTES)
+        assert "safe_state_time" not in result.metrics
+        assert result.metrics["push_off_work"].value > 1.0
+
+
+def test_a_nondisabled_wearer_keeps_the_gait_and_the_device_takes_over_part_of_lifting_the_foot() -> None:
+    comparison = compare_walks(load_walk("proportional", ["wearer.keeps_gait=1"]), MINUTES)
+    worn, bare = comparison.with_device, comparison.without_device
+    for result in (worn, bare):
+        assert "safe_state_time" not in result.metrics
+        assert result.metrics["angle_difference"].value < math.radians(1.0)
+    moments = [metrics["dorsiflexor_moment"].value for metrics in (worn.metrics, bare.metrics, comparison.healthy)]
+    # The plate's weight has to be lifted too where the device is off.
+    assert 0.0 < moments[0] < moments[2] < moments[1]
+
+
+def test_an_impaired_wearer_has_no_moment_of_dorsiflexors_to_speak_of() -> None:
+    result = walk(load_walk("proportional"), MINUTES)
+    assert "dorsiflexor_moment" not in result.recording
+    assert "dorsiflexor_moment" not in result.metrics
