@@ -9,6 +9,7 @@ mid-swing, dorsiflexion on the toes). It prints the table of docs/how-to/let-it-
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,13 +138,19 @@ class Runs:
     late_toes: Floats
 
 
+def failing(sensors: GaitSensors, faults: Kind) -> GaitSensors:
+    """Sensors with these faults."""
+    changed: dict[str, Any] = {f"{sensor}_fault": fault for sensor, fault in faults.items()}
+    return sensors._replace(**changed)
+
+
 def run(name: str, faults: list[Kind], begins: Floats) -> Runs:
     """Run a configuration with every fault from every instant [s]; ``faults`` may be one that is empty."""
     configuration = load_walk(name)
     stride = configuration.gait.stride_time
     sound = configuration.gait_sensors
     sensors = [
-        sound._replace(**{f"{sensor}_fault": fault._replace(time=float(time)) for sensor, fault in kind.items()})
+        failing(sound, {sensor: fault._replace(time=float(time)) for sensor, fault in kind.items()})
         for kind in faults
         for time in begins
     ]
@@ -232,9 +239,9 @@ def main() -> None:
     print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
     print("\n".join(f"| {' | '.join(cells)} |" for cells in table))
     bad = sum(cells[1].startswith("neither") for cells in table)
-    words = [f"{len(table)} kinds", f"{sum(cells[1] == 'found' for cells in table)} found"]
-    words += [f"{sum('harmless' in cells[1] for cells in table)} harmless, or found where not", f"{bad} neither"]
-    print("\n" + ", ".join(words))
+    counts = [f"{len(table)} kinds", f"{sum(cells[1] == 'found' for cells in table)} found"]
+    counts += [f"{sum('harmless' in cells[1] for cells in table)} harmless, or found where not", f"{bad} neither"]
+    print("\n" + ", ".join(counts))
 
 
 if __name__ == "__main__":

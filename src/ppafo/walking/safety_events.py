@@ -9,7 +9,8 @@ import numpy as np
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.signs import HELPS, PAUSED, SIGNS, STOPPED, Sign
 from ppafo.engine.lanes import Floats
-from ppafo.simulation.reading import PLAIN, WRITTEN_UNITS
+from ppafo.simulation.declaration import PLAIN
+from ppafo.simulation.reading import WRITTEN_UNITS
 from ppafo.units import from_si
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.recorded import SAFE_ROW, VENTINGS_ROW
