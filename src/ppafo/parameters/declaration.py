@@ -73,6 +73,11 @@ REPORTED = (
     Quantity("largest_angle", "rad", "largest angle that was used or measured"),
     Quantity("other_supply_pressure", "Pa_a", "a second supply pressure used in experiments"),
     Quantity("demanded_torque", "N m", "maximum torque that a task requires"),
+    Quantity("torque_efficiency", "", "work at the shaft over the work p dV of the gas"),
+    Quantity("walking_torque", "N m", "peak torque of the device while it walks"),
+    Quantity("walking_torque_pressure", "Pa_a", "supply pressure of that torque"),
+    Quantity("rated_torque", "N m", "largest torque of the actuator"),
+    Quantity("rated_torque_pressure", "Pa_a", "supply pressure of that torque"),
 )
 REPORTED_FORMULA = "choked_flow_exponent"
 REPORTED_OF_A_VALVE = (

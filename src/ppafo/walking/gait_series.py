@@ -1,17 +1,15 @@
 """A gait as the engine uses it: eight harmonics of each curve, its events, and how the heel meets the ground."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ppafo.constants import STANDARD_GRAVITY
 from ppafo.gait import Gait
 from ppafo.gait.gait import Curve
 from ppafo.model.fourier import HARMONICS, Harmonic, Series
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.signals.recording import Floats
-from ppafo.walking.wearer import Wearer
 
 FLAT_FROM, FLAT_TO = 0.15, 0.35
 """Phases between which every foot stands flat; the angle of the foot is taken from there."""
@@ -24,9 +22,6 @@ USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
 
 EVENT_PHASES = np.linspace(0.0, 1.0, 1001)[150:]
 """Phases at which events are looked for, from the first flat foot on."""
-
-ROLL_ANGLES = tuple(math.radians(degrees) for degrees in range(2, 16))
-"""Tilts at which the lever of the ground force may have risen half of the way."""
 
 CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
 """Shares of the swing between which the toes must clear the ground."""
@@ -60,59 +55,17 @@ def truncate(curve: Curve) -> Curve:
     return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
 
 
-@dataclass(frozen=True, slots=True)
-class HeelRocker:
-    """Lever [m] of the ground force behind the ankle: nearly flat, far up, and the tilt [rad] half of the way up."""
-
-    flat: float
-    raised: float
-    half: float
-
-
-def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
-    """The lever over the tilt of the measured foot while it comes down on its heel alone, by least squares.
-
-    From the measured moment, which horizontal forces are part of, or without one from the centre of pressure. A heel
-    that is still up when the toes of the measured foot take over keeps the last lever. The lever of the heel itself
-    bounds it, and stands in where nothing was measured.
-    """
-    phases = np.linspace(0.0, landing_phase(gait), 151)
-    levers = _measured_levers(gait, phases)
-    tilt = _foot_angles(gait, phases) - gait_timing(gait).ground_angle
-    if levers is None or gait.vertical_force is None:
-        return HeelRocker(wearer.heel_lever, wearer.heel_lever, ROLL_ANGLES[0])
-    force = np.maximum(truncate(gait.vertical_force).values_at(phases), 0.0)
-    flat = min(max(float(levers[-1]), 0.0), wearer.heel_lever)
-    _, rise, half = min(_rise(half, np.maximum(tilt, 0.0), levers - flat, force) for half in ROLL_ANGLES)
-    return HeelRocker(flat, min(max(flat + rise, flat), wearer.heel_lever), half)
-
-
-def _measured_levers(gait: Gait, phases: Floats) -> Floats | None:
-    if gait.ankle_moment is not None and gait.vertical_force is not None:
-        force = np.maximum(truncate(gait.vertical_force).values_at(phases) * STANDARD_GRAVITY, 1.0)
-        return -truncate(gait.ankle_moment).values_at(phases) / force
-    return None if gait.centre_of_pressure is None else -truncate(gait.centre_of_pressure).values_at(phases)
-
-
-def _rise(half: float, tilt: Floats, levers: Floats, force: Floats) -> tuple[float, float, float]:
-    """Squares left over, the rise [m] of the lever far up, and the angle [rad] of half of it; weighted by the force."""
-    shape = force * tilt / (tilt + half)
-    rise = float(shape @ (force * levers)) / max(float(shape @ shape), 1.0e-12)
-    left = force * levers - rise * shape
-    return float(left @ left), rise, half
-
-
 def landing_phase(gait: Gait) -> float:
     """Phase [strides] at which the measured foot has come down: the first time within ``NEARLY_FLAT`` of flat.
 
     The last degrees are those of heel pad and shoe, which the foot of the engine has not: it is flat at once.
     """
     phases = np.linspace(0.0, FLAT_FROM, 151)
-    down = _foot_angles(gait, phases) < gait_timing(gait).ground_angle + NEARLY_FLAT
+    down = foot_angles(gait, phases) < gait_timing(gait).ground_angle + NEARLY_FLAT
     return float(phases[np.argmax(down)]) if down.any() else FLAT_FROM
 
 
-def _foot_angles(gait: Gait, phases: Floats) -> Floats:
+def foot_angles(gait: Gait, phases: Floats) -> Floats:
     """Angles [rad] of the measured foot over the horizontal."""
     shank, ankle = truncate(gait.shank_angle), truncate(gait.ankle_angle)
     return shank.values_at(phases) - ankle.values_at(phases) + 0.5 * math.pi
@@ -120,7 +73,7 @@ def _foot_angles(gait: Gait, phases: Floats) -> Floats:
 
 def gait_timing(gait: Gait) -> GaitTiming:
     """Frequency [Hz], events [strides] and the flat foot's angle [rad]; heel rise and angle come from the curves."""
-    foot = _foot_angles(gait, EVENT_PHASES)
+    foot = foot_angles(gait, EVENT_PHASES)
     events = gait_events(foot[None, :], np.array([gait.stance_share]))
     return GaitTiming(
         frequency=1.0 / gait.stride_time, start=0.0, **{name: float(values[0]) for name, values in events.items()}

@@ -42,7 +42,14 @@ from ppafo.walking.schema import walk_file
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 _TURN = 2.0 * math.pi
-_TEXTS = ("gait", "device.valve", "controller.kind", "gas_model.kind", *(f"faults.{sensor}.kind" for sensor in FAULTY))
+_TEXTS = (
+    "gait",
+    "device.set",
+    "device.valve",
+    "controller.kind",
+    "gas_model.kind",
+    *(f"faults.{sensor}.kind" for sensor in FAULTY),
+)
 DEFAULT_PERIOD = 1.0e-3
 
 

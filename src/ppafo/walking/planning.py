@@ -24,7 +24,8 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import Pieces, Steps, compose_run
 from ppafo.simulation.scenario import ProfileChoice, Thermal
-from ppafo.walking.gait_series import gait_series, gait_timing, heel_rocker
+from ppafo.walking.gait_series import gait_series, gait_timing
+from ppafo.walking.heel_rocker import heel_rocker
 from ppafo.walking.wearer import Wearer
 
 ANGLES = (math.radians(60.0), math.radians(115.0))

@@ -32,8 +32,9 @@ def batch_of_many(
     single = batch_of(run)
     count = build.mass.size
     assert run.walk is not None, "a population walks"
-    segments = segment_values(replace(configuration.wearer, heel_lever=run.walk.leg.heel_lever), build)
-    segments["flat_heel_lever"] = run.walk.leg.flat_heel_lever * build.stature
+    # How the heel rolls is its shape, which is that of the one leg at the size of the other.
+    leg, segments = run.walk.leg, segment_values(configuration.wearer, build)
+    segments |= {name: getattr(leg, name) * build.stature for name in ("heel_lever", "flat_heel_lever")}
     parameters, states = (np.repeat(column, count, axis=1) for column in (single.parameters, single.states))
     _overwrite(
         parameters, row_numbers(single.program.parameter_rows()), _parameter_rows(run, segments, gaits, generator)

@@ -129,3 +129,15 @@ def test_bad_input_is_one_line_and_exit_code_2(words: list[str], capsys: pytest.
 def test_the_schema_is_printed_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", "parameters"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "ppafo parameter set"
+
+
+def test_several_sets_are_audited_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["audit", "ppafo2011", "ppafo2011-consistent"]) == 0
+    head, *rows = (line.split() for line in capsys.readouterr().out.splitlines())
+    assert head == ["finding", "ppafo2011", "ppafo2011-consistent"]
+    assert ["virtual-work", "warning", "note"] in rows
+    assert ["flow-of-solenoid", "accepted", "accepted"] in rows
+    assert main(["audit", "ppafo2011", "ppafo2011-printed", "--json"]) == 1
+    document = json.loads(capsys.readouterr().out)
+    assert [one["set"] for one in document["sets"]] == ["ppafo2011", "ppafo2011-printed"]
+    assert document["sets"][1]["counts"]["error"] == 9

@@ -18,7 +18,8 @@ from ppafo.model import contact as ground
 from ppafo.model.gait import gait_at
 from ppafo.model.leg import foot_inertia_about_ankle, passive_torque
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.walking.gait_series import heel_rocker, landing_phase, truncate
+from ppafo.walking.gait_series import landing_phase, truncate
+from ppafo.walking.heel_rocker import heel_rocker
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import Wearer, paper_subject
 

@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.run import batch_of
+from ppafo.engine.run import Run, batch_of
 from ppafo.gait import load_gait
 from ppafo.gait.gait import KNEE, Curve
 from ppafo.simulation.sampled import state_row_numbers
@@ -50,6 +50,17 @@ def varied(curve: Curve | None, series: SeriesOfMany, index: int) -> Curve:
     return replace(curve, mean=float(series.mean[index]), cosines=cosines, sines=sines)
 
 
+def with_heel_of(run: Run, shared: Run, stature: float) -> Run:
+    """A run whose heel rolls as that of another one, at another size."""
+    assert run.walk is not None, "it walks"
+    assert shared.walk is not None, "it walks"
+    levers = shared.walk.leg.heel_lever * stature, shared.walk.leg.flat_heel_lever * stature
+    leg = run.walk.leg._replace(
+        heel_lever=levers[0], flat_heel_lever=levers[1], heel_roll_angle=shared.walk.leg.heel_roll_angle
+    )
+    return replace(run, walk=replace(run.walk, leg=leg))
+
+
 def test_any_wearer_walks_as_it_would_alone() -> None:
     configuration, index, count = load_walk("solenoid"), 3, 5
     people = walk_population(configuration, MINUTES, count, seed=3)
@@ -73,8 +84,8 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
         assert float(values[index]) == pytest.approx(getattr(timing, name), rel=1e-9), name
     wearer = replace(configuration.wearer, **{name: float(values[index]) for name, values in segments.items()})
     alone = replace(configuration, wearer=wearer, gait=gait, settings=settings)
-    run = plan_walk(plan_of(alone, 60.0 * MINUTES))
     shared = plan_walk(plan_of(configuration, 60.0 * MINUTES))
+    run = with_heel_of(plan_walk(plan_of(alone, 60.0 * MINUTES)), shared, float(build.stature[index]))
     begun = batch_of_many(configuration, shared, build, gaits, np.random.default_rng(3)).states[:, index]
     paths = [path for group, row in run.program.state_rows().items() for path in leaf_paths(row, group)]
     for path, value, own in zip(paths, begun.tolist(), batch_of(run).states[:, 0].tolist(), strict=True):

@@ -5,11 +5,13 @@ from collections.abc import Callable, Iterator
 from ppafo.parameters.audit import (
     choked_flow,
     dimensions,
+    filling,
     flow,
     gas_data,
     ideal_gas,
     inertia,
     orifices,
+    published_torque,
     ranges,
     sonic_flow,
     torque_ceiling,
@@ -30,6 +32,8 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
     "inertia": inertia.check,
     "virtual work": virtual_work.check,
     "volumes": volumes.check,
+    "filling": filling.check,
     "torque ceiling": torque_ceiling.check,
+    "published torque": published_torque.check,
     "ideal gas": ideal_gas.check,
 }

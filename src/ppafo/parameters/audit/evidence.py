@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import UnitError
+from ppafo.model.chambers import chamber_1_volume
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.audit.finding import NamedValue
@@ -112,6 +113,17 @@ class Evidence:
         high_path = self._first("reported.largest_angle", "actuator.angle_max")
         found = self.numbers(low_path, high_path)
         return None if found is None else (low_path, found[0], high_path, found[1])
+
+    def single_fill_gas(self) -> str | None:
+        """Return the path of the first gas use of a single filling that the set reports."""
+        paths = (f"reported.valves.{name}.single_fill_gas" for name in self.parameter_set.valve_kinds)
+        return next((path for path in paths if self.number(path)), None)
+
+    def chamber_1_volume(self, angle: float) -> float | None:
+        """Return the volume of chamber 1 [m^3] at an angle [rad], without a dead volume that the set does not have."""
+        found = self.numbers("actuator.volume_per_angle", "actuator.angle_min")
+        dead_volume = self.number("actuator.dead_volume_1") or 0.0
+        return None if found is None else chamber_1_volume(angle, found[1], found[0], dead_volume)
 
     def _first(self, preferred: str, other: str) -> str:
         return preferred if preferred in self.parameter_set.numbers else other

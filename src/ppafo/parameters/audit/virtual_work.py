@@ -7,22 +7,46 @@ from ppafo.parameters.audit.finding import Finding, Side
 
 _TORQUE_CONSTANT = "actuator.torque_constant"
 _VOLUME_PER_ANGLE = "actuator.volume_per_angle"
+_EFFICIENCY = "reported.torque_efficiency"
 _SUPPLY = "supply.pressure"
+_ID = "virtual-work"
 _TOLERANCE = 0.1
 
 
 def check(evidence: Evidence) -> Iterator[Finding]:
-    """Yield a warning where the two differ by more than 10 %, with what a measured gas use says about the volume."""
-    found = evidence.numbers(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE)
-    if found is None or min(found) <= 0.0 or abs(found[1] / found[0] - 1.0) <= _TOLERANCE:
+    """Yield a warning where the two differ by more than 10 %, a note where a stated efficiency explains it."""
+    found, efficiency = evidence.numbers(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE), evidence.number(_EFFICIENCY)
+    if found is None or min(found) <= 0.0:
         return
-    torque_constant, volume_per_angle = found
+    if efficiency is not None and abs(found[1] * efficiency / found[0] - 1.0) <= _TOLERANCE:
+        yield _closure(evidence, found[0] / found[1])
+    elif abs(found[1] / found[0] - 1.0) > _TOLERANCE:
+        yield _contradiction(evidence, *found)
+
+
+def _closure(evidence: Evidence, ratio: float) -> Finding:
+    """Return the note that the shaft's work is that of the gas less the stated loss."""
+    return Finding(
+        id=_ID,
+        severity="note",
+        title="torque constant and volume per angle agree, with the stated efficiency",
+        values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY),
+        sides=(Side("torque constant over volume per angle", ratio, ""),),
+        paragraph=(
+            f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
+            f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where the shaft drives "
+            "the vane and compresses gas, where a real loss has the other sign."
+        ),
+    )
+
+
+def _contradiction(evidence: Evidence, torque_constant: float, volume_per_angle: float) -> Finding:
     gas_paths, gas_sides, gas_text = _gas_use(evidence, torque_constant, volume_per_angle)
-    yield Finding(
-        id="virtual-work",
+    return Finding(
+        id=_ID,
         severity="warning",
         title="torque constant and volume per angle differ, against virtual work",
-        values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, *gas_paths),
+        values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY, *gas_paths),
         sides=(
             Side("torque constant", torque_constant, "m^3"),
             Side("volume per angle", volume_per_angle, "m^3/rad"),
@@ -43,7 +67,7 @@ def _gas_use(
 ) -> tuple[tuple[str, ...], tuple[Side, ...], str]:
     """Return paths, numbers and a sentence on the volume that the gas for one filling needs."""
     gas, supply, angles = evidence.gas(), evidence.number(_SUPPLY), evidence.angle_range()
-    path = _single_fill(evidence)
+    path = evidence.single_fill_gas()
     if gas is None or supply is None or supply <= evidence.atmosphere() or angles is None or path is None:
         return (), (), ""
     density = density_change(gas, supply - evidence.atmosphere())
@@ -63,9 +87,3 @@ def _gas_use(
         f"angle. The gas use favours the {nearer}."
     )
     return (path, _SUPPLY, angles[0], angles[2]), sides, text
-
-
-def _single_fill(evidence: Evidence) -> str | None:
-    """Return the path of the first gas use of a single filling that the set reports."""
-    paths = (f"reported.valves.{name}.single_fill_gas" for name in evidence.parameter_set.valve_kinds)
-    return next((path for path in paths if evidence.number(path)), None)

@@ -62,7 +62,8 @@ def _answer_of_several(several: Endurances) -> Answer:
     uses = several.uses
     first = next(iter(uses.values()))
     head = (*_USE, *_COURSE, *(_REUSED if first.reuse else ()), Column("ended"))
-    chambers = tuple(f"{name}: {_chambers(one.reuse)}" for name, one in uses.items() if one.reuse is not None)
+    chambers = [f"{name}: {_chambers(one.reuse)}" for name, one in uses.items() if one.reuse is not None]
+    chambers += [f"{name} {words}: {text}" for name, one in uses.items() for words, text in _other_facts(one)]
     return Answer(
         name="endurance",
         kicker="Endurance",
@@ -70,7 +71,7 @@ def _answer_of_several(several: Endurances) -> Answer:
         lead=(first.bottle.title,),
         sections=(
             Section(table=Table(head, tuple((name, *_cells(one)) for name, one in uses.items()))),
-            Section(remarks=chambers),
+            Section(remarks=tuple(chambers)),
             Section("What is not in the model", (_LEFT_OUT,), is_detail=True),
         ),
         data={"recordings": {name: _data(one) for name, one in uses.items()}},
@@ -105,7 +106,20 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
     ]
     if "liquid_mass" in recording:
         rows.append(("liquid used up", _dry_since(course)))
-    return rows + (_reuse_facts(found, found.reuse, found.without_reuse) if found.reuse and found.without_reuse else [])
+    rows += _reuse_facts(found, found.reuse, found.without_reuse) if found.reuse and found.without_reuse else []
+    return rows + _other_facts(found)
+
+
+def _other_facts(found: Endurance) -> list[tuple[str, str]]:
+    """Return what the same walk comes to with the other readings of the paper's chambers, docs/decisions/0014."""
+    return [
+        (
+            f"with {name}",
+            f"{_gas(other.draw.mass_per_step)} a step, {_minutes(other.discharge.walking_time)} of walking, "
+            f"{other.discharge.steps:.0f} steps{', without reuse' if found.reuse else ''}",
+        )
+        for name, other in found.others.items()
+    ]
 
 
 def _reuse_facts(found: Endurance, reused: Reuse, without: Discharge) -> list[tuple[str, str]]:
@@ -184,6 +198,11 @@ def _data(found: Endurance) -> dict[str, Any]:
         "schedule": asdict(found.schedule),
         "bottle": _bottle_data(found),
     }
+    if found.others:
+        data["other_chambers"] = {
+            name: _course_data(other.discharge) | {"gas_per_step": other.draw.mass_per_step}
+            for name, other in found.others.items()
+        }
     if found.reuse is not None and found.without_reuse is not None:
         cycle, balance = found.reuse.cycle._asdict(), found.reuse.balance._asdict()
         data["reuse"] = {"cycle": cycle, "balance": balance, "without_reuse": _course_data(found.without_reuse)}

@@ -3,7 +3,7 @@
 import math
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -134,7 +134,8 @@ class Actuator:
 class WalkGas:
     """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride, and the actuator.
 
-    ``gas_per_stride`` is that of the strides with help, 0 where the walk took none.
+    ``gas_per_stride`` is that of the strides with help, 0 where the walk took none. ``others`` is the gas use of the
+    same walk with other readings of the paper's chambers, by their names.
     """
 
     name: str
@@ -142,6 +143,7 @@ class WalkGas:
     gas_per_stride: float
     stride_time: float
     actuator: Actuator
+    others: Mapping[str, Draw] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +192,23 @@ def read_walk_gas(folder: Path) -> WalkGas:
     gas = _number(document, "metrics.gas.value", path, -_LEAST) if has_gas else 0.0
     stride_time = _number(document, "configuration.gait.stride_time", path, 0.0)
     name = document["configuration"].get("name", folder.name)
-    return WalkGas(str(name), _recording(folder), gas, stride_time, actuator)
+    return WalkGas(str(name), _recording(folder), gas, stride_time, actuator, _others(document, actuator, path))
+
+
+def _others(document: Mapping[str, Any], actuator: Actuator, file: Path) -> dict[str, Draw]:
+    """Return the gas use of a walk with other chambers than its own, by name."""
+    listed = document.get("volumes", [])
+    if not isinstance(listed, list) or not all(isinstance(item, Mapping) for item in listed):
+        raise DataError(f"{file}: 'volumes' is not a list of tables; write the walk again")
+    found = {}
+    for item in listed:
+        takes_none = "peak_flow" in item and item["peak_flow"] is None
+        if takes_none or all(item.get(name) == getattr(actuator, name) for name in _VOLUMES):
+            continue
+        gas, time, peak = (_number(item, name, file, 0.0) for name in ("gas_per_stride", "stride_time", "peak_flow"))
+        name = str(item.get("chambers", "other chambers"))
+        found[name] = draw_of_numbers(gas, time, max(peak, gas / time))
+    return found
 
 
 def _recording(folder: Path) -> Recording:

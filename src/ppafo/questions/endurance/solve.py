@@ -1,7 +1,7 @@
 """How long one bottle lasts for a gas use, with and without reuse of the exhaust; for several uses side by side."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ppafo.answers import Solved
@@ -41,6 +41,7 @@ class Endurance(Solved):
 
     ``discharge`` is the requested course; ``without_reuse`` the same without reuse, where there is one.
     ``steps_when_warm`` is the number of steps that a bottle which stays at room temperature gives: what cooling costs.
+    ``others`` is the same, without reuse, for a walk with other readings of the paper's chambers, by their names.
     """
 
     bottle: Bottle
@@ -50,6 +51,7 @@ class Endurance(Solved):
     reuse: Reuse | None
     without_reuse: Discharge | None
     steps_when_warm: float
+    others: Mapping[str, "Endurance"] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +116,8 @@ def endurance_of_walk_gas(gas: WalkGas, bottle: Bottle, schedule: Schedule, reus
     """Return how long a bottle lasts when a walk continues; DataError where it took no gas."""
     changes, draw = tuple(reuse), draw_of_walk(gas)
     plan = parse_reuse(changes, bottle, full_chambers(gas)) if changes else None
-    return follow_bottle(bottle, draw, schedule, plan)
+    others = {name: follow_bottle(bottle, other, schedule) for name, other in gas.others.items()}
+    return replace(follow_bottle(bottle, draw, schedule, plan), others=others)
 
 
 def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, plan: ReusePlan | None = None) -> Endurance:

@@ -1,5 +1,6 @@
 """The answer of a sizing study: the valves with pressure and bottle, their margins, the suggestion, the doubts."""
 
+from dataclasses import asdict
 from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
@@ -10,6 +11,7 @@ from ppafo.questions.size.figure import sizing_figure
 from ppafo.questions.size.file import SizingProblem
 from ppafo.questions.size.search import LIMITS
 from ppafo.questions.size.solve import SizedValve, Sizing
+from ppafo.questions.size.volumes import other_sentences
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.version import __version__
 
@@ -61,7 +63,7 @@ def answer_of(sizing: Sizing) -> Answer:
         lead=(*([problem.description] if problem.description else []), _profile_sentence(problem)),
         sections=(
             *_tables(sizing),
-            Section(remarks=(suggestion, *_remarks(sizing))),
+            Section(remarks=(suggestion, *other_sentences(sizing.others), *_remarks(sizing))),
             Section(
                 "Error and gas over pressure",
                 figure=Figure("size", _CAPTION, lambda: sizing_figure(sizing)),
@@ -186,6 +188,7 @@ def _data(sizing: Sizing, suggestion: str) -> dict[str, Any]:
         "suggested": None if sizing.choice is None else sizing.choice.valve.name,
         "summary": suggestion,
         "valves": [_valve_data(item) for item in sizing.valves],
+        "other_chambers": [asdict(one) for one in sizing.others],
         "runs": sizing.runs,
         "failures": [{"reason": reason, "runs": count} for reason, count in sizing.failures.items()],
         "doubtful": doubts_data(sizing.doubtful),

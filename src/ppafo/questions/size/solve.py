@@ -23,6 +23,7 @@ from ppafo.questions.size.search import (
     limit_of,
     try_pressures,
 )
+from ppafo.questions.size.volumes import OtherChambers, with_other_chambers
 from ppafo.signals import Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
@@ -76,7 +77,7 @@ class Sizing(Solved):
     """The result of a sizing study: every valve, and the place of the lightest that works with a bottle, if any.
 
     ``recording`` is the suggestion on the profile, None without one. ``failures`` maps reasons of failed runs to how
-    many had them.
+    many had them. ``others`` is the suggestion with other readings of the paper's chambers.
     """
 
     problem: SizingProblem
@@ -86,6 +87,7 @@ class Sizing(Solved):
     runs: int
     failures: Mapping[str, int]
     seconds: float
+    others: tuple[OtherChambers, ...]
 
     @property
     def choice(self) -> SizedValve | None:
@@ -118,7 +120,9 @@ def size(problem: SizingProblem | str | Path, threads: int | None = None, progre
         sized.append(_size_valve(trials, valve))
     good = [place for place, item in enumerate(sized) if item.works and item.mass is not None]
     suggested = min(good, key=lambda place: (sized[place].mass, sized[place].pressure), default=None)
-    recording = None if suggested is None else _recording(trials, sized[suggested])
+    choice = None if suggested is None else sized[suggested]
+    recording = None if choice is None else _recording(trials, choice)
+    others = () if choice is None else with_other_chambers(chosen, choice.valve, choice.pressure, threads)
     return Sizing(
         problem=chosen,
         valves=tuple(sized),
@@ -127,6 +131,7 @@ def size(problem: SizingProblem | str | Path, threads: int | None = None, progre
         runs=trials.runs,
         failures=dict(trials.failures),
         seconds=time.perf_counter() - begun,
+        others=others,
     )
 
 

@@ -12,6 +12,7 @@ from ppafo.metrics import Metric
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.endurance.solve import Endurance
 from ppafo.questions.walk.solve import WalkPair, Wearers
+from ppafo.questions.walk.volumes import volumes_data, volumes_sections
 from ppafo.questions.walk.wearers import wearers_answer
 from ppafo.signals.recording import Floats
 from ppafo.simulation.document import UNITS, plain
@@ -95,12 +96,13 @@ def _pair_answer(pair: WalkPair) -> Answer:
         sections=(
             Section(paragraphs=_set_up(comparison), is_detail=True),
             Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
+            *volumes_sections(pair.volumes),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
             *_course(worn),
             *(_pictures(comparison) if worn.averages and bare.averages else ()),
             *_assumptions_section(configuration.assumed),
         ),
-        data=_data(comparison, pair.life),
+        data=_data(comparison, pair.life) | {"volumes": volumes_data(pair.volumes)},
         passed=comparison.is_completed and worn.is_helped,
         files={
             "recording.nc": lambda: netcdf_bytes(worn.recording, None),

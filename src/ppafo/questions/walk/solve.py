@@ -8,6 +8,7 @@ from typing import Any
 from ppafo.answers import Solved
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
+from ppafo.questions.walk.volumes import VolumeReading, walks_by_volume
 from ppafo.walking.comparison import Comparison, compare_walks
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
@@ -19,10 +20,14 @@ _LONG = 12.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkPair(Solved):
-    """A walk with the device and without it; ``life`` is how long one bottle lasts, None where no gas was taken."""
+    """A walk with the device and without it; ``life`` is how long one bottle lasts, None where no gas was taken.
+
+    ``volumes`` has the walk and the same with the other readings of the paper's chambers; none for chambers of its own.
+    """
 
     comparison: Comparison
     life: Endurance | None
+    volumes: tuple[VolumeReading, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +60,8 @@ def walk_with_and_without(
         advance = _reporter(report, "walking", "wearers", 0.0)
         return Wearers(walk_population(chosen, minutes, wearers, seed, advance))
     comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
-    return WalkPair(comparison, endurance_of_walk(comparison.with_device))
+    life = endurance_of_walk(comparison.with_device)
+    return WalkPair(comparison, life, walks_by_volume(comparison.with_device, life))
 
 
 def default_folder(values: Mapping[str, Any]) -> Path:

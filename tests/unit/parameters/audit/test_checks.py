@@ -142,3 +142,54 @@ def test_a_value_that_no_device_can_have_is_an_error() -> None:
 
 def test_a_set_with_almost_nothing_in_it_has_almost_nothing_to_say() -> None:
     assert audit(replace(BASE, numbers={}, texts={}, accepted={})) == []
+
+
+def test_a_stated_efficiency_that_explains_the_volume_is_a_note_and_another_is_a_warning() -> None:
+    closed = findings("actuator.volume_per_angle=18.1 cm^3/rad", "reported.torque_efficiency=0.8")["virtual-work"]
+    assert closed.severity == "note"
+    assert side(closed, "torque constant over volume per angle") == pytest.approx(0.8, rel=0.01)
+    assert findings("reported.torque_efficiency=0.8")["virtual-work"].severity == "warning"
+    assert findings("actuator.volume_per_angle=18.1 cm^3/rad")["virtual-work"].severity == "warning"
+    assert "virtual-work" not in findings("actuator.volume_per_angle=14.5 cm^3/rad")
+
+
+def test_the_gas_of_one_filling_is_asked_of_the_whole_chamber() -> None:
+    found = findings()["gas-of-one-filling"]
+    assert found.severity == "note"
+    assert side(found, "gas that fills chamber 1") == pytest.approx(51e-6 * 6.123, rel=0.01)
+    small = "actuator.volume_per_angle=18.1 cm^3/rad"
+    assert findings(small)["gas-of-one-filling"].severity == "warning"
+    assert findings(small, "actuator.dead_volume_1=32 cm^3")["gas-of-one-filling"].severity == "note"
+    assert findings("actuator.dead_volume_1=60 cm^3")["gas-of-one-filling"].severity == "warning"
+
+
+def test_published_torques_at_rest_speak_of_the_torque_constant() -> None:
+    assert side(findings()["walking-torque"], "torque constant times pressure") == pytest.approx(9.0, rel=0.01)
+    assert side(findings()["rated-torque"], "torque constant times pressure") == pytest.approx(12.0, rel=0.01)
+    weak = findings("actuator.torque_constant=10 cm^3")
+    assert {weak[name].severity for name in ("walking-torque", "rated-torque")} == {"warning"}
+    small = findings("actuator.volume_per_angle=14.5 cm^3/rad")
+    assert {small[name].severity for name in ("walking-torque", "rated-torque")} == {"note"}
+
+
+def test_a_torque_of_walking_has_to_come_within_a_push_off() -> None:
+    name = "walking-torque-in-time-solenoid"
+    assert findings()[name].severity == "warning"
+    assert findings()["walking-torque-in-time-proportional"].severity == "note"
+    small = findings("actuator.volume_per_angle=18.1 cm^3/rad")[name]
+    assert small.severity == "note"
+    assert side(small, "time to fill") == pytest.approx(side(findings()[name], "time to fill") * 30.4 / 82.1, rel=0.01)
+
+
+def test_choked_filling_takes_the_time_of_the_closed_formula() -> None:
+    low = ("reported.walking_torque=3 N m", "actuator.volume_per_angle=18.1 cm^3/rad")
+    mass = 0.9 * 3.0 / 1.451e-5 * (2e-6 + 18.1e-6 * 1.5708) / (8.314 / 0.044 * 298.0)
+    flow = 0.113 * 12.6e-6 * 0.002812 * (101325.0 + 90 * 6894.757)
+    found = findings(*low)["walking-torque-in-time-solenoid"]
+    assert side(found, "time to fill") == pytest.approx(mass / flow, rel=2e-3)
+
+
+def test_a_set_without_reports_is_asked_nothing() -> None:
+    silent = {path: entry for path, entry in BASE.numbers.items() if not path.startswith("reported.")}
+    found = {finding.id for finding in audit(replace(BASE, numbers=silent))}
+    assert not found & {"gas-of-one-filling", "walking-torque", "rated-torque", "walking-torque-in-time-solenoid"}

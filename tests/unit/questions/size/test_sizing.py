@@ -9,6 +9,7 @@ import jsonschema
 import numpy as np
 import pytest
 
+from ppafo.answers.text import text_of
 from ppafo.control.tabulated import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
@@ -17,6 +18,7 @@ from ppafo.questions.size.profile import choose_knots
 from ppafo.questions.size.search import Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.questions.size.solve import Sizing, size, smallest_bottle
 from ppafo.signals import Channel, Recording
+from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
 
 SHIPPED = Path(__file__).parents[4] / "src" / "ppafo" / "questions" / "size" / "library" / "push-off.toml"
@@ -237,3 +239,36 @@ def test_a_recording_that_is_no_profile_is_one_line(tmp_path: Path, content: str
     with pytest.raises(PpafoError, match=re.escape(message)) as caught:
         load_sizing(tmp_path / "wrong.toml")
     assert "\n" not in str(caught.value)
+
+
+def test_the_suggestion_is_tried_with_the_other_chambers_of_the_paper(sizing: Sizing) -> None:
+    assert sizing.choice is not None
+    consistent, short = sizing.others
+    assert consistent.gas == pytest.approx(sizing.choice.gas, rel=0.15)
+    assert consistent.gas != sizing.choice.gas
+    for one in sizing.others:
+        assert one.keeps == (one.error <= sizing.problem.largest_error)
+        assert one.gas_in_all == pytest.approx(one.gas * 100 * (1.0 + sizing.problem.reserve))
+    assert f"with {short.name}: RMS error" in text_of(sizing.answer())
+
+
+def test_other_chambers_come_to_what_a_scenario_with_them_comes_to(sizing: Sizing) -> None:
+    choice, problem = sizing.choice, sizing.problem
+    assert choice is not None
+    changes = ["device.set=ppafo2011-consistent", "actuator.dead_volume_1=2 cm^3", "actuator.dead_volume_2=2 cm^3"]
+    device = load_scenario("torque-task-proportional", changes).device
+    scenario = dataclasses.replace(problem.scenario, device=device)
+    own = dataclasses.replace(problem, scenario=scenario, actuator=None)
+    trial = Trials(own).best(choice.valve, np.array([choice.pressure]))
+    assert sizing.others[1].gas == trial.gas[0]
+    assert sizing.others[1].error == trial.error[0]
+
+
+def test_an_actuator_of_its_own_has_no_other_chambers(folder: Path) -> None:
+    path = folder / "own.toml"
+    path.write_text(
+        FILE.replace("smc-crb2bw40-90d", "smc-crb2bw30-90d").replace('rms_error = "0.4 N m"', 'rms_error = "2 N m"')
+    )
+    found = size(path)
+    assert found.choice is not None
+    assert found.others == ()

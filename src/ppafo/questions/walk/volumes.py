@@ -1,0 +1,130 @@
+"""The same walk with other chambers: what gas, work and bottle come to where the paper leaves the volume open."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ppafo.answers import Column, Section, Table
+from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
+from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
+from ppafo.walking.strides import SETTLING
+from ppafo.walking.walk import WalkResult, walk
+
+LONGEST = 1.0
+"""Minutes that are walked at most with other chambers: a walk repeats itself."""
+
+_HEAD = (
+    Column("chambers"),
+    Column("swept", "volume per angle", ".3g"),
+    Column("dead", "volume", ".3g"),
+    Column("gas per stride", "gas mass", ".3f"),
+    Column("work of the gas", "energy", ".2f"),
+    Column("at the shaft", "energy", ".2f"),
+    Column("in push-off", "energy", ".2f"),
+    Column("peak torque", "torque", ".2f"),
+    Column("bottle", "duration", ".3g"),
+)
+_EXPLAINED = (
+    "The paper's torque constant and volume per angle contradict each other by virtual work, so the walk is repeated, "
+    f"for at most {LONGEST:g} min, with other chambers. Controllers keep what they believe of them. With the volume by "
+    "virtual work and dead volumes that are as large as the torque task's gas wants, the torque that was published of "
+    "walking at 90 psi gauge does not come in time; with short lines it does, and the torque task does not take its "
+    "gas. Work of the gas is the integral of (P1 - P2) dV over a stride, work at the shaft that of the actuator "
+    "torque. The peak torque is that of the mean stride."
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VolumeReading:
+    """A walk with some chambers; works of a stride [J], peak of the mean torque [N m]; ``life`` None without gas."""
+
+    chambers: ChamberVolumes
+    result: WalkResult
+    gas_work: float
+    shaft_work: float
+    peak_torque: float
+    life: Endurance | None
+
+
+def walks_by_volume(result: WalkResult, life: Endurance | None) -> tuple[VolumeReading, ...]:
+    """Return a walk and the same with the other readings of its chambers; none where it has chambers of its own.
+
+    The walk is left alone where no gas was taken or it has no whole strides, for then nothing rests on the volume.
+    """
+    actuator = result.configuration.device.actuator
+    others, own = other_readings(actuator), own_reading(actuator)
+    if life is None or own is None or not others or not result.averages:
+        return ()
+    minutes = min(float(result.recording.time[-1]) / 60.0, LONGEST)
+    found = [_read(own, result, life)]
+    for chambers in others:
+        configuration = result.configuration
+        other = walk(replace(configuration, device=chambers.of(configuration.device)), minutes)
+        if other.status.is_completed and other.averages:
+            found.append(_read(chambers, other, endurance_of_walk(other)))
+    return tuple(found)
+
+
+def _read(chambers: ChamberVolumes, result: WalkResult, life: Endurance | None) -> VolumeReading:
+    recording, starts = result.recording, result.starts[SETTLING:]
+    walked = slice(int(starts[0]), int(starts[-1]) + 1)
+    difference = (recording["pressure_1"] - recording["pressure_2"])[walked]
+    turned = float(np.trapezoid(difference, recording["angle"][walked])) / (starts.size - 1)
+    torque_constant = result.configuration.device.actuator.torque_constant
+    return VolumeReading(
+        chambers=chambers,
+        result=result,
+        gas_work=chambers.volume_per_angle * turned,
+        shaft_work=torque_constant * turned,
+        peak_torque=float(result.averages["torque"].mean.max()),
+        life=life,
+    )
+
+
+def volumes_sections(read: tuple[VolumeReading, ...]) -> tuple[Section, ...]:
+    """Return the table of the readings, and how to read it; nothing without them."""
+    if not read:
+        return ()
+    table = Table(_HEAD, tuple(map(_row, read)))
+    return (
+        Section("What rests on the volume of the chambers", table=table),
+        Section("Why there are several chambers", (_EXPLAINED,), is_detail=True),
+    )
+
+
+def _row(one: VolumeReading) -> tuple[str | float | None, ...]:
+    chambers, metrics = one.chambers, one.result.metrics
+    return (
+        chambers.name,
+        chambers.volume_per_angle,
+        chambers.dead_volume_1,
+        metrics["gas"].value,
+        one.gas_work,
+        one.shaft_work,
+        metrics["push_off_work"].value,
+        one.peak_torque,
+        None if one.life is None else one.life.discharge.walking_time,
+    )
+
+
+def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
+    """Return the readings as plain data in SI; the gas use of each is what a bottle is followed with."""
+    return [
+        {
+            "chambers": one.chambers.name,
+            "volume_per_angle": one.chambers.volume_per_angle,
+            "dead_volume_1": one.chambers.dead_volume_1,
+            "dead_volume_2": one.chambers.dead_volume_2,
+            "gas_per_stride": one.result.metrics["gas"].value,
+            "stride_time": one.result.configuration.gait.stride_time,
+            "peak_flow": None if one.life is None else one.life.draw.peak_flow,
+            "gas_work": one.gas_work,
+            "shaft_work": one.shaft_work,
+            "push_off_work": one.result.metrics["push_off_work"].value,
+            "peak_torque": one.peak_torque,
+            "walking_time": None if one.life is None else one.life.discharge.walking_time,
+        }
+        for one in read
+    ]
