@@ -183,7 +183,7 @@ def test_a_stop_is_told_with_its_sign_readings_settings_and_time(
     assert told.startswith("stopped for good at 6.30 s: a force that no foot gives; heel ")
     assert told.endswith(" N, toe 9e+03 N; lowest_force -40 N, largest_force 3e+03 N")
     assert "help in 5 of 7 strides" in lines
-    assert told.removeprefix("s").partition(";")[0] in (tmp_path / "walk/report.html").read_text()
+    assert "a force that no foot gives" in (tmp_path / "walk/report.html").read_text()
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())
     (event,) = document["events"]
     assert (event["kind"], event["sign"], event["settings"]) == (
