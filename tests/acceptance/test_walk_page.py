@@ -22,7 +22,7 @@ def test_the_commands_and_the_python_of_the_page_run(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     commands = [line for block in blocks("sh") for line in block.splitlines()]
-    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 12
+    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 13
     table = PAGE.partition("| In the folder |")[2].partition("\n\n")[0]
     listed = {
         name for cell in re.findall(r"^\| (`.*?`) \|", table, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)
@@ -42,10 +42,10 @@ def test_the_table_of_the_page_is_what_the_command_prints(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    shown = [line.split() for line in PAGE.partition("    ppafo walk")[2].splitlines()[2:11]]
+    shown = [line.split() for line in PAGE.partition("    ppafo walk")[2].splitlines()[2:13]]
     assert main(["walk", "solenoid", "--minutes", "0.2"]) == 0
-    assert [line.split() for line in capsys.readouterr().out.splitlines()[2:11]] == shown
-    assert len(shown) == 9
+    assert [line.split() for line in capsys.readouterr().out.splitlines()[2:13]] == shown
+    assert len(shown) == 11
 
 
 def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:

@@ -100,7 +100,9 @@ def sensors(draw: random.Random) -> Iterator[Entry]:
     noisy = SensorParameters(0.01, 500.0, 0.002, 300.0, 12345.0)
     fault = Fault(0.02, 1.0, 0.0)
     gait = GaitSensors(
-        50.0, 2.0, 1.0, 0.2, 0.3, 0.3, 0.2, 0.2, fault, *(Fault(9.0, 0.0, 1.0),) * 3, Fault(0.03, 0.0, 2e5)
+        *(50.0, 2.0, 1.0, 0.2, 0.3, 0.3, 0.2, 0.2),
+        *(fault, Fault(0.01, 0.0, 0.0, 1.0, 0.8, 5.0, 90.0, 0.3, 0.7, 0.2, 0.02), *(Fault(9.0, 0.0, 1.0),) * 2),
+        Fault(0.03, 0.0, 2e5),
     )
     shown, slow = GaitSeen(*(0.0,) * 8), SensorState(1.3, 1e5, 1e5, 1.3, 1e5, 1e5)
     readings, walking, following = [], [], []

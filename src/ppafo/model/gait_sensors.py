@@ -1,4 +1,7 @@
-"""What a controller of walking sees: two force sensors under the foot beside angle and pressures, with faults."""
+"""What a controller of walking sees: two force sensors under the foot beside angle and pressures, with faults.
+
+One draw a sample tells of every sensor with a fault whether its sample is lost: two that lose samples lose the same.
+"""
 
 from typing import NamedTuple
 
@@ -17,11 +20,25 @@ class GaitMeasurement(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """From ``time`` [s] on a sensor shows its last value (``holds`` 1) or ``reading`` (``holds`` 0)."""
+    """What is wrong with a sensor from ``time`` [s] on: it shows its last value (``holds`` 1) or ``reading``.
+
+    With ``distorts`` 1 it shows gain times what is there, plus an offset and a drift [1/s] in its own unit, with a
+    fraction of the other sensor of its kind (``crosstalk``), a first-order lag (``memory``, what is left of its last
+    value after a sample) and a fraction of its samples lost. With a ``period`` [s] above 0 it is so in the first half
+    of each period only.
+    """
 
     time: float
     holds: float
     reading: float
+    distorts: float = 0.0
+    gain: float = 1.0
+    offset: float = 0.0
+    drift: float = 0.0
+    crosstalk: float = 0.0
+    memory: float = 0.0
+    lost_fraction: float = 0.0
+    period: float = 0.0
 
 
 class GaitSensors(NamedTuple):
@@ -62,6 +79,9 @@ class GaitSeen(NamedTuple):
     smooth_pressure_2: float
 
 
+HALF = 0.5
+"""Fraction of its period in which a fault that comes and goes is there."""
+
 NOTHING_SEEN = GaitSeen(
     heel_force=0.0,
     toe_force=0.0,
@@ -83,10 +103,31 @@ def lagged_reading(shown: float, true: float, follow_rate: float, step: float) -
     return shown + (true - shown) * fraction / (1.0 + fraction)
 
 
-def faulty(fault: Fault, reading: float, last: float, time: float) -> float:
-    """A reading at ``time`` [s] as a sensor with a fault gives it, in the sensor's unit."""
+def is_active(fault: Fault, time: float) -> bool:
+    """True where a fault acts at a time [s]; one that comes and goes does so in the first half of each period."""
+    length = fault.period if fault.period > 0.0 else 1.0
+    periods = max(0.0, time - fault.time) / length
+    away = (periods - float(int(periods)) >= HALF) & (fault.period > 0.0)
+    return (time >= fault.time) & (not away)
+
+
+def distorted(fault: Fault, reading: float, other: float, last: float, time: float) -> float:
+    """A reading at ``time`` [s] with gain, offset, drift, lag and some of the other sensor in it, in its unit."""
+    mixed = reading + fault.crosstalk * (other - reading)
+    target = fault.gain * mixed + fault.offset + fault.drift * (time - fault.time)
+    return target + fault.memory * (last - target)
+
+
+def faulty(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
+    """A reading at ``time`` [s] as a sensor with a fault gives it, in its unit; ``other`` is that of the other sensor.
+
+    ``draw`` from 0 to 1 tells whether the sample is lost.
+    """
+    wrong = distorted(fault, reading, other, last, time)
+    wrong = last if draw < fault.lost_fraction else wrong
     stuck = last if fault.holds > 0.5 else fault.reading
-    return stuck if time >= fault.time else reading
+    shown = wrong if fault.distorts > 0.5 else stuck
+    return shown if is_active(fault, time) else reading
 
 
 def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, channel: int) -> float:
@@ -139,11 +180,12 @@ def measure_gait(
     kept_2 = hold_if_lost(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
     kept_heel = hold_if_lost(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
     kept_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
-    shown_angle = faulty(gait_sensors.angle_fault, kept_angle, was_angle, time)
-    shown_1 = faulty(gait_sensors.pressure_1_fault, kept_1, was_1, time)
-    shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, was_2, time)
-    shown_heel = faulty(gait_sensors.heel_fault, kept_heel, was_heel, time)
-    shown_toe = faulty(gait_sensors.toe_fault, kept_toe, was_toe, time)
+    draw = unit_noise(seed, sample, 10)
+    shown_angle = faulty(gait_sensors.angle_fault, kept_angle, kept_angle, was_angle, time, draw)
+    shown_1 = faulty(gait_sensors.pressure_1_fault, kept_1, kept_2, was_1, time, draw)
+    shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, kept_1, was_2, time, draw)
+    shown_heel = faulty(gait_sensors.heel_fault, kept_heel, kept_toe, was_heel, time, draw)
+    shown_toe = faulty(gait_sensors.toe_fault, kept_toe, kept_heel, was_toe, time, draw)
     remembered = GaitSeen(
         heel_force=shown_heel,
         toe_force=shown_toe,

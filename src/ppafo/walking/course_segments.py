@@ -43,13 +43,13 @@ class SegmentResult:
     safe_time: float | None
 
 
-def steady_strides(planned: PlannedCourse, strikes: Floats) -> NDArray[np.intp]:
-    """Numbers of the whole strides, between strikes at times [s], at an even speed on level ground."""
+def steady_strides(planned: PlannedCourse, strikes: Floats) -> NDArray[np.bool_]:
+    """True for each whole stride, between strikes at times [s], at an even speed on level ground."""
     first, last = strikes[:-1], strikes[1:]
     steady = np.zeros(first.size, dtype=np.bool_)
     for start, end in planned.steady:
         steady |= (first >= start) & (last <= end)
-    return np.flatnonzero(steady)
+    return steady
 
 
 def segment_results(
@@ -132,7 +132,6 @@ def course_metrics(segments: Sequence[SegmentResult], recording: Recording, stea
         "course_time": Metric(float(recording.time[-1]), "s", "length of the course"),
         "steady_strides": Metric(float(steady), "-", "whole strides at an even speed on level ground"),
         "course_strides": Metric(float(sum(item.strides for item in segments)), "-", "strides of the course"),
-        "helped_strides": Metric(float(sum(item.helped for item in segments)), "-", "... without the safe state"),
         "course_gas": Metric(float(recording["supplied_mass"][-1]), "kg", "gas taken from the supply on the course"),
         "course_work": Metric(
             sum(item.push_off_work for item in segments), "J", "work of T_ex while the foot rolls over the toes"

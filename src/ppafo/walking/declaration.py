@@ -33,7 +33,37 @@ READINGS = {
     "pressure_1": Quantity("reading", "Pa_a", "its reading from then on", 0.0, -1.0e9, 1.0e9),
     "pressure_2": Quantity("reading", "Pa_a", "its reading from then on", 0.0, -1.0e9, 1.0e9),
 }
-FAULT_KINDS = {"frozen": "keeps its last reading", "stuck": "gives one fixed reading"}
+_SLOPES = {"N": ("N", "N/s"), "rad": ("rad", "rad/s"), "Pa_a": ("Pa_d", "Pa/s")}
+"""Unit of a sensor to those of an offset and of a drift."""
+
+PERIOD_OF_FAULT = Quantity(
+    "period", "s", "the fault is there in the first half of each such period; always with 0", 0.0, 0.0, 1.0e6
+)
+
+
+def _distortions(unit: str) -> tuple[Quantity, ...]:
+    offset, drift = _SLOPES[unit]
+    return (
+        Quantity("gain", "1", "what it shows over what is there", 1.0, -10.0, 100.0),
+        Quantity("offset", offset, "what is added to it", 0.0, -1.0e9, 1.0e9),
+        Quantity("drift", drift, "what is added in each second", 0.0, -1.0e9, 1.0e9),
+        Quantity("crosstalk", "1", "fraction of the other sensor's reading in it; 1 on both swaps them", 0.0, 0.0, 1.0),
+        Quantity("lag", "s", "time constant with which it follows", 0.0, 0.0, 100.0),
+        Quantity("lost_share", "1", "fraction of its samples that are lost", 0.0, 0.0, 1.0),
+    )
+
+
+DISTORTIONS = {
+    sensor: tuple(item for item in _distortions(reading.unit) if sensor != "angle" or item.name != "crosstalk")
+    for sensor, reading in READINGS.items()
+}
+"""What can be wrong with the readings of a distorted sensor; there is no other angle to be mixed with."""
+
+FAULT_KINDS = {
+    "frozen": "keeps its last reading",
+    "stuck": "gives one fixed reading",
+    "distorted": "gives a wrong reading that follows what is there",
+}
 
 
 def controller_settings(kind: str) -> tuple[Quantity, ...]:
@@ -53,6 +83,6 @@ def quantities(controller: str) -> dict[str, Quantity]:
     }
     found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
     for sensor in FAULTY:
-        found[f"faults.{sensor}.time"] = FAULT_TIME
-        found[f"faults.{sensor}.reading"] = READINGS[sensor]
+        items = (FAULT_TIME, PERIOD_OF_FAULT, READINGS[sensor], *DISTORTIONS[sensor])
+        found |= {f"faults.{sensor}.{item.name}": item for item in items}
     return found | supply_line.paths()

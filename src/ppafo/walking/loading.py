@@ -26,8 +26,10 @@ from ppafo.walking.contradictions import check_walk
 from ppafo.walking.course import WalkingCourse, load_course
 from ppafo.walking.declaration import (
     ANGLE_BANDWIDTH,
+    DISTORTIONS,
     FAULT_TIME,
     FAULTY,
+    PERIOD_OF_FAULT,
     PRESSURE_BANDWIDTH,
     READINGS,
     SEED,
@@ -203,8 +205,24 @@ def _fault(reading: Reading, sensor: str) -> Fault:
     if not kind:
         return Fault(time=NEVER, holds=0.0, reading=0.0)
     time = reading.number(f"{section}.time", FAULT_TIME)
-    shown = reading.number(f"{section}.reading", READINGS[sensor])
-    return Fault(time=time, holds=1.0 if kind == "frozen" else 0.0, reading=shown)
+    period = reading.number(f"{section}.period", PERIOD_OF_FAULT)
+    if kind != "distorted":
+        shown = reading.number(f"{section}.reading", READINGS[sensor])
+        return Fault(time=time, holds=1.0 if kind == "frozen" else 0.0, reading=shown, period=period)
+    wrong = {item.name: reading.number(f"{section}.{item.name}", item) for item in DISTORTIONS[sensor]}
+    return Fault(
+        time=time,
+        holds=0.0,
+        reading=0.0,
+        distorts=1.0,
+        gain=wrong["gain"],
+        offset=wrong["offset"],
+        drift=wrong["drift"],
+        crosstalk=wrong.get("crosstalk", 0.0),
+        memory=math.exp(-_period(reading) / wrong["lag"]) if wrong["lag"] > 0.0 else 0.0,
+        lost_fraction=wrong["lost_share"],
+        period=period,
+    )
 
 
 def _period(reading: Reading) -> float:

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ppafo.control.walking.signs import STOPPED
 from ppafo.engine.lane_rows import LANES
 from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.engine.rows import row_numbers
@@ -14,7 +16,7 @@ from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_planning import turns_walked
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.recorded import SAFE_ROW
+from ppafo.walking.recorded import SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.walk import REMEDY, Progress, plan_of, silent, walk_duration
 from ppafo.walking.wearers_rows import batch_of_many, course_of_many
@@ -55,7 +57,7 @@ class Population:
     """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
 
     ``diverged`` counts the wearers whose walk left what is possible; they are not in ``outcomes`` nor in ``traits``.
-    ``vented`` counts those whose controller stopped trusting its sensors and vented both chambers permanently.
+    ``vented`` counts those whose controller stopped for good, ``paused`` the others whose controller paused.
     """
 
     configuration: Configuration
@@ -65,6 +67,7 @@ class Population:
     outcomes: Mapping[str, Floats]
     diverged: int
     vented: int
+    paused: int
 
     @property
     def count(self) -> int:
@@ -118,8 +121,16 @@ def walk_population(
         "stance_share": gaits.timing["toe_off"],
     }
     kept = [{name: values[good] for name, values in table.items()} for table in (traits, outcomes)]
-    vented = int((rows[SAFE_ROW][good] > 0.5).sum()) if SAFE_ROW in rows else 0
-    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], int((~good).sum()), vented)
+    vented, paused = _vented_and_paused(rows, good)
+    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], int((~good).sum()), vented, paused)
+
+
+def _vented_and_paused(rows: Mapping[str, Floats], good: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return how many of the good walks ended stopped, and how many of the others had a pause."""
+    if SAFE_ROW not in rows:
+        return 0, 0
+    stopped = rows[SAFE_ROW][good] == STOPPED
+    return int(stopped.sum()), int((~stopped & (rows[VENTINGS_ROW][good] > 0.0)).sum())
 
 
 def _run_in_groups(batch: Batch, progress: Progress) -> Floats:

@@ -18,8 +18,11 @@ from ppafo.walking.gait_series import truncate
 from ppafo.walking.posture import AnklePath, ankle_path
 
 PHASE_ROW = "controller_state.phase.phase"
-SAFE_ROW = "controller_state.safety.vented"
-"""Where event-based controllers keep the phase that they see, and whether they have vented permanently."""
+SAFE_ROW = "controller_state.safety.level"
+"""Where event-based controllers keep the phase that they see, and whether they help, pause or have stopped."""
+
+VENTINGS_ROW = "controller_state.safety.ventings"
+"""And how often they have paused or stopped."""
 
 REQUEST_ROW = "controller_state.request.torque"
 """Where those that follow a torque keep the one they want."""

@@ -37,12 +37,16 @@ def _controller() -> Any:
 
 
 def _fault(sensor: str) -> Any:
-    time = quantity_fields((declaration.FAULT_TIME,))
-    reading = quantity_fields((declaration.READINGS[sensor],))
+    timing = quantity_fields((declaration.FAULT_TIME, declaration.PERIOD_OF_FAULT))
+    own = {
+        "frozen": {},
+        "stuck": quantity_fields((declaration.READINGS[sensor],)),
+        "distorted": quantity_fields(declaration.DISTORTIONS[sensor]),
+    }
     return one_of(
         [
-            table(f"{model_name(sensor)}Frozen", kind_field("frozen", declaration.FAULT_KINDS["frozen"]) | time),
-            table(f"{model_name(sensor)}Stuck", kind_field("stuck", declaration.FAULT_KINDS["stuck"]) | time | reading),
+            table(f"{model_name(sensor)}{kind.capitalize()}", kind_field(kind, summary) | timing | own[kind])
+            for kind, summary in declaration.FAULT_KINDS.items()
         ]
     )
 

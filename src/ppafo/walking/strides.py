@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.control.walking.signs import HELPS
 from ppafo.signals import CHANNELS, Recording
 
 Floats = NDArray[np.float64]
@@ -58,28 +59,39 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
     return {name: np.diff(totals[item.total][starts]) for name, item in PER_STRIDE.items()}
 
 
+def helped_strides(level: Floats, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """True for each whole stride that had help from strike to strike, from the level of ``control.walking.signs``."""
+    vented = np.concatenate([[0], np.cumsum(level > HELPS)])
+    return np.asarray(vented[starts[1:]] == vented[starts[:-1]])
+
+
+def samples_of(chosen: NDArray[np.bool_], starts: NDArray[np.intp], samples: int) -> NDArray[np.bool_]:
+    """True for each sample in one of the chosen strides."""
+    edges = np.zeros(samples + 1)
+    np.add.at(edges, starts[:-1][chosen], 1.0)
+    np.add.at(edges, starts[1:][chosen], -1.0)
+    return np.asarray(np.cumsum(edges)[:-1] > 0.5)
+
+
 def mean_curves(
-    recording: Recording, starts: NDArray[np.intp], ends: NDArray[np.intp] | None = None
+    recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np.bool_] | None = None
 ) -> dict[str, Curves]:
     """Mean and deviation of every channel over strides brought to the same phases, in its SI unit; {} without strides.
 
-    Each stride ends where the next one starts, unless the samples of their ``ends`` are given. Channels that hold their
-    value between samples, such as the command, have no mean.
+    ``chosen`` are the strides (strides,) to take, all unless given. Channels that hold their value between samples,
+    such as the command, have no mean.
     """
-    first, last = (starts[:-1], starts[1:]) if ends is None else (starts, ends)
-    if first.size < 1:
+    if starts.size < 2 or (chosen is not None and not chosen.any()):
         return {}
-    times = _times_between(recording.time[first], recording.time[last])
+    times = times_of_phases(recording.time, starts)
+    times = times if chosen is None else times[chosen]
     names = [name for name in recording.names if not (name in CHANNELS and CHANNELS[name].is_held)]
     return {name: _curves(np.interp(times, recording.time, recording[name]), recording.unit(name)) for name in names}
 
 
 def times_of_phases(time: Floats, starts: NDArray[np.intp]) -> Floats:
     """Times [s] of ``PHASES`` in each stride, shape (strides, phases)."""
-    return _times_between(time[starts[:-1]], time[starts[1:]])
-
-
-def _times_between(first: Floats, last: Floats) -> Floats:
+    first, last = time[starts[:-1]], time[starts[1:]]
     return np.asarray(first[:, None] + PHASES * (last - first)[:, None])
 
 

@@ -19,13 +19,13 @@ from ppafo.simulation.result import Status
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.storage.opensim import write_opensim
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.course_planning import PlannedCourse
 from ppafo.walking.course_segments import SegmentResult, course_metrics, segment_results, steady_strides
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import WalkPlan, course_of_walk, plan_walk
-from ppafo.walking.recorded import recording_of_walk
-from ppafo.walking.strides import SETTLING, Curves, mean_curves, per_stride, stride_starts
-from ppafo.walking.walk_metrics import walk_metrics
+from ppafo.walking.recorded import SAFE_ROW, recording_of_walk
+from ppafo.walking.safety_events import SafetyEvent, safety_events
+from ppafo.walking.strides import Curves, helped_strides, mean_curves, per_stride, stride_starts
+from ppafo.walking.walk_metrics import settled, stride_metrics, walk_metrics
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,8 +51,11 @@ def silent(done: float, total: float) -> None:  # both are there for those who l
 class WalkResult:
     """A finished walk: recording, numbers of each stride (strides,), curves over the stride, and numbers of the whole.
 
-    ``averages`` and ``metrics`` leave out the first strides, in which the controller learns. ``starts`` are the samples
-    of the recording right after each heel strike. ``segments`` are those of a course, none without one.
+    ``averages`` and ``metrics`` are those of the strides with help, without the first ones, in which the controller
+    learns; ``vented_metrics`` those of the strides in which it paused or had stopped, {} without such. ``starts`` are
+    the samples of the recording right after each heel strike, ``helped`` tells of each stride whether it had help
+    throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are those of a course,
+    none without one; means are then over its strides at an even speed on level ground.
     """
 
     configuration: Configuration
@@ -62,7 +65,15 @@ class WalkResult:
     metrics: Mapping[str, Metric]
     status: Status
     starts: NDArray[np.intp]
+    helped: NDArray[np.bool_]
+    vented_metrics: Mapping[str, Metric]
+    events: tuple[SafetyEvent, ...]
     segments: tuple[SegmentResult, ...] = ()
+
+    @property
+    def is_helped(self) -> bool:
+        """True where at least half of the whole strides had help."""
+        return 2 * int(self.helped.sum()) >= self.helped.size
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
@@ -177,30 +188,23 @@ def _walk_result(
     status: Status,
 ) -> WalkResult:
     strides = per_stride(record, starts)
+    helped = helped_strides(record.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
     planned = course_of_walk(configuration)
+    steady = settled(np.ones(helped.size, dtype=np.bool_))
     if planned is not None:
-        return _course_result(configuration, planned, recording, strides, starts, status)
-    settled = starts[SETTLING:]
-    averages = mean_curves(recording, settled)
-    metrics = walk_metrics(configuration, recording, strides, averages, settled)
-    return WalkResult(configuration, recording, strides, averages, metrics, status, starts)
-
-
-def _course_result(
-    configuration: Configuration,
-    planned: PlannedCourse,
-    recording: Recording,
-    strides: Mapping[str, Floats],
-    starts: NDArray[np.intp],
-    status: Status,
-) -> WalkResult:
-    """The result of a course: means are over its strides at an even speed on level ground, the rest over all of it."""
-    kept = steady_strides(planned, recording.time[starts])
-    averages = mean_curves(recording, starts[:-1][kept], starts[1:][kept])
-    metrics = walk_metrics(configuration, recording, strides, averages, starts, kept)
-    segments = segment_results(configuration, planned, recording, strides["push_off_work"], starts)
-    metrics |= course_metrics(segments, recording, kept.size)
-    return WalkResult(configuration, recording, strides, averages, metrics, status, starts, segments)
+        steady = steady_strides(planned, recording.time[starts])
+    averages, vented = (mean_curves(recording, starts, chosen & steady) for chosen in (helped, ~helped))
+    metrics = walk_metrics(configuration, recording, strides, averages, starts, helped, steady)
+    without = ~helped & steady
+    apart = stride_metrics(configuration, strides, vented, without) if without.any() else {}
+    events = safety_events(configuration, recording.time, record)
+    segments: tuple[SegmentResult, ...] = ()
+    if planned is not None:
+        segments = segment_results(configuration, planned, recording, strides["push_off_work"], starts)
+        metrics |= course_metrics(segments, recording, int((helped & steady).sum()))
+    return WalkResult(
+        configuration, recording, strides, averages, metrics, status, starts, helped, apart, events, segments
+    )
 
 
 def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:

@@ -12,7 +12,7 @@ from ppafo.signals import Recording
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.posture import ankle_path
-from ppafo.walking.strides import PER_STRIDE, PHASES, SETTLING, Curves
+from ppafo.walking.strides import PER_STRIDE, PHASES, SETTLING, Curves, samples_of
 
 
 def walk_metrics(
@@ -21,31 +21,46 @@ def walk_metrics(
     strides: Mapping[str, Floats],
     averages: Mapping[str, Curves],
     starts: NDArray[np.intp],
-    kept: slice | NDArray[np.intp] = slice(SETTLING, None),
+    helped: NDArray[np.bool_],
+    counted: NDArray[np.bool_],
 ) -> dict[str, Metric]:
-    """Metrics of a walk by name, in SI; ``starts`` are the samples after each heel strike, the first ones left out.
+    """Metrics of a walk by name, in SI, of its strides with help.
 
-    ``kept`` are the strides that the means are over.
+    ``starts`` are the samples after each heel strike, ``helped`` tells which strides had help and ``counted`` which of
+    all are for means. ``averages`` are those of the counted strides with help.
     """
-    return _of_strides(configuration, strides, averages, kept) | _tracking(recording, starts) | _safety(recording)
+    counts = (
+        Metric(float(helped.size), "-", "whole strides of the walk"),
+        Metric(float(helped.sum()), "-", "whole strides with help from strike to strike"),
+        Metric(float((~helped).sum()), "-", "whole strides with the chambers vented in at least a part of them"),
+        Metric(float(np.ptp(recording["supplied_mass"][[0, -1]])), "kg", "gas taken from the supply in the whole walk"),
+    )
+    found = stride_metrics(configuration, strides, averages, helped & counted)
+    found |= dict(zip(("strides", "helped_strides", "vented_strides", "total_gas"), counts, strict=True))
+    return found | _tracking(recording, starts, helped & counted) | _safety(recording)
 
 
-def _of_strides(
+def settled(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The chosen strides without the first ones of the walk."""
+    return chosen & (np.arange(chosen.size) >= SETTLING)
+
+
+def stride_metrics(
     configuration: Configuration,
     strides: Mapping[str, Floats],
     averages: Mapping[str, Curves],
-    kept: slice | NDArray[np.intp],
+    chosen: NDArray[np.bool_],
 ) -> dict[str, Metric]:
-    """Means over some strides, and what they are of a healthy ankle."""
+    """Means over the chosen strides (strides,), and what they are of a healthy ankle; ``averages`` are theirs too."""
     found = {}
     over = "" if configuration.course is None else " over the strides at an even speed on level ground"
     for name, item in PER_STRIDE.items():
-        values = strides[name][kept]
+        values = strides[name][chosen]
         if name == "slap_rate":
             values = values[values < 0.0]
         if values.size:
             found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean{over}")
-    found["strides"] = Metric(float(strides["gas"].size), "-", "whole strides of the walk")
+    found["counted_strides"] = Metric(float(chosen.sum()), "-", "strides over which the means are taken")
     healthy = healthy_positive_work(configuration)
     if healthy > 0.0:
         found["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
@@ -76,13 +91,12 @@ def lowest_toes(configuration: Configuration, height: Floats) -> Metric:
     )
 
 
-def _tracking(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Metric]:
+def _tracking(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np.bool_]) -> dict[str, Metric]:
     """How well a controller that wants a torque gets it in push-off; nothing for others or without strides."""
-    if "reference" not in recording or starts.size < 2:
+    if "reference" not in recording or not chosen.any():
         return {}
-    walked = slice(int(starts[0]), int(starts[-1]))
-    pushes = recording["controller_phase"][walked] == PUSH_OFF
-    error = (recording["reference"] - recording["torque"])[walked][pushes]
+    pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
+    error = (recording["reference"] - recording["torque"])[pushes]
     if not error.size:
         return {}
     rms = float(np.sqrt(np.mean(error**2)))
@@ -90,11 +104,11 @@ def _tracking(recording: Recording, starts: NDArray[np.intp]) -> dict[str, Metri
 
 
 def _safety(recording: Recording) -> dict[str, Metric]:
-    """When the controller stopped trusting its sensors; nothing where it never did."""
+    """When the controller first vented both chambers; nothing where it never did."""
     if "safe_state" not in recording or not recording["safe_state"].any():
         return {}
     time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
-    return {"safe_state_time": Metric(time, "s", "time at which the controller vented both chambers permanently")}
+    return {"safe_state_time": Metric(time, "s", "time at which the controller first paused or stopped")}
 
 
 def healthy_positive_work(configuration: Configuration) -> float:

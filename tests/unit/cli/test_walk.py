@@ -12,6 +12,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.questions.walk import solve
 from ppafo.storage import read_csv, read_netcdf
+from ppafo.storage.recordings import read_recording
 from ppafo.walking import loading
 
 SHORT = ["--minutes", "0.1"]
@@ -199,21 +200,67 @@ def test_bad_input_is_one_line_and_writes_nothing(
     assert names(tmp_path) == []
 
 
-def test_a_failing_sensor_is_told_with_the_time_of_the_safe_state(
+def test_a_stop_is_told_with_its_sign_readings_settings_and_time(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    faulty = ["faults.toe.kind=stuck", "faults.toe.time=3.3 s", "faults.toe.reading=9 kN"]
+    faulty = ["faults.toe.kind=stuck", "faults.toe.time=6.3 s", "faults.toe.reading=9 kN"]
     words = [word for text in faulty for word in ("--set", text)]
     assert main(["walk", "--minutes", "0.15", *words, "--out", str(tmp_path / "walk")]) == 0
-    told = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("safe state"))
-    assert 3.3 <= float(told.split()[-2]) < 3.4
-    assert (
-        "Safe state: time at which the controller vented both chambers permanently"
-        in (tmp_path / "walk/report.html").read_text()
-    )
+    lines = capsys.readouterr().out.splitlines()
+    told = next(line for line in lines if line.startswith("stopped"))
+    assert told.startswith("stopped for good at 6.30 s: a force that no foot gives; heel ")
+    assert told.endswith(" N, toe 9e+03 N; lowest_force -40 N, largest_force 3e+03 N")
+    assert "help in 5 of 7 strides" in lines
+    assert "a force that no foot gives" in (tmp_path / "walk/report.html").read_text()
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())
-    assert 3.3 <= document["metrics"]["safe_state_time"]["value"] < 3.4
+    (event,) = document["events"]
+    assert (event["kind"], event["sign"], event["settings"]) == (
+        "stop",
+        "force_range",
+        {"lowest_force": -40.0, "largest_force": 3000.0},
+    )
+    assert event["readings"]["toe_force"] == 9000.0
+    assert event["time"] == pytest.approx(6.3)
+    assert event["message"] == told
+    assert document["metrics"]["safe_state_time"]["value"] == pytest.approx(6.3)
     assert "safe_state_time" not in document["metrics_off"]
+    assert (tmp_path / "walk" / "over-time.png").is_file()
+
+
+def test_strides_with_help_and_vented_ones_stand_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    faulty = ["faults.toe.kind=stuck", "faults.toe.time=4 s", "faults.toe.reading=0 N"]
+    words = [word for text in faulty for word in ("--set", text)]
+    assert main(["walk", "--minutes", "0.2", *words, "--out", str(tmp_path / "walk")]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert "help in 3 of 10 strides: fewer than half" in lines
+    assert any(line.split() == ["with", "vented", "without", "healthy"] for line in lines)
+    document = json.loads((tmp_path / "walk" / "walk.json").read_text())
+    helped, vented, bare = (document[name] for name in ("metrics", "metrics_vented", "metrics_off"))
+    assert helped["gas"]["value"] > 5.0e-4
+    assert vented["gas"]["value"] < 1.0e-4
+    assert vented["lowest_toes"]["value"] == pytest.approx(bare["lowest_toes"]["value"], abs=1.0e-3)
+    assert helped["lowest_toes"]["value"] > 0.0
+    counts = [helped[name]["value"] for name in ("helped_strides", "vented_strides", "strides")]
+    assert counts == [3.0, 7.0, 10.0]
+    strides = (tmp_path / "walk" / "strides.csv").read_text().splitlines()
+    assert [line.split(",")[-1] for line in strides[1:]] == ["helped [-]", *["1.0"] * 3, *["0.0"] * 7]
+    supplied = read_recording(tmp_path / "walk")["supplied_mass"]
+    assert helped["total_gas"]["value"] == supplied[-1] - supplied[0]
+
+
+def test_a_bottle_lasts_as_long_as_the_strides_with_help_say(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    faulty = ["--set", "faults.toe.kind=stuck", "--set", "faults.toe.time=4 s"]
+    main(["walk", "--minutes", "0.2", *faulty, "--out", str(tmp_path / "failing")])
+    main(["walk", "--minutes", "0.2", "--out", str(tmp_path / "sound")])
+    lives = []
+    for name in ("failing", "sound"):
+        words = ["endurance", str(tmp_path / name), "--json", "--reuse", "reservoir_volume=50 cm^3"]
+        capsys.readouterr()
+        assert main([*words, "--out", str(tmp_path / f"{name}-life")]) == 0
+        lives.append(json.loads(capsys.readouterr().out)["result"]["walking_time"])
+    assert lives[0] == pytest.approx(lives[1], rel=0.05)
 
 
 def test_a_minute_may_be_given_as_a_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

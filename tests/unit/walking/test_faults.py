@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.control.walking import signs
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import batch_of
@@ -19,6 +20,7 @@ from ppafo.simulation.sampled import state_row_numbers
 from ppafo.units import parse_quantity
 from ppafo.walking import load_walk, walk_population
 from ppafo.walking.planning import plan_walk
+from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.walk import plan_of
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
@@ -98,16 +100,16 @@ def injected(name: str) -> Injected:
     parameters[places] = np.array([numbers(one) for one in sensors]).T
     states = np.repeat(single.states, len(sensors), axis=1)
     rows, clock = state_row_numbers(run), replace(single.clock, record_every=RECORD_EVERY)
-    names = ("controller_state.safety.vented", "state.angle", "state.mass_1", "state.mass_2")
+    names = (SAFE_ROW, "state.angle", "state.mass_1", "state.mass_2")
     records = []
     for first in range(0, len(sensors), LANES):
         part = slice(first, first + LANES)
         record = run_batch(Batch(single.program, clock, parameters[:, part], states[:, part])).record
         records.append(record[:, [rows[item] for item in names]])
-    vented, *state = np.concatenate(records, axis=2).transpose(1, 0, 2)
+    level, *state = np.concatenate(records, axis=2).transpose(1, 0, 2)
     pressure = np.maximum(*chamber_pressures(run.plant, *state)) - run.plant.atmospheric_pressure
-    time = np.arange(vented.shape[0]) * run.step * RECORD_EVERY
-    found = np.where(vented[-1] > 0.5, time[np.argmax(vented > 0.5, axis=0)], np.inf)
+    time = np.arange(level.shape[0]) * run.step * RECORD_EVERY
+    found = np.where(level[-1] > signs.HELPS, time[np.argmax(level > signs.HELPS, axis=0)], np.inf)
     shape = (len(FAULTS), PHASES)
     return Injected(time, np.tile(begins, (len(FAULTS), 1)), found.reshape(shape), pressure.reshape(-1, *shape), stride)
 
@@ -154,11 +156,15 @@ NOISE = [
 def test_nobody_of_two_hundred_wearers_is_vented_without_a_fault(name: str, sensors: list[str]) -> None:
     configuration = load_walk(name, [f"sensors.{text}" for text in sensors])
     people = walk_population(configuration, 0.4, 200, seed=1)
-    assert (people.count, people.diverged, people.vented) == (200, 0, 0)
+    assert (people.count, people.diverged, people.vented, people.paused) == (200, 0, 0, 0)
     assert people.outcomes["gas"].min() > 1.0e-4
 
 
-def test_wearers_whose_controller_vented_are_counted() -> None:
+def test_wearers_whose_controller_paused_or_stopped_are_counted() -> None:
     configuration = load_walk("solenoid", ["faults.heel.kind=stuck", "faults.heel.time=3 s"])
     people = walk_population(configuration, 0.15, 9)
-    assert people.vented == 9
+    assert (people.vented, people.paused) == (0, 9)
+    configuration = load_walk("solenoid", ["faults.toe.kind=frozen", "faults.toe.time=3.2 s"])
+    people = walk_population(configuration, 0.15, 9)
+    assert people.vented + people.paused == 9
+    assert people.vented >= 5

@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 from ppafo.answers.text import text_of
 from ppafo.questions.walk.answer import comparison_table
 from ppafo.questions.walk.wearers import wearers_answer
-from ppafo.walking import Comparison, compare_walks, load_walk, walk_population
+from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.legs import drags, frames_figure, last_phases, legs_of
 from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.figures.over_time import over_time_figure
 from ppafo.walking.figures.phases import strip_figure
 from ppafo.walking.figures.wearers import population_figure
 
@@ -88,6 +89,36 @@ def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:
     assert len([line for line in toes.lines if len(np.asarray(line.get_xdata())) > 2]) == 3
     assert "simulated" in texts(figure)
     assert len(walk_figure({"off": pair.without_device}).axes[0].lines) < len(angle.lines)
+
+
+@lru_cache
+def failing() -> WalkResult:
+    """A walk whose toe sensor dies after seven seconds."""
+    return walk("solenoid", 0.2, ["faults.toe.kind=stuck", "faults.toe.time=7 s"])
+
+
+def test_pictures_of_the_leg_show_a_stride_with_help_where_there_was_one() -> None:
+    result = failing()
+    turns = last_phases(result, 2, 100)
+    assert turns.size == 200
+    assert turns[-1] * result.configuration.gait.stride_time < result.events[0].time
+    inside = np.flatnonzero((turns % 1.0 > 0.75) & (turns % 1.0 < 0.95))
+    assert legs_of(result, turns).worn.toe[inside, 1].min() > -0.01
+    assert result.helped[np.floor(turns[[0, -1]]).astype(int) - 1].all()
+
+
+def test_the_walk_over_time_shows_the_fault_the_pause_and_how_long_it_helped() -> None:
+    result = failing()
+    figure = over_time_figure(result)
+    gas, toes, phases, level = figure.axes
+    assert {"toe fails", "help", "pause", "simulated"} <= set(texts(figure))
+    lines = [line for line in gas.lines if len(np.asarray(line.get_xdata())) == 2]
+    assert sorted(float(np.asarray(line.get_xdata())[0]) for line in lines) == [7.0, result.events[0].time]
+    np.testing.assert_allclose(gas.lines[0].get_ydata(), 1e3 * result.recording["supplied_mass"])
+    np.testing.assert_allclose(toes.lines[0].get_ydata(), 100.0 * result.recording["toe_height"])
+    assert [label.get_text() for label in phases.get_yticklabels()] == ["swing", "heel", "free", "push"]
+    edges = [patch.get_x() for patch in level.patches]
+    assert edges == pytest.approx([0.0, result.events[0].time])
 
 
 def test_the_table_has_a_cell_for_each_walk() -> None:

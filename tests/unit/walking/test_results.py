@@ -12,7 +12,7 @@ from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk
 from ppafo.walking.gait_series import NEARLY_FLAT, gait_timing
-from ppafo.walking.strides import PHASES, SETTLING, mean_curves, stride_starts
+from ppafo.walking.strides import PHASES, SETTLING, helped_strides, mean_curves, samples_of, stride_starts
 
 MINUTES = 0.15
 
@@ -143,3 +143,14 @@ def test_a_result_can_be_drawn_and_says_what_it_is() -> None:
     result = compared("proportional").with_device
     assert len(result.plot().axes) == 5
     assert repr(result).startswith("Walk 'proportional', 0.15 min: completed\n  gas ")
+
+
+def test_a_stride_has_help_only_if_every_sample_of_it_has() -> None:
+    starts = np.array([3, 10, 20, 30])
+    level = np.zeros(40)
+    level[12:14] = 1.0
+    level[30:] = 2.0
+    helped = helped_strides(level, starts)
+    assert helped.tolist() == [True, False, True]
+    assert np.flatnonzero(samples_of(helped, starts, 40)).tolist() == [*range(3, 10), *range(20, 30)]
+    assert helped_strides(level, starts[:1]).size == 0

@@ -86,6 +86,9 @@ class AssistingState(Protocol):
 
 START = TorqueRequest(0.0, 0.0, 0.0)
 
+LARGEST_PRESS = 0.7
+"""Largest torque in plantarflexion [N m] that is requested in the swing."""
+
 
 def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: float) -> float:
     """Requested torque [N m], above 0 in plantarflexion, at an angle [rad] and its rate [rad/s]; 0 in mid-stance."""
@@ -93,7 +96,10 @@ def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: f
     hold = rules.hold
     held = hold.stiffness * (hold.swing_angle - angle) - hold.damping * rate
     landing, swing = profile_torque(rules.landing, fraction), profile_torque(rules.swing, fraction)
-    lifted = held - (landing if phase.phase == phases.LANDING else swing)
+    lands = phase.phase == phases.LANDING
+    lifted = held - (landing if lands else swing)
+    # On the heel nothing presses the toes down, and in the air little: an angle that is read too low asks for it.
+    lifted = min(lifted, 0.0 if lands else LARGEST_PRESS)
     pushed = profile_torque(rules.push_off, fraction) if phase.phase == phases.PUSH_OFF else 0.0
     torque = lifted if phases.lifts(phase.phase) else pushed
     return max(-rules.largest_torque, min(rules.largest_torque, torque))
@@ -122,7 +128,7 @@ def assess(
         safety=watch,
         request=TorqueRequest(measurement.angle, rate, torque),
         continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
-        acts=1.0 if works and watch.vented < 0.5 else 0.0,
+        acts=1.0 if works and watch.level < 0.5 else 0.0,
     )
 
 

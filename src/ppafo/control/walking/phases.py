@@ -1,8 +1,8 @@
 """Where a controller believes the wearer to be: heel strike, mid-stance, push-off or swing, from two force sensors.
 
 Each sensor is loaded above one threshold and unloaded below another (hysteresis), and a change counts only when it has
-lasted (debounce). The time between two heel strikes is followed by a moving average, and the push-off begins at a
-fraction of it.
+lasted (debounce). The time between two heel strikes is followed by a moving average. The push-off begins at a fraction
+of it, once the heel is off the ground, and ends where the heel comes down again: who stands is not pushed.
 """
 
 from typing import NamedTuple
@@ -77,8 +77,9 @@ def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float) ->
     after_swing = LANDING if on_heel else (MID_STANCE if on_toe else SWING)
     after_landing = MID_STANCE if on_toe else (LANDING if on_heel else SWING)
     leaves_ground = not on_heel and not on_toe
-    after_mid_stance = SWING if leaves_ground else (PUSH_OFF if late and on_toe else MID_STANCE)
-    after_push_off = SWING if leaves_ground else PUSH_OFF
+    rises = on_toe and not on_heel
+    after_mid_stance = SWING if leaves_ground else (PUSH_OFF if late and rises else MID_STANCE)
+    after_push_off = SWING if leaves_ground else (PUSH_OFF if rises else MID_STANCE)
     found = after_swing if phase == SWING else after_landing
     found = after_mid_stance if phase == MID_STANCE else found
     return after_push_off if phase == PUSH_OFF else found

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import DataError, ParameterError
@@ -135,8 +134,8 @@ class Actuator:
 class WalkGas:
     """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride, and the actuator.
 
-    ``gas_per_stride`` is 0 where the walk took none. ``others`` is the gas use of the same walk with other readings of
-    the paper's chambers, by their names.
+    ``gas_per_stride`` is that of the strides with help, 0 where the walk took none. ``others`` is the gas use of the
+    same walk with other readings of the paper's chambers, by their names.
     """
 
     name: str
@@ -260,7 +259,8 @@ def full_chambers(walk: WalkGas) -> FullChambers:
     """Return how full the chambers get, mean over strides: what can be reused, and what for.
 
     The plantarflexion chamber is fullest when it begins to vent, at the end of push-off; the other one when it has been
-    filled. The first strides, in which the controller learns, are left out. DataError where no whole stride is left.
+    filled. The first strides, in which the controller learns, and those without help are left out. DataError where no
+    whole stride is left.
     """
     recording, actuator = walk.recording, walk.actuator
     angle = recording["angle"]
@@ -272,14 +272,16 @@ def full_chambers(walk: WalkGas) -> FullChambers:
             f"walk '{walk.name}': {recording.duration:.3g} s contain no complete stride after the first {SETTLING}"
         )
     bounds = np.searchsorted(recording.time, edges)
-    exhaust = _fullest(recording["pressure_1"], np.asarray(volume_1), bounds)
-    fill = _fullest(recording["pressure_2"], np.asarray(volume_2), bounds)
-    return FullChambers(*exhaust, *fill, strides=edges.size - 1)
+    level = recording["safe_state"] if "safe_state" in recording else np.zeros(recording.time.size)
+    strides = [(first, last) for first, last in pairwise(bounds.tolist()) if not level[first:last].any()]
+    if not strides:
+        raise DataError(f"walk '{walk.name}': no stride after the first {SETTLING} had help throughout")
+    exhaust = _fullest(recording["pressure_1"], np.asarray(volume_1), strides)
+    fill = _fullest(recording["pressure_2"], np.asarray(volume_2), strides)
+    return FullChambers(*exhaust, *fill, strides=len(strides))
 
 
-def _fullest(pressure: Floats, volume: Floats, bounds: NDArray[np.intp]) -> tuple[float, float]:
-    """Return pressure and volume where a chamber holds the most gas, mean over the strides between some samples."""
-    places = [
-        first + int(np.argmax(pressure[first:last] * volume[first:last])) for first, last in pairwise(bounds.tolist())
-    ]
+def _fullest(pressure: Floats, volume: Floats, strides: list[tuple[int, int]]) -> tuple[float, float]:
+    """Return pressure and volume where a chamber holds the most gas, mean over strides from sample to sample."""
+    places = [first + int(np.argmax(pressure[first:last] * volume[first:last])) for first, last in strides]
     return float(pressure[places].mean()), float(volume[places].mean())

@@ -25,16 +25,20 @@ from ppafo.walking.configuration import Configuration
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.figures.over_time import failures, over_time_figure
 from ppafo.walking.figures.phases import strip_figure
 from ppafo.walking.gait_subject import person_remarks
+from ppafo.walking.safety_events import event_lines
 from ppafo.walking.strides import PER_STRIDE, PHASES
 from ppafo.walking.walk import WalkResult
 
 SCHEMA_VERSION = 1
 _HEAD = ("", "with", "without", "healthy")
+_VENTED = "vented"
 _ROWS = (
     ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
+    ("total_gas", "Gas of the whole walk", "gas mass", 2),
     ("push_off_work", "Work on the wearer in push-off", "energy", 2),
     ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
     ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
@@ -42,13 +46,15 @@ _ROWS = (
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
     ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
     ("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
+    ("counted_strides", "Strides with these means", "", 0),
 )
 """Metric, title, kind of quantity and digits behind the point of each row."""
 
 _EXPLAINED = (
     "'Without' is the same wearer with the same device and both chambers vented. 'Healthy' is the gait itself. The "
     "first strides, in which the controller learns the stride time, are left out. The device is on one leg, so a "
-    "stride is one step of that leg."
+    "stride is one step of that leg. A stride in which the controller paused or had stopped is not in 'with' but in "
+    "'vented', where there is one."
 )
 _LEGS = "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground: they would drag."
 _MOVING = "Two strides at half speed. A dark red foot drags."
@@ -59,6 +65,10 @@ _PHASES = (
 _MEAN = (
     "Mean over the strides with the standard deviation as a band. A deterministic walk on a perfectly regular gait "
     "has almost none."
+)
+_OVER_TIME = (
+    "Gas, toes and phases over the whole walk. The strip shows where the controller helps, pauses and has stopped; a "
+    "dashed line is where a sensor fails."
 )
 _LIMITS = (
     "The gait is prescribed: the device moves the ankle where the foot is free, and cannot change how the wearer walks."
@@ -76,7 +86,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
     worn, bare = comparison.with_device, comparison.without_device
     configuration = worn.configuration
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    remarks = [*person_remarks(configuration), _bottle(pair.life), _safety(comparison), trust_remark(configuration)]
+    remarks = [*person_remarks(configuration), _bottle(pair.life), *_safety(worn), trust_remark(configuration)]
     remarks += [
         f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
     ]
@@ -93,11 +103,12 @@ def _pair_answer(pair: WalkPair) -> Answer:
             Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
             *volumes_sections(pair.volumes),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
+            *(_over_time(worn) if configuration.course is None else ()),
             *(course_pictures(comparison) if configuration.course is not None else _pictures(comparison)),
             *_assumptions_section(configuration.assumed),
         ),
         data=_data(comparison, pair.life) | {"volumes": volumes_data(pair.volumes)},
-        passed=comparison.is_completed,
+        passed=comparison.is_completed and worn.is_helped,
         files={
             "recording.nc": lambda: netcdf_bytes(worn.recording, None),
             "recording.csv": lambda: marked_csv_bytes(worn.recording),
@@ -120,21 +131,24 @@ def _set_up(comparison: Comparison) -> tuple[str, ...]:
 
 
 def comparison_table(comparison: Comparison) -> Table:
-    """Return a row for each number: with the device, without it, and of a healthy ankle."""
+    """Return a row for each number: with the device, without it, and of a healthy ankle.
+
+    Strides in which the controller paused or had stopped have a column of their own, where there are any.
+    """
     healthy = dict(comparison.healthy)
     if "push_off_work" in healthy:
         healthy["push_off_share"] = Metric(1.0, "-", "")
-    person = {"body_mass": Metric(comparison.with_device.configuration.wearer.body_mass, "kg", "who walks")}
-    columns = tuple(
-        person | dict(metrics)
-        for metrics in (comparison.with_device.metrics, comparison.without_device.metrics, healthy)
-    )
+    worn, bare = comparison.with_device, comparison.without_device
+    person = {"body_mass": Metric(worn.configuration.wearer.body_mass, "kg", "who walks")}
+    vented = (worn.vented_metrics,) if worn.vented_metrics else ()
+    columns = tuple(person | dict(metrics) for metrics in (worn.metrics, *vented, bare.metrics, healthy))
+    head = (*_HEAD[:2], *(_VENTED,) * len(vented), *_HEAD[2:])
     rows = [
         (title_with_unit(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
         for name, title, quantity, digits in _ROWS
         if any(name in metrics for metrics in columns)
     ]
-    return Table(tuple(map(Column, _HEAD)), tuple(rows))
+    return Table(tuple(map(Column, head)), tuple(rows))
 
 
 def _cell(metric: Metric | None, quantity: str, digits: int) -> str | None:
@@ -165,6 +179,17 @@ def _pictures(comparison: Comparison) -> tuple[Section, ...]:
     )
 
 
+def _over_time(worn: WalkResult) -> tuple[Section, ...]:
+    """Return the walk over time, where something happened in it."""
+    if not worn.events and not failures(worn.configuration):
+        return ()
+    return (
+        Section(
+            "The walk over time", figure=Figure("over-time", _OVER_TIME, lambda: over_time_figure(worn)), is_detail=True
+        ),
+    )
+
+
 def _assumptions_section(assumed: Mapping[str, str]) -> tuple[Section, ...]:
     if not assumed:
         return ()
@@ -172,12 +197,13 @@ def _assumptions_section(assumed: Mapping[str, str]) -> tuple[Section, ...]:
     return (Section("What is assumed", table=table, is_detail=True),)
 
 
-def _safety(comparison: Comparison) -> str:
-    """Return what there is to say of the safe state; empty where the controller never went into it."""
-    metrics = comparison.with_device.metrics
-    if "safe_state_time" not in metrics:
-        return ""
-    return f"safe state: {metrics['safe_state_time'].summary}, at {metrics['safe_state_time'].value:.2f} s"
+def _safety(worn: WalkResult) -> list[str]:
+    """Return the pauses, the stop and the returns of help, and how many strides had help; [] where all had."""
+    if not worn.events:
+        return []
+    helped, strides = int(worn.helped.sum()), worn.helped.size
+    counted = f"help in {helped} of {strides} strides"
+    return [*event_lines(worn.events), counted if worn.is_helped else f"{counted}: fewer than half"]
 
 
 def _bottle(life: Endurance | None) -> str:
@@ -218,6 +244,8 @@ def _data(comparison: Comparison, life: Endurance | None) -> dict[str, Any]:
         "metrics": plain(dict(comparison.with_device.metrics)),
         "bottle": _bottle_data(life),
         **course_data(comparison),
+        "metrics_vented": plain(dict(comparison.with_device.vented_metrics)),
+        "events": [event.to_dict() for event in comparison.with_device.events],
         "metrics_off": plain(dict(comparison.without_device.metrics)),
         "healthy": plain(dict(comparison.healthy)),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
@@ -230,6 +258,7 @@ def strides_csv(result: WalkResult) -> bytes:
     count = result.strides["gas"].size
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
     columns |= {f"{name} [{item.unit}]": result.strides[name] for name, item in PER_STRIDE.items()}
+    columns["helped [-]"] = result.helped.astype(np.float64)
     return _csv(columns)
 
 

@@ -36,12 +36,14 @@ def wearers_answer(population: Population) -> Answer:
         for name, (title, quantity, digits) in SHOWN.items()
     ]
     figure = Figure("wearers", _CAPTION, lambda: population_figure(population))
-    safe = f"safe state: the controllers of {population.vented} wearers vented both chambers permanently"
-    remarks = (
-        person_remarks(configuration)
-        + [safe] * bool(population.vented)
-        + [population.message] * bool(population.diverged)
-    )
+    stopped = f"safe state: the controllers of {population.vented} wearers vented both chambers permanently"
+    paused = f"paused: the controllers of {population.paused} wearers vented both chambers for some strides"
+    remarks = [
+        *person_remarks(configuration),
+        *[stopped] * bool(population.vented),
+        *[paused] * bool(population.paused),
+    ]
+    remarks += [population.message] * bool(population.diverged)
     return Answer(
         name="wearers",
         kicker="Walks of many wearers",
@@ -73,6 +75,7 @@ def _data(population: Population) -> dict[str, Any]:
         "wearers": population.count,
         "diverged": population.diverged,
         "vented": population.vented,
+        "paused": population.paused,
         "minutes": population.minutes,
         "seed": population.seed,
         "varied": {

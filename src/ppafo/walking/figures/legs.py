@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.answers.style import GREY, house_style, mark_kind
 from ppafo.signals.recording import Floats
@@ -53,10 +54,23 @@ def legs_of(result: WalkResult, turns: Floats) -> Legs:
 
 
 def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
-    """Return running phases [strides] of some strides near the end of a walk, an equal number in each."""
+    """Return running phases [strides] of some strides near the end of a walk, an equal number in each.
+
+    They are the last ones in a row that had help, where there are as many.
+    """
     last = int(result.recording.time[-1] / result.configuration.gait.stride_time + 1.0e-6)
     count = min(strides, max(1, last - 1))
+    last = _last_helped(result.helped, last, count)
     return np.asarray(last - count + np.arange(count * per_stride) / per_stride)
+
+
+def _last_helped(helped: NDArray[np.bool_], last: int, count: int) -> int:
+    """Return the end [strides] of the last ``count`` strides with help up to ``last``; that where there are none."""
+    if helped.all():
+        return last
+    # The walk begins with a stride of its own, at a heel strike that is not counted.
+    ends = [end for end in range(last, count, -1) if helped[end - count - 1 : end - 1].sum() == count]
+    return ends[0] if ends else last
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,8 +14,9 @@ from ppafo.model.command import VENTS_ABOVE
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.legs import GHOST, draw_ground, last_phases, leg_artists, legs_of
 from ppafo.walking.figures.mean_stride import WITH
-from ppafo.walking.strides import PHASES, SETTLING, times_of_phases
+from ppafo.walking.strides import PHASES, times_of_phases
 from ppafo.walking.walk import WalkResult
+from ppafo.walking.walk_metrics import settled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -97,12 +98,12 @@ def strip_figure(result: WalkResult) -> "Figure":
 
 
 def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floats:
-    """Fraction of the strides in each state at ``PHASES``, shape (states, phases); none where nothing is known."""
-    starts = result.starts[SETTLING:]
-    if channel not in result.recording or starts.size < 2:
+    """Fraction of the strides with help in each state at ``PHASES``, shape (states, phases); 0 if nothing is known."""
+    chosen = settled(result.helped)
+    if channel not in result.recording or not chosen.any():
         return np.zeros((len(states), PHASES.size))
     time = result.recording.time
-    found = np.searchsorted(time, times_of_phases(time, starts), side="right") - 1
+    found = np.searchsorted(time, times_of_phases(time, result.starts)[chosen], side="right") - 1
     values = result.recording[channel][found]
     return np.array([np.mean(state.holds(values), axis=0) for state in states])
 

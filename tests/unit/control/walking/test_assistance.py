@@ -60,7 +60,14 @@ def test_a_lifted_foot_is_held_by_a_spring_and_a_damper_up_to_the_largest_torque
     assert assistance.requested_torque(bare, at(SWING, 0.8), 1.6, 0.0) == pytest.approx(-1.0)
     assert assistance.requested_torque(bare, at(SWING, 0.8), 1.5, 2.0) == pytest.approx(-1.0)
     assert assistance.requested_torque(bare, at(SWING, 0.8), 3.0, 0.0) == -5.0
-    assert assistance.requested_torque(bare, at(SWING, 0.8), 0.5, 0.0) == 5.0
+    assert assistance.requested_torque(bare, at(SWING, 0.8), 1.45, 0.0) == pytest.approx(0.5)
+    assert assistance.requested_torque(bare, at(SWING, 0.8), 0.5, 0.0) == assistance.LARGEST_PRESS
+
+
+def test_nothing_presses_the_toes_down_while_the_foot_stands_on_its_heel() -> None:
+    for angle, rate in ((0.5, 0.0), (1.5, -9.0)):
+        assert assistance.requested_torque(RULES, at(SWING, 0.05), angle, rate) > 0.0
+        assert assistance.requested_torque(RULES, at(LANDING, 0.05), angle, rate) == 0.0
 
 
 def test_landing_and_swing_are_one_task_and_the_others_are_not() -> None:

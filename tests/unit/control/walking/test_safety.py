@@ -1,13 +1,13 @@
-"""Each sign by which a controller of walking stops trusting its sensors, by itself."""
+"""Each sign by which a controller of walking vents the chambers, by itself: whether it pauses or stops."""
 
 import math
 
 import pytest
 
-from ppafo.control.walking import phases, safety
+from ppafo.control.walking import phases, safety, signs
 from ppafo.control.walking.declaration import SAFETY_QUANTITIES
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
-from ppafo.control.walking.safety import SafetyRules, SafetyState, SlowPressures, ValveTimes
+from ppafo.control.walking.safety import Finding, SafetyRules, SafetyState, SlowPressures, ValveTimes
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -20,6 +20,21 @@ def phase(name: float, since: float, heel: float = 1.0, toe: float = 1.0, in_pha
     return PhaseState(name, Switch(heel, 0.0), Switch(toe, 0.0), in_phase, since, 1.0, 5.0)
 
 
+def found(
+    seen: GaitMeasurement = GOOD,
+    now: PhaseState | None = None,
+    before: PhaseState | None = None,
+    state: SafetyState = safety.START,
+    rules: SafetyRules = RULES,
+) -> float:
+    """The sign that vents at a sample, 0 where none does."""
+    after = now or phase(MID_STANCE, 0.1)
+    watch = safety.monitor(rules, state, before or after, after, seen, PERIOD)
+    assert (watch.level > signs.HELPS) == (watch.finding.sign > signs.NO_SIGN)
+    assert watch.level == signs.level_of(watch.finding.sign)
+    return watch.finding.sign
+
+
 def vents(
     seen: GaitMeasurement = GOOD,
     now: PhaseState | None = None,
@@ -27,8 +42,7 @@ def vents(
     state: SafetyState = safety.START,
     rules: SafetyRules = RULES,
 ) -> bool:
-    after = now or phase(MID_STANCE, 0.1)
-    return safety.monitor(rules, state, before or after, after, seen, PERIOD).vented > 0.5
+    return found(seen, now, before, state, rules) > signs.NO_SIGN
 
 
 def test_the_rules_are_declared_in_their_order() -> None:
@@ -37,21 +51,47 @@ def test_the_rules_are_declared_in_their_order() -> None:
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "sign"),
     [
-        {"heel_force": 3001.0},
-        {"toe_force": 3001.0},
-        {"angle": 0.29},
-        {"angle": 2.41},
-        {"pressure_1": 2.9e4},
-        {"pressure_2": 2.9e4},
-        {"pressure_1": 2.1e6},
-        {"pressure_2": 2.1e6},
+        ({"heel_force": 3001.0}, signs.FORCE_RANGE),
+        ({"heel_force": -41.0}, signs.FORCE_RANGE),
+        ({"toe_force": -41.0}, signs.FORCE_RANGE),
+        ({"toe_force": 3001.0}, signs.FORCE_RANGE),
+        ({"angle": 0.29}, signs.ANGLE_RANGE),
+        ({"angle": 2.41}, signs.ANGLE_RANGE),
+        ({"pressure_1": 5.9e4}, signs.PRESSURE_RANGE),
+        ({"pressure_2": 5.9e4}, signs.PRESSURE_RANGE),
+        ({"pressure_1": 2.1e6}, signs.PRESSURE_RANGE),
+        ({"pressure_2": 2.1e6}, signs.PRESSURE_RANGE),
     ],
 )
-def test_a_reading_out_of_range_vents_at_once(change: dict[str, float]) -> None:
+def test_a_reading_out_of_range_stops_at_once(change: dict[str, float], sign: float) -> None:
     assert not vents()
-    assert vents(GOOD._replace(**change))
+    assert found(GOOD._replace(**change)) == sign
+    assert signs.level_of(sign) == signs.STOPPED
+
+
+def test_every_sign_says_what_it_goes_by_and_those_of_faults_come_first() -> None:
+    numbers = list(signs.SIGNS)
+    assert numbers == [float(number) for number in range(1, len(numbers) + 1)]
+    assert len({sign.name for sign in signs.SIGNS.values()}) == len(numbers)
+    levels = [signs.level_of(number) for number in numbers]
+    assert levels == sorted(levels, reverse=True)
+    assert set(levels) == {signs.PAUSED, signs.STOPPED}
+    settings = {item.name for item in SAFETY_QUANTITIES}
+    assert all(set(sign.settings) <= settings for sign in signs.SIGNS.values())
+    assert all(set(sign.readings) < set(GaitMeasurement._fields) for sign in signs.SIGNS.values())
+
+
+def test_of_two_signs_the_one_that_stops_counts() -> None:
+    endless = phase(PUSH_OFF, 1.3, 0.0, in_phase=1.21)
+    assert found(now=endless) == signs.ENDLESS_PHASE
+    assert found(GOOD._replace(angle=9.0), endless) == signs.ANGLE_RANGE
+    paused = safety.monitor(RULES, safety.START, endless, endless, GOOD, PERIOD)
+    assert paused.finding == Finding(signs.ENDLESS_PHASE, 300.0, 200.0, 1.5, 1.1e5, 1.05e5)
+    stopped = safety.monitor(RULES, paused, endless, endless, GOOD._replace(angle=9.0), PERIOD)
+    assert (stopped.level, stopped.ventings) == (signs.STOPPED, 2.0)
+    assert stopped.finding == Finding(signs.ANGLE_RANGE, 300.0, 200.0, 9.0, 1.1e5, 1.05e5)
 
 
 def still_for(seconds: float, seen: GaitMeasurement, now: PhaseState) -> bool:
@@ -59,10 +99,10 @@ def still_for(seconds: float, seen: GaitMeasurement, now: PhaseState) -> bool:
     for sample in range(round(seconds / PERIOD)):
         moving = seen._replace(angle=seen.angle + 1.0e-9 * sample)
         state = safety.monitor(RULES, state, now, now, moving, PERIOD)
-    return state.vented > 0.5
+    return state.level > signs.HELPS
 
 
-def test_a_loaded_force_that_stays_the_same_is_frozen_and_an_unloaded_one_is_not() -> None:
+def test_a_loaded_force_that_stays_the_same_is_a_sign_and_an_unloaded_one_is_not() -> None:
     assert not still_for(0.24, GOOD, phase(MID_STANCE, 0.1))
     assert still_for(0.26, GOOD, phase(MID_STANCE, 0.1))
     assert still_for(0.26, GOOD, phase(PUSH_OFF, 0.5, heel=0.0))
@@ -77,11 +117,31 @@ def test_an_angle_that_stays_the_same_is_a_sign_but_in_the_swing(name: float, is
     assert vents(now=now, state=safety.START._replace(readings=shown)) is is_sign
 
 
+@pytest.mark.parametrize(
+    ("still", "now", "before", "sign"),
+    [
+        ("heel", phase(MID_STANCE, 0.5, 1.0, 0.0), phase(MID_STANCE, 0.5), signs.FROZEN_HEEL),
+        ("heel", phase(MID_STANCE, 0.5), phase(MID_STANCE, 0.5), signs.STILL_HEEL),
+        ("toe", phase(MID_STANCE, 0.5, 0.0, 1.0), phase(MID_STANCE, 0.5), signs.FROZEN_TOE),
+        ("toe", phase(MID_STANCE, 0.5), phase(MID_STANCE, 0.5), signs.STILL_TOE),
+        ("angle", phase(LANDING, 0.0, 1.0, 0.0), phase(SWING, 0.9, 0.0, 0.0), signs.FROZEN_ANGLE),
+        ("angle", phase(LANDING, 0.0, 1.0, 0.0), phase(SWING, 0.4, 0.0, 0.0), signs.STILL_ANGLE),
+        ("angle", phase(MID_STANCE, 0.5), phase(MID_STANCE, 0.5), signs.STILL_ANGLE),
+    ],
+)
+def test_a_reading_that_stays_the_same_pauses_and_stops_once_another_sensor_shows_a_step(
+    still: str, now: PhaseState, before: PhaseState, sign: float
+) -> None:
+    shown = {"heel": "heel_force", "toe": "toe_force", "angle": "angle"}[still]
+    readings = safety.START.readings._replace(**{shown: getattr(GOOD, shown), f"{still}_unchanged": 0.95})
+    assert found(now=now, before=before, state=safety.START._replace(readings=readings)) == sign
+
+
 @pytest.mark.parametrize(("heel", "toe"), [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
 def test_a_foot_that_must_stand_flat_loads_both_sensors(heel: float, toe: float) -> None:
     steady = safety.START._replace(steady=1.0)
     flat, early, late = (phase(MID_STANCE, since, heel, toe) for since in (0.2, 0.15, 0.26))
-    assert vents(now=flat, state=steady)
+    assert found(now=flat, state=steady) == signs.NOT_FLAT
     assert not vents(now=early, state=steady)
     assert not vents(now=late, state=steady)
     assert not vents(now=flat), "no usual stride came before"
@@ -97,17 +157,28 @@ def test_only_a_stride_that_took_about_the_stride_time_is_a_usual_one(last: floa
 def test_strides_that_begin_on_the_toes_are_counted_in_a_row() -> None:
     swing, on_toes, on_heel = phase(SWING, 1.3), phase(MID_STANCE, 0.0, 0.0, 1.0), phase(LANDING, 0.0)
     once = safety.monitor(RULES, safety.START, swing, on_toes, GOOD, PERIOD)
-    assert (once.toe_strides, once.vented) == (1.0, 0.0)
-    assert vents(now=on_toes, before=swing, state=once)
+    assert (once.toe_strides, once.level) == (1.0, signs.HELPS)
+    assert found(now=on_toes, before=swing, state=once) == signs.TOE_STRIDES
     assert not vents(now=on_heel, before=swing, state=once)
     assert safety.monitor(RULES, once, swing, on_heel, GOOD, PERIOD).toe_strides == 0.0
     assert not vents(now=on_toes, before=swing, state=once, rules=RULES._replace(most_toe_strides=2.0))
 
 
-def test_a_phase_without_end_and_a_stride_without_toes_vent() -> None:
-    assert vents(now=phase(PUSH_OFF, 1.3, 0.0, in_phase=1.21))
-    assert vents(now=phase(SWING, 0.4, 0.0, 0.0), before=phase(LANDING, 0.4))
+def test_a_phase_without_end_and_a_stride_without_toes_pause() -> None:
+    assert found(now=phase(PUSH_OFF, 1.3, 0.0, in_phase=1.21)) == signs.ENDLESS_PHASE
+    assert found(now=phase(SWING, 2.0, 0.0, 0.0, in_phase=1.21)) == signs.ENDLESS_PHASE
+    assert not vents(now=phase(SWING, 2.0, 0.0, 0.0, in_phase=1.19))
+    assert found(now=phase(MID_STANCE, 1.21)) == signs.ENDLESS_PHASE, "a stance that the heel divides is one"
+    assert found(now=phase(SWING, 0.4, 0.0, 0.0), before=phase(LANDING, 0.4)) == signs.NO_TOES
     assert not vents(now=phase(MID_STANCE, 0.1), before=phase(LANDING, 0.1))
+
+
+def test_a_swing_that_is_too_short_for_a_steady_stride_pauses() -> None:
+    lands = phase(LANDING, 0.0, 1.0, 0.0)
+    before = phase(SWING, 1.0, 0.0, 0.0, in_phase=0.24)
+    assert found(now=lands, before=before) == signs.SHORT_SWING
+    assert not vents(now=lands, before=before._replace(in_phase=0.26))
+    assert not vents(now=lands, before=before._replace(since_strike=0.85)), "a scuff ends a swing early"
 
 
 def after_commands(command: float, seconds: float) -> SafetyState:
@@ -121,7 +192,7 @@ def after_commands(command: float, seconds: float) -> SafetyState:
 def test_a_chamber_that_was_filled_shows_pressure(command: float, name: str) -> None:
     filled = GOOD._replace(pressure_1=3.0e5, pressure_2=3.0e5)
     empty = filled._replace(**{name: 1.0e5})
-    assert vents(empty, state=after_commands(command, 0.052))
+    assert found(empty, state=after_commands(command, 0.052)) == signs.NO_RISE
     assert not vents(filled, state=after_commands(command, 0.052))
     assert not vents(empty, state=after_commands(command, 0.048))
     assert not vents(empty, state=after_commands(0.5 * command, 0.098)), "half open it takes twice as long"
@@ -134,7 +205,7 @@ def test_a_chamber_that_was_filled_shows_pressure(command: float, name: str) -> 
 def test_a_vented_chamber_shows_no_pressure_while_the_foot_stands_flat(name: str) -> None:
     stuck = GOOD._replace(**{name: 1.5e5})
     flat = phase(MID_STANCE, 0.1)
-    assert vents(stuck, flat, state=after_commands(VENT, 0.252))
+    assert found(stuck, flat, state=after_commands(VENT, 0.252)) == signs.NO_FALL
     assert not vents(stuck, flat, state=after_commands(VENT, 0.248))
     assert not vents(GOOD, flat, state=after_commands(VENT, 0.252))
     for moving in (phase(SWING, 0.8, 0.0, 0.0), phase(LANDING, 0.1, 1.0, 0.0), phase(MID_STANCE, 0.4, 0.0, 1.0)):
@@ -149,9 +220,9 @@ def test_a_chamber_that_still_vents_is_no_sign_and_one_that_has_stopped_is(
     state = after_commands(VENT, 0.252)
     for sample in range(151):
         left = 4.0e4 * math.exp((150 - sample) * PERIOD / fall_time)
-        state = stood(state._replace(vented=0.0), sample, **{name: 1.01e5 + left})
+        state = stood(state._replace(level=signs.HELPS), sample, **{name: 1.01e5 + left})
         if 100 <= sample <= 150:
-            assert (state.vented > 0.5) is is_sign
+            assert (state.level == signs.STOPPED) is is_sign
 
 
 def stood(state: SafetyState, sample: int, **pressures: float) -> SafetyState:
@@ -165,24 +236,24 @@ def test_a_pressure_that_freezes_while_the_chamber_vents_is_found_soon() -> None
     state = after_commands(VENT, 0.252)._replace(slow_pressures=SlowPressures(2.2e5, GOOD.pressure_2))
     for sample in range(100):
         state = stood(state, sample, pressure_1=2.0e5 - 500.0 * sample)
-    assert state.vented < 0.5
+    assert state.level == signs.HELPS
     for sample in range(100, 140):
         state = stood(state, sample, pressure_1=1.5e5)
-    assert state.vented > 0.5
+    assert state.level == signs.STOPPED
 
 
 @pytest.mark.parametrize("reading", [1.02e5, 1.2e5, 1.3e5, 2.0e5, 4.0e5])
 def test_no_single_reading_is_right_for_a_filled_and_a_vented_chamber(reading: float) -> None:
     frozen = GOOD._replace(pressure_1=reading)
     pushes, stands = phase(PUSH_OFF, 0.5, 0.0), phase(MID_STANCE, 0.4)
-    found = [
+    seen = [
         vents(frozen, pushes, state=after_commands(1.0, 0.06)),
         vents(frozen, stands, state=after_commands(VENT, 0.3)),
     ]
-    assert found.count(True) == 1
+    assert seen.count(True) == 1
 
 
-def test_once_vented_it_stays_so() -> None:
+def test_once_stopped_it_stays_so() -> None:
     state = safety.monitor(RULES, safety.START, phases.START, phases.START, GOOD._replace(angle=9.0), PERIOD)
     for command in (1.0, -0.3, 0.0):
         state = safety.monitor(RULES, state, phases.START, phases.START, GOOD, PERIOD)
