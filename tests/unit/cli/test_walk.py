@@ -143,10 +143,11 @@ def test_the_list_names_every_walk_and_every_course(capsys: pytest.CaptureFixtur
 
 def test_a_course_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "along"
-    assert main(["walk", "solenoid", "--course", "stairs", "--minutes", "0.3", "--out", str(folder)]) == 0
+    assert main(["walk", "solenoid", "--course", "stairs", "--minutes", "0.3", "--out", str(folder)]) == 1
     out = capsys.readouterr().out
     assert "stairs, 0.6 m/s" in out
     assert "whole course" in out
+    assert "strides: fewer than half" in out
     assert "is scaled to 0.6, 0.8 m/s: beyond 1.06 to 1.6 m/s" in out
     assert {"course.png", "course.svg", "segments.csv", "segments-off.csv"} <= set(names(folder))
     assert "legs.png" not in names(folder)
@@ -160,7 +161,7 @@ def test_a_course_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pyt
 
 def test_a_bottle_is_not_asked_about_a_course(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "along"
-    assert main(["walk", "solenoid", "--course", "stairs", "--minutes", "0.1", "--out", str(folder)]) == 0
+    assert main(["walk", "solenoid", "--course", "stairs", "--minutes", "0.1", "--out", str(folder)]) == 1
     capsys.readouterr()
     assert main(["endurance", str(folder)]) == 2
     assert "the walk was on course 'stairs', whose strides differ" in capsys.readouterr().err
