@@ -23,22 +23,22 @@ SCENARIOS = (
     "torque-task-solenoid",
 )
 WALKS = ("off", "proportional", "proportional-learning", "proportional-regulators", "solenoid", "solenoid-regulators")
-SETS = ("ppafo2011", "ppafo2011-printed")
+SETS = ("ppafo2011", "ppafo2011-consistent", "ppafo2011-printed")
 
 LINES: dict[str, str] = {
     **{f"simulate-{name}": f"simulate {name} --out {{out}}" for name in SCENARIOS},
     **{f"walk-{name}": f"walk {name} --minutes 0.1 --out {{out}}" for name in WALKS},
     "wearers": "walk proportional --minutes 0.1 --wearers 20 --out {out}",
     **{f"audit-{name}": f"audit {name}" for name in SETS},
-    **{f"set-{name}": f"sets {name}" for name in SETS},
+    **{f"set-{name}": f"sets show {name}" for name in SETS},
     "parts": "parts",
-    "gait": "gait show",
+    "gait": "gait show falisse2019-subject1",
     "compare": "compare torque-task-solenoid torque-task-proportional --study torque-task-uncertainty --draws 256",
-    "sensitivity": "sensitivity torque-task-uncertainty --samples 256",
-    "sensitivity-morris": "sensitivity torque-task-uncertainty --samples 32 --method morris",
-    "montecarlo": "montecarlo torque-task-uncertainty --metric rms_error --draws 2048",
+    "sensitivity": "sensitivity torque-task-uncertainty --configuration proportional --samples 256",
+    "sensitivity-morris": "sensitivity torque-task-uncertainty --configuration proportional --samples 32 --method morris",
+    "montecarlo": "montecarlo torque-task-uncertainty --configuration proportional --metric rms_error --draws 2048",
     "endurance": "endurance --gas-per-step '0.3 g'",
-    "size": "size",
+    "size": "size push-off",
     "tune": "tune pid-gains",
     "league": "league --draws 8",
     "league-walk": "league --walk --minutes 0.1 --draws 8",
