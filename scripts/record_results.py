@@ -35,7 +35,7 @@ LINES: dict[str, str] = {
     "gait": "gait show falisse2019-subject1",
     "compare": "compare torque-task-solenoid torque-task-proportional --study torque-task-uncertainty --draws 256",
     "sensitivity": "sensitivity torque-task-uncertainty --configuration proportional --samples 256",
-    "sensitivity-morris": "sensitivity torque-task-uncertainty --configuration proportional --samples 32 --method morris",
+    "morris": "sensitivity torque-task-uncertainty --configuration proportional --samples 32 --method morris",
     "montecarlo": "montecarlo torque-task-uncertainty --configuration proportional --metric rms_error --draws 2048",
     "endurance": "endurance --gas-per-step '0.3 g'",
     "size": "size push-off",
