@@ -9,8 +9,8 @@ import numpy as np
 from ppafo.answers import Column, Section, Table
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
-from ppafo.walking.strides import SETTLING
 from ppafo.walking.walk import WalkResult, walk
+from ppafo.walking.walk_metrics import settled
 
 LONGEST = 1.0
 """Minutes that are walked at most with other chambers: a walk repeats itself."""
@@ -31,8 +31,8 @@ _EXPLAINED = (
     f"for at most {LONGEST:g} min, with other chambers. Controllers keep what they believe of them. With the volume by "
     "virtual work and dead volumes that are as large as the torque task's gas wants, the torque that was published of "
     "walking at 90 psi gauge does not come in time; with short lines it does, and the torque task does not take its "
-    "gas. Work of the gas is the integral of (P1 - P2) dV over a stride, work at the shaft that of the actuator "
-    "torque. The peak torque is that of the mean stride."
+    "gas. Work of the gas is the integral of (P1 - P2) dV over a stride with help, work at the shaft that of the "
+    "actuator torque. The peak torque is that of the mean stride."
 )
 
 
@@ -68,10 +68,10 @@ def walks_by_volume(result: WalkResult, life: Endurance | None) -> tuple[VolumeR
 
 
 def _read(chambers: ChamberVolumes, result: WalkResult, life: Endurance | None) -> VolumeReading:
-    recording, starts = result.recording, result.starts[SETTLING:]
-    walked = slice(int(starts[0]), int(starts[-1]) + 1)
-    difference = (recording["pressure_1"] - recording["pressure_2"])[walked]
-    turned = float(np.trapezoid(difference, recording["angle"][walked])) / (starts.size - 1)
+    recording, helped = result.recording, settled(result.helped)
+    difference, angle = recording["pressure_1"] - recording["pressure_2"], recording["angle"]
+    done = np.concatenate([[0.0], np.cumsum(0.5 * (difference[1:] + difference[:-1]) * np.diff(angle))])
+    turned = float(np.diff(done[result.starts])[helped].mean())
     torque_constant = result.configuration.device.actuator.torque_constant
     return VolumeReading(
         chambers=chambers,
