@@ -43,7 +43,7 @@ MEASURES = {
     "push_off_work": ("J", "work of T_ex while the foot rolls over the toes, in one stride"),
     "gas": ("kg", "gas taken from the supply in one stride"),
     "switchings": ("-", "changes of the valve's path in one stride: to chamber 1, to chamber 2, vented"),
-    "safe_state": ("-", "1 if the controller vented permanently"),
+    "safe_state": ("-", "1 if the controller paused or stopped"),
 }
 """Unit and meaning of every measure."""
 
@@ -58,7 +58,7 @@ class Course:
     """A walk as samples (samples,): phase in turns, contact, angles [rad], torque [N m], command, height of toes [m].
 
     Running totals: gas [kg], slap rates [rad/s] and landings, strikes with the toes first, work [J]; ``vented`` 1 once
-    the controller has vented for good.
+    the controller has paused or stopped.
     """
 
     phase: Floats

@@ -26,7 +26,7 @@ def clear_fraction(robust: Robustness) -> float:
 
 
 def safe_states(robust: Robustness) -> int:
-    """Return the number of draws on which the controller vented for good, with sensors that work."""
+    """Return the number of draws on which the controller paused or stopped, with sensors that work."""
     return sum(1 for value in robust.values("safe_state", 0.0) if value > 0.0)
 
 
@@ -119,9 +119,9 @@ def _robustness_data(robust: Robustness) -> dict[str, Any]:
 def _standing_remarks(league: League, standing: Standing) -> Sequence[str]:
     """Return what went wrong: the safe state with good sensors, and strides that no stride of the bound is like."""
     name, robust, measures = standing.entrant.name, standing.robustness, standing.measures
-    found = [f"{name} vented permanently on the nominal task"] if measures["safe_state"] > 0.0 else []
+    found = [f"{name} paused or stopped on the nominal task"] if measures["safe_state"] > 0.0 else []
     vented = 0 if robust is None else safe_states(robust)
-    found += [f"{name} vented permanently in {vented} of the draws, although the sensors work"] if vented else []
+    found += [f"{name} paused or stopped in {vented} of the draws, although the sensors work"] if vented else []
     if league.bounds and measures["toe_strikes"] > 0.0:
         fraction = quantity_text(measures["toe_strikes"], "fraction", ".0f")
         found.append(f"{name} begins {fraction} of its strides on the toes, unlike any stride of the bound")

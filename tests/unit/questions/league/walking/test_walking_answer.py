@@ -76,7 +76,7 @@ def test_a_row_has_a_cell_for_every_heading_and_the_distances_to_the_bound(leagu
 def test_the_notes_say_task_bound_draws_and_what_went_wrong(league: League) -> None:
     text = text_of(league.answer())
     assert "5 N m at 0.53 of the stride" in text
-    assert "event_proportional vented permanently in 1 of the draws" in text
+    assert "event_proportional paused or stopped in 1 of the draws" in text
     assert "event_proportional diverged in 1 of the draws" in text
     assert "off begins 100 % of its strides on the toes" in text
     assert "servo is absent: there is no such valve" in text
