@@ -39,6 +39,7 @@ from ppafo.simulation.simulate import simulate_many
 from ppafo.walking import Configuration, load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.posture import ankle_path
+from ppafo.walking.recorded import PHASE_ROW, REQUEST_ROW, VENTINGS_ROW
 from ppafo.walking.walk import plan_of
 
 GAS_PRICE = 1.0e3
@@ -54,7 +55,7 @@ TOE_LANDING_PRICE = 2.0
 CLEARANCE = 0.005
 """Height [m] over the ground that the toes shall have in mid-swing."""
 FAILED = 1.0e3
-"""N m: the price of a run that diverges, or of a walk that ends in the safe state."""
+"""N m: the price of a run that diverges, or of a walk whose controller paused or stopped."""
 
 SECONDS = 12.0
 STRIDES = 6
@@ -129,7 +130,7 @@ class WalkJudgement:
     """What came of walks, each an array (walks,); gas [kg], work [J] and slap rate [rad/s] as means over the strides.
 
     ``error`` is the RMS torque error in push-off [N m], ``toe_height`` the lowest over the ground in mid-swing [m],
-    ``toe_landing`` the share of strides that begin on the toes, ``is_good`` False where a walk failed.
+    ``toe_landing`` the fraction of strides that begin on the toes, ``is_good`` False where a walk failed.
     """
 
     error: Floats
@@ -167,7 +168,7 @@ def judge_walks(configuration: Configuration, settings: Mapping[str, float | Flo
     samples = round(STRIDES * configuration.gait.stride_time / RECORD_INTERVAL)
     late = outcome.record[-samples - 1 :]
     good = (states["result.failure_time"] >= NEVER_FAILED) & np.isfinite(outcome.states).all(axis=0)
-    vented = states.get("controller_state.safety.vented", np.zeros(walks)) > 0.5
+    vented = states.get(VENTINGS_ROW, np.zeros(walks)) > 0.0
     return WalkJudgement(
         error=_push_off_error(run, rows, late),
         gas=_gain(late, rows, "state.supplied_mass") / STRIDES,
@@ -185,13 +186,13 @@ def _gain(record: Floats, rows: Mapping[str, int], total: str) -> Floats:
 
 def _push_off_error(run: Run, rows: Mapping[str, int], record: Floats) -> Floats:
     """RMS of torque wanted less torque [N m] in push-off; 0 for a law that wants none."""
-    wish = rows.get("controller_state.wish.torque")
+    wish = rows.get(REQUEST_ROW)
     if wish is None:
         return np.zeros(record.shape[2])
     gas = (record[:, rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
     pressure_1, pressure_2 = chamber_pressures(run.plant, *gas)
     error = record[:, wish] - run.plant.torque_constant * np.subtract(pressure_1, pressure_2)
-    pushes = record[:, rows["controller_state.phase.phase"]] == phases.PUSH_OFF
+    pushes = record[:, rows[PHASE_ROW]] == phases.PUSH_OFF
     return np.asarray(np.sqrt((error**2 * pushes).sum(axis=0) / np.maximum(pushes.sum(axis=0), 1)))
 
 

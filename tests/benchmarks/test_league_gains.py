@@ -61,7 +61,7 @@ def test_candidates_walk_as_each_alone_and_as_a_walk_of_the_command_line() -> No
     assert alone.toe_height[0] > 0.0
 
 
-def test_a_walk_that_ends_in_the_safe_state_has_failed() -> None:
+def test_a_walk_whose_controller_stops_has_failed() -> None:
     settings = gains.defaults(KIND) | {"largest_force": np.array([3.0e3, 100.0])}
     found = gains.judge_walks(gains.walks_to_judge(KIND)[0], settings, 2).price
     assert found[0] < 10.0
