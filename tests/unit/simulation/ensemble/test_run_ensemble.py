@@ -155,7 +155,7 @@ def test_metrics_and_traces_in_another_order_are_the_same_program_and_numbers(mo
     programs = []
     monkeypatch.setattr(
         running,
-        "metered",
+        "add_meters",
         lambda *given: programs.append((batch := add_meters(*given)).program) or batch,  # type: ignore[func-returns-value]
     )
     base = load_scenario(TASK, ["run.duration=0.1 s"])
