@@ -75,7 +75,7 @@ Cell = Callable[[str, int, str], float]
 
 def _read(path: str | Path, cell: Cell) -> OpenSimTable:
     try:
-        lines = _lines(read_bytes(path))
+        lines = text_lines(read_bytes(path))
         header = _header(lines)
         number, labels = _labels(lines, header)
         values, remarks = _without_repeats(_rows(lines, number + 1, labels, header, cell))
@@ -109,7 +109,8 @@ def _without_repeats(values: Floats) -> tuple[Floats, list[str]]:
     return values[:kept], [f"{rows} the time {values[-1, 0]:g} s and {'was' if dropped == 1 else 'were'} dropped"]
 
 
-def _lines(content: bytes) -> list[str]:
+def text_lines(content: bytes) -> list[str]:
+    """Return the lines of a text file in UTF-8, with any line ends; DataError where it is none."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

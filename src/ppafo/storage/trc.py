@@ -15,6 +15,7 @@ import numpy as np
 from ppafo.errors import DataError, first_twice, one_line
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
+from ppafo.storage.opensim import text_lines
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _FIRST = "PathFileType"
@@ -35,7 +36,7 @@ class MarkerTable:
 def read_trc(path: str | Path) -> MarkerTable:
     """Return the markers in a ``.trc`` file; DataError names file, line and what is wrong."""
     try:
-        lines = _lines(read_bytes(path))
+        lines = text_lines(read_bytes(path))
         if not lines[0].startswith(_FIRST) or len(lines) <= _HEAD_LINES:
             raise DataError(
                 f"is not a .trc file: its first line begins with '{_FIRST}', and five lines come before rows"
@@ -49,16 +50,6 @@ def read_trc(path: str | Path) -> MarkerTable:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     markers = {name: values[:, 1 + 3 * place : 4 + 3 * place].T for place, name in enumerate(names)}
     return MarkerTable(values[:, 0], markers, unit)
-
-
-def _lines(content: bytes) -> list[str]:
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise DataError(f"is not a text file in UTF-8 (byte {error.start})") from error
-    if "\0" in text:
-        raise DataError(f"is not a text file (byte {text.index(chr(0))} is zero)")
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def _unit(lines: list[str]) -> str:
