@@ -185,13 +185,13 @@ def _gain(record: Floats, rows: Mapping[str, int], total: str) -> Floats:
 
 
 def _push_off_error(run: Run, rows: Mapping[str, int], record: Floats) -> Floats:
-    """RMS of torque wanted less torque [N m] in push-off; 0 for a law that wants none."""
-    wish = rows.get(REQUEST_ROW)
-    if wish is None:
+    """RMS of requested torque less torque [N m] in push-off; 0 for a law that requests none."""
+    requested = rows.get(REQUEST_ROW)
+    if requested is None:
         return np.zeros(record.shape[2])
     gas = (record[:, rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
     pressure_1, pressure_2 = chamber_pressures(run.plant, *gas)
-    error = record[:, wish] - run.plant.torque_constant * np.subtract(pressure_1, pressure_2)
+    error = record[:, requested] - run.plant.torque_constant * np.subtract(pressure_1, pressure_2)
     pushes = record[:, rows[PHASE_ROW]] == phases.PUSH_OFF
     return np.asarray(np.sqrt((error**2 * pushes).sum(axis=0) / np.maximum(pushes.sum(axis=0), 1)))
 

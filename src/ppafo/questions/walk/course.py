@@ -25,7 +25,7 @@ _HEAD = (
     Column("lowest toes (cm)"),
     Column("... without (cm)"),
     Column("push, heel loaded (N m)"),
-    Column("safe state at (s)"),
+    Column("pause or stop at (s)"),
 )
 _WHOLE = "whole course"
 _COURSE = (
