@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ppafo.model.columns import over_runs, root
+from ppafo.model.elementary import power
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,17 +41,17 @@ def critical_pressure_ratio(heat_capacity_ratio: float) -> float:
 
 
 def _critical_ratio(k: float) -> float:
-    return float((2.0 / (k + 1.0)) ** (k / (k - 1.0)))
+    return power(2.0 / (k + 1.0), k / (k - 1.0))
 
 
 def choked_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
     """C1 [s/m] of equation (6), with the exponent (k + 1)/(k - 1); ``gas_constant`` is the specific one."""
-    power = over_runs(_choked_power, heat_capacity_ratio)
-    return root(heat_capacity_ratio / (gas_constant * temperature) * power)
+    choked = over_runs(_choked_power, heat_capacity_ratio)
+    return root(heat_capacity_ratio / (gas_constant * temperature) * choked)
 
 
 def _choked_power(k: float) -> float:
-    return float((2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
+    return power(2.0 / (k + 1.0), (k + 1.0) / (k - 1.0))
 
 
 def subsonic_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:

@@ -1,17 +1,23 @@
-"""Flow curves fitted to the exact flow functions, and conductances, for both forms of an orifice."""
+"""Flow curves fitted to the exact flow functions, and conductances, for both forms of an orifice.
+
+By plain arithmetic and square roots alone, so that a run begins with the same bits on every machine.
+"""
 
 import math
 from collections.abc import Sequence
 from functools import lru_cache
 
-import numpy as np
-
 from ppafo.constants import STANDARD_REFERENCE_DENSITY_AIR, STANDARD_REFERENCE_TEMPERATURE
 from ppafo.model.columns import over_runs, root
+from ppafo.model.elementary import power
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
-from ppafo.model.orifice import TERMS, FlowCurve, isentropic_flow_function, iso6358_flow_function
+from ppafo.model.orifice import TERMS, FlowCurve
 
-FIT_POINTS = 400
+PLACES = (0.01371, 0.117149, 0.300253, 0.522087, 0.735768, 0.900391, 0.988845)
+"""Where a curve meets the exact function: 1 - r over that of the critical ratio.
+
+A curve that is best by relative least squares crosses the exact function of helium here, and of other gases nearby.
+"""
 
 
 def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
@@ -36,15 +42,19 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
 
 @lru_cache(maxsize=4096)
 def _isentropic_coefficients(heat_capacity_ratio: float) -> tuple[float, ...]:
-    gaps = _gaps(critical_pressure_ratio(heat_capacity_ratio))
-    return _fit_curve(gaps, np.array([isentropic_flow_function(1.0 - gap, heat_capacity_ratio) for gap in gaps]))
+    """Coefficients of a gas, through the exact function of equation (7) at places below the critical pressure ratio."""
+    k = heat_capacity_ratio
+    critical_gap = 1.0 - critical_pressure_ratio(k)
+    gaps = [critical_gap * place for place in PLACES]
+    choked = math.sqrt(0.5 * (k - 1.0) * power(2.0 / (k + 1.0), (k + 1.0) / (k - 1.0)))
+    values = [power(1.0 - gap, 1.0 / k) * math.sqrt((1.0 - power(1.0 - gap, (k - 1.0) / k)) / gap) for gap in gaps]
+    return _polynomial_through(gaps, [value / choked for value in values])
 
 
 @lru_cache(maxsize=1)
 def _iso6358_coefficients() -> tuple[float, ...]:
-    """Coefficients for a critical ratio of 0."""
-    gaps = _gaps(0.0)
-    return _fit_curve(gaps, np.array([iso6358_flow_function(1.0 - gap, 0.0) for gap in gaps]))
+    """Coefficients for a critical ratio of 0, where the function is the root of (1 - r)(1 + r)."""
+    return _polynomial_through(PLACES, [math.sqrt(2.0 - place) for place in PLACES])
 
 
 def area_conductance(
@@ -65,20 +75,19 @@ def sonic_conductance_mass(sonic_conductance: float, gas_constant: float, temper
     return same_gas * root(air_constant / gas_constant)
 
 
-def _gaps(critical_ratio: float) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
-    """Chebyshev-like points of 1 - r between 0 and the critical gap."""
-    angles = np.linspace(0.0, math.pi, FIT_POINTS + 1)[1:]
-    return np.asarray(0.5 * (1.0 - critical_ratio) * (1.0 - np.cos(angles)))
-
-
-def _fit_curve(
-    gaps: "np.ndarray[tuple[int], np.dtype[np.float64]]", exact: "np.ndarray[tuple[int], np.dtype[np.float64]]"
-) -> tuple[float, ...]:
-    """Coefficients of a polynomial times a root, by relative least squares."""
-    target = exact / np.sqrt(gaps)
-    powers = np.vander(gaps, TERMS, increasing=True)
-    coefficients = np.linalg.lstsq(powers / target[:, None], np.ones_like(target), rcond=None)[0]
-    return tuple(coefficients.tolist())
+def _polynomial_through(places: Sequence[float], values: Sequence[float]) -> tuple[float, ...]:
+    """Coefficients, from the constant one upwards, of the polynomial that has some values at some places (Newton)."""
+    differences = list(values)
+    for order in range(1, TERMS):
+        for index in range(TERMS - 1, order - 1, -1):
+            rise = differences[index] - differences[index - 1]
+            differences[index] = rise / (places[index] - places[index - order])
+    coefficients = [0.0] * TERMS
+    for place, difference in zip(reversed(places), reversed(differences), strict=True):
+        raised = [0.0, *coefficients[:-1]]
+        coefficients = [higher - place * lower for higher, lower in zip(raised, coefficients, strict=True)]
+        coefficients[0] += difference
+    return tuple(coefficients)
 
 
 def _curve(critical_ratio: float, linear_ratio: float, coefficients: Sequence[float]) -> FlowCurve:
