@@ -102,8 +102,14 @@ class Curve:
         """Return the values at many phases [strides]."""
         import numpy as np
 
-        turns = 2.0 * np.pi * np.multiply.outer(np.asarray(phases, dtype=np.float64), 1.0 + np.arange(self.harmonics))
-        values = self.mean + np.cos(turns) @ np.array(self.cosines) + np.sin(turns) @ np.array(self.sines)
+        from ppafo.model.elementary import sine_and_cosine
+
+        first_sine, first_cosine = sine_and_cosine(np.asarray(phases, dtype=np.float64))
+        sine, cosine = first_sine, first_cosine
+        values = self.mean + 0.0 * first_cosine
+        for of_cosine, of_sine in zip(self.cosines, self.sines, strict=True):
+            values = values + (of_cosine * cosine + of_sine * sine)
+            cosine, sine = cosine * first_cosine - sine * first_sine, sine * first_cosine + cosine * first_sine
         return np.asarray(values, dtype=np.float64)
 
 

@@ -11,6 +11,7 @@ from ppafo.engine.rows import leaves
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.course import NEVER, PARTS, STANDS_AT, Course, CoursePart
+from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import LegParameters, torque_of_shank
 from ppafo.signals.recording import Floats
@@ -263,7 +264,7 @@ def standing_gait(leg: LegParameters, timing: GaitTiming, course: Course) -> Gai
     first = course.parts[0]
     ground: Numbers = timing.ground_angle
     upright = 0.0 * ground
-    sine_foot, cosine_foot = np.sin(ground), np.cos(ground)
+    sine_foot, cosine_foot = sine_and_cosine(ground / (2.0 * math.pi))
     torque: Any = torque_of_shank
     return GaitNow(
         phase=first.turns,

@@ -13,6 +13,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.declaration import Quantity
+from ppafo.model.elementary import exponential
 from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters import apply_overrides, build_device, load_parameter_set
@@ -196,7 +197,7 @@ def _memory(reading: Reading, bandwidth: Quantity) -> float:
     path = f"sensors.{bandwidth.name}"
     if value_at(reading.document, path) is None:
         return 0.0
-    return math.exp(-_TURN * reading.number(path, bandwidth) * _period(reading))
+    return exponential(-_TURN * reading.number(path, bandwidth) * _period(reading))
 
 
 def _fault(reading: Reading, sensor: str) -> Fault:
@@ -219,7 +220,7 @@ def _fault(reading: Reading, sensor: str) -> Fault:
         offset=wrong["offset"],
         drift=wrong["drift"],
         crosstalk=wrong.get("crosstalk", 0.0),
-        memory=math.exp(-_period(reading) / wrong["lag"]) if wrong["lag"] > 0.0 else 0.0,
+        memory=exponential(-_period(reading) / wrong["lag"]) if wrong["lag"] > 0.0 else 0.0,
         lost_fraction=wrong["lost_share"],
         period=period,
     )

@@ -6,6 +6,7 @@ import numpy as np
 
 from ppafo.gait import Gait
 from ppafo.gait.gait import KNEE, Curve
+from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.fourier import HARMONICS
 from ppafo.signals.recording import Floats
 from ppafo.walking.anthropometry import draw_bounded_normal
@@ -97,13 +98,14 @@ def _draw_series(curve: Curve | None, count: int, generator: np.random.Generator
 
 def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> dict[str, Floats]:
     """What ``gait_events`` finds, by field of ``GaitTiming``; some people at a time, to need less memory."""
-    turns = 2.0 * np.pi * np.outer(np.arange(1, HARMONICS + 1), EVENT_PHASES)
-    cosine, sine = np.cos(turns), np.sin(turns)
+    sine, cosine = sine_and_cosine(np.outer(np.arange(1, HARMONICS + 1), EVENT_PHASES))
     found = []
     for first in range(0, stance_share.size, _AT_ONCE):
         part = slice(first, first + _AT_ONCE)
         level = shank.mean[part] - ankle.mean[part] + 0.5 * np.pi
-        foot = (shank.cosines - ankle.cosines)[part] @ cosine + (shank.sines - ankle.sines)[part] @ sine
-        foot += level[:, None]
+        cosines, sines = (shank.cosines - ankle.cosines)[part], (shank.sines - ankle.sines)[part]
+        foot = np.repeat(level[:, None], EVENT_PHASES.size, axis=1)
+        for order in range(HARMONICS):
+            foot += cosines[:, order, None] * cosine[order] + sines[:, order, None] * sine[order]
         found.append(gait_events(foot, stance_share[part]))
     return {name: np.concatenate([part[name] for part in found]) for name in found[0]}

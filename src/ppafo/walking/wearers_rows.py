@@ -11,6 +11,7 @@ from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.gait.gait import KNEE
 from ppafo.model.chambers import chamber_mass
+from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import GaitTiming
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.plant import chamber_volumes
@@ -119,13 +120,13 @@ def _state_rows(
     plant = run.plant
     volumes = chamber_volumes(plant, now["ankle"])
     masses = [chamber_mass(plant.atmospheric_pressure, volume, plant.gas_product) for volume in volumes]
-    foot = now["shank"] - now["ankle"] + 0.5 * np.pi
+    sine_foot, cosine_foot = sine_and_cosine((now["shank"] - now["ankle"]) / (2.0 * np.pi) + 0.25)
     return (
         {f"walk.now.{name}": values for name, values in now.items()}
         | shown
         | {
-            "walk.foot.sine": np.sin(foot),
-            "walk.foot.cosine": np.cos(foot),
+            "walk.foot.sine": sine_foot,
+            "walk.foot.cosine": cosine_foot,
             "state.angle": now["ankle"],
             "state.angular_velocity": now["ankle_rate"],
             "state.mass_1": np.asarray(masses[0]),
@@ -159,8 +160,8 @@ def _gait_at_heel_strike(run: Run, segments: Mapping[str, Floats], gaits: Varied
     leg: Any = run.walk.leg
     leg = leg._replace(**own)
     torque: Any = torque_of_shank
-    foot = shank - ankle + 0.5 * np.pi
-    directions = np.sin(shank), np.cos(shank), np.sin(foot), np.cos(foot)
+    turn = 2.0 * np.pi
+    directions = *sine_and_cosine(shank / turn), *sine_and_cosine((shank - ankle) / turn + 0.25)
     carried = torque(leg, *directions, shank_rate, shank_acceleration, knee["knee_forward"], knee["knee_up"])
     return {
         "shank": shank,
