@@ -7,7 +7,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce test coverage quick check format bench lock clean
+.PHONY: reproduce test coverage quick check format bench bits lock clean
 
 reproduce: $(READY)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -38,6 +38,10 @@ format: $(READY)
 bench: $(READY)
 	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements-bench.lock
 	$(BIN)/python -m benchmarks --out out/bench
+
+# Whether every shipped scenario and walk has the same bits on several processors; each compiles its own models, for minutes.
+bits: $(READY)
+	$(BIN)/python scripts/bits.py
 
 $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "ppafo needs Python 3.11 or newer; try: make PYTHON=python3.12")'

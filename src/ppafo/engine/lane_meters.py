@@ -5,7 +5,7 @@ once before the first sample, then followed.
 """
 
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
-from ppafo.model.plant import chamber_pressures_in_one_division
+from ppafo.model.plant import chamber_pressures
 from ppafo.model.vane import actuator_torque
 from ppafo.signals.meter import SAME_LEVEL, Sample, advance_course, is_away
 
@@ -44,7 +44,7 @@ def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
 def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     """Lines that make the sample of a lane."""
     add, program = rows.add, rows.program
-    pressures = add(chamber_pressures_in_one_division)
+    pressures = add(chamber_pressures)
     wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]"
     thermal = ("thermal", "masses") if program.is_thermal else ()
     warm = [f"thermal.temperature * (state.mass_{chamber} / masses.mass_{chamber})" for chamber in (1, 2)]

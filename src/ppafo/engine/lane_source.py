@@ -14,17 +14,15 @@ from collections import namedtuple
 
 import numpy as np
 from numba import njit
-
-FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}
 '''
-INLINE = '@njit(forceinline=True, fastmath=FAST, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
+INLINE = '@njit(forceinline=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 """How what the loop calls is compiled: into it, and not to be called from Python, which would take a third longer."""
 
 SIGNATURE = (
     '"void(float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], '
     'float64[:, :, ::1], int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)"'
 )
-COMPILED = f'@njit({SIGNATURE}, cache=True, nogil=True, fastmath=FAST, error_model="numpy")'
+COMPILED = f'@njit({SIGNATURE}, cache=True, nogil=True, error_model="numpy")'
 SAME_MOMENT = 1.0e-9
 """Fractions of a step that are taken to be one instant."""
 ARGUMENTS = (

@@ -55,13 +55,14 @@ def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
     gap = 1.0 - pressure_ratio
     linear_gap = 1.0 - curve.linear_ratio
     inside = max(min(gap, 1.0 - curve.critical_ratio), linear_gap)
-    polynomial = curve.coefficients[6]
-    polynomial = polynomial * inside + curve.coefficients[5]
-    polynomial = polynomial * inside + curve.coefficients[4]
-    polynomial = polynomial * inside + curve.coefficients[3]
-    polynomial = polynomial * inside + curve.coefficients[2]
-    polynomial = polynomial * inside + curve.coefficients[1]
-    polynomial = polynomial * inside + curve.coefficients[0]
+    # Even and odd powers apart: half as many operations wait for one another.
+    square = inside * inside
+    even = curve.coefficients[6] * square + curve.coefficients[4]
+    even = even * square + curve.coefficients[2]
+    even = even * square + curve.coefficients[0]
+    odd = curve.coefficients[5] * square + curve.coefficients[3]
+    odd = odd * square + curve.coefficients[1]
+    polynomial = even + inside * odd
     return math.sqrt(inside) * polynomial * min(gap * curve.linear_slope, 1.0)
 
 
@@ -74,24 +75,23 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
     linear_gap = 1.0 - curve.linear_ratio
     choked_gap = 1.0 - curve.critical_ratio
     inside = max(min(gap, choked_gap), linear_gap)
-    polynomial = curve.coefficients[6]
-    derivative = curve.coefficients[6]
-    polynomial = polynomial * inside + curve.coefficients[5]
-    derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.coefficients[4]
-    derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.coefficients[3]
-    derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.coefficients[2]
-    derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.coefficients[1]
-    derivative = derivative * inside + polynomial
-    polynomial = polynomial * inside + curve.coefficients[0]
+    square = inside * inside
+    even = curve.coefficients[6] * square + curve.coefficients[4]
+    even_slope = curve.coefficients[6] * square + even
+    even = even * square + curve.coefficients[2]
+    even_slope = even_slope * square + even
+    even = even * square + curve.coefficients[0]
+    odd = curve.coefficients[5] * square + curve.coefficients[3]
+    odd_slope = curve.coefficients[5] * square + odd
+    odd = odd * square + curve.coefficients[1]
+    polynomial = even + inside * odd
+    derivative = (inside + inside) * (even_slope + inside * odd_slope) + odd
     root = math.sqrt(inside)
+    inverse = 1.0 / root
     value = root * polynomial
     # Near equal pressures the chord from there: with the slope of the curve a settled chamber would ring at the kink.
     is_near = gap < 2.0 * linear_gap
-    slope = (polynomial if is_near else 0.5 * polynomial + inside * derivative) / root
+    slope = (polynomial if is_near else 0.5 * polynomial + inside * derivative) * inverse
     slope = 0.0 if gap > choked_gap else slope
     return value * min(gap * curve.linear_slope, 1.0), -slope
 

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
+from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.model.columns import Number
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.ports import BlendedPort, SinglePort
@@ -97,21 +97,17 @@ def chamber_volumes(plant: PlantParameters, angle: Number) -> tuple[Number, Numb
     return volume_1, volume_2
 
 
-def chamber_pressures(plant: PlantParameters, angle: Number, mass_1: Number, mass_2: Number) -> tuple[Number, Number]:
-    """Absolute pressures of both chambers [Pa]. Equation (3)."""
-    volume_1, volume_2 = chamber_volumes(plant, angle)
-    pressure_1 = chamber_pressure(mass_1, volume_1, plant.gas_product)
-    pressure_2 = chamber_pressure(mass_2, volume_2, plant.gas_product)
-    return pressure_1, pressure_2
-
-
-def chamber_pressures_in_one_division(
-    plant: PlantParameters, angle: float, mass_1: float, mass_2: float
-) -> tuple[float, float]:
-    """As ``chamber_pressures``, to rounding: a division costs as much as ten products. Equation (3)."""
+def pressures_per_mass(plant: PlantParameters, angle: Number) -> tuple[Number, Number]:
+    """Pressures over masses [Pa/kg] of both chambers at an angle [rad], in one division, which costs ten products."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
     per_volumes = plant.gas_product / (volume_1 * volume_2)
-    return mass_1 * volume_2 * per_volumes, mass_2 * volume_1 * per_volumes
+    return volume_2 * per_volumes, volume_1 * per_volumes
+
+
+def chamber_pressures(plant: PlantParameters, angle: Number, mass_1: Number, mass_2: Number) -> tuple[Number, Number]:
+    """Absolute pressures of both chambers [Pa]. Equation (3)."""
+    per_mass_1, per_mass_2 = pressures_per_mass(plant, angle)
+    return mass_1 * per_mass_1, mass_2 * per_mass_2
 
 
 def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> float:

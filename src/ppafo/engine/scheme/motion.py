@@ -19,6 +19,7 @@ ALLOWED_BY_GAS = 3.0e-6
 """Error of one part over the angle in which the smaller chamber would close."""
 MISSED_FRACTION = 0.2
 """Fraction of the way between where the gas took the vane to be and where an event left it that counts as an error."""
+SIXTH = 1.0 / 6.0
 LOWEST_REBOUND = 1.0e-7
 """Height over the range of the angle below which a rebound is none."""
 
@@ -75,9 +76,8 @@ def next_velocity(
 ) -> float:
     """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; ``torque`` at the end [N m], less friction."""
     half = 0.5 * duration
-    return (angular_velocity + half * (acceleration + torque / plant.inertia)) / (
-        1.0 + half * plant.viscous_damping / plant.inertia
-    )
+    momentum = plant.inertia * (angular_velocity + half * acceleration)
+    return (momentum + half * torque) / (plant.inertia + half * plant.viscous_damping)
 
 
 def time_to_stop(distance: float, angular_velocity: float, acceleration: float) -> float:
@@ -107,10 +107,11 @@ def depart(
     sliding = way * plant.dynamic_torque
     duration = step * (1.0 - departure.fraction) * (1.0 - waits)
     velocity = departure.angular_velocity
-    first = (start_torque - sliding - plant.viscous_damping * velocity) / plant.inertia
-    last = (next_torque - sliding) / plant.inertia
+    per_inertia = 1.0 / plant.inertia
+    first = (start_torque - sliding - plant.viscous_damping * velocity) * per_inertia
+    last = (next_torque - sliding) * per_inertia
     next_rate = next_velocity(plant, velocity, first, next_torque - sliding, duration)
-    travel = duration * velocity + duration * duration * (first / 3.0 + last / 6.0)
+    travel = duration * velocity + duration * duration * (first + first + last) * SIXTH
     goes = moving or leaves_at_once or leaves_later
     turned = next_rate * way <= 0.0
     angle = departure.angle + (travel if goes and travel * way > 0.0 else 0.0)
@@ -168,14 +169,14 @@ def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length:
     angle = begun.next_angle if slides else left_angle
     rate = slid_velocity if slides else left_velocity
 
-    last = (sliding_torque - plant.viscous_damping * full_velocity) / plant.inertia
-    bent = abs(last - begun.acceleration) * length * length / 6.0 if way != 0.0 else 0.0
+    last = (sliding_torque - plant.viscous_damping * full_velocity) * (1.0 / plant.inertia)
+    bent = abs(last - begun.acceleration) * length * length * SIXTH if way != 0.0 else 0.0
     missed = MISSED_FRACTION * abs(angle - begun.next_angle)
     # Where a chamber is small, a little of the angle is much of the pressure.
     volume_1, volume_2 = chamber_volumes(plant, begun.next_angle)
-    allowed_by_gas = ALLOWED_BY_GAS * min(volume_1, volume_2) / plant.volume_per_angle
-    allowed = min(ALLOWED_OF_ANGLE * (plant.angle_max - plant.angle_min), allowed_by_gas)
-    return angle, rate, (bent + missed) / allowed
+    swept = plant.volume_per_angle * (plant.angle_max - plant.angle_min)
+    allowed_volume = min(ALLOWED_OF_ANGLE * swept, ALLOWED_BY_GAS * min(volume_1, volume_2))
+    return angle, rate, (bent + missed) * plant.volume_per_angle / allowed_volume
 
 
 def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: float) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
-from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
+from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, pressures_per_mass
 from ppafo.model.ports import admitted_flow
 
 GAMMA = 0.2928932188134524
@@ -102,9 +102,7 @@ def linearise(
     port_flow_slopes: Callable[..., Any],
 ) -> tuple[Linearisation, Flows]:
     """All flows at the beginning of a step [s], and their linearisation. Equations (3), (6) to (9)."""
-    volumes = chamber_volumes(plant, state.angle)
-    per_mass_1 = plant.gas_product / volumes[0]
-    per_mass_2 = plant.gas_product / volumes[1]
+    per_mass_1, per_mass_2 = pressures_per_mass(plant, state.angle)
     pressure_1 = state.mass_1 * per_mass_1
     pressure_2 = state.mass_2 * per_mass_2
     in_1 = port_flow_slopes(pressure_1, port_1, plant.valve_curve)
@@ -171,14 +169,15 @@ def begin_moving_stage(
     step: float,
 ) -> MovingGas:
     """First stage of one step [s] with moving volumes, from all flows at its beginning and their linearisation."""
+    per_mass_1, per_mass_2 = pressures_per_mass(plant, state.angle)
     volumes = chamber_volumes(plant, state.angle)
     next_volumes = chamber_volumes(plant, next_angle)
     # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
-    duration = max(step, SHORTEST)
+    per_duration = 1.0 / (plant.gas_product * max(step, SHORTEST))
     drift = response(
         linear,
-        state.mass_1 * (volumes[0] - next_volumes[0]) / (volumes[0] * duration),
-        state.mass_2 * (volumes[1] - next_volumes[1]) / (volumes[1] * duration),
+        state.mass_1 * per_mass_1 * (volumes[0] - next_volumes[0]) * per_duration,
+        state.mass_2 * per_mass_2 * (volumes[1] - next_volumes[1]) * per_duration,
     )
     first = solve_stage(
         linear,
@@ -277,12 +276,16 @@ def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle
     added_1 = linear.d * (begun.first.mass_1 + second.mass_1) - linear.b * (begun.first.mass_2 + second.mass_2)
     added_2 = linear.a * (begun.first.mass_2 + second.mass_2) - linear.c * (begun.first.mass_1 + second.mass_1)
     volume_1, volume_2 = chamber_volumes(plant, next_angle)
-    weight = 0.5 * step * plant.gas_product / ALLOWED_OF_PRESSURE
     scale = abs(linear.scale)
-    return weight * max(
-        (scale * abs(added_1) + refused) / (volume_1 * pressure_that_matters(plant, begun.end_1)),
-        (scale * abs(added_2) + refused) / (volume_2 * pressure_that_matters(plant, begun.end_2)),
-    )
+    content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)
+    content_2 = volume_2 * pressure_that_matters(plant, begun.end_2)
+    missed = larger_share(scale * abs(added_1) + refused, content_1, scale * abs(added_2) + refused, content_2)
+    return 0.5 / ALLOWED_OF_PRESSURE * step * plant.gas_product * missed
+
+
+def larger_share(part_1: float, whole_1: float, part_2: float, whole_2: float) -> float:
+    """The larger of both parts over their wholes, which are above 0; in one division."""
+    return max(part_1 * whole_2, part_2 * whole_1) / (whole_1 * whole_2)
 
 
 def opening_error(plant: PlantParameters, begun: StillGas, shift: float, next_angle: float, step: float) -> float:
@@ -294,11 +297,10 @@ def opening_error(plant: PlantParameters, begun: StillGas, shift: float, next_an
     volume_1, volume_2 = chamber_volumes(plant, next_angle)
     answer_1 = abs(begun.linear.a - 1.0) * abs(begun.first.mass_1)
     answer_2 = abs(begun.linear.d - 1.0) * abs(begun.first.mass_2)
-    weight = shift * step * plant.gas_product / (12.0 * GAMMA * ALLOWED_OF_PRESSURE)
-    return weight * max(
-        answer_1 / (volume_1 * pressure_that_matters(plant, begun.end_1)),
-        answer_2 / (volume_2 * pressure_that_matters(plant, begun.end_2)),
-    )
+    content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)
+    content_2 = volume_2 * pressure_that_matters(plant, begun.end_2)
+    weight = 1.0 / (12.0 * GAMMA * ALLOWED_OF_PRESSURE)
+    return weight * shift * step * plant.gas_product * larger_share(answer_1, content_1, answer_2, content_2)
 
 
 def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:

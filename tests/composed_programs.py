@@ -1,0 +1,71 @@
+"""Programs that the catalogues can compose: every entry, with every feature of the engine, drawn at random."""
+
+import random
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.engine.program import Program
+from ppafo.engine.replay import RECORDED_ANGLE
+from ppafo.metrics import METRICS
+from ppafo.model.valves import dump
+from ppafo.model.valves.catalog import VALVES
+from ppafo.model.valves.kind import ValveModel
+from ppafo.signals.meter import MeterKind
+
+
+def valve_models(walks: bool) -> list[ValveModel]:
+    """Every model that the valves of the catalogue choose; a proportional one in a walk has a dump valve."""
+    found: dict[int, ValveModel] = {}
+    for kind in VALVES.values():
+        choose = dump.choose if walks and kind.name == "proportional" else kind.choose
+        names = [item.name for item in kind.quantities]
+        settings = [dict.fromkeys(names, 0.0), *({**dict.fromkeys(names, 0.0), name: 0.01} for name in names)]
+        for model in map(choose, settings):
+            found |= {id(model): model}
+    return list(found.values())
+
+
+def meters() -> tuple[MeterKind, ...]:
+    """Every meter of the metrics."""
+    return tuple({meter.name: meter for kind in METRICS.values() for meter in kind.meters}.values())
+
+
+def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:
+    """``count`` programs, every third a walk, in which the entries of each catalogue take turns; the rest is drawn."""
+    draw = random.Random(seed)
+    valves, walking_valves = valve_models(walks=False), valve_models(walks=True)
+    laws, walking_laws, profiles = (
+        [None, *CONTROLLERS.values()],
+        list(WALKING_CONTROLLERS.values()),
+        list(PROFILES.values()),
+    )
+    angles = [None, RECORDED_ANGLE, *profiles]
+    for number in range(count):
+        walks = number % 3 == 2
+        angle = None if walks else angles[number % len(angles)]
+        metered = not walks and draw.random() < 0.3
+        yield Program(
+            valve=_turn(walking_valves if walks else valves, number),
+            reference=PROFILES["constant"] if walks else _turn(profiles, number),
+            controller=_turn(walking_laws, number) if walks else _turn(laws, number),
+            angle=angle,
+            ideal_sensors=draw.random() < 0.5,
+            late_commands=draw.random() < 0.3,
+            late_signals=not walks and draw.random() < 0.3,
+            slow_sensors=not walks and draw.random() < 0.3,
+            is_thermal=draw.random() < 0.4,
+            walks=walks,
+            takes_course=walks and draw.random() < 0.5,
+            has_lines=draw.random() < 0.4,
+            # A free vane always goes through its steps in parts, a leg never as its error asks.
+            is_adaptive=not walks and (angle is None or draw.random() < 0.5),
+            samples_inside=draw.random() < 0.2,
+            meters=meters() if metered else (),
+            traced=("angle", "mass_1") if metered else (),
+        )
+
+
+def _turn(items: Sequence[Any], number: int) -> Any:
+    return items[number % len(items)]
