@@ -18,7 +18,7 @@ from ppafo.parameters import load_parameter_set
 from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.design.file import read_design_file
 from ppafo.questions.endurance.draw import read_walk_gas
-from ppafo.questions.endurance.file import load_bottle
+from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.questions.size.file import read_sizing_file
 from ppafo.questions.sweep.results import load_study_results
 from ppafo.questions.tune.file import load_tuning

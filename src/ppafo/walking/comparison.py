@@ -44,8 +44,9 @@ def compare_walks(
 
 
 def with_device_off(configuration: Configuration) -> Configuration:
-    """The same wearer and device with both chambers vented; no gas flows, so no supply lines are needed."""
-    return replace(configuration, name=f"{configuration.name}-off", controller=off.KIND, settings={}, supply_lines=None)
+    """The same wearer and device with both chambers vented; no gas flows, so no bottle and no lines are needed."""
+    name = f"{configuration.name}-off"
+    return replace(configuration, name=name, controller=off.KIND, settings={}, supply_lines=None, bottle=None)
 
 
 def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:

@@ -21,6 +21,9 @@ from ppafo.simulation.declaration import ISOTHERMAL, PERIOD, RATE, kind_at, valu
 from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.overriding import device_paths, is_of_device, split_override
 from ppafo.simulation.reading import Reading
+from ppafo.simulation.supply_line import SECTION as LINES
+from ppafo.walking import bottle_supply
+from ppafo.walking.bottle_supply import read_bottle
 from ppafo.walking.configuration import NEVER, Configuration
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.course import WalkingCourse, load_course
@@ -51,6 +54,7 @@ _TEXTS = (
     "device.valve",
     "controller.kind",
     "gas_model.kind",
+    bottle_supply.NAME,
     *(f"faults.{sensor}.kind" for sensor in FAULTY),
 )
 DEFAULT_PERIOD = 1.0e-3
@@ -66,16 +70,19 @@ def load_walk(
     overrides: Iterable[str] = (),
     gait: str | Path | None = None,
     course: str | Path | None = None,
+    bottle: str | Path | None = None,
 ) -> Configuration:
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
-    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` and
-    ``course`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its subject as the
+    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
+    ``course`` and ``bottle`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its subject as the
     default wearer. ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
     document = _apply_overrides(FILE.parse(FILE.read(name_or_path), file), given, file)
+    if bottle is not None:
+        document.setdefault(bottle_supply.SECTION, {})["name"] = str(bottle)
     load_walking_controller(kind_at(document, "controller"))
     validate(walk_file(), document, file, ScenarioError)
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
@@ -84,6 +91,11 @@ def load_walk(
     device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
     walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
     is_named = gait is not None or "gait" in document
+    carried = read_bottle(reading, device, folder if bottle is None else Path())
+    if carried is not None:
+        # A bottle feeds lines: their regulators and volumes are the defaults unless the file has others.
+        document.setdefault(LINES, {})
+    lines = read_supply_lines(reading, device)
     configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
@@ -97,13 +109,15 @@ def load_walk(
         period=_period(reading),
         step=reading.number("run.step", STEP),
         assumed=dict(document.get("assumed", {}))
-        | {item.path: f"{item.value}, {item.note}" for item in assumed_lines(reading)},
+        | {item.path: f"{item.value}, {item.note}" for item in assumed_lines(reading)}
+        | ({} if carried is None else carried.assumed),
         file=str(name_or_path),
         overrides=given,
-        supply_lines=read_supply_lines(reading, device),
+        supply_lines=lines if lines is None or carried is None else carried.lines(lines),
         thermal=read_thermal(reading),
         course=_course(course or document.get("course"), folder, course is None),
         wearer_origin=wearer_origin(reading, walked, is_named),
+        bottle=carried,
     )
     check_walk(configuration, reading)
     course_of_walk(configuration)
@@ -119,6 +133,9 @@ def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file:
         known = (*quantities(kind_at(changed, "controller")), *_TEXTS)
         if path in known:
             _set(changed, path, text)
+        elif bottle_supply.is_of_bottle(path):
+            own = changed.setdefault(bottle_supply.SECTION, {}).setdefault("overrides", [])
+            own.append(override.partition(".")[2])
         elif not is_of_device(path):
             hint = nearest_name(path, [*known, *device_paths()])
             raise ScenarioError(f"override '{one_line(override)}': {file} has no value '{path}'{hint}")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ppafo.answers import Solved
 from ppafo.errors import ParameterError
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.questions.endurance.discharge import Discharge, discharge
 from ppafo.questions.endurance.draw import (
     Draw,
@@ -20,7 +21,6 @@ from ppafo.questions.endurance.draw import (
     walk_gas,
 )
 from ppafo.questions.endurance.ending import smallest_mass_when_warm
-from ppafo.questions.endurance.file import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.questions.endurance.reuse import Reuse, ReusePlan, parse_reuse
 from ppafo.questions.endurance.reuse import reuse as reuse_exhaust
 from ppafo.signals import Recording

@@ -23,7 +23,7 @@ from ppafo.questions.endurance.draw import (
     read_walk_gas,
     walk_gas,
 )
-from ppafo.questions.endurance.file import PAPER_BOTTLE, load_bottle
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance.solve import endurance_of_walk, endurance_of_walk_gas
 from ppafo.signals import Channel, Recording
 from ppafo.storage.netcdf import netcdf_bytes
