@@ -1,10 +1,11 @@
 """Gas that comes cold out of a regulator: throttled at constant enthalpy, warmed by the regulator's body and the hose.
 
 A throttle keeps the enthalpy, and the vapour over liquid CO2 has less of it than the gas at room temperature has: it
-comes out cold, or partly as dry ice where the outlet lies below the triple point's pressure. What it lacks it takes from
-the parts that it passes. A part has one temperature; gas that passes it takes up a fixed share, the effectiveness, of
-what would bring it to that temperature, since in turbulent flow the transfer grows nearly as the flow does (with its
-power 0.8, Dittus and Boelter). Dry ice stays in the seat and narrows it until gas with enough enthalpy takes it along.
+comes out cold, or partly as dry ice where the outlet lies below the pressure of the triple point. What it lacks it
+takes from the parts that it passes. A part has one temperature; gas that passes it takes up a fixed share, the
+effectiveness, of what would bring it to that temperature, since in turbulent flow the transfer grows nearly as the
+flow does (with its power 0.8, Dittus and Boelter). Dry ice stays in the seat and narrows it until gas with enough
+enthalpy takes it along.
 """
 
 from bisect import bisect_right
@@ -25,6 +26,7 @@ from ppafo.model.source import (
     Regulator,
     bottle_content,
     bottle_rates,
+    content_energy,
     content_temperature,
     regulator_flow_limit,
 )
@@ -33,6 +35,7 @@ DRY_ICE = 5.55e5
 """Heat that turns dry ice into vapour at the triple point [J/kg]: 350 of evaporation (tables), 205 of melting (CRC)."""
 
 _HALVINGS = 60
+_FIRST_SECANT, _SAME_TEMPERATURE, _MAXIMUM_SECANTS = 1.0e-3, 1.0e-9, 12
 
 
 class Passage(NamedTuple):
@@ -163,9 +166,9 @@ def ice_rate(line: Isobar, enthalpy: float, flow: float, ice: float, step: float
     return max(flow * (line.enthalpies[0] - enthalpy) / DRY_ICE, -ice / step)
 
 
-def supply_now(table: FluidTable, line: Isobar, supply: ColdSupply, state: SupplyState) -> SupplyNow:
-    """What a supply offers in a state: pressures and flow of the regulator, temperatures of the gas."""
-    content = _content(table, supply, state)
+def supply_now(table: FluidTable, line: Isobar, supply: ColdSupply, state: SupplyState, near: float) -> SupplyNow:
+    """What a supply offers in a state whose content is ``near`` a temperature [K]: pressure, flow and warmth."""
+    content = _content(table, supply, state, near)
     regulator = supply.regulator
     highest = min(regulator.set_pressure, max(content.pressure - regulator.pressure_margin, 0.0))
     limit = regulator_flow_limit(
@@ -189,13 +192,20 @@ def supply_now(table: FluidTable, line: Isobar, supply: ColdSupply, state: Suppl
 
 
 def advance_supply(
-    table: FluidTable, line: Isobar, supply: ColdSupply, state: SupplyState, mass: float, step: float
+    table: FluidTable,
+    line: Isobar,
+    supply: ColdSupply,
+    state: SupplyState,
+    content: BottleContent,
+    mass: float,
+    step: float,
 ) -> SupplyState:
-    """The state after a step [s] in which a mass [kg] left the bottle evenly, by Heun's rule."""
+    """The state after a step [s] in which a mass [kg] left the bottle evenly, by Heun's rule, from its ``content``."""
     flow = mass / step
-    first = supply_rates(table, line, supply, state, flow, step)
+    first = supply_rates(line, supply, state, content, flow, step)
     guess = SupplyState(*(value + step * rate for value, rate in zip(state, first, strict=True)))
-    second = supply_rates(table, line, supply, guess, flow, step)
+    then = _content(table, supply, guess, content.temperature)
+    second = supply_rates(line, supply, guess, then, flow, step)
     rates = zip(state, first, second, strict=True)
     after = SupplyState(*(value + 0.5 * step * (one + other) for value, one, other in rates))
     # The mass itself, so that what left the bottle is what came through the regulator, to the last digit.
@@ -203,11 +213,10 @@ def advance_supply(
 
 
 def supply_rates(
-    table: FluidTable, line: Isobar, supply: ColdSupply, state: SupplyState, flow: float, step: float
+    line: Isobar, supply: ColdSupply, state: SupplyState, content: BottleContent, flow: float, step: float
 ) -> SupplyState:
     """Time derivatives of a state under a flow [kg/s], as a state; ``step`` [s] is how long they are to hold."""
     bottle = BottleState(state.mass, state.energy, state.wall_temperature)
-    content = _content(table, supply, state)
     now = bottle_rates(content, bottle, flow, supply.wall, supply.room_temperature)
     arriving = enthalpy_behind(line, supply.body, state.body_temperature, content.outflow_enthalpy)
     growth = ice_rate(line, arriving, flow, state.ice, step)
@@ -229,6 +238,21 @@ def supply_rates(
     )
 
 
-def _content(table: FluidTable, supply: ColdSupply, state: SupplyState) -> BottleContent:
-    temperature = content_temperature(table, state.mass, supply.volume, state.energy)
+def _content(table: FluidTable, supply: ColdSupply, state: SupplyState, near: float) -> BottleContent:
+    temperature = _temperature_near(table, state.mass, supply.volume, state.energy, near)
     return bottle_content(table, state.mass, supply.volume, temperature)
+
+
+def _temperature_near(table: FluidTable, mass: float, volume: float, energy: float, near: float) -> float:
+    """Temperature [K] of a content as ``content_temperature``, by secants from one that is ``near``."""
+    before, after = near, near + _FIRST_SECANT
+    miss = content_energy(table, mass, volume, before) - energy
+    for _ in range(_MAXIMUM_SECANTS):
+        next_miss = content_energy(table, mass, volume, after) - energy
+        if next_miss == miss:
+            break
+        found = after - next_miss * (after - before) / (next_miss - miss)
+        if abs(found - after) <= _SAME_TEMPERATURE and table.temperatures[0] < found < table.temperatures[-1]:
+            return found
+        before, after, miss = after, found, next_miss
+    return content_temperature(table, mass, volume, energy)

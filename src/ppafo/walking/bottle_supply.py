@@ -51,17 +51,21 @@ class BottleSupply:
         energy = content_energy(self.bottle.fluid.table, self.mass, self.bottle.volume, self.temperature)
         return SupplyState(self.mass, energy, *(self.temperature,) * 3, 0.0, 0.0, 0.0, 0.0)
 
-    def offers(self, state: SupplyState) -> SupplyNow:
-        """Return what the supply offers the device in a state."""
-        return supply_now(self.bottle.fluid.table, self.line, self.bottle.supply, state)
+    def offers(self, state: SupplyState, near: float) -> SupplyNow:
+        """Return what the supply offers the device in a state whose content is ``near`` a temperature [K]."""
+        return supply_now(self.bottle.fluid.table, self.line, self.bottle.supply, state, near)
+
+    def offers_first(self) -> SupplyNow:
+        """Return what the supply offers the device at the start."""
+        return self.offers(self.start(), self.temperature)
 
     def device_at_start(self, device: Device) -> Device:
         """Return the device with gas of the temperature that the supply has at the start."""
-        return replace(device, gas=replace(device.gas, temperature=self.offers(self.start()).gas_temperature))
+        return replace(device, gas=replace(device.gas, temperature=self.offers_first().gas_temperature))
 
     def lines(self, lines: SupplyLines) -> SupplyLines:
         """Return the lines with the droop of the bottle's regulator, and with what it passes at the start."""
-        most = self.offers(self.start()).largest_flow
+        most = self.offers_first().largest_flow
         return lines._replace(droop_1=self.bottle.regulator.droop, largest_flow_1=most)
 
     @property
@@ -142,7 +146,7 @@ def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
     for path in _OWN:
         if value_at(reading.document, path) is not None:
             raise reading.refusal(path, f"the bottle's regulator has its own: set {SECTION}.regulator.droop or .area")
-    pressure = supply.offers(supply.start()).content.pressure
+    pressure = supply.offers_first().content.pressure
     if pressure < regulator.set_pressure + regulator.pressure_margin:
         has = quantity_text(pressure, "Pa_a", device.supply.atmospheric_pressure)
         needs = quantity_text(

@@ -75,8 +75,8 @@ def load_walk(
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
-    ``course`` and ``bottle`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its subject as the
-    default wearer. ScenarioError, ParameterError or DataError for anything that cannot be used.
+    ``course`` and ``bottle`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its
+    subject as the default wearer. ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)

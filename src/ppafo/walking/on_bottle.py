@@ -1,8 +1,8 @@
 """A walk on its bottle: lanes and bottle take turns, and the walk ends where the bottle no longer feeds it.
 
-Chambers and lines move within milliseconds, bottle, regulator and hose within seconds. So the lanes run for a tenth of a
-second with what the supply offers at its beginning, and the supply follows with the gas that the regulator let through
-in it. Nothing is compiled for it: what a supply offers are parameters of any program with lines.
+Chambers and lines move within milliseconds, bottle, regulator and hose within seconds. So the lanes run for a tenth of
+a second with what the supply offers at its beginning, and the supply follows with the gas that the regulator let
+through in it. Nothing is compiled for it: what a supply offers are parameters of any program with lines.
 """
 
 import math
@@ -17,9 +17,12 @@ from ppafo.engine.lanes import BatchResult, Floats, LaneBlock, load_program
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.model.cold_gas import DRY_ICE, SupplyNow, SupplyState, advance_supply, open_share
+from ppafo.model.fluid_table import has_liquid
 from ppafo.model.source import bottle_content
+from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle_supply import BottleSupply
 
+WALKED = "walk's end"
 EndKind = Literal["walk's end", "empty", "too cold", "frozen", "iced", "too little flow"]
 
 OFFERED = ("plant.gas_product", "plant.valve_conductance", "plant.leak_conductance", "plant.supply_pressure")
@@ -71,7 +74,7 @@ class SupplyBalance(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SupplyCourse:
-    """A supply over a walk: times [s] (n,) at which bottle and device met, values (n,) by name in ``UNITS``, its end."""
+    """A supply over a walk: times [s] (n,) at which bottle and device met, values (n,) by name in ``UNITS``."""
 
     supply: BottleSupply
     times: Floats
@@ -84,6 +87,12 @@ class SupplyCourse:
     def at(self, name: str, times: Floats) -> Floats:
         """Return a value at times [s], straight between those at which bottle and device met."""
         return np.interp(times, self.times, self.values[name])
+
+    @property
+    def recording(self) -> Recording:
+        """Return the course of the supply as a recording."""
+        channels = {name: Channel(values, UNITS[name]) for name, values in self.values.items()}
+        return Recording(f"bottle {self.supply.bottle.name}", self.times, channels, kind="simulated")
 
     @property
     def balance(self) -> SupplyBalance:
@@ -114,7 +123,7 @@ def run_on_bottle(
     regulated, line = states["line_state.regulated_mass"], states["line_state.mass_1"]
     every = max(1, round(supply.coupling / run.step))
     state, table = supply.start(), supply.bottle.fluid.table
-    met = [(0.0, state, supply.offers(state))]
+    met = [(0.0, state, supply.offers_first())]
     gauges = [1.0] * max(2, math.ceil(_STRIDES * stride_time / (every * run.step)))
     ending, done = None, 0
     while ending is None and done < count:
@@ -126,14 +135,15 @@ def run_on_bottle(
         mass = float(block.states[regulated, 0]) - before
         if not math.isfinite(mass):
             break
-        state = advance_supply(table, supply.line, supply.bottle.supply, state, mass, steps * run.step)
-        now = supply.offers(state)
+        content = met[-1][2].content
+        state = advance_supply(table, supply.line, supply.bottle.supply, state, content, mass, steps * run.step)
+        now = supply.offers(state, content.temperature)
         met.append((done * run.step, state, now))
         gauges = [*gauges[1:], offered.gauge(float(block.states[line, 0]), now)]
         ending = _ending(supply, state, now, max(gauges), done * run.step)
     result = block.result()
     record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
-    last = ending or SupplyEnding("walk's end", _at_the_end(state), done * run.step)
+    last = ending or SupplyEnding(WALKED, _at_the_end(state), done * run.step)
     let_through = float(block.states[regulated, 0]) - float(batch.states[regulated, 0])
     return BatchResult(result.states, record), _course(supply, met, let_through, last)
 
@@ -168,7 +178,7 @@ class _OfferedRows:
 def _ending(
     supply: BottleSupply, state: SupplyState, now: SupplyNow, reached: float, time: float
 ) -> SupplyEnding | None:
-    """Return what ends a walk, None while it goes on; ``reached`` is the best gauge pressure of late over the set [-]."""
+    """Return what ends a walk, None while it goes on; ``reached`` is the best gauge pressure of late over the set."""
     bottle = supply.bottle
     left = _grams(state.mass)
     if now.content.temperature <= bottle.fluid.table.temperatures[0] + _ABOVE_FREEZING:
@@ -216,6 +226,8 @@ def _course(
         )
         for _, state, now in met
     ]
-    values = dict(zip(UNITS, np.array(rows).T, strict=True))
+    values = dict(zip(UNITS, np.array(rows).T.copy(), strict=True))
+    if not has_liquid(supply.bottle.fluid.table):
+        del values["liquid_mass"]
     times = np.array([time for time, _, _ in met])
     return SupplyCourse(supply, times, values, met[0][1], met[-1][1], regulated, ending)

@@ -67,7 +67,7 @@ def recording_of_walk(
         channels["dorsiflexor_moment"] = (dorsiflexor_moment(run, record), "N m")
     channels |= gas_channels(configuration.device.gas, run, record)
     if supply is not None:
-        channels |= {name: (supply.at(name, time), unit) for name, unit in UNITS.items()}
+        channels |= {name: (supply.at(name, time), UNITS[name]) for name in supply.values}
         channels["bottle_mass"] = (supply.first.mass - record["line_state.regulated_mass"], "kg")
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")

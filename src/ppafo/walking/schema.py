@@ -53,7 +53,7 @@ def _fault(sensor: str) -> Any:
 
 def _bottle() -> dict[str, Any]:
     numbers = {item.name: optional(number_type(item), item.summary) for item in bottle_supply.NUMBERS}
-    changes = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
+    changes: Any = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
     return {"name": optional(str, "name of a bottle, or the path of its file"), **numbers, "overrides": changes}
 
 

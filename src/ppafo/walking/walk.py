@@ -118,11 +118,9 @@ def walk(
     bad input. ``progress`` gets the minutes done and the minutes in all, part by part.
     """
     is_loaded = isinstance(configuration, Configuration)
-    chosen = (
-        configuration
-        if isinstance(configuration, Configuration)
-        else load_walk(configuration, overrides, gait, course, bottle)
-    )
+    chosen = configuration
+    if not isinstance(chosen, Configuration):
+        chosen = load_walk(chosen, overrides, gait, course, bottle)
     if is_loaded and (any(item is not None for item in (gait, course, bottle)) or tuple(overrides)):
         raise ScenarioError(
             "overrides, a gait, a course and a bottle go with a name or a file; a Configuration takes them in load_walk"

@@ -41,7 +41,8 @@ class Endurance(Solved):
 
     ``discharge`` is the requested course; ``without_reuse`` the same without reuse, where there is one.
     ``steps_when_warm`` is the number of steps that a bottle which stays at room temperature gives: what cooling costs.
-    ``others`` is the same, without reuse, for a walk with other readings of the paper's chambers, by their names.
+    ``is_of_course`` is true where a step is a whole course. ``others`` is the same, without reuse, for a walk with
+    other readings of the paper's chambers, by their names.
     """
 
     bottle: Bottle
@@ -51,6 +52,7 @@ class Endurance(Solved):
     reuse: Reuse | None
     without_reuse: Discharge | None
     steps_when_warm: float
+    is_of_course: bool = False
     others: Mapping[str, "Endurance"] = field(default_factory=dict)
 
 
@@ -103,7 +105,8 @@ def endurance_of_walk(
 ) -> Endurance | None:
     """Return how long a bottle lasts when the walk continues without rest; None where the walk took no gas.
 
-    A step is a stride of the leg with the device. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``: what they
+    A step is a stride of the leg with the
+    device, or a whole course. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``: what they
     do not say of the chambers is taken from the walk.
     """
     gas = walk_gas(result)
@@ -117,7 +120,7 @@ def endurance_of_walk_gas(gas: WalkGas, bottle: Bottle, schedule: Schedule, reus
     changes, draw = tuple(reuse), draw_of_walk(gas)
     plan = parse_reuse(changes, bottle, full_chambers(gas)) if changes else None
     others = {name: follow_bottle(bottle, other, schedule) for name, other in gas.others.items()}
-    return replace(follow_bottle(bottle, draw, schedule, plan), others=others)
+    return replace(follow_bottle(bottle, draw, schedule, plan), others=others, is_of_course=bool(gas.course))
 
 
 def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, plan: ReusePlan | None = None) -> Endurance:
