@@ -22,8 +22,8 @@ from ppafo.model.source import bottle_content
 from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle_supply import BottleSupply
 
-WALKED = "walk's end"
 EndKind = Literal["walk's end", "empty", "too cold", "frozen", "iced", "too little flow"]
+WALKED: EndKind = "walk's end"
 
 OFFERED = ("plant.gas_product", "plant.valve_conductance", "plant.leak_conductance", "plant.supply_pressure")
 _PARAMETERS = (*OFFERED, "lines.largest_flow_1")

@@ -88,13 +88,8 @@ def _pair_answer(pair: WalkPair) -> Answer:
     worn, bare = comparison.with_device, comparison.without_device
     configuration = worn.configuration
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    remarks = [
-        *person_remarks(configuration),
-        bottle_remark(worn),
-        _bottle(pair.life),
-        *_safety(worn),
-        trust_remark(configuration),
-    ]
+    bottles = (bottle_remark(worn), _bottle(pair.life))
+    remarks = [*person_remarks(configuration), *bottles, *_safety(worn), trust_remark(configuration)]
     remarks += [
         f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
     ]

@@ -19,7 +19,7 @@ _CAPTION = (
 _EXPLAINED = (
     "The vapour of liquid CO2 lacks heat: from 20 degC it wants 95 kJ/kg to be gas of 25 degC behind the regulator. It "
     "takes it from the regulator's body and from the hose, which take it from the room. Below the triple point dry ice "
-    "stays in the seat and narrows it. The gas in the lines and chambers keeps the temperature with which it leaves the "
+    "stays in the seat and narrows it. The gas in lines and chambers keeps the temperature with which it leaves the "
     "hose; in truth their walls warm it, so its effect here is the largest that it can have.",
     "A walk ends where the line behind the regulator no longer comes within the given share of the set pressure in two "
     "strides, or where the content of the bottle freezes.",
@@ -31,11 +31,10 @@ def bottle_sections(worn: WalkResult) -> tuple[Section, ...]:
     supply = worn.supply
     if supply is None:
         return ()
+    figure = Figure("bottle", _CAPTION, lambda: bottle_figure(worn))
     return (
         Section("On the bottle", table=Table((), tuple(_facts(worn, supply)))),
-        Section(
-            "The bottle over the walk", figure=Figure("bottle", _CAPTION, lambda: bottle_figure(worn)), is_detail=True
-        ),
+        Section("The bottle over the walk", figure=figure, is_detail=True),
         Section("How to read the bottle", _EXPLAINED, is_detail=True),
     )
 
@@ -64,13 +63,8 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
         ("seat free of ice, at least", quantity_text(float(values["seat_open"].min()), "fraction", ".0f")),
     ]
     if peaks.size > 3:
-        settled = quantity_text(float(peaks[2]), "torque")
-        rows.append(
-            (
-                "peak torque of a stride",
-                f"{settled} in the third, {quantity_text(float(peaks[-1]), 'torque')} in the last",
-            )
-        )
+        third, last = (quantity_text(float(peak), "torque") for peak in (peaks[2], peaks[-1]))
+        rows.append(("peak torque of a stride", f"{third} in the third, {last} in the last"))
     return rows
 
 

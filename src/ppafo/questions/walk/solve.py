@@ -53,8 +53,8 @@ def walk_with_and_without(
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
     that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
-    ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError for bad input; a walk that diverges is an answer
-    that has not passed.
+    ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError for bad input; a walk that diverges
+    is an answer that has not passed.
     """
     chosen = configuration
     if not isinstance(chosen, Configuration):
