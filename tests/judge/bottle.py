@@ -1,4 +1,4 @@
-"""An independent simulator of a walking device on its bottle: everything in one set of equations, coupled at every stage.
+"""An independent simulator of a walking device on its bottle: one set of equations, coupled at every stage.
 
 It is given the angle of the ankle and the command to the valves as a walk recorded them, and CoolProp's properties at
 nodes of its own; it knows no table, no step and no coupling of the package. Runge and Kutta of order four, 0.1 ms. The
@@ -58,10 +58,7 @@ def between(nodes: Column, values: Column, at: float) -> float:
 
 def content(gas: Fluid, temperature: float, mass: float, volume: float) -> float:
     """Internal energy [J] of liquid and vapour in a volume [m^3]."""
-    vapour, liquid = (
-        between(gas.temperatures, gas.vapour, temperature),
-        between(gas.temperatures, gas.liquid, temperature),
-    )
+    vapour, liquid = (between(gas.temperatures, density, temperature) for density in (gas.vapour, gas.liquid))
     wet = (mass - volume * vapour) / (1.0 - vapour / liquid)
     boiled = between(gas.temperatures, gas.vapour_energy, temperature)
     return wet * between(gas.temperatures, gas.liquid_energy, temperature) + (mass - wet) * boiled
@@ -209,7 +206,7 @@ def numbers_of(walk: Any) -> Numbers:
 
 
 def coil_positions(commands: Floats, wanted: Any, interval: float) -> NDArray[np.bool_]:
-    """Whether a coil is open at each sample of the commands: it takes an order 50 ms after its last one at the soonest."""
+    """Whether a coil is open at each sample of the commands: it takes an order 50 ms after its last one or later."""
     position, taken, found = False, -1.0, np.zeros(commands.size, dtype=np.bool_)
     for sample, command in enumerate(commands):
         time = sample * interval
@@ -294,7 +291,9 @@ def main(words: list[str]) -> None:
         changes = [f"bottle.coupling={coupling}", "bottle.fill=0.3", "bottle.temperature=280 K"]
         found = walk("solenoid-regulators", 1.0, changes, bottle="paper-co2-9oz")
         gaps = differences(found, judge(found, float(found.recording.time[-1])))
-        print(coupling, found.supply.ending, {name: f"{gap:.3g}" for name, gap in gaps.items()}, flush=True)
+        line = f"{coupling}: {found.supply.ending.time:.6g} s, "
+        sys.stdout.write(line + ", ".join(f"{name} {gap:.3g}" for name, gap in gaps.items()) + "\n")
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, isobar, supply_now
 from ppafo.model.declaration import Quantity
+from ppafo.model.fluid_table import densest_gas, has_liquid, liquid_density
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.source import content_energy
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
@@ -131,6 +133,14 @@ def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> di
     if not nodes[0] < found["temperature"] <= nodes[-1]:
         known = f"must be above {nodes[0]:g} K and at most {nodes[-1]:g} K, where {bottle.fluid.name} is known"
         raise reading.refusal(f"{SECTION}.temperature", known)
+    mass, table = found["fill"] * bottle.mass, bottle.fluid.table
+    most = bottle.volume * (liquid_density if has_liquid(table) else densest_gas)(table, found["temperature"])
+    if mass >= most:
+        fits = f"{GRAMS_PER_KILOGRAM * most:.4g} g fit into it at {found['temperature']:g} K"
+        raise ScenarioError(
+            f"{reading.file}: [{SECTION}]: {GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}, and {fits}: set "
+            f"{SECTION}.fill or {SECTION}.temperature lower"
+        )
     return found
 
 
