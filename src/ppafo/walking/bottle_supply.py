@@ -25,6 +25,9 @@ FILL = Quantity("fill", "1", "gas in the bottle over that of a full one", 1.0, 0
 TEMPERATURE = Quantity("temperature", "K", "temperature of bottle, regulator and hose at the start", None, 200.0, 400.0)
 LEAST_TORQUE = Quantity("least_torque", "1", "torque that ends the walk, over that at the set pressure", 0.9, 0.0, 1.0)
 COUPLING = Quantity("coupling", "s", "how often bottle and device tell each other", 0.1, 1.0e-3, 1.0)
+OVERRIDES = tuple(f"{SECTION}.{path}" for path in PATHS)
+"""What an override may set of the bottle's own file: ``bottle.regulator.area``, ``bottle.room.temperature``."""
+
 NUMBERS = (FILL, TEMPERATURE, LEAST_TORQUE, COUPLING)
 
 _OWN = tuple(f"{LINES}.plantarflexion.{name}" for name in ("droop", "largest_flow"))
@@ -90,12 +93,6 @@ class BottleSupply:
             "coupling": self.coupling,
             "values": {path: entry.model_dump() for path, entry in self.bottle.entries.items()},
         }
-
-
-def is_of_bottle(path: str) -> bool:
-    """Tell whether an override is of the bottle's own file: ``bottle.regulator.area``, ``bottle.room.temperature``."""
-    section, _, inner = path.partition(".")
-    return section == SECTION and inner in PATHS
 
 
 def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply | None:

@@ -133,11 +133,11 @@ def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file:
         known = (*quantities(kind_at(changed, "controller")), *_TEXTS)
         if path in known:
             _set(changed, path, text)
-        elif bottle_supply.is_of_bottle(path):
+        elif path in bottle_supply.OVERRIDES:
             own = changed.setdefault(bottle_supply.SECTION, {}).setdefault("overrides", [])
             own.append(override.partition(".")[2])
         elif not is_of_device(path):
-            hint = nearest_name(path, [*known, *device_paths()])
+            hint = nearest_name(path, [*known, *bottle_supply.OVERRIDES, *device_paths()])
             raise ScenarioError(f"override '{one_line(override)}': {file} has no value '{path}'{hint}")
     return changed
 

@@ -148,7 +148,7 @@ class WalkGas:
     gas_per_stride: float
     stride_time: float
     actuator: Actuator
-    others: Mapping[str, Draw] = field(default_factory=dict)
+    others: Mapping[str, "OtherGas"] = field(default_factory=dict)
     course: str = ""
 
 
@@ -161,6 +161,14 @@ class FullChambers:
     fill_pressure: float
     fill_volume: float
     strides: int
+
+
+@dataclass(frozen=True, slots=True)
+class OtherGas:
+    """The gas use of a walk with other chambers, and how full these get, None where that is not known."""
+
+    draw: Draw
+    chambers: FullChambers | None
 
 
 def walk_gas(result: WalkResult) -> WalkGas:
@@ -213,7 +221,7 @@ def read_walk_gas(folder: Path) -> WalkGas:
     )
 
 
-def _others(document: Mapping[str, Any], actuator: Actuator, file: Path, keys: tuple[str, ...]) -> dict[str, Draw]:
+def _others(document: Mapping[str, Any], actuator: Actuator, file: Path, keys: tuple[str, ...]) -> dict[str, OtherGas]:
     """Return the gas use of a walk with other chambers than its own, by name."""
     listed = document.get("volumes", [])
     if not isinstance(listed, list) or not all(isinstance(item, Mapping) for item in listed):
@@ -225,8 +233,18 @@ def _others(document: Mapping[str, Any], actuator: Actuator, file: Path, keys: t
             continue
         gas, time, peak = (_number(item, name, file, 0.0) for name in (*keys, "peak_flow"))
         name = str(item.get("chambers", "other chambers"))
-        found[name] = draw_of_numbers(gas, time, max(peak, gas / time))
+        found[name] = OtherGas(draw_of_numbers(gas, time, max(peak, gas / time)), _full_of(item, file))
     return found
+
+
+def _full_of(item: Mapping[str, Any], file: Path) -> FullChambers | None:
+    if item.get("full_chambers") is None:
+        return None
+    names = ("exhaust_pressure", "exhaust_volume", "fill_pressure", "fill_volume", "strides")
+    exhaust, its_volume, fill, other_volume, strides = (
+        _number(item, f"full_chambers.{name}", file, 0.0) for name in names
+    )
+    return FullChambers(exhaust, its_volume, fill, other_volume, int(strides))
 
 
 def _recording(folder: Path) -> Recording:

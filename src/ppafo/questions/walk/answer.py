@@ -79,7 +79,7 @@ _LIMITS = (
 
 def answer_of(solved: WalkPair | Wearers) -> Answer:
     """Return the answer of one wearer's walks, or of many wearers."""
-    return wearers_answer(solved.population) if isinstance(solved, Wearers) else _pair_answer(solved)
+    return wearers_answer(solved.population, solved.volumes) if isinstance(solved, Wearers) else _pair_answer(solved)
 
 
 def _pair_answer(pair: WalkPair) -> Answer:

@@ -9,11 +9,12 @@ from ppafo.answers import Solved
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
 from ppafo.questions.walk.volumes import VolumeReading, walks_by_volume
+from ppafo.questions.walk.wearers_volumes import wearers_by_volume
 from ppafo.walking import course as courses
 from ppafo.walking.comparison import Comparison, compare_walks
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import FILE, load_walk
-from ppafo.walking.population import Population, walk_population
+from ppafo.walking.population import Population
 
 _LONG = 12.0
 """Minutes above which a walk reports how far it is."""
@@ -33,9 +34,10 @@ class WalkPair(Solved):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wearers(Solved):
-    """What many wearers get."""
+    """What many wearers get; ``volumes`` is the same for fewer of them with other readings of the paper's chambers."""
 
     population: Population
+    volumes: Mapping[str, Population]
 
 
 def walk_with_and_without(
@@ -62,7 +64,7 @@ def walk_with_and_without(
     report = progress or report_nothing
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
-        return Wearers(walk_population(chosen, minutes, wearers, seed, advance))
+        return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))
     comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
     life = endurance_of_walk(comparison.with_device) if chosen.bottle is None else None
     return WalkPair(comparison, life, walks_by_volume(comparison.with_device, life, minutes))

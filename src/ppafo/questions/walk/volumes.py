@@ -1,14 +1,15 @@
 """The same walk with other chambers: what gas, work and bottle come to where the paper leaves the volume open."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ppafo.answers import Column, Section, Table
+from ppafo.errors import DataError
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
-from ppafo.questions.endurance.draw import largest_flow
+from ppafo.questions.endurance.draw import full_chambers, largest_flow, walk_gas
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
 from ppafo.walking.on_bottle import WALKED
 from ppafo.walking.walk import WalkResult, walk
@@ -149,6 +150,7 @@ def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
             "gas_per_stride": one.result.metrics["gas"].value,
             "stride_time": one.result.configuration.gait.stride_time,
             "peak_flow": _peak_flow(one),
+            "full_chambers": _full(one.result),
             "gas_work": one.gas_work,
             "shaft_work": one.shaft_work,
             "push_off_work": one.result.metrics["push_off_work"].value,
@@ -159,6 +161,14 @@ def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
         }
         for one in read
     ]
+
+
+def _full(result: WalkResult) -> dict[str, Any] | None:
+    """Return how full the chambers get, by which a reuse of the exhaust is followed; None where strides differ."""
+    try:
+        return asdict(full_chambers(walk_gas(result)))
+    except DataError:
+        return None
 
 
 def _course_gas(result: WalkResult) -> dict[str, float]:
