@@ -19,6 +19,7 @@ from ppafo.model.fluid_table import densest_gas, fluid_pressure, has_liquid, liq
 from ppafo.model.gas import SPECIES
 from ppafo.model.source import BottleWall, Regulator, bottle_content, pressure_reserve
 from ppafo.parameters.bottles.fluids import Fluid, load_fluid
+from ppafo.parameters.bottles.from_part import bottle_parts, scaled_entries
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.provenance import Entry, TextEntry
 from ppafo.units import format_quantity, split_quantity, to_si
@@ -172,12 +173,16 @@ def list_bottles() -> tuple[str, ...]:
 
 
 def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bottle:
-    """Return a bottle by its name in the package or by the path of a TOML file, with values replaced.
+    """Return a bottle by its name, that of a part of the catalogue, or the path of a TOML file, with values replaced.
 
     ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
-    parsed, file = read_model(FILE, bottle_file(), name_or_path)
+    part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
+    parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
     found = _warming() | _given(parsed)
+    if part is not None:
+        parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})
+        found, file = scaled_entries(part, found), part.name
     for override in overrides:
         found = _override(found, override)
     return _build(parsed, found, file)
