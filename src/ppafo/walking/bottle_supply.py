@@ -25,8 +25,8 @@ FILL = Quantity("fill", "1", "gas in the bottle over that of a full one", 1.0, 0
 TEMPERATURE = Quantity("temperature", "K", "temperature of bottle, regulator and hose at the start", None, 200.0, 400.0)
 LEAST_TORQUE = Quantity("least_torque", "1", "torque that ends the walk, over that at the set pressure", 0.9, 0.0, 1.0)
 COUPLING = Quantity("coupling", "s", "how often bottle and device tell each other", 0.1, 1.0e-3, 1.0)
-OVERRIDES = tuple(f"{SECTION}.{path}" for path in PATHS)
-"""What an override may set of the bottle's own file: ``bottle.regulator.area``, ``bottle.room.temperature``."""
+OVERRIDES = {path if path.startswith(f"{SECTION}.") else f"{SECTION}.{path}": path for path in PATHS}
+"""What an override may set of the bottle's own file, ``bottle.volume`` and ``bottle.regulator.area``, by its path."""
 
 NUMBERS = (FILL, TEMPERATURE, LEAST_TORQUE, COUPLING)
 

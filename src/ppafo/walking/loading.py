@@ -135,7 +135,7 @@ def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file:
             _set(changed, path, text)
         elif path in bottle_supply.OVERRIDES:
             own = changed.setdefault(bottle_supply.SECTION, {}).setdefault("overrides", [])
-            own.append(override.partition(".")[2])
+            own.append(f"{bottle_supply.OVERRIDES[path]}={text}")
         elif not is_of_device(path):
             hint = nearest_name(path, [*known, *bottle_supply.OVERRIDES, *device_paths()])
             raise ScenarioError(f"override '{one_line(override)}': {file} has no value '{path}'{hint}")
