@@ -110,7 +110,7 @@ def isobar(table: FluidTable, pressure: float) -> Isobar:
     enthalpies = tuple(gas_enthalpy(table, node, pressure) for node in dry)
     lowest = table.temperatures[0]
     freezes = has_liquid(table) and fluid_pressure(table, lowest, densest_gas(table, lowest)) > pressure
-    return Isobar(pressure, tuple(dry), enthalpies, 1.0 if freezes else 0.0)
+    return Isobar(pressure=pressure, temperatures=tuple(dry), enthalpies=enthalpies, freezes=1.0 if freezes else 0.0)
 
 
 def gas_enthalpy(table: FluidTable, temperature: float, pressure: float) -> float:
@@ -203,11 +203,11 @@ def advance_supply(
     """The state after a step [s] in which a mass [kg] left the bottle evenly, by Heun's rule, from its ``content``."""
     flow = mass / step
     first = supply_rates(line, supply, state, content, flow, step)
-    guess = SupplyState(*(value + step * rate for value, rate in zip(state, first, strict=True)))
+    guess = SupplyState._make(value + step * rate for value, rate in zip(state, first, strict=True))
     then = _content(table, supply, guess, content.temperature)
     second = supply_rates(line, supply, guess, then, flow, step)
     rates = zip(state, first, second, strict=True)
-    after = SupplyState(*(value + 0.5 * step * (one + other) for value, one, other in rates))
+    after = SupplyState._make(value + 0.5 * step * (one + other) for value, one, other in rates)
     # The mass itself, so that what left the bottle is what came through the regulator, to the last digit.
     return after._replace(mass=state.mass - mass)
 

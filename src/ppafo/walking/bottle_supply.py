@@ -54,7 +54,17 @@ class BottleSupply:
     def start(self) -> SupplyState:
         """Return the state at the start: all parts at one temperature, no ice."""
         energy = content_energy(self.bottle.fluid.table, self.mass, self.bottle.volume, self.temperature)
-        return SupplyState(self.mass, energy, *(self.temperature,) * 3, 0.0, 0.0, 0.0, 0.0)
+        return SupplyState(
+            mass=self.mass,
+            energy=energy,
+            wall_temperature=self.temperature,
+            body_temperature=self.temperature,
+            hose_temperature=self.temperature,
+            ice=0.0,
+            outflow=0.0,
+            delivered=0.0,
+            room_heat=0.0,
+        )
 
     def offers(self, state: SupplyState, near: float) -> SupplyNow:
         """Return what the supply offers the device in a state whose content is ``near`` a temperature [K]."""

@@ -104,8 +104,14 @@ class SupplyCourse:
             supply.body.heat_capacity * (first.body_temperature - last.body_temperature),
             supply.hose.heat_capacity * (first.hose_temperature - last.hose_temperature),
         )
-        ice = DRY_ICE * last.ice
-        return SupplyBalance(first.mass - last.mass, self.regulated, sum(parts), ice, last.room_heat, last.delivered)
+        return SupplyBalance(
+            left_bottle=first.mass - last.mass,
+            regulated=self.regulated,
+            given_up=sum(parts),
+            ice=DRY_ICE * last.ice,
+            room=last.room_heat,
+            delivered=last.delivered,
+        )
 
 
 def run_on_bottle(

@@ -111,7 +111,7 @@ def _draw_torque(axes: "Axes", result: WalkResult, scale: float) -> None:
     peaks = peak_torques(result)
     times = result.recording.time[result.starts[:-1]] / scale if peaks.size else peaks
     axes.plot(times, peaks, color=BLUE, marker=".", markersize=2.5, linewidth=0.8)
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.1 * float(peaks.max(initial=0.1)))
     axes.set_title("Peak torque of each stride (N m)")
 
 
