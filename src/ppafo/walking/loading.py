@@ -14,6 +14,7 @@ from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import Fault, GaitSensors
+from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters import apply_overrides, build_device, load_parameter_set
 from ppafo.parameters.device import Device
@@ -23,7 +24,7 @@ from ppafo.simulation.overriding import device_paths, is_of_device, split_overri
 from ppafo.simulation.reading import Reading
 from ppafo.simulation.supply_line import SECTION as LINES
 from ppafo.walking import bottle_supply
-from ppafo.walking.bottle_supply import read_bottle
+from ppafo.walking.bottle_supply import BottleSupply, read_bottle
 from ppafo.walking.configuration import NEVER, Configuration
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.course import WalkingCourse, load_course
@@ -92,10 +93,7 @@ def load_walk(
     walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
     is_named = gait is not None or "gait" in document
     carried = read_bottle(reading, device, folder if bottle is None else Path())
-    if carried is not None:
-        # A bottle feeds lines: their regulators and volumes are the defaults unless the file has others.
-        document.setdefault(LINES, {})
-    lines = read_supply_lines(reading, device)
+    lines = _lines(reading, document, device, carried)
     configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
@@ -113,7 +111,7 @@ def load_walk(
         | ({} if carried is None else carried.assumed),
         file=str(name_or_path),
         overrides=given,
-        supply_lines=lines if lines is None or carried is None else carried.lines(lines),
+        supply_lines=lines,
         thermal=read_thermal(reading),
         course=_course(course or document.get("course"), folder, course is None),
         wearer_origin=wearer_origin(reading, walked, is_named),
@@ -165,6 +163,16 @@ def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device
         return build_device(apply_overrides(parameters, overrides, valve), valve)
     except ParameterError as error:
         raise ParameterError(f"{file}: [device]: {one_line(error)}") from error
+
+
+def _lines(
+    reading: Reading, document: dict[str, Any], device: Device, carried: BottleSupply | None
+) -> SupplyLines | None:
+    """Return the lines of a walk; a bottle always feeds some, with the defaults of what the file does not say."""
+    if carried is not None:
+        document.setdefault(LINES, {})
+    lines = read_supply_lines(reading, device)
+    return lines if lines is None or carried is None else carried.lines(lines)
 
 
 def _course(name: str | Path | None, folder: Path, relative: bool) -> WalkingCourse | None:

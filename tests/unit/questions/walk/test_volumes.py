@@ -160,7 +160,9 @@ def test_a_bottle_takes_the_folder_of_a_course_and_refuses_to_reuse_its_exhaust(
 def test_wearers_walk_again_with_the_other_chambers() -> None:
     found = walk_with_and_without("solenoid", MINUTES, wearers=20, seed=4)
     assert isinstance(found, Wearers)
-    again = walk_with_and_without("solenoid", MINUTES, wearers=20, seed=4, overrides=["device.set=ppafo2011-consistent"])
+    again = walk_with_and_without(
+        "solenoid", MINUTES, wearers=20, seed=4, overrides=["device.set=ppafo2011-consistent"]
+    )
     assert isinstance(again, Wearers)
     own, consistent, _ = found.volumes.values()
     assert own is found.population
