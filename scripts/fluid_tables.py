@@ -1,6 +1,6 @@
 """Makes the property tables of the package from CoolProp; run again only to change their nodes or CoolProp's version.
 
-    python scripts/fluid_tables.py src/ppafo/questions/endurance/fluid_tables
+    python scripts/fluid_tables.py src/ppafo/parameters/bottles/fluid_tables
 
 writes ``CO2.json``, ``air.json`` and ``N2.json``. Needs the extra ``properties``. No property equation stands here.
 """

@@ -10,7 +10,7 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import main
-from ppafo.questions.endurance.file import PAPER_BOTTLE, list_bottles
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, list_bottles
 from ppafo.walking import load_walk
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "how-long-does-the-bottle-last.md"

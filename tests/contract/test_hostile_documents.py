@@ -15,10 +15,10 @@ from ppafo.gait.loading import load_gait
 from ppafo.gait.recorded.mapping import load_map
 from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set
+from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.design.file import read_design_file
 from ppafo.questions.endurance.draw import read_walk_gas
-from ppafo.questions.endurance.file import load_bottle
 from ppafo.questions.size.file import read_sizing_file
 from ppafo.questions.sweep.results import load_study_results
 from ppafo.questions.tune.file import load_tuning

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from ppafo.errors import PpafoError
 from ppafo.gait.loading import load_gait
+from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.design.file import load_design
-from ppafo.questions.endurance.file import load_bottle
 from ppafo.questions.size.file import load_sizing
 from ppafo.questions.tune.file import load_tuning
 from ppafo.rig.preset import load_preset

@@ -61,8 +61,8 @@ KINDS: dict[str, _NewFile] = {
     ),
     "bottle": _NewFile(
         "bottle",
-        "questions/endurance/bottles",
-        "ppafo.questions.endurance.file:load_bottle",
+        "parameters/bottles/files",
+        "ppafo.parameters.bottles.bottle:load_bottle",
         "ppafo endurance --bottle FILE --gas-per-step '0.3 g' --out out/NAME",
     ),
     "parts": _NewFile(

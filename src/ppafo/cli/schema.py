@@ -21,7 +21,7 @@ FORMATS: dict[str, str] = {
     "rig": "ppafo.rig.preset",
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",
-    "bottle": "ppafo.questions.endurance.file",
+    "bottle": "ppafo.parameters.bottles.bottle",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 

@@ -36,16 +36,17 @@ def compare_walks(
     configuration: Configuration, minutes: float | None = None, progress: Progress = silent
 ) -> Comparison:
     """Walk ``minutes`` [min], or a whole course, with the device and with it off; ScenarioError for bad input."""
-    return Comparison(
-        walk(configuration, minutes, progress=progress),
-        walk(with_device_off(configuration), minutes, progress=progress),
-        healthy_metrics(configuration),
-    )
+    worn = walk(configuration, minutes, progress=progress)
+    # As long as the bottle lasted, where there is one.
+    as_long = minutes if worn.supply is None else float(worn.recording.time[-1]) / 60.0
+    bare = walk(with_device_off(configuration), as_long, progress=progress)
+    return Comparison(worn, bare, healthy_metrics(configuration))
 
 
 def with_device_off(configuration: Configuration) -> Configuration:
-    """The same wearer and device with both chambers vented; no gas flows, so no supply lines are needed."""
-    return replace(configuration, name=f"{configuration.name}-off", controller=off.KIND, settings={}, supply_lines=None)
+    """The same wearer and device with both chambers vented; no gas flows, so no bottle and no lines are needed."""
+    name = f"{configuration.name}-off"
+    return replace(configuration, name=name, controller=off.KIND, settings={}, supply_lines=None, bottle=None)
 
 
 def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:

@@ -10,6 +10,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.device import Device
 from ppafo.simulation.scenario import Thermal
+from ppafo.walking.bottle_supply import BottleSupply
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.wearer import Wearer
 
@@ -21,6 +22,7 @@ class Configuration:
     ``supply_lines`` are the lines behind its regulators, None where the supply pressures are constant. ``thermal`` is
     how the gas takes up heat, None where it keeps its temperature. ``course`` is what the wearer does one after the
     other, None where stride follows equal stride.
+    ``bottle`` is the one that the device hangs on, None where its supply does not end.
     ``wearer_origin`` says in words whose body mass it is.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
@@ -43,6 +45,7 @@ class Configuration:
     thermal: Thermal | None = None
     course: WalkingCourse | None = None
     wearer_origin: str = "the paper's subject"
+    bottle: BottleSupply | None = None
 
     @property
     def has_ideal_sensors(self) -> bool:

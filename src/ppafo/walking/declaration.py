@@ -4,6 +4,7 @@ from ppafo.control.walking.catalog import walking_controllers
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import supply_line
 from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, THERMAL_GAS
+from ppafo.walking import bottle_supply
 from ppafo.walking.wearer import WEARER
 
 LARGEST_SEED = 2**32 - 1
@@ -80,6 +81,7 @@ def quantities(controller: str) -> dict[str, Quantity]:
         "sensors": (*WALK_SENSORS, *BANDWIDTHS, SEED),
         "run": (STEP,),
         "gas_model": THERMAL_GAS,
+        bottle_supply.SECTION: bottle_supply.NUMBERS,
     }
     found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
     for sensor in FAULTY:

@@ -15,6 +15,7 @@ from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.declaration import Quantity
 from ppafo.model.elementary import exponential
 from ppafo.model.gait_sensors import Fault, GaitSensors
+from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters import apply_overrides, build_device, load_parameter_set
 from ppafo.parameters.device import Device
@@ -22,6 +23,9 @@ from ppafo.simulation.declaration import ISOTHERMAL, PERIOD, RATE, kind_at, valu
 from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.overriding import device_paths, is_of_device, split_override
 from ppafo.simulation.reading import Reading
+from ppafo.simulation.supply_line import SECTION as LINES
+from ppafo.walking import bottle_supply
+from ppafo.walking.bottle_supply import BottleSupply, read_bottle
 from ppafo.walking.configuration import NEVER, Configuration
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.course import WalkingCourse, load_course
@@ -52,6 +56,7 @@ _TEXTS = (
     "device.valve",
     "controller.kind",
     "gas_model.kind",
+    bottle_supply.NAME,
     *(f"faults.{sensor}.kind" for sensor in FAULTY),
 )
 DEFAULT_PERIOD = 1.0e-3
@@ -67,16 +72,19 @@ def load_walk(
     overrides: Iterable[str] = (),
     gait: str | Path | None = None,
     course: str | Path | None = None,
+    bottle: str | Path | None = None,
 ) -> Configuration:
     """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
 
-    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait`` and
-    ``course`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its subject as the
-    default wearer. ScenarioError, ParameterError or DataError for anything that cannot be used.
+    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
+    ``course`` and ``bottle`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its
+    subject as the default wearer. ScenarioError, ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
     document = _apply_overrides(FILE.parse(FILE.read(name_or_path), file), given, file)
+    if bottle is not None:
+        document.setdefault(bottle_supply.SECTION, {})["name"] = str(bottle)
     load_walking_controller(kind_at(document, "controller"))
     validate(walk_file(), document, file, ScenarioError)
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
@@ -85,6 +93,8 @@ def load_walk(
     device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
     walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
     is_named = gait is not None or "gait" in document
+    carried = read_bottle(reading, device, folder if bottle is None else Path())
+    lines = _lines(reading, document, device, carried)
     configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
@@ -98,13 +108,15 @@ def load_walk(
         period=_period(reading),
         step=reading.number("run.step", STEP),
         assumed=dict(document.get("assumed", {}))
-        | {item.path: f"{item.value}, {item.note}" for item in assumed_lines(reading)},
+        | {item.path: f"{item.value}, {item.note}" for item in assumed_lines(reading)}
+        | ({} if carried is None else carried.assumed),
         file=str(name_or_path),
         overrides=given,
-        supply_lines=read_supply_lines(reading, device),
+        supply_lines=lines,
         thermal=read_thermal(reading),
         course=_course(course or document.get("course"), folder, course is None),
         wearer_origin=wearer_origin(reading, walked, is_named),
+        bottle=carried,
     )
     check_walk(configuration, reading)
     course_of_walk(configuration)
@@ -120,8 +132,11 @@ def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file:
         known = (*quantities(kind_at(changed, "controller")), *_TEXTS)
         if path in known:
             _set(changed, path, text)
+        elif path in bottle_supply.OVERRIDES:
+            own = changed.setdefault(bottle_supply.SECTION, {}).setdefault("overrides", [])
+            own.append(f"{bottle_supply.OVERRIDES[path]}={text}")
         elif not is_of_device(path):
-            hint = nearest_name(path, [*known, *device_paths()])
+            hint = nearest_name(path, [*known, *bottle_supply.OVERRIDES, *device_paths()])
             raise ScenarioError(f"override '{one_line(override)}': {file} has no value '{path}'{hint}")
     return changed
 
@@ -149,6 +164,16 @@ def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device
         return build_device(apply_overrides(parameters, overrides, valve), valve)
     except ParameterError as error:
         raise ParameterError(f"{file}: [device]: {one_line(error)}") from error
+
+
+def _lines(
+    reading: Reading, document: dict[str, Any], device: Device, carried: BottleSupply | None
+) -> SupplyLines | None:
+    """Return the lines of a walk; a bottle always feeds some, with the defaults of what the file does not say."""
+    if carried is not None:
+        document.setdefault(LINES, {})
+    lines = read_supply_lines(reading, device)
+    return lines if lines is None or carried is None else carried.lines(lines)
 
 
 def _course(name: str | Path | None, folder: Path, relative: bool) -> WalkingCourse | None:

@@ -98,6 +98,8 @@ def walk_population(
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
         raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
+    if configuration.bottle is not None:
+        raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
     generator = np.random.default_rng(seed)
     build = draw_builds(wearers, generator)
     gaits = draw_gaits(configuration.gait, build.stature, generator)

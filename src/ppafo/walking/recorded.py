@@ -1,6 +1,7 @@
 """The recording of a walk: the engine's rows as channels with units."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ppafo.simulation.simulate import gas_channels
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_planning import pace_in_time
 from ppafo.walking.gait_series import truncate
+from ppafo.walking.on_bottle import UNITS, SupplyCourse
 from ppafo.walking.posture import AnklePath, ankle_path
 
 PHASE_ROW = "controller_state.phase.phase"
@@ -28,8 +30,15 @@ REQUEST_ROW = "controller_state.request.torque"
 """Where those that follow a torque keep the one they want."""
 
 
-def recording_of_walk(configuration: Configuration, run: Run, time: Floats, record: Mapping[str, Floats]) -> Recording:
-    """The recording of a walk [SI] from its rows (samples,) by path, at these times [s]."""
+def recording_of_walk(
+    configuration: Configuration,
+    run: Run,
+    time: Floats,
+    record: Mapping[str, Floats],
+    supply: SupplyCourse | None = None,
+) -> Recording:
+    """The recording of a walk [SI] from its rows (samples,) by path, at these times [s]; with its bottle's course."""
+    run = run if supply is None else _with_cold_gas(run, supply, time)
     assert run.walk is not None, "a walk has a leg"
     angle, rate = record["state.angle"], record["state.angular_velocity"]
     pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])
@@ -57,6 +66,9 @@ def recording_of_walk(configuration: Configuration, run: Run, time: Floats, reco
     if run.walk.leg.keeps_gait >= 0.5:
         channels["dorsiflexor_moment"] = (dorsiflexor_moment(run, record), "N m")
     channels |= gas_channels(configuration.device.gas, run, record)
+    if supply is not None:
+        channels |= {name: (supply.at(name, time), UNITS[name]) for name in supply.values}
+        channels["bottle_mass"] = (supply.first.mass - record["line_state.regulated_mass"], "kg")
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
         channels["safe_state"] = (record[SAFE_ROW], "-")
@@ -66,6 +78,14 @@ def recording_of_walk(configuration: Configuration, run: Run, time: Floats, reco
         channels |= _course_channels(configuration, run, path, time, record)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
+
+
+def _with_cold_gas(run: Run, supply: SupplyCourse, time: Floats) -> Run:
+    """The run with the gas of each time [s], as it was in force between two meetings of bottle and device."""
+    met = np.maximum(np.searchsorted(supply.times, time + 1.0e-9 * run.step, side="right") - 1, 0)
+    warmth = supply.values["gas_temperature"] / supply.values["gas_temperature"][0]
+    product: Any = run.plant.gas_product * warmth[np.minimum(met, supply.times.size - 2)]
+    return replace(run, plant=run.plant._replace(gas_product=product))
 
 
 def _course_channels(

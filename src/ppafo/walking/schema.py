@@ -19,7 +19,7 @@ from ppafo.simulation.schema import (
     quantity_fields,
     supply_line_table,
 )
-from ppafo.walking import declaration
+from ppafo.walking import bottle_supply, declaration
 from ppafo.walking.wearer import WEARER
 
 
@@ -49,6 +49,12 @@ def _fault(sensor: str) -> Any:
             for kind, summary in declaration.FAULT_KINDS.items()
         ]
     )
+
+
+def _bottle() -> dict[str, Any]:
+    numbers = {item.name: optional(number_type(item), item.summary) for item in bottle_supply.NUMBERS}
+    changes: Any = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
+    return {"name": optional(str, "name of a bottle, or the path of its file"), **numbers, "overrides": changes}
 
 
 def walk_file() -> type[BaseModel]:
@@ -84,6 +90,9 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
         supply_line.SECTION: optional(
             supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
+        ),
+        bottle_supply.SECTION: optional(
+            table("WalkBottle", _bottle()), "bottle that the device hangs on; a supply without end unless given"
         ),
         "run": optional(table("WalkRun", quantity_fields((declaration.STEP,))), "how it is computed"),
         "assumed": (

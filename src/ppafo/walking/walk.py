@@ -1,7 +1,7 @@
 """Runs a walk and collects its results, stride by stride and on average."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, batch_of
 from ppafo.errors import ScenarioError
 from ppafo.gait.opensim_names import opensim_recording
 from ppafo.metrics import Metric
+from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.simulation.result import Status
 from ppafo.simulation.sampled import state_row_numbers
@@ -21,6 +22,7 @@ from ppafo.storage.opensim import write_opensim
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_segments import SegmentResult, course_metrics, segment_results, steady_strides
 from ppafo.walking.loading import load_walk
+from ppafo.walking.on_bottle import SupplyCourse, run_on_bottle
 from ppafo.walking.planning import WalkPlan, course_of_walk, plan_walk
 from ppafo.walking.recorded import SAFE_ROW, recording_of_walk
 from ppafo.walking.safety_events import SafetyEvent, safety_events
@@ -33,6 +35,9 @@ if TYPE_CHECKING:
 SHORTEST_STRIDES = 5
 SHORTEST_COURSE = 1.0
 DEFAULT_MINUTES = 1.0
+BOTTLE_MINUTES = 10.0
+"""Minutes of a walk on a bottle, unless given or ended by the bottle before."""
+
 LONGEST_MINUTES = 60.0
 RECORD_INTERVALS = ((61.0, 1.0e-3), (601.0, 5.0e-3), (60.0 * LONGEST_MINUTES, 2.0e-2))
 """Up to which length of a walk [s] the record has which interval [s]: an hour of milliseconds would not fit."""
@@ -56,6 +61,7 @@ class WalkResult:
     the samples of the recording right after each heel strike, ``helped`` tells of each stride whether it had help
     throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are those of a course,
     none without one; means are then over its strides at an even speed on level ground.
+    ``supply`` is the bottle over the walk, None where the device hangs on none.
     """
 
     configuration: Configuration
@@ -69,6 +75,7 @@ class WalkResult:
     vented_metrics: Mapping[str, Metric]
     events: tuple[SafetyEvent, ...]
     segments: tuple[SegmentResult, ...] = ()
+    supply: SupplyCourse | None = None
 
     @property
     def is_helped(self) -> bool:
@@ -101,23 +108,29 @@ def walk(
     gait: str | Path | None = None,
     progress: Progress = silent,
     course: str | Path | None = None,
+    bottle: str | Path | None = None,
 ) -> WalkResult:
     """Walk for ``minutes`` [min]: a configuration, the name of a shipped one, or a file; overrides as for the command.
 
-    Unless ``minutes`` are given it is the whole course, or one minute where there is none.
+    Unless ``minutes`` are given it is the whole course, or one minute where there is none, and up to ten on a bottle,
+    which may end it before. ``gait``, ``course`` and ``bottle`` stand in place of those of a name or a file.
     A walk that diverges is a result with that status, up to the time of failure. ScenarioError or ParameterError for
     bad input. ``progress`` gets the minutes done and the minutes in all, part by part.
     """
     is_loaded = isinstance(configuration, Configuration)
-    chosen = (
-        configuration if isinstance(configuration, Configuration) else load_walk(configuration, overrides, gait, course)
-    )
-    if is_loaded and (gait is not None or course is not None or tuple(overrides)):
+    chosen = configuration
+    if not isinstance(chosen, Configuration):
+        chosen = load_walk(chosen, overrides, gait, course, bottle)
+    if is_loaded and (any(item is not None for item in (gait, course, bottle)) or tuple(overrides)):
         raise ScenarioError(
-            "overrides, a gait and a course go with a name or a file; a Configuration takes them in load_walk"
+            "overrides, a gait, a course and a bottle go with a name or a file; a Configuration takes them in load_walk"
         )
     run = plan_walk(plan_of(chosen, walk_duration(chosen, minutes)))
-    outcome = _run_in_parts(batch_of(run), run.step, progress)
+    supply = None
+    if chosen.bottle is None:
+        outcome = _run_in_parts(batch_of(run), run.step, progress)
+    else:
+        outcome, supply = run_on_bottle(run, chosen.bottle, chosen.gait.stride_time, progress)
     rows = state_row_numbers(run)
     record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
     failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
@@ -127,9 +140,9 @@ def walk(
         kept = time < status.time
         kept[0] = True
         time, record = time[kept], {name: values[kept] for name, values in record.items()}
-    recording = recording_of_walk(chosen, run, time, record)
+    recording = recording_of_walk(chosen, run, time, record, supply)
     starts = stride_starts(record["walk.strides"])
-    return _walk_result(chosen, recording, record, starts, status)
+    return replace(_walk_result(chosen, recording, record, starts, status), supply=supply)
 
 
 def walk_duration(configuration: Configuration, minutes: float | None = None) -> float:
@@ -137,7 +150,8 @@ def walk_duration(configuration: Configuration, minutes: float | None = None) ->
     course = course_of_walk(configuration)
     if minutes is None and course is not None:
         minutes = float(course.duration) / 60.0
-    minutes = DEFAULT_MINUTES if minutes is None else minutes
+    if minutes is None:
+        minutes = DEFAULT_MINUTES if configuration.bottle is None else BOTTLE_MINUTES
     seconds = 60.0 * minutes
     shortest = SHORTEST_STRIDES * configuration.gait.stride_time if course is None else SHORTEST_COURSE
     if not shortest <= seconds <= 60.0 * LONGEST_MINUTES:
@@ -162,7 +176,7 @@ def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
 def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
     """The plan of a walk of this length [s]."""
     return WalkPlan(
-        device=configuration.device,
+        device=_fed_device(configuration),
         wearer=configuration.wearer,
         gait=configuration.gait,
         controller=configuration.controller,
@@ -178,6 +192,12 @@ def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
         thermal=configuration.thermal,
         course=configuration.course,
     )
+
+
+def _fed_device(configuration: Configuration) -> Device:
+    """Return the device with the gas that its supply has at the start: cold gas where it hangs on a bottle."""
+    bottle = configuration.bottle
+    return configuration.device if bottle is None else bottle.device_at_start(configuration.device)
 
 
 def _walk_result(

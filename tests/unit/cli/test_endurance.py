@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.questions.endurance.file import list_bottles
+from ppafo.parameters.bottles.bottle import list_bottles
 from ppafo.signals import Channel, Recording
 from ppafo.storage.comma_separated import read_csv, write_csv
 

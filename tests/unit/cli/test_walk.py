@@ -159,12 +159,15 @@ def test_a_course_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pyt
     assert len(lines) == 5
 
 
-def test_a_bottle_is_not_asked_about_a_course(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bottle_repeats_a_course_as_a_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "along"
     assert main(["walk", "solenoid", "--course", "stairs", "--minutes", "0.1", "--out", str(folder)]) == 1
     capsys.readouterr()
-    assert main(["endurance", str(folder)]) == 2
-    assert "the walk was on course 'stairs', whose strides differ" in capsys.readouterr().err
+    assert main(["endurance", str(folder), "--reuse", "reservoir_volume=50 cm^3"]) == 2
+    assert "the strides of course 'stairs' differ; take a walk without a course" in capsys.readouterr().err
+    main(["endurance", str(folder)])
+    told = capsys.readouterr()
+    assert "walk 'solenoid' on course 'stairs'" in told.out or "no gas was taken" in told.err
 
 
 def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[str]) -> None:

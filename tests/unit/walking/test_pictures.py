@@ -146,7 +146,7 @@ def test_histograms_hold_every_wearer() -> None:
     figure = population_figure(people)
     heights = [patch.get_height() for patch in figure.axes[0].patches]
     assert sum(heights) == 60
-    lines = text_of(wearers_answer(people)).splitlines()
+    lines = text_of(wearers_answer(people, {})).splitlines()
     assert lines[0] == "proportional: 60 wearers, 0.1 min each"
     gas = [float(cell) for cell in next(line for line in lines if line.startswith("Gas")).split()[4:]]
     assert gas == sorted(gas)

@@ -66,6 +66,6 @@ QUESTION = Question(
         ),
         SET,
     ),
-    library="ppafo.questions.endurance.file:FILE",
+    library="ppafo.parameters.bottles.bottle:FILE",
     compiles=False,
 )

@@ -7,6 +7,8 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, quantity_text
+from ppafo.model.cold_gas import heat_to_warm
+from ppafo.model.source import bottle_content
 from ppafo.questions.endurance.discharge import Discharge
 from ppafo.questions.endurance.figure import endurance_figure
 from ppafo.questions.endurance.reuse import GIVEN, Reuse
@@ -18,8 +20,8 @@ from ppafo.version import __version__
 FORMAT = "ppafo endurance"
 
 _LEFT_OUT = (
-    "Not in the model: cooling of the regulator itself, liquid carried out with the vapour, a bottle held upside "
-    "down, leaking connections, and ice on the outside of the bottle."
+    "Not in the model: a regulator that its gas cools or ices (`ppafo walk --bottle` has it), liquid carried out with "
+    "the vapour, a bottle held upside down, leaking connections, and ice on the outside of the bottle."
 )
 _REUSE_ASSUMES = (
     "A balance for ideal gas at constant temperature: pressures equalise, check valves have no losses, nothing "
@@ -98,6 +100,7 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
         ("steps without cooling", f"{found.steps_when_warm:.0f} (a bottle that stays at room temperature)"),
         ("ended", course.ending.message),
         ("gas", f"{_gas(draw.mass_per_step)} a step, {flows[0]}, largest {flows[1]}"),
+        ("heat that it lacks", _lacking_heat(found)),
         (
             "lowest temperature of the content",
             quantity_text(float(np.min(recording["bottle_temperature"])), "temperature", ".1f"),
@@ -115,11 +118,17 @@ def _other_facts(found: Endurance) -> list[tuple[str, str]]:
     return [
         (
             f"with {name}",
-            f"{_gas(other.draw.mass_per_step)} a step, {_minutes(other.discharge.walking_time)} of walking, "
-            f"{other.discharge.steps:.0f} steps{', without reuse' if found.reuse else ''}",
+            f"{_gas(other.draw.mass_per_step + _saved(other))} a step, "
+            f"{f'{_gas(_saved(other))} of it saved, ' if other.reuse else ''}"
+            f"{_minutes(other.discharge.walking_time)} of walking, {other.discharge.steps:.0f} steps"
+            f"{', without reuse' if found.reuse and not other.reuse else ''}",
         )
         for name, other in found.others.items()
     ]
+
+
+def _saved(found: Endurance) -> float:
+    return found.reuse.balance.returned_mass if found.reuse else 0.0
 
 
 def _reuse_facts(found: Endurance, reused: Reuse, without: Discharge) -> list[tuple[str, str]]:
@@ -131,6 +140,14 @@ def _reuse_facts(found: Endurance, reused: Reuse, without: Discharge) -> list[tu
         ("chambers", _chambers(reused)),
         ("without reuse", f"{_minutes(without.walking_time)} of walking, {without.steps:.0f} steps"),
     ]
+
+
+def _lacking_heat(found: Endurance) -> str:
+    """Return what warms the gas of the full bottle to the room's temperature behind the regulator."""
+    bottle, room = found.bottle, found.bottle.room_temperature
+    content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, room)
+    heat = heat_to_warm(bottle.fluid.table, content, room, bottle.regulator.set_pressure)
+    return f"{quantity_text(heat * found.draw.mean_flow, 'power')}, {heat / 1000.0:.3g} kJ/kg, at the start"
 
 
 def _dry_since(course: Discharge) -> str:
@@ -200,7 +217,8 @@ def _data(found: Endurance) -> dict[str, Any]:
     }
     if found.others:
         data["other_chambers"] = {
-            name: _course_data(other.discharge) | {"gas_per_step": other.draw.mass_per_step}
+            name: _course_data(other.discharge)
+            | {"gas_per_step": other.draw.mass_per_step + _saved(other), "gas_saved": _saved(other)}
             for name, other in found.others.items()
         }
     if found.reuse is not None and found.without_reuse is not None:

@@ -18,9 +18,9 @@ from ppafo.model.source import (
     content_temperature,
     delivered_pressure,
 )
+from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.questions.endurance.draw import Draw, Schedule
 from ppafo.questions.endurance.ending import Ending, Stop, ending, flow_limit, frozen_below, reserve
-from ppafo.questions.endurance.file import Bottle
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 

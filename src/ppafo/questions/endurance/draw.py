@@ -29,6 +29,10 @@ _MAXIMUM_FALLEN = 0.1
 WALK_FILE = "walk.json"
 FORMAT = "ppafo walk"
 _VOLUMES = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
+_STRIDE_KEYS = ("gas", "gas_per_stride", "stride_time")
+_COURSE_KEYS = ("course_gas", "gas_of_course", "course_time")
+"""Metric of the gas of a step, and what the readings of the chambers call that gas and the time of a step."""
+
 _CHANNELS = ("angle", "pressure_1", "pressure_2", "supplied_mass")
 _LEAST = 1.0e-12
 """Gas [kg] by which a walk that takes none may come out below 0: rounding of its totals."""
@@ -135,7 +139,8 @@ class WalkGas:
     """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride, and the actuator.
 
     ``gas_per_stride`` is that of the strides with help, 0 where the walk took none. ``others`` is the gas use of the
-    same walk with other readings of the paper's chambers, by their names.
+    same walk with other readings of the paper's chambers, by their names. A walk on a ``course``, "" without one, is
+    repeated as a whole: gas and time are then those of the course.
     """
 
     name: str
@@ -143,7 +148,8 @@ class WalkGas:
     gas_per_stride: float
     stride_time: float
     actuator: Actuator
-    others: Mapping[str, Draw] = field(default_factory=dict)
+    others: Mapping[str, "OtherGas"] = field(default_factory=dict)
+    course: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,16 +163,26 @@ class FullChambers:
     strides: int
 
 
+@dataclass(frozen=True, slots=True)
+class OtherGas:
+    """The gas use of a walk with other chambers, and how full these get, None where that is not known."""
+
+    draw: Draw
+    chambers: FullChambers | None
+
+
 def walk_gas(result: WalkResult) -> WalkGas:
     """Return the gas of a walk."""
-    configuration, gas = result.configuration, result.metrics.get("gas")
+    configuration, course = result.configuration, result.configuration.course
+    gas = result.metrics.get("gas" if course is None else "course_gas")
     actuator = configuration.device.actuator
     return WalkGas(
         configuration.name,
         result.recording,
         0.0 if gas is None else gas.value,
-        configuration.gait.stride_time,
+        configuration.gait.stride_time if course is None else result.recording.duration,
         Actuator(**{name: getattr(actuator, name) for name in Actuator.__slots__}),
+        course="" if course is None else course.name,
     )
 
 
@@ -189,19 +205,23 @@ def read_walk_gas(folder: Path) -> WalkGas:
         *(_number(document, f"configuration.device.actuator.{name}", path, 0.0) for name in _VOLUMES),
     )
     course = _table(document, "configuration", path).get("course")
-    if course is not None:
-        name = _table({"course": course}, "course", path).get("name", "")
-        raise DataError(
-            f"{path}: the walk was on course '{name}', whose strides differ; give --gas-per-step, or a walk without one"
-        )
-    has_gas = "gas" in _table(document, "metrics", path)
-    gas = _number(document, "metrics.gas.value", path, -_LEAST) if has_gas else 0.0
-    stride_time = _number(document, "configuration.gait.stride_time", path, 0.0)
+    keys = _STRIDE_KEYS if course is None else _COURSE_KEYS
+    has_gas = keys[0] in _table(document, "metrics", path)
+    gas = _number(document, f"metrics.{keys[0]}.value", path, -_LEAST) if has_gas else 0.0
+    time = "configuration.gait.stride_time" if course is None else "metrics.course_time.value"
     name = document["configuration"].get("name", folder.name)
-    return WalkGas(str(name), _recording(folder), gas, stride_time, actuator, _others(document, actuator, path))
+    return WalkGas(
+        str(name),
+        _recording(folder),
+        gas,
+        _number(document, time, path, 0.0),
+        actuator,
+        _others(document, actuator, path, keys[1:]),
+        "" if course is None else str(_table({"course": course}, "course", path).get("name", "")),
+    )
 
 
-def _others(document: Mapping[str, Any], actuator: Actuator, file: Path) -> dict[str, Draw]:
+def _others(document: Mapping[str, Any], actuator: Actuator, file: Path, keys: tuple[str, ...]) -> dict[str, OtherGas]:
     """Return the gas use of a walk with other chambers than its own, by name."""
     listed = document.get("volumes", [])
     if not isinstance(listed, list) or not all(isinstance(item, Mapping) for item in listed):
@@ -211,10 +231,20 @@ def _others(document: Mapping[str, Any], actuator: Actuator, file: Path) -> dict
         takes_none = "peak_flow" in item and item["peak_flow"] is None
         if takes_none or all(item.get(name) == getattr(actuator, name) for name in _VOLUMES):
             continue
-        gas, time, peak = (_number(item, name, file, 0.0) for name in ("gas_per_stride", "stride_time", "peak_flow"))
+        gas, time, peak = (_number(item, name, file, 0.0) for name in (*keys, "peak_flow"))
         name = str(item.get("chambers", "other chambers"))
-        found[name] = draw_of_numbers(gas, time, max(peak, gas / time))
+        found[name] = OtherGas(draw_of_numbers(gas, time, max(peak, gas / time)), _full_of(item, file))
     return found
+
+
+def _full_of(item: Mapping[str, Any], file: Path) -> FullChambers | None:
+    if item.get("full_chambers") is None:
+        return None
+    names = ("exhaust_pressure", "exhaust_volume", "fill_pressure", "fill_volume", "strides")
+    exhaust, its_volume, fill, other_volume, strides = (
+        _number(item, f"full_chambers.{name}", file, 0.0) for name in names
+    )
+    return FullChambers(exhaust, its_volume, fill, other_volume, int(strides))
 
 
 def _recording(folder: Path) -> Recording:
@@ -250,9 +280,8 @@ def draw_of_walk(walk: WalkGas) -> Draw:
     # An open valve may let gas back into the supply for moments, so the largest flow is that of a tenth of a second.
     peak = max(largest_flow(walk.recording), walk.gas_per_stride / walk.stride_time)
     draw = draw_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
-    return Draw(
-        draw.mass_per_step, draw.step_time, draw.peak_flow, f"walk '{walk.name}', {walk.recording.kind}, repeated"
-    )
+    along = f" on course '{walk.course}'" if walk.course else ""
+    return replace(draw, origin=f"walk '{walk.name}'{along}, {walk.recording.kind}, repeated")
 
 
 def full_chambers(walk: WalkGas) -> FullChambers:
@@ -262,6 +291,8 @@ def full_chambers(walk: WalkGas) -> FullChambers:
     filled. The first strides, in which the controller learns, and those without help are left out. DataError where no
     whole stride is left.
     """
+    if walk.course:
+        raise DataError(f"--reuse: the strides of course '{walk.course}' differ; take a walk without a course")
     recording, actuator = walk.recording, walk.actuator
     angle = recording["angle"]
     volume_1 = chamber_1_volume(angle, actuator.angle_min, actuator.volume_per_angle, actuator.dead_volume_1)

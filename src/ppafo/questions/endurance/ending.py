@@ -6,8 +6,8 @@ from typing import Literal
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.model.fluid_table import densest_gas, has_liquid
 from ppafo.model.source import BottleContent, bottle_content, pressure_reserve, regulator_flow_limit
+from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.questions.endurance.draw import Draw
-from ppafo.questions.endurance.file import Bottle
 
 EndKind = Literal["empty", "too cold", "frozen", "time is up"]
 Stop = Literal["supply", "frozen", "time"]

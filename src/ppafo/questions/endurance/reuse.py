@@ -9,9 +9,9 @@ from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.model.declaration import Quantity
 from ppafo.model.exhaust_reuse import ReuseBalance, ReuseCycle, reuse_balance
 from ppafo.parameters import load_device
+from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.parameters.declaration import is_within
 from ppafo.questions.endurance.draw import FullChambers
-from ppafo.questions.endurance.file import Bottle
 from ppafo.units import parse_quantity
 
 REUSE = (

@@ -6,9 +6,11 @@ from pathlib import Path
 
 from ppafo.answers import Solved
 from ppafo.errors import ParameterError
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.questions.endurance.discharge import Discharge, discharge
 from ppafo.questions.endurance.draw import (
     Draw,
+    OtherGas,
     Schedule,
     WalkGas,
     draw_of_numbers,
@@ -20,7 +22,7 @@ from ppafo.questions.endurance.draw import (
     walk_gas,
 )
 from ppafo.questions.endurance.ending import smallest_mass_when_warm
-from ppafo.questions.endurance.file import PAPER_BOTTLE, Bottle, load_bottle
+from ppafo.questions.endurance.other_chambers import other_draws
 from ppafo.questions.endurance.reuse import Reuse, ReusePlan, parse_reuse
 from ppafo.questions.endurance.reuse import reuse as reuse_exhaust
 from ppafo.signals import Recording
@@ -41,7 +43,8 @@ class Endurance(Solved):
 
     ``discharge`` is the requested course; ``without_reuse`` the same without reuse, where there is one.
     ``steps_when_warm`` is the number of steps that a bottle which stays at room temperature gives: what cooling costs.
-    ``others`` is the same, without reuse, for a walk with other readings of the paper's chambers, by their names.
+    ``is_of_course`` is true where a step is a whole course. ``others`` is the same for a walk or a run with
+    other readings of the paper's chambers, by their names.
     """
 
     bottle: Bottle
@@ -51,6 +54,7 @@ class Endurance(Solved):
     reuse: Reuse | None
     without_reuse: Discharge | None
     steps_when_warm: float
+    is_of_course: bool = False
     others: Mapping[str, "Endurance"] = field(default_factory=dict)
 
 
@@ -103,7 +107,8 @@ def endurance_of_walk(
 ) -> Endurance | None:
     """Return how long a bottle lasts when the walk continues without rest; None where the walk took no gas.
 
-    A step is a stride of the leg with the device. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``: what they
+    A step is a stride of the leg with the
+    device, or a whole course. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``: what they
     do not say of the chambers is taken from the walk.
     """
     gas = walk_gas(result)
@@ -116,8 +121,18 @@ def endurance_of_walk_gas(gas: WalkGas, bottle: Bottle, schedule: Schedule, reus
     """Return how long a bottle lasts when a walk continues; DataError where it took no gas."""
     changes, draw = tuple(reuse), draw_of_walk(gas)
     plan = parse_reuse(changes, bottle, full_chambers(gas)) if changes else None
-    others = {name: follow_bottle(bottle, other, schedule) for name, other in gas.others.items()}
-    return replace(follow_bottle(bottle, draw, schedule, plan), others=others)
+    others = {name: _other(bottle, other, schedule, changes) for name, other in gas.others.items()}
+    return replace(follow_bottle(bottle, draw, schedule, plan), others=others, is_of_course=bool(gas.course))
+
+
+def _other(bottle: Bottle, other: OtherGas, schedule: Schedule, changes: tuple[str, ...]) -> Endurance:
+    """Return how long the bottle lasts with other chambers; without reuse where theirs is not known or not possible."""
+    if changes and other.chambers is not None:
+        try:
+            return follow_bottle(bottle, other.draw, schedule, parse_reuse(changes, bottle, other.chambers))
+        except ParameterError:
+            pass
+    return follow_bottle(bottle, other.draw, schedule)
 
 
 def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, plan: ReusePlan | None = None) -> Endurance:
@@ -154,4 +169,8 @@ def _endurance_of_use(
         return endurance_of_walk_gas(gas, bottle, schedule, reuse)
     recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
     draw = draw_of_recording(recording, step_time)
-    return follow_bottle(bottle, draw, schedule, parse_reuse(reuse, bottle) if reuse else None)
+    found = follow_bottle(bottle, draw, schedule, parse_reuse(reuse, bottle) if reuse else None)
+    if isinstance(use, Recording | WalkResult):
+        return found
+    others = other_draws(use, step_time)
+    return replace(found, others={name: follow_bottle(bottle, other, schedule) for name, other in others.items()})

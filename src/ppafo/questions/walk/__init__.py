@@ -20,7 +20,19 @@ QUESTION = Question(
             "what the wearer does one after the other: a name or a .toml file; 'ppafo walk --list' has the names",
             "COURSE",
         ),
-        Argument(("--minutes",), "minutes", "time to walk; default 1, or a whole course", "N", minutes),
+        Argument(
+            ("--bottle",),
+            "bottle",
+            "hang the device on a bottle: a name ('ppafo endurance --list') or a .toml file; the walk ends with it",
+            "BOTTLE",
+        ),
+        Argument(
+            ("--minutes",),
+            "minutes",
+            "time to walk; default 1, up to 10 on a bottle, or a whole course",
+            "N",
+            minutes,
+        ),
         Argument(
             ("--wearers",), "wearers", "number of different wearers to simulate instead of one", "N", counting_number
         ),

@@ -2,6 +2,7 @@
 
 import platform
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.metrics import Metric
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.endurance.solve import Endurance
+from ppafo.questions.walk.bottle import bottle_data, bottle_files, bottle_remark, bottle_sections
 from ppafo.questions.walk.course import course_data, course_files, course_pictures, course_sections, trust_remark
 from ppafo.questions.walk.solve import WalkPair, Wearers
 from ppafo.questions.walk.volumes import volumes_data, volumes_sections
@@ -77,7 +79,7 @@ _LIMITS = (
 
 def answer_of(solved: WalkPair | Wearers) -> Answer:
     """Return the answer of one wearer's walks, or of many wearers."""
-    return wearers_answer(solved.population) if isinstance(solved, Wearers) else _pair_answer(solved)
+    return wearers_answer(solved.population, solved.volumes) if isinstance(solved, Wearers) else _pair_answer(solved)
 
 
 def _pair_answer(pair: WalkPair) -> Answer:
@@ -86,7 +88,8 @@ def _pair_answer(pair: WalkPair) -> Answer:
     worn, bare = comparison.with_device, comparison.without_device
     configuration = worn.configuration
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    remarks = [*person_remarks(configuration), _bottle(pair.life), *_safety(worn), trust_remark(configuration)]
+    bottles = (bottle_remark(worn), _bottle(pair.life))
+    remarks = [*person_remarks(configuration), *bottles, *_safety(worn), trust_remark(configuration)]
     remarks += [
         f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
     ]
@@ -101,6 +104,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
             Section(paragraphs=_set_up(comparison), is_detail=True),
             *course_sections(comparison),
             Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
+            *bottle_sections(worn),
             *volumes_sections(pair.volumes),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
             *(_over_time(worn) if configuration.course is None else ()),
@@ -118,6 +122,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
             "mean-stride.csv": lambda: mean_stride_csv(worn),
             "mean-stride-off.csv": lambda: mean_stride_csv(bare),
             **course_files(comparison),
+            **bottle_files(worn),
         },
     )
 
@@ -213,8 +218,13 @@ def _bottle(life: Endurance | None) -> str:
     course = life.discharge
     return (
         f"one bottle ({life.bottle.name}, {1.0e3 * life.bottle.mass:.0f} g): {course.walking_time / 60.0:.1f} min, "
-        f"{course.steps:.0f} strides of this leg; {course.ending.message}"
+        f"{_steps(life)}; {course.ending.message}"
     )
+
+
+def _steps(life: Endurance) -> str:
+    steps = life.discharge.steps
+    return f"{steps:.1f} times this course" if life.is_of_course else f"{steps:.0f} strides of this leg"
 
 
 def _bottle_data(life: Endurance | None) -> dict[str, Any] | None:
@@ -244,13 +254,22 @@ def _data(comparison: Comparison, life: Endurance | None) -> dict[str, Any]:
         "metrics": plain(dict(comparison.with_device.metrics)),
         "bottle": _bottle_data(life),
         **course_data(comparison),
+        **bottle_data(comparison.with_device),
         "metrics_vented": plain(dict(comparison.with_device.vented_metrics)),
         "events": [event.to_dict() for event in comparison.with_device.events],
         "metrics_off": plain(dict(comparison.without_device.metrics)),
         "healthy": plain(dict(comparison.healthy)),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        "configuration": plain(configuration) | {"controller": configuration.controller.name},
+        "configuration": _configuration_data(configuration),
     }
+
+
+def _configuration_data(configuration: Configuration) -> dict[str, Any]:
+    """Return the configuration as data; its bottle by its values, not by the tables of its gas."""
+    own = configuration.bottle
+    document: dict[str, Any] = plain(replace(configuration, bottle=None))
+    document["controller"] = configuration.controller.name
+    return document if own is None else document | {"bottle": own.to_dict()}
 
 
 def strides_csv(result: WalkResult) -> bytes:

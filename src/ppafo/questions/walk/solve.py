@@ -9,11 +9,12 @@ from ppafo.answers import Solved
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
 from ppafo.questions.walk.volumes import VolumeReading, walks_by_volume
+from ppafo.questions.walk.wearers_volumes import wearers_by_volume
 from ppafo.walking import course as courses
 from ppafo.walking.comparison import Comparison, compare_walks
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import FILE, load_walk
-from ppafo.walking.population import Population, walk_population
+from ppafo.walking.population import Population
 
 _LONG = 12.0
 """Minutes above which a walk reports how far it is."""
@@ -33,9 +34,10 @@ class WalkPair(Solved):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wearers(Solved):
-    """What many wearers get."""
+    """What many wearers get; ``volumes`` is the same for fewer of them with other readings of the paper's chambers."""
 
     population: Population
+    volumes: Mapping[str, Population]
 
 
 def walk_with_and_without(
@@ -43,6 +45,7 @@ def walk_with_and_without(
     minutes: float | None = None,
     gait: str | Path | None = None,
     course: str | Path | None = None,
+    bottle: str | Path | None = None,
     wearers: int | None = None,
     seed: int = 1,
     overrides: Sequence[str] = (),
@@ -51,22 +54,20 @@ def walk_with_and_without(
     """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
-    that of its course unless given; ``gait`` and ``course`` stand in place of those of the configuration; ``wearers``
-    the number of different wearers, drawn with ``seed``. ScenarioError for bad input; a walk that diverges is an answer
-    that has not passed.
+    that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
+    ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError for bad input; a walk that diverges
+    is an answer that has not passed.
     """
     chosen = configuration
     if not isinstance(chosen, Configuration):
-        chosen = load_walk(chosen, overrides, gait, course)
+        chosen = load_walk(chosen, overrides, gait, course, bottle)
     report = progress or report_nothing
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
-        return Wearers(walk_population(chosen, minutes, wearers, seed, advance))
+        return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))
     comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
-    # A bottle is asked how often it can give the same: a course is not made of equal strides.
-    life = endurance_of_walk(comparison.with_device) if chosen.course is None else None
-    volumes = walks_by_volume(comparison.with_device, life) if chosen.course is None else ()
-    return WalkPair(comparison, life, volumes)
+    life = endurance_of_walk(comparison.with_device) if chosen.bottle is None else None
+    return WalkPair(comparison, life, walks_by_volume(comparison.with_device, life, minutes))
 
 
 def list_files() -> list[dict[str, Any]]:
@@ -83,8 +84,11 @@ def list_files() -> list[dict[str, Any]]:
 
 def default_folder(values: Mapping[str, Any]) -> Path:
     """Return where the command writes by default: by the name of the configuration."""
-    configuration = load_walk(values["configuration"], values["overrides"], values["gait"], values["course"])
+    configuration = load_walk(
+        values["configuration"], values["overrides"], values["gait"], values["course"], values["bottle"]
+    )
     along = "" if configuration.course is None else f"-{configuration.course.name}"
+    along += "" if configuration.bottle is None else f"-{configuration.bottle.bottle.name}"
     return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
 
 

@@ -1,19 +1,22 @@
 """The same walk with other chambers: what gas, work and bottle come to where the paper leaves the volume open."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ppafo.answers import Column, Section, Table
+from ppafo.errors import DataError
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
+from ppafo.questions.endurance.draw import full_chambers, largest_flow, walk_gas
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
+from ppafo.walking.on_bottle import WALKED
 from ppafo.walking.walk import WalkResult, walk
 from ppafo.walking.walk_metrics import settled
 
 LONGEST = 1.0
-"""Minutes that are walked at most with other chambers: a walk repeats itself."""
+"""Minutes that are walked at most with other chambers: a walk repeats itself, but for a course and on a bottle."""
 
 _HEAD = (
     Column("chambers"),
@@ -26,6 +29,7 @@ _HEAD = (
     Column("peak torque", "torque", ".2f"),
     Column("bottle", "duration", ".3g"),
 )
+_ENDED = Column("ended")
 _EXPLAINED = (
     "The paper's torque constant and volume per angle contradict each other by virtual work, so the walk is repeated, "
     f"for at most {LONGEST:g} min, with other chambers. Controllers keep what they believe of them. With the volume by "
@@ -48,22 +52,28 @@ class VolumeReading:
     life: Endurance | None
 
 
-def walks_by_volume(result: WalkResult, life: Endurance | None) -> tuple[VolumeReading, ...]:
+def walks_by_volume(
+    result: WalkResult, life: Endurance | None, minutes: float | None = None
+) -> tuple[VolumeReading, ...]:
     """Return a walk and the same with the other readings of its chambers; none where it has chambers of its own.
 
-    The walk is left alone where no gas was taken or it has no whole strides, for then nothing rests on the volume.
+    The walk is left alone where no gas was taken or it has no whole strides, for then nothing rests on the volume. On a
+    bottle the others walk for as many ``minutes`` [min] as it was to be, each on a bottle of its own.
     """
     actuator = result.configuration.device.actuator
     others, own = other_readings(actuator), own_reading(actuator)
-    if life is None or own is None or not others or not result.averages:
+    takes_gas = life is not None or (result.supply is not None and result.supply.regulated > 0.0)
+    if not takes_gas or own is None or not others or not result.averages:
         return ()
-    minutes = min(float(result.recording.time[-1]) / 60.0, LONGEST)
+    if result.supply is None:
+        walked = float(result.recording.time[-1]) / 60.0
+        minutes = min(walked, LONGEST) if result.configuration.course is None else walked
     found = [_read(own, result, life)]
     for chambers in others:
         configuration = result.configuration
         other = walk(replace(configuration, device=chambers.of(configuration.device)), minutes)
         if other.status.is_completed and other.averages:
-            found.append(_read(chambers, other, endurance_of_walk(other)))
+            found.append(_read(chambers, other, endurance_of_walk(other) if other.supply is None else None))
     return tuple(found)
 
 
@@ -87,7 +97,9 @@ def volumes_sections(read: tuple[VolumeReading, ...]) -> tuple[Section, ...]:
     """Return the table of the readings, and how to read it; nothing without them."""
     if not read:
         return ()
-    table = Table(_HEAD, tuple(map(_row, read)))
+    on_bottle = any(one.result.supply is not None for one in read)
+    head = (*_HEAD, _ENDED) if on_bottle else _HEAD
+    table = Table(head, tuple((*_row(one), *([_ending(one)] if on_bottle else [])) for one in read))
     return (
         Section("What rests on the volume of the chambers", table=table),
         Section("Why there are several chambers", (_EXPLAINED,), is_detail=True),
@@ -105,8 +117,26 @@ def _row(one: VolumeReading) -> tuple[str | float | None, ...]:
         one.shaft_work,
         metrics["push_off_work"].value,
         one.peak_torque,
-        None if one.life is None else one.life.discharge.walking_time,
+        _lasts(one),
     )
+
+
+def _lasts(one: VolumeReading) -> float | None:
+    """Return how long the bottle lasts [s]: that of the walk where it ended it, else one that is followed alone."""
+    supply = one.result.supply
+    if supply is not None:
+        return supply.ending.time if supply.ending.kind != WALKED else None
+    return None if one.life is None else one.life.discharge.walking_time
+
+
+def _peak_flow(one: VolumeReading) -> float | None:
+    if one.result.supply is not None:
+        return largest_flow(one.result.recording)
+    return None if one.life is None else one.life.draw.peak_flow
+
+
+def _ending(one: VolumeReading) -> str | None:
+    return None if one.result.supply is None else one.result.supply.ending.kind
 
 
 def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
@@ -119,12 +149,29 @@ def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
             "dead_volume_2": one.chambers.dead_volume_2,
             "gas_per_stride": one.result.metrics["gas"].value,
             "stride_time": one.result.configuration.gait.stride_time,
-            "peak_flow": None if one.life is None else one.life.draw.peak_flow,
+            "peak_flow": _peak_flow(one),
+            "full_chambers": _full(one.result),
             "gas_work": one.gas_work,
             "shaft_work": one.shaft_work,
             "push_off_work": one.result.metrics["push_off_work"].value,
             "peak_torque": one.peak_torque,
-            "walking_time": None if one.life is None else one.life.discharge.walking_time,
+            "walking_time": _lasts(one),
+            **({} if one.result.supply is None else {"ending": one.result.supply.ending._asdict()}),
+            **_course_gas(one.result),
         }
         for one in read
     ]
+
+
+def _full(result: WalkResult) -> dict[str, Any] | None:
+    """Return how full the chambers get, by which a reuse of the exhaust is followed; None where strides differ."""
+    try:
+        return asdict(full_chambers(walk_gas(result)))
+    except DataError:
+        return None
+
+
+def _course_gas(result: WalkResult) -> dict[str, float]:
+    """Return the gas [kg] and the time [s] of a whole course, by which a bottle follows it."""
+    names = {"gas_of_course": "course_gas", "course_time": "course_time"}
+    return {own: result.metrics[name].value for own, name in names.items() if name in result.metrics}

@@ -8,6 +8,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, title_with_unit
+from ppafo.questions.walk.wearers_volumes import wearers_volumes_data, wearers_volumes_sections
 from ppafo.signals.recording import Floats
 from ppafo.simulation.document import UNITS, plain
 from ppafo.version import __version__
@@ -26,7 +27,7 @@ _CAPTION = (
 )
 
 
-def wearers_answer(population: Population) -> Answer:
+def wearers_answer(population: Population, volumes: Mapping[str, Population]) -> Answer:
     """Return the answer of many wearers; no figure where every walk diverged."""
     configuration = population.configuration
     tables = {**population.outcomes, **population.traits}
@@ -51,9 +52,10 @@ def wearers_answer(population: Population) -> Answer:
         lead=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
         sections=(
             Section(table=Table(head, tuple(rows)), remarks=tuple(remarks)),
+            *wearers_volumes_sections(volumes),
             *((Section("The wearers", figure=figure, is_detail=True),) if population.count else ()),
         ),
-        data=_data(population),
+        data=_data(population) | {"volumes": wearers_volumes_data(volumes)},
         passed=not population.diverged,
         files={"wearers.csv": lambda: wearers_csv(population)},
         command="walk",

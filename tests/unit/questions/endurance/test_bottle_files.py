@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from ppafo.errors import ParameterError
-from ppafo.questions.endurance.file import PAPER_BOTTLE, json_schema, list_bottles, load_bottle
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, json_schema, list_bottles, load_bottle
 
-TEXT = (resources.files("ppafo.questions.endurance") / "bottles" / f"{PAPER_BOTTLE}.toml").read_text(encoding="utf-8")
+TEXT = (resources.files("ppafo.parameters.bottles") / "files" / f"{PAPER_BOTTLE}.toml").read_text(encoding="utf-8")
 
 
 def changed(tmp_path: Path, old: str, new: str) -> Path:

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.questions.endurance.discharge import Discharge, discharge
 from ppafo.questions.endurance.draw import Schedule, draw_of_numbers
-from ppafo.questions.endurance.file import PAPER_BOTTLE, Bottle, load_bottle
 
 INSULATED = ("bottle.content_heat_transfer=0 W/K",)
 HELD_WARM = ("bottle.content_heat_transfer=100000 W/K", "bottle.room_heat_transfer=100000 W/K")

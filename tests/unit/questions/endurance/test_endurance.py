@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError, ParameterError
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance.draw import Schedule, draw_of_numbers, draw_of_recording
-from ppafo.questions.endurance.file import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance.reuse import parse_reuse, reuse
 from ppafo.questions.endurance.solve import Endurance, Endurances, endurance, follow_bottle
 from ppafo.signals import Channel, Recording

@@ -12,6 +12,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.errors import DataError, ParameterError
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance.draw import (
     FORMAT,
     Actuator,
@@ -23,7 +24,6 @@ from ppafo.questions.endurance.draw import (
     read_walk_gas,
     walk_gas,
 )
-from ppafo.questions.endurance.file import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance.solve import endurance_of_walk, endurance_of_walk_gas
 from ppafo.signals import Channel, Recording
 from ppafo.storage.netcdf import netcdf_bytes

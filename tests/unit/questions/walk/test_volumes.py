@@ -10,7 +10,7 @@ from ppafo.answers.text import text_of
 from ppafo.errors import DataError
 from ppafo.questions.endurance.draw import read_walk_gas
 from ppafo.questions.endurance.solve import Endurance, endurance
-from ppafo.questions.walk.solve import WalkPair, walk_with_and_without
+from ppafo.questions.walk.solve import WalkPair, Wearers, walk_with_and_without
 
 MINUTES = 0.1
 
@@ -108,3 +108,87 @@ def test_a_folder_of_an_earlier_version_has_no_others(folder: Path, tmp_path: Pa
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     (tmp_path / "walk.json").write_text(json.dumps(document), encoding="utf-8")
     assert read_walk_gas(tmp_path).others == {}
+
+
+def test_what_a_reservoir_saves_is_that_of_each_reading(pair: WalkPair, folder: Path) -> None:
+    life = endurance(folder, reuse=["reservoir_volume=50 cm^3"])
+    assert isinstance(life, Endurance)
+    for one, other in zip(pair.volumes[1:], life.others.values(), strict=True):
+        assert other.reuse is not None
+        alone = endurance(one.result, reuse=["reservoir_volume=50 cm^3"])
+        assert isinstance(alone, Endurance)
+        assert other.discharge.steps == pytest.approx(alone.discharge.steps)
+    assert text_of(life.answer()).count("of it saved") == len(pair.volumes[1:])
+
+
+@pytest.fixture(scope="module")
+def course() -> WalkPair:
+    found = walk_with_and_without("solenoid", course="stairs")
+    assert isinstance(found, WalkPair)
+    return found
+
+
+def test_a_course_is_walked_again_with_the_other_chambers_and_from_a_bottle(course: WalkPair) -> None:
+    gas, time = (course.comparison.with_device.metrics[name].value for name in ("course_gas", "course_time"))
+    assert course.life is not None
+    assert course.life.draw.mean_flow == pytest.approx(gas / time)
+    assert course.life.discharge.steps == pytest.approx(course.life.discharge.walking_time / time)
+    assert "times this course" in text_of(course.answer())
+    taken = [one.result.metrics["course_gas"].value for one in course.volumes]
+    assert taken[0] == gas
+    assert taken[2] < 0.8 * taken[1]
+
+
+def test_a_bottle_takes_the_folder_of_a_course_and_refuses_to_reuse_its_exhaust(
+    course: WalkPair, tmp_path: Path
+) -> None:
+    # What a bottle reads of the folder of a walk; the rest is figures.
+    answer = course.answer()
+    (tmp_path / "walk.json").write_text(json.dumps(answer.data), encoding="utf-8")
+    (tmp_path / "recording.nc").write_bytes(answer.files["recording.nc"]())
+    life = endurance(tmp_path)
+    assert isinstance(life, Endurance)
+    assert course.life is not None
+    assert life.discharge.steps == pytest.approx(course.life.discharge.steps)
+    assert [other.draw.mass_per_step for other in life.others.values()] == pytest.approx(
+        [one.result.metrics["course_gas"].value for one in course.volumes[1:]]
+    )
+    with pytest.raises(DataError, match="the strides of course 'stairs' differ"):
+        endurance(tmp_path, reuse=["reservoir_volume=50 cm^3"])
+
+
+def test_wearers_walk_again_with_the_other_chambers() -> None:
+    found = walk_with_and_without("solenoid", MINUTES, wearers=20, seed=4)
+    assert isinstance(found, Wearers)
+    again = walk_with_and_without(
+        "solenoid", MINUTES, wearers=20, seed=4, overrides=["device.set=ppafo2011-consistent"]
+    )
+    assert isinstance(again, Wearers)
+    own, consistent, _ = found.volumes.values()
+    assert own is found.population
+    assert (consistent.outcomes["gas"] == again.population.outcomes["gas"]).all()
+    assert "What rests on the volume of the chambers" in text_of(found.answer())
+    own_chambers = walk_with_and_without(
+        "solenoid", MINUTES, wearers=2, overrides=["actuator.volume_per_angle=20 cm^3/rad"]
+    )
+    assert isinstance(own_chambers, Wearers)
+    assert own_chambers.volumes == {}
+
+
+def test_a_run_is_run_again_from_its_folder_with_the_other_chambers(tmp_path: Path) -> None:
+    scenario = "torque-task-solenoid"
+    ppafo.simulate(ppafo.load_scenario(scenario, ["run.duration=0.3 s"])).save(tmp_path / "out")
+    life = endurance(tmp_path / "out")
+    assert isinstance(life, Endurance)
+    other = life.others["ppafo2011-consistent"]
+    volumes = ["actuator.volume_per_angle=18.1 cm^3/rad", "actuator.dead_volume_1=32 cm^3"]
+    again = ppafo.simulate(
+        ppafo.load_scenario(scenario, ["run.duration=0.3 s", *volumes, "actuator.dead_volume_2=32 cm^3"])
+    )
+    assert other.draw.mass_per_step == pytest.approx(again.recording["supplied_mass"][-1], rel=2e-3)
+    (tmp_path / "out" / "run.json").write_text(
+        (tmp_path / "out" / "run.json").read_text(encoding="utf-8").replace("1.451e-05", "1.551e-05"), encoding="utf-8"
+    )
+    changed = endurance(tmp_path / "out")
+    assert isinstance(changed, Endurance)
+    assert changed.others == {}, "the device of the folder is not what its file says"

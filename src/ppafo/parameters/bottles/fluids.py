@@ -8,7 +8,7 @@ from importlib import resources
 from ppafo.errors import ParameterError, nearest_name
 from ppafo.model.fluid_table import FluidTable
 
-_FOLDER = resources.files("ppafo.questions.endurance") / "fluid_tables"
+_FOLDER = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"
 
 

@@ -13,18 +13,20 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import NAME, make_schema, optional, read_model, table
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
+from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity
 from ppafo.model.fluid_table import densest_gas, fluid_pressure, has_liquid, liquid_density
 from ppafo.model.gas import SPECIES
 from ppafo.model.source import BottleWall, Regulator, bottle_content, pressure_reserve
+from ppafo.parameters.bottles.fluids import Fluid, load_fluid
+from ppafo.parameters.bottles.from_part import bottle_parts, scaled_entries
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.provenance import Entry, TextEntry
-from ppafo.questions.endurance.fluids import Fluid, load_fluid
 from ppafo.units import format_quantity, split_quantity, to_si
 
 PAPER_BOTTLE = "paper-co2-9oz"
 
-FILE = TomlKind("bottle", "bottle", resources.files("ppafo.questions.endurance") / "bottles", ParameterError)
+FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") / "files", ParameterError)
 _HALVINGS = 80
 
 BOTTLE = (
@@ -54,13 +56,39 @@ REGULATOR = (
         minimum_allowed=False,
     ),
 )
+BODY = (
+    Quantity("heat_capacity", "J/K", "heat capacity of the regulator's body", minimum=1e-3, maximum=1e6),
+    Quantity(
+        "effectiveness", "", "share of the way to the body's temperature that the gas warms", minimum=0.0, maximum=1.0
+    ),
+    Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the regulator", minimum=0.0, maximum=1e6),
+    Quantity(
+        "ice_capacity",
+        "kg",
+        "dry ice that closes the regulator's seat",
+        minimum=0.0,
+        maximum=1.0,
+        minimum_allowed=False,
+    ),
+)
+HOSE = (
+    Quantity("heat_capacity", "J/K", "heat capacity of the hose to the device", minimum=1e-3, maximum=1e6),
+    Quantity(
+        "effectiveness", "", "share of the way to the hose's temperature that the gas warms", minimum=0.0, maximum=1.0
+    ),
+    Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the hose", minimum=0.0, maximum=1e6),
+)
 ROOM = (Quantity("temperature", "K", "temperature of the room, and initially of bottle and gas"),)
 
 SECTIONS: dict[str, tuple[Quantity, ...]] = {
     "bottle": BOTTLE + FILL_BY_MASS + FILL_BY_PRESSURE,
-    "regulator": REGULATOR,
+    "regulator": REGULATOR + BODY,
+    "hose": HOSE,
     "room": ROOM,
 }
+_MAY_LACK = "hose"
+"""Section that a file may leave out."""
+
 PATHS: dict[str, Quantity] = {
     f"{section}.{item.name}": item for section, members in SECTIONS.items() for item in members
 }
@@ -69,6 +97,9 @@ NEEDED = tuple(
     for section, members in (("bottle", BOTTLE), ("regulator", REGULATOR), ("room", ROOM))
     for item in members
 )
+
+WARMING = (*(f"regulator.{item.name}" for item in BODY), *(f"hose.{item.name}" for item in HOSE))
+"""What warms the gas on its way; a file that says nothing of it has the values of the paper's bottle."""
 
 
 def _section(name: str) -> Any:
@@ -86,7 +117,12 @@ def bottle_file() -> type[BaseModel]:
         "notes": (str, ""),
         "gas": (TextEntry, Field(description="name of the fluid, which needs a property table")),
     }
-    fields |= {name: (_section(name), Field(description=f"section {name}")) for name in SECTIONS}
+    fields |= {
+        name: optional(_section(name), f"section {name}")
+        if name == _MAY_LACK
+        else (_section(name), Field(description=f"section {name}"))
+        for name in SECTIONS
+    }
     return table("BottleFile", fields)
 
 
@@ -111,7 +147,24 @@ class Bottle:
     wall: BottleWall
     regulator: Regulator
     room_temperature: float
+    body: Passage
+    ice_capacity: float
+    hose: Passage
     entries: Mapping[str, Entry]
+
+    @property
+    def supply(self) -> ColdSupply:
+        """The bottle with its regulator and hose as the model takes it."""
+        return ColdSupply(
+            volume=self.volume,
+            wall=self.wall,
+            regulator=self.regulator,
+            body=self.body,
+            ice_capacity=self.ice_capacity,
+            hose=self.hose,
+            room_temperature=self.room_temperature,
+            heat_capacity_ratio=self.heat_capacity_ratio,
+        )
 
 
 def list_bottles() -> tuple[str, ...]:
@@ -120,17 +173,32 @@ def list_bottles() -> tuple[str, ...]:
 
 
 def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bottle:
-    """Return a bottle by its name in the package or by the path of a TOML file, with values replaced.
+    """Return a bottle by its name, that of a part of the catalogue, or the path of a TOML file, with values replaced.
 
     ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
-    parsed, file = read_model(FILE, bottle_file(), name_or_path)
-    given = {section: getattr(parsed, section) for section in SECTIONS}
-    entries = {path: getattr(given[path.partition(".")[0]], path.partition(".")[2]) for path in PATHS}
-    found = {path: entry for path, entry in entries.items() if entry is not None}
+    part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
+    parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
+    found = _warming() | _given(parsed)
+    if part is not None:
+        parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})
+        found, file = scaled_entries(part, found), part.name
     for override in overrides:
         found = _override(found, override)
     return _build(parsed, found, file)
+
+
+def _given(parsed: Any) -> dict[str, Entry]:
+    given = {section: getattr(parsed, section) for section in SECTIONS}
+    entries = {path: getattr(given[path.partition(".")[0]], path.partition(".")[2], None) for path in PATHS}
+    return {path: entry for path, entry in entries.items() if entry is not None}
+
+
+@functools.cache
+def _warming() -> dict[str, Entry]:
+    """Return the values of regulator and hose of the paper's bottle."""
+    given = _given(read_model(FILE, bottle_file(), PAPER_BOTTLE)[0])
+    return {path: given[path] for path in WARMING}
 
 
 def _override(entries: Mapping[str, Entry], override: str) -> dict[str, Entry]:
@@ -175,6 +243,9 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
             seat_area=values["regulator.area"] * values["regulator.discharge_coefficient"],
         ),
         room_temperature=values["room.temperature"],
+        body=Passage(*(values[f"regulator.{name}"] for name in Passage._fields)),
+        ice_capacity=values["regulator.ice_capacity"],
+        hose=Passage(*(values[f"hose.{name}"] for name in Passage._fields)),
         entries=entries,
     )
     _check_content(bottle, file)

@@ -1,0 +1,258 @@
+"""Gas that comes cold out of a regulator: throttled at constant enthalpy, warmed by the regulator's body and the hose.
+
+A throttle keeps the enthalpy, and the vapour over liquid CO2 has less of it than the gas at room temperature has: it
+comes out cold, or partly as dry ice where the outlet lies below the pressure of the triple point. What it lacks it
+takes from the parts that it passes. A part has one temperature; gas that passes it takes up a fixed share, the
+effectiveness, of what would bring it to that temperature, since in turbulent flow the transfer grows nearly as the
+flow does (with its power 0.8, Dittus and Boelter). Dry ice stays in the seat and narrows it until gas with enough
+enthalpy takes it along.
+"""
+
+from bisect import bisect_right
+from typing import NamedTuple
+
+from ppafo.model.fluid_table import (
+    Column,
+    FluidTable,
+    densest_gas,
+    fluid_pressure,
+    gas_specific_energy,
+    has_liquid,
+)
+from ppafo.model.source import (
+    BottleContent,
+    BottleState,
+    BottleWall,
+    Regulator,
+    bottle_content,
+    bottle_rates,
+    content_energy,
+    content_temperature,
+    regulator_flow_limit,
+)
+
+DRY_ICE = 5.55e5
+"""Heat that turns dry ice into vapour at the triple point [J/kg]: 350 of evaporation (tables), 205 of melting (CRC)."""
+
+_HALVINGS = 60
+_FIRST_SECANT, _SAME_TEMPERATURE, _MAXIMUM_SECANTS = 1.0e-3, 1.0e-9, 12
+
+
+class Passage(NamedTuple):
+    """A part that the gas passes: heat capacity [J/K], effectiveness [-], heat per kelvin from the room [W/K]."""
+
+    heat_capacity: float
+    effectiveness: float
+    room_heat_transfer: float
+
+
+class Isobar(NamedTuple):
+    """Gas at one pressure [Pa]: enthalpies [J/kg] at temperatures [K], straight between; ``freezes`` 1 where ice forms.
+
+    The first node is where the gas begins to condense or to freeze, or where the table begins.
+    """
+
+    pressure: float
+    temperatures: Column
+    enthalpies: Column
+    freezes: float
+
+
+class ColdSupply(NamedTuple):
+    """A bottle with what stands behind it: volume [m^3], wall, regulator with the room for ice in its seat [kg], hose.
+
+    ``room_temperature`` [K]; ``heat_capacity_ratio`` [-] is that of the gas.
+    """
+
+    volume: float
+    wall: BottleWall
+    regulator: Regulator
+    body: Passage
+    ice_capacity: float
+    hose: Passage
+    room_temperature: float
+    heat_capacity_ratio: float
+
+
+class SupplyState(NamedTuple):
+    """What changes: the bottle as in ``BottleState``, temperatures of regulator and hose [K], dry ice in the seat [kg].
+
+    Totals since the start [J]: enthalpy that left the bottle, enthalpy delivered, heat from the room into all parts.
+    """
+
+    mass: float
+    energy: float
+    wall_temperature: float
+    body_temperature: float
+    hose_temperature: float
+    ice: float
+    outflow: float
+    delivered: float
+    room_heat: float
+
+
+class SupplyNow(NamedTuple):
+    """What a supply offers in a state: content of the bottle, highest pressure [Pa] and flow [kg/s] of its regulator.
+
+    ``outlet_temperature`` of the gas behind the regulator and ``gas_temperature`` behind the hose [K].
+    """
+
+    content: BottleContent
+    set_pressure: float
+    largest_flow: float
+    outlet_temperature: float
+    gas_temperature: float
+
+
+def isobar(table: FluidTable, pressure: float) -> Isobar:
+    """Enthalpies of a gas at a pressure [Pa], at the temperatures of its table from where it is dry gas."""
+    dry = [node for node in table.temperatures if fluid_pressure(table, node, densest_gas(table, node)) >= pressure]
+    enthalpies = tuple(gas_enthalpy(table, node, pressure) for node in dry)
+    lowest = table.temperatures[0]
+    freezes = has_liquid(table) and fluid_pressure(table, lowest, densest_gas(table, lowest)) > pressure
+    return Isobar(pressure=pressure, temperatures=tuple(dry), enthalpies=enthalpies, freezes=1.0 if freezes else 0.0)
+
+
+def gas_enthalpy(table: FluidTable, temperature: float, pressure: float) -> float:
+    """Specific enthalpy [J/kg] of gas at a temperature [K] and a pressure [Pa], by halving for its density."""
+    low, high = 0.0, densest_gas(table, temperature)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if fluid_pressure(table, temperature, middle) < pressure:
+            low = middle
+        else:
+            high = middle
+    return gas_specific_energy(table, temperature, high) + pressure / high
+
+
+def enthalpy_at(line: Isobar, temperature: float) -> float:
+    """Specific enthalpy [J/kg] on an isobar at a temperature [K]; its ends hold outside it."""
+    return _along(line.temperatures, line.enthalpies, temperature)
+
+
+def temperature_at(line: Isobar, enthalpy: float) -> float:
+    """Temperature [K] on an isobar at a specific enthalpy [J/kg]; below its first node the gas is wet and as cold."""
+    return _along(line.enthalpies, line.temperatures, enthalpy)
+
+
+def _along(nodes: Column, values: Column, at: float) -> float:
+    index = min(max(bisect_right(nodes, at) - 1, 0), len(nodes) - 2)
+    weight = min(max((at - nodes[index]) / (nodes[index + 1] - nodes[index]), 0.0), 1.0)
+    return (1.0 - weight) * values[index] + weight * values[index + 1]
+
+
+def enthalpy_behind(line: Isobar, passage: Passage, part_temperature: float, enthalpy: float) -> float:
+    """Specific enthalpy [J/kg] of gas behind a part at a temperature [K] that it reached with ``enthalpy`` [J/kg]."""
+    return enthalpy + passage.effectiveness * (enthalpy_at(line, part_temperature) - enthalpy)
+
+
+def heat_to_warm(table: FluidTable, content: BottleContent, temperature: float, pressure: float) -> float:
+    """Heat [J/kg] that brings what leaves a bottle to a temperature [K] at a pressure [Pa] behind the regulator."""
+    return gas_enthalpy(table, temperature, pressure) - content.outflow_enthalpy
+
+
+def open_share(supply: ColdSupply, ice: float) -> float:
+    """Share of the seat [-] that dry ice [kg] leaves open."""
+    return max(0.0, 1.0 - ice / supply.ice_capacity)
+
+
+def ice_rate(line: Isobar, enthalpy: float, flow: float, ice: float, step: float) -> float:
+    """Growth of the dry ice in the seat [kg/s] under a flow [kg/s] of an enthalpy [J/kg]; no more goes than is there.
+
+    What the gas lacks at the temperature where ice forms is taken from it as ice, and what it has beyond takes ice off.
+    """
+    if line.freezes < 0.5:
+        return 0.0
+    return max(flow * (line.enthalpies[0] - enthalpy) / DRY_ICE, -ice / step)
+
+
+def supply_now(table: FluidTable, line: Isobar, supply: ColdSupply, state: SupplyState, near: float) -> SupplyNow:
+    """What a supply offers in a state whose content is ``near`` a temperature [K]: pressure, flow and warmth."""
+    content = _content(table, supply, state, near)
+    regulator = supply.regulator
+    highest = min(regulator.set_pressure, max(content.pressure - regulator.pressure_margin, 0.0))
+    limit = regulator_flow_limit(
+        regulator._replace(set_pressure=highest),
+        content.pressure,
+        content.temperature,
+        supply.heat_capacity_ratio,
+        table.gas_constant,
+    )
+    outlet = enthalpy_behind(line, supply.body, state.body_temperature, content.outflow_enthalpy)
+    if line.freezes > 0.5:
+        outlet = max(outlet, line.enthalpies[0])
+    behind = enthalpy_behind(line, supply.hose, state.hose_temperature, outlet)
+    return SupplyNow(
+        content=content,
+        set_pressure=highest,
+        largest_flow=limit * open_share(supply, state.ice),
+        outlet_temperature=temperature_at(line, outlet),
+        gas_temperature=temperature_at(line, behind),
+    )
+
+
+def advance_supply(
+    table: FluidTable,
+    line: Isobar,
+    supply: ColdSupply,
+    state: SupplyState,
+    content: BottleContent,
+    mass: float,
+    step: float,
+) -> SupplyState:
+    """The state after a step [s] in which a mass [kg] left the bottle evenly, by Heun's rule, from its ``content``."""
+    flow = mass / step
+    first = supply_rates(line, supply, state, content, flow, step)
+    guess = SupplyState._make(value + step * rate for value, rate in zip(state, first, strict=True))
+    then = _content(table, supply, guess, content.temperature)
+    second = supply_rates(line, supply, guess, then, flow, step)
+    rates = zip(state, first, second, strict=True)
+    after = SupplyState._make(value + 0.5 * step * (one + other) for value, one, other in rates)
+    # The mass itself, so that what left the bottle is what came through the regulator, to the last digit.
+    return after._replace(mass=state.mass - mass)
+
+
+def supply_rates(
+    line: Isobar, supply: ColdSupply, state: SupplyState, content: BottleContent, flow: float, step: float
+) -> SupplyState:
+    """Time derivatives of a state under a flow [kg/s], as a state; ``step`` [s] is how long they are to hold."""
+    bottle = BottleState(state.mass, state.energy, state.wall_temperature)
+    now = bottle_rates(content, bottle, flow, supply.wall, supply.room_temperature)
+    arriving = enthalpy_behind(line, supply.body, state.body_temperature, content.outflow_enthalpy)
+    growth = ice_rate(line, arriving, flow, state.ice, step)
+    leaving = flow * arriving + growth * DRY_ICE
+    outlet = leaving / flow if flow > 0.0 else arriving
+    behind = enthalpy_behind(line, supply.hose, state.hose_temperature, outlet)
+    to_body = supply.body.room_heat_transfer * (supply.room_temperature - state.body_temperature)
+    to_hose = supply.hose.room_heat_transfer * (supply.room_temperature - state.hose_temperature)
+    return SupplyState(
+        mass=now.mass_rate,
+        energy=now.content_energy_rate,
+        wall_temperature=now.wall_temperature_rate,
+        body_temperature=(to_body - flow * (arriving - content.outflow_enthalpy)) / supply.body.heat_capacity,
+        hose_temperature=(to_hose - flow * (behind - outlet)) / supply.hose.heat_capacity,
+        ice=growth,
+        outflow=now.outflow_power,
+        delivered=flow * behind,
+        room_heat=now.room_heat + to_body + to_hose,
+    )
+
+
+def _content(table: FluidTable, supply: ColdSupply, state: SupplyState, near: float) -> BottleContent:
+    temperature = _temperature_near(table, state.mass, supply.volume, state.energy, near)
+    return bottle_content(table, state.mass, supply.volume, temperature)
+
+
+def _temperature_near(table: FluidTable, mass: float, volume: float, energy: float, near: float) -> float:
+    """Temperature [K] of a content as ``content_temperature``, by secants from one that is ``near``."""
+    before, after = near, near + _FIRST_SECANT
+    miss = content_energy(table, mass, volume, before) - energy
+    for _ in range(_MAXIMUM_SECANTS):
+        next_miss = content_energy(table, mass, volume, after) - energy
+        if next_miss == miss:
+            break
+        found = after - next_miss * (after - before) / (next_miss - miss)
+        if abs(found - after) <= _SAME_TEMPERATURE and table.temperatures[0] < found < table.temperatures[-1]:
+            return found
+        before, after, miss = after, found, next_miss
+    return content_temperature(table, mass, volume, energy)

@@ -1,0 +1,135 @@
+"""A walk on its bottle: what closes, an independent simulator, the coupling, what ends it, and what is refused."""
+
+import numpy as np
+import pytest
+
+from ppafo.errors import ParameterError, ScenarioError
+from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking.comparison import with_device_off
+from ppafo.walking.walk import WalkResult
+from tests.judge import bottle as independent
+
+WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
+SMALL = ["bottle.fill=0.15", "bottle.temperature=262 K"]
+
+
+@pytest.fixture(scope="module")
+def small() -> WalkResult:
+    return walk(WALK, 0.15, SMALL, bottle=BOTTLE)
+
+
+def test_mass_and_energy_close(small: WalkResult) -> None:
+    assert small.supply is not None
+    balance = small.supply.balance
+    assert balance.left_bottle == pytest.approx(balance.regulated, rel=1e-12)
+    assert balance.regulated > 4.0e-3
+    assert balance.given_up + balance.ice + balance.room == pytest.approx(balance.delivered, rel=1e-12)
+
+
+def test_what_leaves_the_bottle_is_in_the_lines_or_went_into_the_device(small: WalkResult) -> None:
+    recording, configuration = small.recording, small.configuration
+    lines = configuration.supply_lines
+    assert lines is not None
+    product = configuration.device.gas.specific_gas_constant * recording["gas_temperature"]
+    stored = (recording["line_pressure_1"] * lines.volume_1 + recording["line_pressure_2"] * lines.volume_2) / product
+    gone = recording["bottle_mass"][0] - recording["bottle_mass"]
+    # The gas temperature is drawn straight between two meetings, in which it stood still.
+    assert gone - recording["supplied_mass"] == pytest.approx(stored - stored[0], abs=2e-6)
+
+
+def test_an_independent_simulator_coupled_at_every_stage_says_the_same(
+    small: WalkResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("CoolProp.CoolProp", reason="needs the extra 'properties'")
+    monkeypatch.setattr(independent, "STEP", 2.5e-4)
+    gaps = independent.differences(small, independent.judge(small, 1.2))
+    assert gaps["regulated_mass"] < 1e-3 * 1.5e-3
+    assert max(gaps[f"{name}_temperature"] for name in ("bottle", "regulator", "hose", "gas")) < 0.12
+    assert max(gaps[f"{name}_rms"] for name in ("line_pressure_1", "pressure_1", "pressure_2")) < 200.0
+
+
+def test_a_tenfold_finer_coupling_changes_little(small: WalkResult) -> None:
+    fine = walk(WALK, 0.15, [*SMALL, "bottle.coupling=10 ms"], bottle=BOTTLE)
+    assert fine.metrics["total_gas"].value == pytest.approx(small.metrics["total_gas"].value, rel=5e-4)
+    for name in ("bottle_temperature", "regulator_temperature", "gas_temperature"):
+        assert fine.recording[name][-1] == pytest.approx(small.recording[name][-1], abs=0.05)
+
+
+def test_a_bottle_whose_gas_comes_warm_feeds_as_a_supply_without_end() -> None:
+    warm = [f"bottle.hose.{name}" for name in ("effectiveness=1", "heat_capacity=1e6 J/K")]
+    found = walk(WALK, 0.1, [*warm, "bottle.regulator.area=50 mm^2"], bottle=BOTTLE)
+    plain = walk(WALK, 0.1)
+    assert found.recording["gas_temperature"] == pytest.approx(298.0, abs=1e-3)
+    for name in ("gas", "push_off_work", "lowest_toes"):
+        assert found.metrics[name].value == pytest.approx(plain.metrics[name].value, rel=1e-4, abs=1e-5)
+
+
+def test_cold_gas_costs_torque_and_takes_more_gas() -> None:
+    cold, plain = walk(WALK, 0.15, ["bottle.temperature=270 K"], bottle=BOTTLE), walk(WALK, 0.15)
+    assert cold.metrics["gas"].value > 1.04 * plain.metrics["gas"].value
+    assert cold.averages["torque"].mean.max() < plain.averages["torque"].mean.max()
+
+
+ENDINGS = {
+    "iced": ["bottle.regulator.effectiveness=0.2"],
+    "empty": ["bottle.fill=0.02"],
+    "too cold": ["bottle.fill=0.3", "bottle.temperature=250 K", "bottle.regulator.pressure_margin=1300 kPa_d"],
+    "frozen": ["bottle.fill=0.1", "bottle.temperature=218 K", "bottle.regulator.pressure_margin=0 kPa_d"],
+    "too little flow": ["bottle.regulator.area=0.002 mm^2"],
+    "walk's end": [],
+}
+
+
+@pytest.mark.parametrize("kind", ENDINGS)
+def test_the_walk_ends_with_its_supply_and_says_why_and_when(kind: str) -> None:
+    found = walk(WALK, 0.2, ENDINGS[kind], bottle=BOTTLE)
+    assert found.supply is not None
+    ending, end = found.supply.ending, float(found.recording.time[-1])
+    assert ending.kind == kind
+    assert ending.time == pytest.approx(end, abs=2e-3)
+    assert (end < 11.9) == (kind != "walk's end")
+    assert f"{1e3 * found.recording['bottle_mass'][-1]:.3g} g " in ending.message
+    assert found.status.is_completed
+    reached = found.recording["line_pressure_1"][found.recording.time > end - 1.0].max() - 101325.0
+    if kind not in ("walk's end", "frozen"):
+        assert reached < 0.9 * 344.74e3 * 1.001, "less than 90 % of the torque in the last stride"
+
+
+def test_ice_narrows_the_seat_until_the_gas_lacks_no_more_than_it_is_given() -> None:
+    found = walk(WALK, 0.2, [*ENDINGS["iced"], "bottle.least_torque=0.01"], bottle=BOTTLE)
+    assert found.supply is not None
+    opened = found.supply.values["seat_open"]
+    assert opened[0] == 1.0
+    assert opened.min() < 0.05
+    assert np.diff(found.recording["regulated_mass"])[-500:].sum() < 0.1 * found.recording["regulated_mass"][-1]
+
+
+MISTAKES = {
+    "bottle.name=paper-co2-9": "did you mean 'paper-co2-9oz'",
+    "bottle.name=air-48ci-3000psi": "holds air, and the device is fed with CO2",
+    "bottle.fill=0": "must be more than 0",
+    "bottle.temperature=200 K": "must be above 216.592 K",
+    "bottle.temperature=303 K": "and 224.9 g fit into it at 303 K",
+    "bottle.regulator.area=0 mm^2": "must be more than 0",
+    "bottle.regulator.are=3 mm^2": "bottle.regulator.area",
+    "supply.relieving=true": "no gas goes back into a bottle",
+    "supply_line.plantarflexion.droop=3 Pa s/kg": "the bottle's regulator has its own",
+    "bottle.regulator.pressure_margin=8 MPa_d": "its regulator needs",
+}
+
+
+@pytest.mark.parametrize("override", MISTAKES)
+def test_a_mistake_is_named_in_one_line(override: str) -> None:
+    with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[override]) as caught:
+        load_walk(WALK, ["bottle.name=paper-co2-9oz", override])
+    assert "\n" not in str(caught.value)
+
+
+def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:
+    configuration = load_walk(WALK, bottle=BOTTLE)
+    with pytest.raises(ScenarioError, match="many wearers walk at a constant supply"):
+        walk_population(configuration, 0.1, 3)
+    changes = ["gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"]
+    with pytest.raises(ScenarioError, match=r"gas_model\.kind.*not with a bottle"):
+        load_walk(WALK, [*changes, "gas_model.wall_area_per_volume=100 1/m"], bottle=BOTTLE)
+    assert with_device_off(configuration).bottle is None
