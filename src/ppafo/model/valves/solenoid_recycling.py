@@ -31,7 +31,7 @@ class RecyclingState(NamedTuple):
 
     pair: PairState
     joined: float
-    holds: float
+    keeps_gas: float
     parting_time: float
     release_time: float
 
@@ -42,7 +42,7 @@ class RecyclingPositions(NamedTuple):
     position_a: float
     position_b: float
     joined: float
-    holds: float
+    keeps_gas: float
 
 
 def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> RecyclingState:
@@ -50,15 +50,15 @@ def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time
     pair = solenoid.settle_timed(valve.pair, state.pair, command, time)
     feeds_1, feeds_2 = pair.coil_a.position > 0.5, pair.coil_b.position > 0.5
     shuts = state.pair.coil_a.position > 0.5 and not feeds_1
-    lets_go = state.holds > 0.5 and not feeds_2
+    lets_go = state.keeps_gas > 0.5 and not feeds_2
     parting = time + valve.joining_time if shuts else state.parting_time
     release = parting + valve.holding_time if shuts else (time if lets_go else state.release_time)
     joins = parting > time + SAME_INSTANT and not feeds_1
-    holds = release > time + SAME_INSTANT and feeds_2 and not joins
+    keeps_gas = release > time + SAME_INSTANT and feeds_2 and not joins
     return RecyclingState(
         pair=pair,
         joined=1.0 if joins else 0.0,
-        holds=1.0 if holds else 0.0,
+        keeps_gas=1.0 if keeps_gas else 0.0,
         parting_time=parting,
         release_time=release,
     )
@@ -67,7 +67,7 @@ def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time
 def next_event(valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> float:
     """Time [s] at which a coil takes a waiting order, its flow changes, or joint or hold end; huge for never."""
     event = solenoid.next_timed_event(valve.pair, state.pair, command, time)
-    event = min(event, state.release_time) if state.holds > 0.5 else event
+    event = min(event, state.release_time) if state.keeps_gas > 0.5 else event
     return min(event, state.parting_time) if state.joined > 0.5 else event
 
 
@@ -77,7 +77,12 @@ def advance(
     """Positions [-] during one part [s] of a step, at whose beginning all that is due happens, and the state."""
     settled = settle(valve, state, command, time)
     pair = settled.pair
-    shown = RecyclingPositions(pair.coil_a.position, pair.coil_b.position, settled.joined, settled.holds)
+    shown = RecyclingPositions(
+        position_a=pair.coil_a.position,
+        position_b=pair.coil_b.position,
+        joined=settled.joined,
+        keeps_gas=settled.keeps_gas,
+    )
     return shown, settled
 
 
@@ -85,7 +90,7 @@ def connect(plant: PlantParameters, shown: RecyclingPositions) -> tuple[SinglePo
     """Ports of both chambers, shut while these are joined, that of chamber 2 while it keeps its gas. Equation (8)."""
     port_1, port_2 = solenoid.connect_positions(plant, PairPositions(shown.position_a, shown.position_b))
     share_1 = 1.0 - shown.joined
-    share_2 = share_1 * (1.0 - shown.holds)
+    share_2 = share_1 * (1.0 - shown.keeps_gas)
     return (
         SinglePort(
             conductance=share_1 * port_1.conductance,
@@ -111,7 +116,7 @@ def instant(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> 
     """Openings [-] at an instant."""
     pair = solenoid.instant_timed(valve.pair, state.pair, command)
     share_1 = 1.0 - state.joined
-    share_2 = share_1 * (1.0 - state.holds)
+    share_2 = share_1 * (1.0 - state.keeps_gas)
     return Openings(
         source_1=share_1 * pair.source_1,
         vent_1=share_1 * pair.vent_1,
@@ -128,7 +133,7 @@ def joined_at_instant(valve: RecyclingSolenoid, state: RecyclingState, command: 
 def rates(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> RecyclingState:
     """Rates [1/s]: none, nothing moves between two events."""
     still = Coil(position=0.0, target=0.0, accepted_time=0.0, change_time=0.0)
-    return RecyclingState(PairState(still, still), joined=0.0, holds=0.0, parting_time=0.0, release_time=0.0)
+    return RecyclingState(PairState(still, still), joined=0.0, keeps_gas=0.0, parting_time=0.0, release_time=0.0)
 
 
 def prepare(settings: Mapping[str, float]) -> RecyclingSolenoid:
@@ -138,7 +143,9 @@ def prepare(settings: Mapping[str, float]) -> RecyclingSolenoid:
 
 def parted_long_ago() -> RecyclingState:
     """Two coils that were switched off long ago, and chambers that are not joined."""
-    return RecyclingState(solenoid.both_off_long_ago(), joined=0.0, holds=0.0, parting_time=NEVER, release_time=NEVER)
+    return RecyclingState(
+        solenoid.both_off_long_ago(), joined=0.0, keeps_gas=0.0, parting_time=NEVER, release_time=NEVER
+    )
 
 
 MODEL = ValveModel(
