@@ -2,17 +2,17 @@
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.typesetting import format_printed_quantity, quantity
 from ppafo.identification.bench_figures import synthetic_figure_3
-from ppafo.questions.reproduce.claim import VERDICTS, count_sentence, count_words, verdict_counts
+from ppafo.questions.reproduce.claim import VERDICTS, Verdict, count_sentence, count_words, verdict_counts
 from ppafo.questions.reproduce.page import holding_torque, reproduction_page
-from ppafo.questions.reproduce.solve import Reproduction
+from ppafo.questions.reproduce.solve import Reproduction, Studies
 from ppafo.questions.reproduce.step_response import Levels
 from ppafo.questions.reproduce.step_response_figure import step_response_figure
-from ppafo.questions.reproduce.studies import ALL, SEED, Studies, Study
+from ppafo.questions.reproduce.studies import ALL, SEED, Study
 from ppafo.questions.reproduce.synthetic import NoEvidence
 from ppafo.questions.reproduce.torque_task_figure import torque_task_figure
 from ppafo.questions.unreported.figure import unreported_figure
@@ -42,42 +42,52 @@ def answer_of(solved: Reproduction | Studies) -> Answer:
 
 def _studies_answer(solved: Studies) -> Answer:
     """Return the table of studies; a contradicted claim of another publication is a result, no failure."""
-    seed = None if solved.reproduction is None else _paper_answer(solved.reproduction)
-    own = [] if solved.reproduction is None else list(solved.reproduction.claims)
-    rows = [] if seed is None else [(SEED, *row) for row in _paper_rows(solved.reproduction)]
-    rows += [
-        (study.publication.name, claim.claim.entry.id, claim.published, claim.ours, VERDICTS[claim.verdict])
-        for study in solved.studies
-        for claim in study.claims
-    ]
-    verdicts = [claim.verdict for claim in own]
-    verdicts += [claim.verdict for study in solved.studies for claim in study.claims]
+    rows, claims, verdicts = _paper_part(solved.reproduction)
+    for study in solved.studies:
+        name = study.publication.name
+        rows += [
+            (name, item.claim.entry.id, item.published, item.ours, VERDICTS[item.verdict]) for item in study.claims
+        ]
+        claims += [item.document(name) for item in study.claims]
+        verdicts += [item.verdict for item in study.claims]
     table = Table(tuple(map(Column, _STUDIES_HEAD)), tuple(rows), left=len(_STUDIES_HEAD))
-    seed_claims = [] if seed is None else [{"study": SEED, **claim} for claim in seed.data["claims"]]
-    names = [study.publication.name for study in solved.studies]
+    only = solved.studies[0].publication.name
+    is_all = solved.reproduction is not None
     return Answer(
         name="claims",
         kicker="Reproduction",
-        title="Published studies, run again" if seed else f"{names[0]}, run again",
+        title="Published studies, run again" if is_all else f"{only}, run again",
         lead=(),
         sections=(
             Section(table=table, remarks=("", count_words(verdicts))),
             Section("How to read it", (_RULE,), is_detail=True),
-            *(section for study in solved.studies for section in _study_sections(study)),
+            *(_study_section(study) for study in solved.studies),
         ),
         data={
-            "study": ALL if seed else names[0],
+            "study": ALL if is_all else only,
             "counts": {verdict: verdicts.count(verdict) for verdict in VERDICTS},
-            "claims": seed_claims
-            + [claim.document(study.publication.name) for study in solved.studies for claim in study.claims],
+            "claims": claims,
             "versions": {"ppafo": __version__},
         },
-        passed=seed is None or seed.passed,
+        passed=solved.reproduction is None or not solved.reproduction.missed,
         command="reproduce",
     )
 
 
-def _study_sections(study: Study) -> tuple[Section, ...]:
+def _paper_part(
+    reproduction: Reproduction | None,
+) -> tuple[list[tuple[str | None, ...]], list[dict[str, Any]], list[Verdict]]:
+    """Return rows, plain data and verdicts of the paper's own claims; none without them."""
+    if reproduction is None:
+        return [], [], []
+    return (
+        [(SEED, *row) for row in _paper_rows(reproduction)],
+        [{"study": SEED, **claim.document()} for claim in reproduction.claims],
+        [claim.verdict for claim in reproduction.claims],
+    )
+
+
+def _study_section(study: Study) -> Section:
     """Return what each claim of a publication says, where it stands, what it rests on, and why its verdict."""
     head = (Column("claim"), Column("statement and source"), Column("agrees"), Column("rests on"), Column("note"))
     rows = tuple(
@@ -91,7 +101,7 @@ def _study_sections(study: Study) -> tuple[Section, ...]:
         for item in study.claims
     )
     heading = f"{study.publication.name}: {study.publication.title}"
-    return (Section(heading, (study.publication.citation,), table=Table(head, rows, left=len(head)), is_detail=True),)
+    return Section(heading, (study.publication.citation,), table=Table(head, rows, left=len(head)), is_detail=True)
 
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:

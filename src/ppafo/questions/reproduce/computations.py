@@ -65,7 +65,8 @@ def _walked(name: str, chambers: ChamberVolumes, overrides: tuple[str, ...]) -> 
 
 
 def _nondisabled(name: str, values: Values) -> WalkResult:
-    return _walked(name, _chambers(values), (KEEPS_GAIT,))
+    held = (f"valve.holding_time={values['holding_time']!r} s",) if name == RECYCLING else ()
+    return _walked(name, _chambers(values), (KEEPS_GAIT, *held))
 
 
 def _healthy_peak_moment(configuration: Configuration) -> float:
@@ -121,6 +122,7 @@ def recycling_work(values: Values) -> float:
 
 
 _OF_PRESSURE, _OF_CHAMBERS = {"pressure": "Pa_a"}, {"chambers": CHAMBERS}
+_OF_RECYCLING = _OF_CHAMBERS | {"holding_time": "s"}
 
 COMPUTATIONS: dict[str, Computation] = {
     "held_torque": Computation("torque constant times gauge pressure", "N m", _OF_PRESSURE, held_torque),
@@ -140,13 +142,13 @@ COMPUTATIONS: dict[str, Computation] = {
     "recycling_saving": Computation(
         "gas of a stride saved by 'solenoid-recycling' against 'solenoid', nondisabled wearer",
         "1",
-        _OF_CHAMBERS,
+        _OF_RECYCLING,
         recycling_saving,
     ),
     "recycling_work": Computation(
         "net work of a stride with 'solenoid-recycling' over that with 'solenoid', nondisabled wearer",
         "1",
-        _OF_CHAMBERS,
+        _OF_RECYCLING,
         recycling_work,
     ),
 }

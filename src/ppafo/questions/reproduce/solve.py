@@ -15,7 +15,7 @@ from ppafo.questions.reproduce.claim import Claim, Observation
 from ppafo.questions.reproduce.measured import measured_claims
 from ppafo.questions.reproduce.printed import load_printed
 from ppafo.questions.reproduce.step_response import Levels, StepEvents, step_events, step_observations
-from ppafo.questions.reproduce.studies import ALL, SEED, Studies, check_study, run_studies
+from ppafo.questions.reproduce.studies import ALL, SEED, Study, check_study, run_studies
 from ppafo.questions.reproduce.synthetic import NoEvidence, SyntheticEvidence, synthetic_evidence
 from ppafo.questions.reproduce.torque_task import torque_task_claims, torque_task_observations
 from ppafo.questions.unreported.solve import Family, infer_settings
@@ -85,6 +85,14 @@ class Reproduction(Solved):
     def missed(self) -> tuple[Claim, ...]:
         """Claims whose number is outside the window that it has to meet."""
         return tuple(claim for claim in self.claims if claim.is_missed)
+
+
+@dataclass(frozen=True, slots=True)
+class Studies(Solved):
+    """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
+
+    studies: tuple[Study, ...]
+    reproduction: Reproduction | None = None
 
 
 @overload

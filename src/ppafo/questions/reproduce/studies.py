@@ -3,18 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ppafo.answers import Solved
 from ppafo.answers.typesetting import format_printed_quantity, quantity
 from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.progress import Progress, Report
 from ppafo.questions.reproduce.claim import Verdict
 from ppafo.questions.reproduce.publication import FILE, Publication, PublishedClaim, load_publication
-
-if TYPE_CHECKING:
-    from ppafo.questions.reproduce.solve import Reproduction
 
 SEED, ALL = "ppafo-2011", "all"
 """The study of the paper that this package is made from, and all studies one after the other."""
@@ -78,14 +74,6 @@ class Study:
 
     publication: Publication
     claims: tuple[JudgedClaim, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Studies(Solved):
-    """Some studies, and the reproduction of the paper where it is among them."""
-
-    studies: tuple[Study, ...]
-    reproduction: "Reproduction | None" = None
 
 
 def study_names() -> tuple[str, ...]:
