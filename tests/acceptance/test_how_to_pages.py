@@ -261,3 +261,14 @@ def test_the_valve_of_the_page_agrees_with_the_reference_solver() -> None:
     agreement = compare_with_reference(plan_run(scenario))
     assert agreement.angle < 2e-4
     assert agreement.worst_pressure < 1e-3
+
+
+def test_the_publication_of_the_page_is_judged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (text,) = blocks("repeat-a-published-study.md", "toml")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    assert main(["reproduce", "--study", "mine.toml"]) == 0
+    printed = [line.split()[1:] for line in capsys.readouterr().out.splitlines()[1:3]]
+    assert [(line[0], line[-1]) for line in printed] == [("torque_at_60_psig", "reproduced"), ("comfort", "testable")]

@@ -27,6 +27,7 @@ STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
 UNSAID_FIGURE = "unreported-settings"
 _HEAD = ("claim", "paper", "ours", "verdict")
+_PAPER = "'ppafo reproduce' without --study makes the page of these claims, with their sources, figures, assumptions and audit."
 _STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
 _RULE = (
     "'Ours' is computed anew whenever this is run. 'Reproduced' follows from printed numbers alone; 'with assumptions' "
@@ -61,6 +62,7 @@ def _studies_answer(solved: Studies) -> Answer:
         sections=(
             Section(table=table, remarks=("", count_words(verdicts))),
             Section("How to read it", (_RULE,), is_detail=True),
+            *((Section(f"{SEED}: the paper", (_PAPER,), is_detail=True),) if is_all else ()),
             *(_study_section(study) for study in solved.studies),
         ),
         data={
