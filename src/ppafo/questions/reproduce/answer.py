@@ -27,7 +27,7 @@ STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
 UNSAID_FIGURE = "unreported-settings"
 _HEAD = ("claim", "paper", "ours", "verdict")
-_PAPER = "'ppafo reproduce' without --study makes the page of these claims, with their sources, figures, assumptions and audit."
+_PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
 _STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
 _RULE = (
     "'Ours' is computed anew whenever this is run. 'Reproduced' follows from printed numbers alone; 'with assumptions' "
