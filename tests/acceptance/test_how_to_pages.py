@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib
+import json
 import re
 import shlex
 import sys
@@ -261,3 +262,27 @@ def test_the_valve_of_the_page_agrees_with_the_reference_solver() -> None:
     agreement = compare_with_reference(plan_run(scenario))
     assert agreement.angle < 2e-4
     assert agreement.worst_pressure < 1e-3
+
+
+def test_the_publication_of_the_page_is_judged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (text,) = blocks("repeat-a-published-study.md", "toml")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    assert main(["reproduce", "--study", "mine.toml"]) == 0
+    printed = [line.split()[1:] for line in capsys.readouterr().out.splitlines()[1:3]]
+    assert [(line[0], line[-1]) for line in printed] == [("torque_at_60_psig", "reproduced"), ("comfort", "testable")]
+
+
+def test_the_commands_on_published_studies_run_and_recycling_saves_what_the_page_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    commands = [line for block in blocks("repeat-a-published-study.md", "sh") for line in block.splitlines()]
+    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 4
+    recycling = json.loads((tmp_path / "out" / "recycling" / "walk.json").read_text())["volumes"]
+    found = {item["chambers"]: f"{1e3 * item['gas_per_stride']:.3f}" for item in recycling}
+    page = (PAGES / "repeat-a-published-study.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"takes (0\.\d+) g instead of 0\.628 .*, (0\.\d+) instead of 0\.664", page)
+    assert (found["ppafo2011"], found["ppafo2011-consistent"]) == shown

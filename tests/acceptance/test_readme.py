@@ -10,7 +10,7 @@ from ppafo.answers.text import text_of
 from ppafo.cli.catalog import COMMANDS
 from ppafo.cli.main import build_parser, main
 from ppafo.engine.reference.agreement import compare_with_reference
-from ppafo.questions.reproduce.solve import Reproduction, reproduce
+from ppafo.questions.reproduce.solve import Reproduction, Studies, reproduce
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 
@@ -49,9 +49,18 @@ def shown_claims() -> dict[str, list[str]]:
 
 
 @pytest.fixture(scope="module")
-def reproduction() -> Reproduction:
-    """One run of the paper's experiments, which the tests below only read."""
-    return reproduce(completions=1000)
+def studies() -> Studies:
+    """One run of every study, which the tests below only read."""
+    found = reproduce(completions=1000, study="all")
+    assert isinstance(found, Studies)
+    return found
+
+
+@pytest.fixture(scope="module")
+def reproduction(studies: Studies) -> Reproduction:
+    """The paper's experiments of that run."""
+    assert studies.reproduction is not None
+    return studies.reproduction
 
 
 @pytest.mark.parametrize("block", blocks("python"))
@@ -102,12 +111,18 @@ def test_the_make_targets_of_the_readme_exist() -> None:
     assert [target for target in targets if f"\n{target}:" not in makefile] == []
 
 
-def test_the_table_of_claims_is_that_of_a_run(reproduction: Reproduction) -> None:
-    printed = {
-        line.split()[0]: re.split(r" {2,}", line)[1:] for line in text_of(reproduction.answer()).splitlines()[1:-2]
-    }
-    testable = {name: cells for name, cells in printed.items() if cells[-1] != "not testable"}
+def test_the_table_of_claims_is_that_of_a_run(studies: Studies) -> None:
+    lines = [re.split(r" {2,}", line) for line in text_of(studies.answer()).splitlines()[1:-2]]
+    testable = {name: cells for study, name, *cells in lines if (study, cells[-1]) != ("ppafo-2011", "not testable")}
     assert shown_claims() == testable
+
+
+def test_the_page_on_studies_shows_what_a_study_prints(studies: Studies) -> None:
+    page = (ROOT / "docs" / "how-to" / "repeat-a-published-study.md").read_text(encoding="utf-8")
+    shown = [line.strip() for line in page.splitlines() if line.startswith("    jrrd-2011")]
+    printed = [line for line in text_of(studies.answer()).splitlines() if line.startswith("jrrd-2011")]
+    assert [line.split() for line in shown] == [line.split() for line in printed]
+    assert shown
 
 
 def test_every_claim_on_a_synthetic_measurement_is_named_in_the_text_below_the_table(

@@ -19,6 +19,7 @@ from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.design.file import read_design_file
 from ppafo.questions.endurance.draw import read_walk_gas
+from ppafo.questions.reproduce.publication import load_publication
 from ppafo.questions.size.file import read_sizing_file
 from ppafo.questions.sweep.results import load_study_results
 from ppafo.questions.tune.file import load_tuning
@@ -48,6 +49,7 @@ LOADERS: dict[str, Callable[[str], Any]] = {
     "gait": load_gait,
     "gait-map": load_map,
     "bottle": load_bottle,
+    "publication": load_publication,
 }
 
 DEEP = 600

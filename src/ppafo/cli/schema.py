@@ -22,6 +22,7 @@ FORMATS: dict[str, str] = {
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",
     "bottle": "ppafo.parameters.bottles.bottle",
+    "publication": "ppafo.questions.reproduce.publication",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 

@@ -9,7 +9,7 @@ that are through wait, masked, and no lane sees another.
 from ppafo.engine.lane_control import sense_end
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.lane_walk import lead_walk, mark_stride
-from ppafo.engine.scheme import motion, parts, pneumatics, supply_lines, thermal_gas, walking
+from ppafo.engine.scheme import joined_chambers, motion, parts, pneumatics, supply_lines, thermal_gas, walking
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -132,18 +132,25 @@ def begin(rows: LaneRows) -> list[str]:
     after = "next_valve" if rows.program.is_adaptive else "valve_state"
     return [
         f"shown, {after} = {add(valve.advance)}(valve, valve_state, command, time, length)",
-        connect(rows, "line_state"),
+        *connect(rows, "line_state"),
         *lead(rows),
         begin_gas(rows),
     ]
 
 
-def connect(rows: LaneRows, line_state: str) -> str:
-    """The ports of both chambers; where there are lines, at the pressures that they have in ``line_state``."""
-    source = "plant"
+def connect(rows: LaneRows, line_state: str) -> list[str]:
+    """The ports of both chambers; where there are lines, at the pressures that they have in ``line_state``.
+
+    A valve that joins the chambers makes the leak between them as wide as it stands open.
+    """
+    source, valve = "plant", rows.program.valve
     if rows.program.has_lines:
         source = f"{rows.add(supply_lines.plant_at_line_pressures)}(plant, lines, {line_state})"
-    return f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"
+    lines = [f"port_1, port_2 = {rows.add(valve.connect)}({source}, shown)"]
+    if valve.joint is not None:
+        opening = f"{rows.add(valve.joint.opening)}(shown)"
+        lines.append(f"plant = {rows.add(joined_chambers.plant_with_joined_chambers)}(plant, {opening})")
+    return lines
 
 
 def lead(rows: LaneRows) -> list[str]:
@@ -199,7 +206,7 @@ def feed(rows: LaneRows) -> list[str]:
         change = f"{add(whole)}(plant, {still}, second, length)"
         error = f"{add(pneumatics.gas_error)}(plant, {still}, second, {next_angle}, length)"
         shifted = f"{add(pneumatics.opening_error)}(plant, {still}, shift, {next_angle}, length)"
-    lines = [*rows.load_first_stage(), connect(rows, "gas.lines.after")]
+    lines = [*rows.load_first_stage(), *connect(rows, "gas.lines.after")]
     lines += [f"second = {second}", f"change = {change}", *feed_lines(rows)]
     if not program.is_adaptive:
         return lines

@@ -188,6 +188,7 @@ def test_the_truth_names_the_preset_with_overrides_and_the_device() -> None:
         ({"overrides": ["rig.line.area=0 m^2"]}, "must be above 0 with a line"),
         ({"overrides": ["friction.statik_torque=1 N m"]}, "did you mean"),
         ({"valve": "solenoyd"}, "did you mean 'solenoid'"),
+        ({"valve": "solenoid_recycling"}, "has no valve between the chambers"),
     ],
 )
 def test_bad_input_is_one_line_with_the_nearest_name(words: dict[str, object], message: str) -> None:

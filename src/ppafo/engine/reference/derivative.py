@@ -154,6 +154,44 @@ def thermal_gas_rates(
     )
 
 
+def joined_gas_rates(
+    gas: GasRates, valve_orifice: ExactOrifice, opening: float, pressure_1: float, pressure_2: float
+) -> GasRates:
+    """Mass flows [kg/s] with a valve beside the leak that joins the chambers. Equations (6), (7), (9)."""
+    across = exact_flow(pressure_1, pressure_2, opening, valve_orifice)
+    return GasRates(
+        mass_1=gas.mass_1 - across,
+        mass_2=gas.mass_2 + across,
+        supplied=gas.supplied,
+        vented=gas.vented,
+        leaked=gas.leaked + abs(across),
+    )
+
+
+def joined_thermal_rates(
+    gas: ThermalGasRates,
+    thermal: ThermalParameters,
+    valve_orifice: ExactOrifice,
+    opening: float,
+    pressure_1: float,
+    pressure_2: float,
+    warmth_1: float,
+    warmth_2: float,
+) -> ThermalGasRates:
+    """As ``joined_gas_rates`` [kg/s], of gas with an energy balance; warmths are T/T_0 [-]."""
+    flow = exact_flow(pressure_1, pressure_2, opening, valve_orifice)
+    across = transport(thermal, pressure_1, pressure_2, warmth_1, warmth_2, flow)
+    return ThermalGasRates(
+        content_1=gas.content_1 - across.content,
+        content_2=gas.content_2 + across.content,
+        mass_1=gas.mass_1 - across.mass,
+        mass_2=gas.mass_2 + across.mass,
+        supplied=gas.supplied,
+        vented=gas.vented,
+        leaked=gas.leaked + abs(across.mass),
+    )
+
+
 def free_motion(
     plant: PlantParameters, angle: float, angular_velocity: float, pressure_1: float, pressure_2: float, way: float
 ) -> tuple[float, float]:

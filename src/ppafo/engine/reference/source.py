@@ -3,7 +3,14 @@
 from collections.abc import Callable
 
 from ppafo.engine.program import NoParameters, Program
-from ppafo.engine.reference.derivative import ExactOrifice, free_motion, gas_rates, thermal_gas_rates
+from ppafo.engine.reference.derivative import (
+    ExactOrifice,
+    free_motion,
+    gas_rates,
+    joined_gas_rates,
+    joined_thermal_rates,
+    thermal_gas_rates,
+)
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector
 from ppafo.model.plant import PlantParameters, ThermalParameters, chamber_pressures
@@ -97,16 +104,24 @@ def right_hand_side_source(program: Program) -> str:
 
 def gas_lines(program: Program, add: Callable[..., str]) -> list[str]:
     """Lines that find the rates ``gas`` and write the slopes of what is in the chambers."""
-    orifices = "valve_orifice, leak_orifice, openings"
+    orifices, joint = "valve_orifice, leak_orifice, openings", program.valve.joint
+    joined = [] if joint is None else [f"joined = {add(joint.instant)}(valve, valve_state, command)"]
     if not program.is_thermal:
+        if joint is not None:
+            joined.append(f"gas = {add(joined_gas_rates)}(gas, valve_orifice, joined, pressure_1, pressure_2)")
         return [
             f"gas = {add(gas_rates)}(plant, {orifices}, pressure_1, pressure_2)",
+            *joined,
             "slopes[2] = gas.mass_1",
             "slopes[3] = gas.mass_2",
         ]
     given = "(y[2], y[3]), (y[7], y[8]), angle, rate"
+    if joint is not None:
+        across = "valve_orifice, joined, pressure_1, pressure_2, y[2] / y[7], y[3] / y[8]"
+        joined.append(f"gas = {add(joined_thermal_rates)}(gas, thermal, {across})")
     return [
         f"gas = {add(thermal_gas_rates)}(plant, thermal, {orifices}, {given})",
+        *joined,
         "slopes[2] = gas.content_1",
         "slopes[3] = gas.content_2",
         "slopes[7] = gas.mass_1",

@@ -8,6 +8,18 @@ from ppafo.model.declaration import Quantity
 
 
 @dataclass(frozen=True, slots=True)
+class Joint:
+    """A path of a valve from one chamber to the other: its opening over the valve's full area, 0 to 1, twice.
+
+    ``opening(shown)`` is that during a step, of what the valve shows the plant; ``instant(parameters, state, command)``
+    that at an instant, for the reference solver.
+    """
+
+    opening: Callable[[Any], float]
+    instant: Callable[..., float]
+
+
+@dataclass(frozen=True, slots=True)
 class ValveModel:
     """Compiled side of a valve.
 
@@ -20,7 +32,7 @@ class ValveModel:
     the step is then done in parts between those changes. ``shift(state, next_state)`` is the relative
     change of the opening of a valve that moves inside a step, None for one that stands still between two changes.
     ``command_delay(settings)`` is the dead time [s] before a
-    command reaches the valve.
+    command reaches the valve. ``joint`` is the path of a valve that also joins the chambers with each other.
 
     The reference solver sees the same valve in continuous time: ``instant(parameters, state, command)`` returns the
     openings at an instant, ``rates(parameters, state, command)`` the time derivatives of the state,
@@ -43,6 +55,7 @@ class ValveModel:
     rates: Callable[..., Any]
     next_event: Callable[..., float]
     settle: Callable[..., Any]
+    joint: Joint | None = None
 
 
 @dataclass(frozen=True, slots=True)

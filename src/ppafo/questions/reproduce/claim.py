@@ -96,6 +96,10 @@ def verdict_counts(claims: Sequence[Claim]) -> dict[Verdict, int]:
 
 def count_sentence(claims: Sequence[Claim]) -> str:
     """Return how many claims have each verdict, for example ``18 claims: 3 reproduced, 4 contradicted``."""
-    counts = verdict_counts(claims)
-    found = ", ".join(f"{count} {VERDICTS[verdict]}" for verdict, count in counts.items() if count)
-    return f"{len(claims)} claims: {found}"
+    return count_words([claim.verdict for claim in claims])
+
+
+def count_words(verdicts: Sequence[Verdict]) -> str:
+    """Return the same of verdicts alone."""
+    found = ", ".join(f"{count} {words}" for key, words in VERDICTS.items() if (count := verdicts.count(key)))
+    return f"{len(verdicts)} claims: {found}"

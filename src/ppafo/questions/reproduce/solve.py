@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, overload
 
 from ppafo.answers import Solved
 from ppafo.errors import SimulationError
@@ -15,6 +15,7 @@ from ppafo.questions.reproduce.claim import Claim, Observation
 from ppafo.questions.reproduce.measured import measured_claims
 from ppafo.questions.reproduce.printed import load_printed
 from ppafo.questions.reproduce.step_response import Levels, StepEvents, step_events, step_observations
+from ppafo.questions.reproduce.studies import ALL, SEED, Study, check_study, run_studies
 from ppafo.questions.reproduce.synthetic import NoEvidence, SyntheticEvidence, synthetic_evidence
 from ppafo.questions.reproduce.torque_task import torque_task_claims, torque_task_observations
 from ppafo.questions.unreported.solve import Family, infer_settings
@@ -86,17 +87,56 @@ class Reproduction(Solved):
         return tuple(claim for claim in self.claims if claim.is_missed)
 
 
+@dataclass(frozen=True, slots=True)
+class Studies(Solved):
+    """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
+
+    studies: tuple[Study, ...]
+    reproduction: Reproduction | None = None
+
+
+@overload
 def reproduce(
-    overrides: Sequence[str] = (), progress: Report | None = None, completions: int | None = None
-) -> Reproduction:
-    """Run the paper's experiments with the shipped scenarios and judge every claim.
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+    completions: int | None = None,
+    study: Literal["ppafo-2011"] = "ppafo-2011",
+) -> Reproduction: ...
+
+
+@overload
+def reproduce(
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+    completions: int | None = None,
+    study: str = SEED,
+) -> Reproduction | Studies: ...
+
+
+def reproduce(
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+    completions: int | None = None,
+    study: str = SEED,
+) -> Reproduction | Studies:
+    """Run the paper's experiments with the shipped scenarios and judge every claim, or those of other publications.
 
     ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
     have it, a path of the device all of them. The virtual rig stands in for the paper's measurements, where it can.
     ``progress`` hears what is being done; ``completions`` of the torque task (default COMPLETIONS) are weighed by
-    what the paper reports, none where values are changed. SimulationError where a run diverges.
+    what the paper reports, none where values are changed. ``study`` is a publication, by name or by its file, or
+    ``all``. SimulationError where a run diverges, ScenarioError for a study that is none.
     """
     report = progress or report_nothing
+    check_study(study, overrides)
+    if study == SEED:
+        return _reproduce_paper(overrides, report, completions)
+    seed = _reproduce_paper((), report, completions) if study == ALL else None
+    return Studies(run_studies(study, report), seed)
+
+
+def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int | None) -> Reproduction:
+    """Return what came of the paper's own experiments."""
     scenarios = _scenarios(overrides)
     runs = {name: _run(scenario, report) for name, scenario in scenarios.items()}
     step, solenoid, proportional = (runs[name] for name in EXPERIMENTS)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.run import Run
+from ppafo.errors import ScenarioError
 from ppafo.model.plant import chamber_volumes
 from ppafo.model.thermal import gas_energy, real_density
 from ppafo.parameters import load_device
@@ -70,10 +71,15 @@ def record_vane_leak(request: Request) -> Outcome:
 
 
 def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
-    """Return the run of a scenario on the rig of a request, recorded ``rate`` times a second [Hz]."""
+    """Return the run of a scenario on the rig of a request, recorded ``rate`` times a second [Hz].
+
+    ScenarioError for a valve that the rig does not have.
+    """
     preset, seed = request.preset, request.seed
     device = real_device(scenario.device, preset)
     run = plan_run(replace(scenario, device=device))
+    if run.program.valve.joint is not None:
+        raise ScenarioError(f"the virtual rig has no valve between the chambers: valve '{device.valve.kind}' has one")
     run = replace(run, plant=rig_plant(run.plant, preset))
     physics = rig_physics(device, preset)
     times = np.arange(int(scenario.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate

@@ -1,0 +1,185 @@
+"""Pair of solenoid valves with a third one between the chambers: the gas of plantarflexion powers dorsiflexion.
+
+When the flow of valve A (chamber 1) leaves the source, the third valve opens for the joining time and both of the pair
+are shut off: gas goes from chamber 1 to chamber 2 until their pressures meet, and the vane, whose chambers then share
+one pressure, is free. When the chambers part, chamber 1 vents, and chamber 2, if valve B is energised, keeps what it
+has got for the holding time, or until valve B lets it go; then valve B tops it up. The third valve has the area of the
+others. Without a joining time it is the pair of ``solenoid``.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.plant import Openings, PlantParameters
+from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
+from ppafo.model.valves import solenoid
+from ppafo.model.valves.kind import Joint, ValveKind, ValveModel
+from ppafo.model.valves.solenoid import NEVER, SAME_INSTANT, Coil, PairPositions, PairState, TimedSolenoid
+
+
+class RecyclingSolenoid(NamedTuple):
+    """The pair, how long the chambers stay joined, and how long chamber 2 then keeps its gas [s]."""
+
+    pair: TimedSolenoid
+    joining_time: float
+    holding_time: float
+
+
+class RecyclingState(NamedTuple):
+    """Both coils, 1 while the chambers are joined, 1 while chamber 2 keeps its gas, and when either ends [s]."""
+
+    pair: PairState
+    joined: float
+    keeps_gas: float
+    parting_time: float
+    release_time: float
+
+
+class RecyclingPositions(NamedTuple):
+    """1 where a valve joins its chamber to the source, 0 where to the atmosphere; joint and hold as in the state."""
+
+    position_a: float
+    position_b: float
+    joined: float
+    keeps_gas: float
+
+
+def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> RecyclingState:
+    """Coils and joint after the changes and orders that are due at ``time`` [s]."""
+    pair = solenoid.settle_timed(valve.pair, state.pair, command, time)
+    feeds_1, feeds_2 = pair.coil_a.position > 0.5, pair.coil_b.position > 0.5
+    shuts = state.pair.coil_a.position > 0.5 and not feeds_1
+    lets_go = state.keeps_gas > 0.5 and not feeds_2
+    parting = time + valve.joining_time if shuts else state.parting_time
+    release = parting + valve.holding_time if shuts else (time if lets_go else state.release_time)
+    joins = parting > time + SAME_INSTANT and not feeds_1
+    keeps_gas = release > time + SAME_INSTANT and feeds_2 and not joins
+    return RecyclingState(
+        pair=pair,
+        joined=1.0 if joins else 0.0,
+        keeps_gas=1.0 if keeps_gas else 0.0,
+        parting_time=parting,
+        release_time=release,
+    )
+
+
+def next_event(valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float) -> float:
+    """Time [s] at which a coil takes a waiting order, its flow changes, or joint or hold end; huge for never."""
+    event = solenoid.next_timed_event(valve.pair, state.pair, command, time)
+    event = min(event, state.release_time) if state.keeps_gas > 0.5 else event
+    return min(event, state.parting_time) if state.joined > 0.5 else event
+
+
+def advance(
+    valve: RecyclingSolenoid, state: RecyclingState, command: float, time: float, step: float
+) -> tuple[RecyclingPositions, RecyclingState]:
+    """Positions [-] during one part [s] of a step, at whose beginning all that is due happens, and the state."""
+    settled = settle(valve, state, command, time)
+    pair = settled.pair
+    shown = RecyclingPositions(
+        position_a=pair.coil_a.position,
+        position_b=pair.coil_b.position,
+        joined=settled.joined,
+        keeps_gas=settled.keeps_gas,
+    )
+    return shown, settled
+
+
+def connect(plant: PlantParameters, shown: RecyclingPositions) -> tuple[SinglePort, SinglePort]:
+    """Ports of both chambers, shut while these are joined, that of chamber 2 while it keeps its gas. Equation (8)."""
+    port_1, port_2 = solenoid.connect_positions(plant, PairPositions(shown.position_a, shown.position_b))
+    share_1 = 1.0 - shown.joined
+    share_2 = share_1 * (1.0 - shown.keeps_gas)
+    return (
+        SinglePort(
+            conductance=share_1 * port_1.conductance,
+            node_pressure=port_1.node_pressure,
+            source_fraction=port_1.source_fraction,
+            takes_back=port_1.takes_back,
+        ),
+        SinglePort(
+            conductance=share_2 * port_2.conductance,
+            node_pressure=port_2.node_pressure,
+            source_fraction=port_2.source_fraction,
+            takes_back=port_2.takes_back,
+        ),
+    )
+
+
+def joined_opening(shown: RecyclingPositions) -> float:
+    """Opening [-] between the chambers during a step."""
+    return shown.joined
+
+
+def instant(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> Openings:
+    """Openings [-] at an instant."""
+    pair = solenoid.instant_timed(valve.pair, state.pair, command)
+    share_1 = 1.0 - state.joined
+    share_2 = share_1 * (1.0 - state.keeps_gas)
+    return Openings(
+        source_1=share_1 * pair.source_1,
+        vent_1=share_1 * pair.vent_1,
+        source_2=share_2 * pair.source_2,
+        vent_2=share_2 * pair.vent_2,
+    )
+
+
+def joined_at_instant(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> float:
+    """Opening [-] between the chambers at an instant."""
+    return state.joined
+
+
+def rates(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> RecyclingState:
+    """Rates [1/s]: none, nothing moves between two events."""
+    still = Coil(position=0.0, target=0.0, accepted_time=0.0, change_time=0.0)
+    return RecyclingState(PairState(still, still), joined=0.0, keeps_gas=0.0, parting_time=0.0, release_time=0.0)
+
+
+def prepare(settings: Mapping[str, float]) -> RecyclingSolenoid:
+    """Parameters [s] from ``settings`` [SI]."""
+    return RecyclingSolenoid(solenoid.prepare_timed(settings), settings["joining_time"], settings["holding_time"])
+
+
+def parted_long_ago() -> RecyclingState:
+    """Two coils that were switched off long ago, and chambers that are not joined."""
+    return RecyclingState(
+        solenoid.both_off_long_ago(), joined=0.0, keeps_gas=0.0, parting_time=NEVER, release_time=NEVER
+    )
+
+
+MODEL = ValveModel(
+    parameters=RecyclingSolenoid,
+    state=RecyclingState,
+    prepare=prepare,
+    initial=parted_long_ago,
+    advance=advance,
+    connect=connect,
+    port_flow=single_port_flow,
+    port_flow_slopes=single_port_flow_slopes,
+    jumps=True,
+    shift=None,
+    command_delay=solenoid.no_dead_time,
+    instant=instant,
+    rates=rates,
+    next_event=next_event,
+    settle=settle,
+    joint=Joint(joined_opening, joined_at_instant),
+)
+
+
+def choose(settings: Mapping[str, float]) -> ValveModel:
+    """The one model there is."""
+    return MODEL
+
+
+KIND = ValveKind(
+    name="solenoid_recycling",
+    summary="Two on/off valves and a third between the chambers, which opens for a time when chamber 1 was fed.",
+    quantities=(
+        *solenoid.KIND.quantities,
+        Quantity("joining_time", "s", "time for which the chambers stay joined after plantarflexion", 0.06, 0.0, 1.0),
+        Quantity("holding_time", "s", "time for which chamber 2 then keeps its gas, without the source", 0.0, 0.0, 1.0),
+    ),
+    choose=choose,
+)
