@@ -13,10 +13,7 @@ from ppafo.simulation.declaration import PLAIN
 from ppafo.simulation.reading import WRITTEN_UNITS
 from ppafo.units import from_si
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.recorded import SAFE_ROW, VENTINGS_ROW
-
-FINDING_ROW = "controller_state.safety.finding"
-"""Where event-based controllers keep the last sign that vented the chambers, and the readings then."""
+from ppafo.walking.recorded import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 
 _WORDS = {LIFTS: "lifts the foot but does not push from", PAUSED: "paused at", STOPPED: "stopped for good at"}
 _RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}

@@ -43,13 +43,6 @@ class Stance(NamedTuple):
     apart: float
 
 
-class SlowPressures(NamedTuple):
-    """Chamber pressures filtered with ``FALL_TIME`` [Pa]: above a reading that falls."""
-
-    pressure_1: float
-    pressure_2: float
-
-
 class Finding(NamedTuple):
     """The last sign that vented the chambers, and the readings then: forces [N], angle [rad], pressures [Pa]."""
 
@@ -65,7 +58,7 @@ class SafetyState(NamedTuple):
     """Level of ``signs``; good strides in a row; how often help got less, and the last; what the signs remember.
 
     ``toe_strides`` are strides in a row on the toes alone, and ``steady`` is 1 where the last stride took about the
-    stride time.
+    stride time. ``slow_pressure_1`` [Pa] is above a reading that falls.
     """
 
     level: float
@@ -77,7 +70,7 @@ class SafetyState(NamedTuple):
     toe_strides: float
     steady: float
     valve_times: ValveTimes
-    slow_pressures: SlowPressures
+    slow_pressure_1: float
 
 
 START = SafetyState(
@@ -90,7 +83,7 @@ START = SafetyState(
     toe_strides=0.0,
     steady=0.0,
     valve_times=ValveTimes(0.0, 0.0, 0.0),
-    slow_pressures=SlowPressures(0.0, 0.0),
+    slow_pressure_1=0.0,
 )
 
 LIFT_STRIDES = 1.0
@@ -103,10 +96,10 @@ STEADY = 0.1
 """A stride that is longer or shorter than the stride time by less than this fraction of it is a usual one."""
 
 FALL_TIME = 0.03
-"""Time constant [s] of the pressures that tell whether a reading falls."""
+"""Time constant [s] of the slow pressure of chamber 1, which tells whether its reading falls."""
 
 FALLS = 0.03
-"""A reading falls that is below its slow pressure by more than this fraction: a venting chamber at 140 kPa by 0.1."""
+"""A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.1."""
 
 MINIMUM_OPENING = 0.1
 """Commands below this may lie within the overlap of a valve: they do not count as opening it."""
@@ -151,13 +144,9 @@ def steady_sign(rules: SafetyRules, before: PhaseState, phase: PhaseState, angle
     return signs.NOT_FLAT if flat & (phase.toe.loaded < 0.5) else found
 
 
-def next_slow_pressures(last: SlowPressures, measurement: GaitMeasurement, period: float) -> SlowPressures:
-    """Slow pressures [Pa] after a sample, taken every ``period`` [s]."""
-    fraction = period / (period + FALL_TIME)
-    return SlowPressures(
-        last.pressure_1 + (measurement.pressure_1 - last.pressure_1) * fraction,
-        last.pressure_2 + (measurement.pressure_2 - last.pressure_2) * fraction,
-    )
+def next_slow_pressure(last: float, pressure: float, period: float) -> float:
+    """Slow pressure [Pa] after a sample, taken every ``period`` [s]."""
+    return last + (pressure - last) * period / (period + FALL_TIME)
 
 
 def holds_pressure(rules: SafetyRules, pressure: float, slow: float) -> bool:
@@ -168,21 +157,21 @@ def holds_pressure(rules: SafetyRules, pressure: float, slow: float) -> bool:
 def valve_sign(
     rules: SafetyRules,
     valve_times: ValveTimes,
-    slow_pressures: SlowPressures,
+    slow_pressure_1: float,
     phase: PhaseState,
     measurement: GaitMeasurement,
 ) -> float:
     """The sign of a pressure that is not what the valve was told long enough.
 
-    A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat. A full
-    chamber vents for longer than ``vent_time`` through a narrow valve while the ankle compresses it, but it does vent.
+    A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat. There
+    the ankle compresses chamber 1, which may vent for longer than ``vent_time`` through a narrow valve, but does vent.
+    Chamber 2 grows then: a pressure that is still seen in it comes late.
     """
     no_rise_1 = (valve_times.filling_1 > rules.fill_time) & (measurement.pressure_1 < rules.filled_pressure)
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
-    left = holds_pressure(rules, measurement.pressure_1, slow_pressures.pressure_1) | holds_pressure(
-        rules, measurement.pressure_2, slow_pressures.pressure_2
-    )
+    left = holds_pressure(rules, measurement.pressure_1, slow_pressure_1)
+    left = left | (measurement.pressure_2 > rules.filled_pressure)
     no_fall = stands & (valve_times.venting > rules.vent_time) & left
     found = signs.NO_FALL if no_fall else NO_SIGN
     return signs.NO_RISE if no_rise_1 | no_rise_2 else found
@@ -233,14 +222,14 @@ def monitor(
     toe_strides = (state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
     steady = (1.0 if usual else 0.0) if enters else state.steady
-    slow_pressures = next_slow_pressures(state.slow_pressures, measurement, period)
+    slow_pressure_1 = next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period)
     sign = signs.TOE_STRIDES if toe_strides > rules.most_toe_strides else NO_SIGN
     sign = first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if steady > 0.5 else sign
     sign = first_sign(gait_sign(rules, before, phase, stance), sign)
     sign = first_sign(readings.still_sign(rules, seen, before, phase), sign)
     sign = first_sign(readings.gone_sign(rules, state.readings, measurement, period), sign)
     sign = first_sign(readings.range_sign(rules, measurement), sign)
-    sign = first_sign(valve_sign(rules, state.valve_times, slow_pressures, phase, measurement), sign)
+    sign = first_sign(valve_sign(rules, state.valve_times, slow_pressure_1, phase, measurement), sign)
     good_strides = next_good_strides(state, before, phase, sign)
     level = max(level_after(rules, state, good_strides, stance.together), signs.level_of(sign))
     vents = level > state.level
@@ -254,7 +243,7 @@ def monitor(
         toe_strides=toe_strides,
         steady=steady,
         valve_times=state.valve_times,
-        slow_pressures=slow_pressures,
+        slow_pressure_1=slow_pressure_1,
     )
 
 
@@ -301,5 +290,5 @@ def safe_command(state: SafetyState, phase: float, command: float, period: float
         toe_strides=state.toe_strides,
         steady=state.steady,
         valve_times=valve_times,
-        slow_pressures=state.slow_pressures,
+        slow_pressure_1=state.slow_pressure_1,
     )
