@@ -130,7 +130,8 @@ def assess(
     rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
     torque = requested_torque(parameters.assistance, phase, measurement.angle, rate)
     # A foot that comes down on its toes turns far, and what is left in the chamber would then push on a loaded heel.
-    bends = phase.phase == phases.MID_STANCE and phase.since_strike < EASING_TIME and measurement.torque > EASED
+    on_toes = phase.phase == phases.MID_STANCE and phase.in_phase >= phase.since_strike
+    bends = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
     works = phases.lifts(phase.phase) or phase.phase == phases.PUSH_OFF or bends
     return Assessment(
         phase=phase,
