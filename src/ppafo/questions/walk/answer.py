@@ -67,7 +67,7 @@ _MEAN = (
     "has almost none."
 )
 _OVER_TIME = (
-    "Gas, toes and phases over the whole walk. The strip shows where the controller helps, pauses and has stopped; a "
+    "Gas, toes and phases over the whole walk. The strip shows where the controller helps, lifts the foot only, pauses and has stopped; a "
     "dashed line is where a sensor fails."
 )
 _LIMITS = (
