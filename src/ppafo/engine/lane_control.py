@@ -2,12 +2,20 @@
 
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.scheme.parts import SAME_INSTANT
-from ppafo.model.gait_sensors import GaitMeasurement, measure_gait
+from ppafo.model.gait_sensors import GaitMeasurement, late_measurement, measure_gait, samples_late
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, follow_signals, measure
 from ppafo.model.vane import actuator_torque
 
 SIGNALS = ("angle", "pressure_1", "pressure_2")
+READINGS = {
+    "heel": "heel_force",
+    "toe": "toe_force",
+    "angle": "angle",
+    "pressure_1": "pressure_1",
+    "pressure_2": "pressure_2",
+}
+"""Sensors of a walk, as their faults are named, and what they read."""
 
 
 def control_loop(rows: LaneRows) -> list[str]:
@@ -85,7 +93,19 @@ def sense_gait(rows: LaneRows) -> list[str]:
         "pressure_2, walk.heel_force, walk.toe_force, plant.torque_constant, step_index * timing.step, "
         "sample_index)",
         *rows.store("gait_seen"),
+        *(late_readings(rows) if rows.program.late_readings else []),
     ]
+
+
+def late_readings(rows: LaneRows) -> list[str]:
+    """Lines that keep the readings of a walk, and hand the controller those of a sensor as late as its fault says."""
+    lines = ["slots = signal_history.shape[1]"]
+    for row, (sensor, reading) in enumerate(READINGS.items()):
+        age = f"{rows.add(samples_late)}(gait_sensors.{sensor}_fault, step_index * timing.step, sample_index)"
+        lines.append(f"signal_history[{row}, sample_index % slots, lane] = seen.{reading}")
+        lines.append(f"late_{reading} = signal_history[{row}, (sample_index - {age}) % slots, lane]")
+    given = ", ".join(f"late_{reading}" for reading in READINGS.values())
+    return [*lines, f"seen = {rows.add(late_measurement)}({given}, plant.torque_constant)"]
 
 
 def signals_before_start(rows: LaneRows) -> list[str]:

@@ -31,6 +31,10 @@ VECTOR = 8
 """Lanes that the widest processors take at once; a block is a whole number of these."""
 
 
+SIGNAL_ROWS = 5
+"""Readings that may come late: angle and pressures, and in a walk two forces."""
+
+
 @dataclass(frozen=True, slots=True)
 class Clock:
     """Numbers that all runs of a batch share; delays are in steps, ``record_every`` 0 records nothing.
@@ -191,7 +195,7 @@ class LaneBlock:
         self._record = np.empty((records, states.shape[0], self._width))
         traces = (clock.samples - 1) // clock.trace_every + 1 if clock.trace_every else 0
         self._trace = np.empty((traces, traced, self.states.shape[1]))
-        self._signals = np.zeros((3, clock.signal_delay + 2, self.states.shape[1]))
+        self._signals = np.zeros((SIGNAL_ROWS, clock.signal_delay + 2, self.states.shape[1]))
         self._commands = np.zeros((clock.command_delay + 2, self.states.shape[1]))
 
     def advance(self, step_count: int) -> None:
@@ -225,7 +229,7 @@ class LaneBlock:
 
     def late_signals(self, step: int) -> Floats:
         """Angle [rad] and pressures [Pa] (3, runs) that late sensors show at ``step``, the next one, but the first."""
-        return self._signals[:, (step - self._clock.signal_delay) % self._signals.shape[1]]
+        return self._signals[:3, (step - self._clock.signal_delay) % self._signals.shape[1]]
 
     def result(self) -> BatchResult:
         """States and record so far."""

@@ -60,9 +60,10 @@ class Program:
 
     ``angle`` None leaves the vane free, otherwise that profile prescribes it. ``controller`` None leaves the command
     to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
-    ``slow_sensors`` True a bandwidth and ``late_signals`` True a delay. ``late_commands`` True adds a dead time before
-    the valve. ``is_thermal`` True gives the gas an energy balance instead of a constant temperature. ``walks`` True
-    puts the device on a walking leg, whose foot is free or where the ground and a gait lead it (``angle`` is None then;
+    ``slow_sensors`` True a bandwidth and ``late_signals`` True a delay. ``late_readings`` True lets sensors of a walk
+    be whole samples late. ``late_commands`` True adds a dead time before the valve. ``is_thermal`` True gives the gas
+    an energy balance instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose foot is
+    free or where the ground and a gait lead it (``angle`` is None then;
     its sensors are its own); ``takes_course`` True lets that leg stand, start, change its speed and stop instead of
     walking stride after equal stride. ``has_lines`` True feeds the device from lines behind regulators instead of
     constant pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded
@@ -77,6 +78,7 @@ class Program:
     ideal_sensors: bool
     late_commands: bool
     late_signals: bool = False
+    late_readings: bool = False
     is_thermal: bool = False
     walks: bool = False
     takes_course: bool = False

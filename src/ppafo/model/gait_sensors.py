@@ -24,8 +24,8 @@ class Fault(NamedTuple):
 
     With ``distorts`` 1 it shows gain times what is there, plus an offset and a drift [1/s] in its own unit, with a
     fraction of the other sensor of its kind (``crosstalk``), a first-order lag (``memory``, what is left of its last
-    value after a sample) and a fraction of its samples lost. With a ``period`` [s] above 0 it is so in the first half
-    of each period only.
+    value after a sample) and a fraction of its samples lost, ``delay`` whole samples late. With a ``period`` [s] above
+    0 it is so in the first half of each period only.
     """
 
     time: float
@@ -39,6 +39,7 @@ class Fault(NamedTuple):
     memory: float = 0.0
     lost_fraction: float = 0.0
     period: float = 0.0
+    delay: float = 0.0
 
 
 class GaitSensors(NamedTuple):
@@ -199,13 +200,28 @@ def measure_gait(
     return measurement_of(remembered, torque_constant), remembered
 
 
+def samples_late(fault: Fault, time: float, sample: int) -> int:
+    """How many samples ago a reading was made that arrives at ``time`` [s], the time of ``sample``."""
+    late = int(fault.delay) if is_active(fault, time) else 0
+    return min(late, sample)
+
+
+def late_measurement(
+    heel_force: float, toe_force: float, angle: float, pressure_1: float, pressure_2: float, torque_constant: float
+) -> GaitMeasurement:
+    """What a controller gets of readings that arrive late: forces [N], angle [rad], pressures [Pa]."""
+    return GaitMeasurement(
+        angle=angle,
+        pressure_1=pressure_1,
+        pressure_2=pressure_2,
+        torque=torque_constant * (pressure_1 - pressure_2),
+        heel_force=heel_force,
+        toe_force=toe_force,
+    )
+
+
 def measurement_of(shown: GaitSeen, torque_constant: float) -> GaitMeasurement:
     """What a controller gets of what the sensors show; its torque is that of the readings, true or not."""
-    return GaitMeasurement(
-        angle=shown.angle,
-        pressure_1=shown.pressure_1,
-        pressure_2=shown.pressure_2,
-        torque=torque_constant * (shown.pressure_1 - shown.pressure_2),
-        heel_force=shown.heel_force,
-        toe_force=shown.toe_force,
+    return late_measurement(
+        shown.heel_force, shown.toe_force, shown.angle, shown.pressure_1, shown.pressure_2, torque_constant
     )

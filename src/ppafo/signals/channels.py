@@ -45,7 +45,9 @@ CHANNELS: dict[str, ChannelKind] = {
         PLAIN_NUMBER, "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off", is_held=True
     ),
     "safe_state": ChannelKind(
-        PLAIN_NUMBER, "0 while the controller helps, 1 in a pause, 2 once it has stopped for good", is_held=True
+        PLAIN_NUMBER,
+        "0 while the controller helps, 1 lifts the foot only, 2 pauses, 3 has stopped for good",
+        is_held=True,
     ),
     "heel_force": ChannelKind("N", "force under the heel as its sensor follows it"),
     "toe_force": ChannelKind("N", "force under the toes as its sensor follows it"),

@@ -51,6 +51,7 @@ def _distortions(unit: str) -> tuple[Quantity, ...]:
         Quantity("crosstalk", "1", "fraction of the other sensor's reading in it; 1 on both swaps them", 0.0, 0.0, 1.0),
         Quantity("lag", "s", "time constant with which it follows", 0.0, 0.0, 100.0),
         Quantity("lost_share", "1", "fraction of its samples that are lost", 0.0, 0.0, 1.0),
+        Quantity("delay", "s", "by how much it is late, to the nearest whole sample", 0.0, 0.0, 1.0),
     )
 
 

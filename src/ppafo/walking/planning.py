@@ -12,7 +12,7 @@ from ppafo.gait import Gait
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.contact import FLAT, HEEL
 from ppafo.model.gait import gait_at
-from ppafo.model.gait_sensors import GaitSensors
+from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle
 from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
 from ppafo.model.regulator import SupplyLines
@@ -79,6 +79,7 @@ def plan_walk(plan: WalkPlan) -> Run:
         has_ideal_sensors=plan.has_ideal_sensors,
         thermal=plan.thermal,
         supply_lines=plan.supply_lines,
+        signal_delay=longest_delay(plan.gait_sensors) * plan.period,
     )
     return compose_run(
         pieces,
@@ -87,6 +88,11 @@ def plan_walk(plan: WalkPlan) -> Run:
         lambda plant: vented_state(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
         walk,
     )
+
+
+def longest_delay(sensors: GaitSensors) -> float:
+    """Most samples by which a fault makes a sensor late."""
+    return max(value.delay for value in sensors if isinstance(value, Fault))
 
 
 def walk_steps(plan: WalkPlan, plant: PlantParameters) -> Steps:

@@ -1,12 +1,13 @@
 """Many wearers at once: one column of the engine repeated, rows overwritten, no loop over people."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.control.walking.signs import STOPPED
+from ppafo.control.walking.signs import SIGNS, STOPPED
 from ppafo.engine.lane_rows import LANES
 from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.engine.rows import row_numbers
@@ -16,7 +17,7 @@ from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_planning import turns_walked
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.recorded import SAFE_ROW, VENTINGS_ROW
+from ppafo.walking.recorded import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.walk import REMEDY, Progress, plan_of, silent, walk_duration
 from ppafo.walking.wearers_rows import batch_of_many, course_of_many
@@ -57,7 +58,8 @@ class Population:
     """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
 
     ``diverged`` counts the wearers whose walk left what is possible; they are not in ``outcomes`` nor in ``traits``.
-    ``vented`` counts those whose controller stopped for good, ``paused`` the others whose controller paused.
+    ``vented`` counts those whose controller stopped for good, ``paused`` the others who had less help for a while.
+    ``signs`` counts both by the last sign that was seen, with the most frequent first.
     """
 
     configuration: Configuration
@@ -68,6 +70,7 @@ class Population:
     diverged: int
     vented: int
     paused: int
+    signs: Mapping[str, int]
 
     @property
     def count(self) -> int:
@@ -123,16 +126,17 @@ def walk_population(
         "stance_share": gaits.timing["toe_off"],
     }
     kept = [{name: values[good] for name, values in table.items()} for table in (traits, outcomes)]
-    vented, paused = _vented_and_paused(rows, good)
-    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], int((~good).sum()), vented, paused)
+    vented, paused, found = _less_help(rows, good)
+    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], int((~good).sum()), vented, paused, found)
 
 
-def _vented_and_paused(rows: Mapping[str, Floats], good: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return how many of the good walks ended stopped, and how many of the others had a pause."""
+def _less_help(rows: Mapping[str, Floats], good: NDArray[np.bool_]) -> tuple[int, int, dict[str, int]]:
+    """Return how many of the good walks ended stopped, how many others had less help, and the last signs of both."""
     if SAFE_ROW not in rows:
-        return 0, 0
-    stopped = rows[SAFE_ROW][good] == STOPPED
-    return int(stopped.sum()), int((~stopped & (rows[VENTINGS_ROW][good] > 0.0)).sum())
+        return 0, 0, {}
+    stopped, less = rows[SAFE_ROW][good] == STOPPED, rows[VENTINGS_ROW][good] > 0.0
+    last = Counter(SIGNS[sign].name for sign in rows[f"{FINDING_ROW}.sign"][good][less].tolist())
+    return int(stopped.sum()), int((~stopped & less).sum()), dict(last.most_common())
 
 
 def _run_in_groups(batch: Batch, progress: Progress) -> Floats:

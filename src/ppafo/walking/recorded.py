@@ -24,7 +24,10 @@ SAFE_ROW = "controller_state.safety.level"
 """Where event-based controllers keep the phase that they see, and whether they help, pause or have stopped."""
 
 VENTINGS_ROW = "controller_state.safety.ventings"
-"""And how often they have paused or stopped."""
+"""And how often they gave less help: lifted only, paused or stopped."""
+
+FINDING_ROW = "controller_state.safety.finding"
+"""And the last sign by which they did, with the readings then."""
 
 REQUEST_ROW = "controller_state.request.torque"
 """Where those that follow a torque keep the one they want."""

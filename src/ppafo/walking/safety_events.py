@@ -7,19 +7,17 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.walking.signs import HELPS, PAUSED, SIGNS, STOPPED, Sign
+from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, SIGNS, STOPPED, Sign
 from ppafo.engine.lanes import Floats
 from ppafo.simulation.declaration import PLAIN
 from ppafo.simulation.reading import WRITTEN_UNITS
 from ppafo.units import from_si
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.recorded import SAFE_ROW, VENTINGS_ROW
+from ppafo.walking.recorded import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 
-FINDING_ROW = "controller_state.safety.finding"
-"""Where event-based controllers keep the last sign that vented the chambers, and the readings then."""
-
-_WORDS = {HELPS: "help came back", PAUSED: "paused", STOPPED: "stopped for good"}
-_NAMES = {HELPS: "help", PAUSED: "pause", STOPPED: "stop"}
+_WORDS = {LIFTS: "lifts the foot but does not push from", PAUSED: "paused at", STOPPED: "stopped for good at"}
+_RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}
+_NAMES = {HELPS: "help", LIFTS: "lift", PAUSED: "pause", STOPPED: "stop"}
 _UNITS = {"heel_force": "N", "toe_force": "N", "angle": "rad", "pressure_1": "Pa_a", "pressure_2": "Pa_a"}
 SHOWN = 5
 """Events that are listed one by one; of more the first ones are, and all are in the file."""
@@ -27,7 +25,7 @@ SHOWN = 5
 
 @dataclass(frozen=True, slots=True)
 class SafetyEvent:
-    """A pause, a stop or the return of help at a time [s] of the recording.
+    """Less help, a pause, a stop or a return of help at a time [s] of the recording.
 
     ``readings`` are what the sensors showed then and ``settings`` what they were compared with, by name, in SI units;
     empty where help came back. ``units`` are those of the settings.
@@ -43,9 +41,9 @@ class SafetyEvent:
     @property
     def message(self) -> str:
         """The event in one line."""
-        head = f"{_WORDS[self.level]} at {self.time:.2f} s"
         if self.sign is None:
-            return head
+            return f"{_RETURNS[self.level]} at {self.time:.2f} s"
+        head = f"{_WORDS[self.level]} {self.time:.2f} s"
         shown = [f"{_word(name)} {_text(value, _UNITS[name])}" for name, value in self.readings.items()]
         limits = [f"{name} {_text(value, self.units[name])}" for name, value in self.settings.items()]
         return f"{head}: {self.sign.summary}; {'; '.join(', '.join(part) for part in (shown, limits) if part)}"
@@ -73,7 +71,7 @@ def safety_events(configuration: Configuration, time: Floats, record: Mapping[st
     return tuple(
         _venting(configuration, float(time[place]), float(level[place]), record, place)
         if vents[place] and level[place] > HELPS
-        else SafetyEvent(float(time[place]), HELPS)
+        else SafetyEvent(float(time[place]), float(level[place]))
         for place in places
     )
 

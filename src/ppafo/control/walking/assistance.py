@@ -8,7 +8,8 @@ from typing import NamedTuple, Protocol
 
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.safety import SafetyRules, SafetyState
+from ppafo.control.walking.safety import SafetyState
+from ppafo.control.walking.signs import SafetyRules
 from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
@@ -86,6 +87,12 @@ class AssistingState(Protocol):
 
 START = TorqueRequest(0.0, 0.0, 0.0)
 
+EASING_TIME = 0.1
+"""Time [s] after a landing on the toes in which a torque in plantarflexion is taken off by the law; it vents after."""
+
+EASED = 0.3
+"""Torque in plantarflexion [N m] above which it is."""
+
 LARGEST_PRESS = 0.7
 """Largest torque in plantarflexion [N m] that is requested in the swing."""
 
@@ -122,13 +129,16 @@ def assess(
     turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
     rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
     torque = requested_torque(parameters.assistance, phase, measurement.angle, rate)
-    works = phases.lifts(phase.phase) or phase.phase == phases.PUSH_OFF
+    # A foot that comes down on its toes turns far, and what is left in the chamber would then push on a loaded heel.
+    on_toes = phase.phase == phases.MID_STANCE and phase.in_phase >= phase.since_strike
+    bends = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
+    works = phases.lifts(phase.phase) or phase.phase == phases.PUSH_OFF or bends
     return Assessment(
         phase=phase,
         safety=watch,
         request=TorqueRequest(measurement.angle, rate, torque),
         continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
-        acts=1.0 if works and watch.level < 0.5 else 0.0,
+        acts=1.0 if works and safety.permits(watch, phase.phase) else 0.0,
     )
 
 
@@ -147,4 +157,5 @@ def valve_command(assessment: Assessment, command: float, period: float) -> tupl
 
     ``period`` [s] is the time until the next command.
     """
-    return safety.safe_command(assessment.safety, command if assessment.acts > 0.5 else VENT, period)
+    sent = command if assessment.acts > 0.5 else VENT
+    return safety.safe_command(assessment.safety, assessment.phase.phase, sent, period)

@@ -13,7 +13,8 @@ from ppafo.control.walking.assistance import Assistance, TorqueRequest
 from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
 from ppafo.control.walking.learnt_table import LearningRules, LearntTable
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.safety import SafetyRules, SafetyState
+from ppafo.control.walking.safety import SafetyState
+from ppafo.control.walking.signs import SafetyRules
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
 

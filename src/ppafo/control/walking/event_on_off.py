@@ -11,7 +11,8 @@ from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.declaration import PHASE_QUANTITIES, SAFETY_QUANTITIES
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.safety import SafetyRules, SafetyState
+from ppafo.control.walking.safety import SafetyState
+from ppafo.control.walking.signs import SafetyRules
 from ppafo.model.command import VENT
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
@@ -55,7 +56,7 @@ def update(
     command = command if held else VENT
     in_time = phase.since_strike < parameters.push_off_end * phase.stride_time
     command = 1.0 if phase.phase == phases.PUSH_OFF and in_time else command
-    command, watch = safety.safe_command(watch, command, period)
+    command, watch = safety.safe_command(watch, phase.phase, command, period)
     return command, EventOnOffState(phase, watch, lifting if held else 0.0)
 
 

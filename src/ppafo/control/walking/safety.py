@@ -1,49 +1,26 @@
-"""When a controller of walking vents both chambers: until the wearer walks well again, or for good.
+"""When a controller of walking helps less: it lifts the foot only, vents until the wearer walks well, or for good.
 
-Only a fault gives readings that no foot and no chamber gives (out of range), readings that contradict the valve (a
-chamber that was filled and shows no pressure, or was vented and shows one that does not fall), and a sensor that stays
-the same while the others show a step (frozen): these stop. Standing, stairs and stumbles too give readings that
-contradict the gait (a stance or a swing without end, a foot that stands flat on one sensor) or stay the same: these
-pause, and help comes back after some good strides. A pressure at rest may stay the same for long, most of all in the
-steps of a converter, so a frozen pressure is found by the valve: no single reading is right for a filled chamber and
-for a vented one.
+Only a fault gives readings that no foot and no chamber gives (out of range, gone at once), readings that contradict the
+valve (a chamber that was filled and shows no pressure, or was vented and shows one that does not fall), and a sensor
+that stays the same while the others show a step (frozen): these stop. Sitting, stumbles and rocking too give readings
+that contradict the gait: these pause. Who stands is not helped, but needs no pause. A foot whose heel is missed may be
+on a stair, or have a dead sensor: it is held up in the swing, which the toes tell, and not pushed. A pressure at rest
+may stay the same for long, most of all in the steps of a converter, so a frozen pressure is found by the valve: no
+single reading is right for a filled chamber and for a vented one.
+
+Help comes back step by step: after one good stride the foot is held up, after ``resume_strides`` it is pushed too.
 
 Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
 """
 
 from typing import NamedTuple
 
-from ppafo.control.walking import signs
-from ppafo.control.walking.phases import LANDING, MID_STANCE, SWING, PhaseState
-from ppafo.control.walking.signs import HELPS, NO_SIGN, PAUSED
+from ppafo.control.walking import readings, signs
+from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState
+from ppafo.control.walking.readings import HALF, NOTHING_READ, LastReadings
+from ppafo.control.walking.signs import HELPS, LIFTS, NO_SIGN, PAUSED, STOPPED, SafetyRules
 from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.gait_sensors import GaitMeasurement
-
-
-class SafetyRules(NamedTuple):
-    """What readings can be, and how long a contradiction may last; ``declaration.SAFETY_QUANTITIES`` says it of each.
-
-    Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``, ``shortest_swing``)
-    or [s], strides, and absolute pressures [Pa]. ``fill_time`` is that of a valve fully open; half open it takes twice
-    as long.
-    """
-
-    lowest_force: float
-    largest_force: float
-    lowest_angle: float
-    highest_angle: float
-    longest_phase: float
-    frozen_time: float
-    most_toe_strides: float
-    flat_from: float
-    flat_to: float
-    lowest_pressure: float
-    highest_pressure: float
-    filled_pressure: float
-    fill_time: float
-    vent_time: float
-    shortest_swing: float
-    resume_strides: float
 
 
 class ValveTimes(NamedTuple):
@@ -54,22 +31,16 @@ class ValveTimes(NamedTuple):
     venting: float
 
 
-class LastReadings(NamedTuple):
-    """Last readings of heel, toe [N] and angle [rad], and how long each has not changed [s]."""
+class Stance(NamedTuple):
+    """Whether heel and toes were loaded (1) since the strike, how long [s] both have been, and only one on the ground.
 
-    heel_force: float
-    toe_force: float
-    angle: float
-    heel_unchanged: float
-    toe_unchanged: float
-    angle_unchanged: float
+    Both times end where the other one begins; the second one ends in the swing too.
+    """
 
-
-class SlowPressures(NamedTuple):
-    """Chamber pressures filtered with ``FALL_TIME`` [Pa]: above a reading that falls."""
-
-    pressure_1: float
-    pressure_2: float
+    heel_seen: float
+    toe_seen: float
+    together: float
+    apart: float
 
 
 class Finding(NamedTuple):
@@ -84,10 +55,10 @@ class Finding(NamedTuple):
 
 
 class SafetyState(NamedTuple):
-    """Level of ``signs``; good strides in a row; pauses and stops so far, and the last; what the signs remember.
+    """Level of ``signs``; good strides in a row; how often help got less, and the last; what the signs remember.
 
-    ``toe_strides`` are strides in a row that began on the toes, and ``steady`` is 1 where the last stride took about
-    the stride time.
+    ``toe_strides`` are strides in a row on the toes alone, and ``steady`` is 1 where the last stride took about the
+    stride time. ``slow_pressure_1`` [Pa] is above a reading that falls.
     """
 
     level: float
@@ -95,10 +66,11 @@ class SafetyState(NamedTuple):
     ventings: float
     finding: Finding
     readings: LastReadings
+    stance: Stance
     toe_strides: float
     steady: float
     valve_times: ValveTimes
-    slow_pressures: SlowPressures
+    slow_pressure_1: float
 
 
 START = SafetyState(
@@ -106,105 +78,75 @@ START = SafetyState(
     good_strides=0.0,
     ventings=0.0,
     finding=Finding(sign=NO_SIGN, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0),
-    readings=LastReadings(
-        heel_force=0.0, toe_force=0.0, angle=0.0, heel_unchanged=0.0, toe_unchanged=0.0, angle_unchanged=0.0
-    ),
+    readings=NOTHING_READ,
+    stance=Stance(0.0, 0.0, 0.0, 0.0),
     toe_strides=0.0,
     steady=0.0,
     valve_times=ValveTimes(0.0, 0.0, 0.0),
-    slow_pressures=SlowPressures(0.0, 0.0),
+    slow_pressure_1=0.0,
 )
+
+LIFT_STRIDES = 1.0
+"""Good strides in a row after which a paused device holds the foot up again."""
+
+STANDS_UP = 0.5
+"""Who sat, and then has heel and toes on the ground for so long [s], is helped again."""
 
 STEADY = 0.1
 """A stride that is longer or shorter than the stride time by less than this fraction of it is a usual one."""
 
-HALF = 0.5
-"""A stride of less than this fraction of the stride time, or of more than its inverse, is not a good one."""
-
 FALL_TIME = 0.03
-"""Time constant [s] of the pressures that tell whether a reading falls."""
+"""Time constant [s] of the slow pressure of chamber 1, which tells whether its reading falls."""
 
 FALLS = 0.03
-"""A reading falls that is below its slow pressure by more than this fraction: a venting chamber at 140 kPa by 0.1."""
+"""A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.1."""
 
 MINIMUM_OPENING = 0.1
 """Commands below this may lie within the overlap of a valve: they do not count as opening it."""
 
 
-def time_unchanged(last: float, reading: float, since: float, period: float) -> float:
-    """How long a reading has been the same to the last bit [s]."""
-    return since + period if reading == last else 0.0
-
-
-def next_readings(last: LastReadings, measurement: GaitMeasurement, period: float) -> LastReadings:
-    """The last readings after a sample, taken every ``period`` [s]."""
-    return LastReadings(
-        heel_force=measurement.heel_force,
-        toe_force=measurement.toe_force,
-        angle=measurement.angle,
-        heel_unchanged=time_unchanged(last.heel_force, measurement.heel_force, last.heel_unchanged, period),
-        toe_unchanged=time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, period),
-        angle_unchanged=time_unchanged(last.angle, measurement.angle, last.angle_unchanged, period),
+def next_stance(last: Stance, before: PhaseState, phase: PhaseState, period: float) -> Stance:
+    """The stance after a sample of ``period`` [s]; a strike begins a new one."""
+    heel, toe = phase.heel.loaded, phase.toe.loaded
+    strikes = (before.phase == SWING) & (phase.phase != SWING)
+    both = min(heel, toe) > 0.5
+    one = (phase.phase != SWING) & (min(heel, toe) < 0.5)
+    return Stance(
+        heel_seen=heel if strikes else max(last.heel_seen, heel),
+        toe_seen=toe if strikes else max(last.toe_seen, toe),
+        together=last.together + period if both else 0.0,
+        apart=last.apart + period if one else 0.0,
     )
 
 
-def range_sign(rules: SafetyRules, measurement: GaitMeasurement) -> float:
-    """The sign of a reading that no foot and no chamber gives."""
-    force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
-    force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
-    angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
-    low, high = min(measurement.pressure_1, measurement.pressure_2), max(measurement.pressure_1, measurement.pressure_2)
-    pressure = (low < rules.lowest_pressure) | (high > rules.highest_pressure)
-    found = signs.PRESSURE_RANGE if pressure else NO_SIGN
-    found = signs.ANGLE_RANGE if angle else found
-    return signs.FORCE_RANGE if force else found
-
-
-def still_sign(rules: SafetyRules, readings: LastReadings, before: PhaseState, phase: PhaseState) -> float:
-    """The sign of a reading that does not change; a fault only where another sensor shows a step meanwhile.
-
-    An unloaded force sensor shows the same for long, and so does the angle of a foot that is held in the swing. Forces
-    and angle of a wearer who stands may stay the same in the steps of a converter, but not while the foot is lifted.
-    """
-    heel = (readings.heel_unchanged > rules.frozen_time) & (phase.heel.loaded > 0.5)
-    toe = (readings.toe_unchanged > rules.frozen_time) & (phase.toe.loaded > 0.5)
-    angle = (readings.angle_unchanged > rules.frozen_time) & (phase.phase != SWING)
-    whole = (before.phase == SWING) & (phase.phase != SWING) & (before.since_strike > HALF * phase.stride_time)
-    found = signs.STILL_ANGLE if angle else NO_SIGN
-    found = signs.STILL_TOE if toe else found
-    found = signs.STILL_HEEL if heel else found
-    found = signs.FROZEN_ANGLE if angle & whole & (readings.angle_unchanged > before.since_strike) else found
-    found = signs.FROZEN_TOE if toe & (phase.heel.loaded != before.heel.loaded) else found
-    return signs.FROZEN_HEEL if heel & (phase.toe.loaded != before.toe.loaded) else found
-
-
-def gait_sign(rules: SafetyRules, before: PhaseState, phase: PhaseState, toe_strides: float, steady: float) -> float:
-    """The sign of forces that do not follow each other as in a gait.
-
-    ``toe_strides`` [strides] and ``steady`` (1 or 0) are those of the next state.
-    """
-    # A heel that comes and goes begins phases anew, but no stance ends without a swing.
-    lasts = phase.in_phase if phase.phase == SWING else max(phase.in_phase, phase.since_strike)
-    endless = lasts > rules.longest_phase * phase.stride_time
+def gait_sign(rules: SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
+    """The sign of forces that do not follow each other as in a gait, at any pace."""
+    longest = rules.longest_phase * phase.stride_time
+    endless = max(phase.in_phase if phase.phase == SWING else 0.0, stance.apart) > longest
+    stays = (before.phase != SWING) & (phase.phase != SWING) & (before.since_strike > longest)
+    returns = (phase.heel.loaded > before.heel.loaded) | (phase.toe.loaded > before.toe.loaded)
     skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
-    has_begun = phase.since_strike > rules.flat_from * phase.stride_time
-    flat = has_begun & (phase.since_strike < rules.flat_to * phase.stride_time) & (steady > 0.5)
-    enters = (before.phase == SWING) & (phase.phase != SWING)
-    short = enters & (steady > 0.5) & (before.in_phase < rules.shortest_swing * phase.stride_time)
-    found = signs.SHORT_SWING if short else NO_SIGN
-    found = signs.NOT_FLAT if flat & (min(phase.heel.loaded, phase.toe.loaded) < 0.5) else found
-    found = signs.TOE_STRIDES if toe_strides > rules.most_toe_strides else found
-    found = signs.NO_TOES if skips_toes else found
+    found = signs.NO_TOES if skips_toes else NO_SIGN
+    found = signs.RESTLESS if stays & returns else found
     return signs.ENDLESS_PHASE if endless else found
 
 
-def next_slow_pressures(last: SlowPressures, measurement: GaitMeasurement, period: float) -> SlowPressures:
-    """Slow pressures [Pa] after a sample, taken every ``period`` [s]."""
-    fraction = period / (period + FALL_TIME)
-    return SlowPressures(
-        last.pressure_1 + (measurement.pressure_1 - last.pressure_1) * fraction,
-        last.pressure_2 + (measurement.pressure_2 - last.pressure_2) * fraction,
-    )
+def steady_sign(rules: SafetyRules, before: PhaseState, phase: PhaseState, angle: float) -> float:
+    """The sign of forces or an angle [rad] that do not fit a stride after one that took the usual time."""
+    flat = phase.since_strike > rules.flat_from * phase.stride_time
+    flat = flat & (phase.since_strike < rules.flat_to * phase.stride_time)
+    enters = (before.phase == SWING) & (phase.phase != SWING)
+    short = enters & (before.in_phase < rules.shortest_swing * phase.stride_time)
+    bent = (angle < rules.lowest_flat_angle) | (angle > rules.highest_flat_angle)
+    found = signs.NO_HEEL if flat & (phase.heel.loaded < 0.5) else NO_SIGN
+    found = signs.SHORT_SWING if short else found
+    found = signs.FLAT_ANGLE if flat & bent & (min(phase.heel.loaded, phase.toe.loaded) > 0.5) else found
+    return signs.NOT_FLAT if flat & (phase.toe.loaded < 0.5) else found
+
+
+def next_slow_pressure(last: float, pressure: float, period: float) -> float:
+    """Slow pressure [Pa] after a sample, taken every ``period`` [s]."""
+    return last + (pressure - last) * period / (period + FALL_TIME)
 
 
 def holds_pressure(rules: SafetyRules, pressure: float, slow: float) -> bool:
@@ -215,21 +157,21 @@ def holds_pressure(rules: SafetyRules, pressure: float, slow: float) -> bool:
 def valve_sign(
     rules: SafetyRules,
     valve_times: ValveTimes,
-    slow_pressures: SlowPressures,
+    slow_pressure_1: float,
     phase: PhaseState,
     measurement: GaitMeasurement,
 ) -> float:
     """The sign of a pressure that is not what the valve was told long enough.
 
-    A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat. A full
-    chamber vents for longer than ``vent_time`` through a narrow valve while the ankle compresses it, but it does vent.
+    A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat. There
+    the ankle compresses chamber 1, which may vent for longer than ``vent_time`` through a narrow valve, but does vent.
+    Chamber 2 grows then: a pressure that is still seen in it comes late.
     """
     no_rise_1 = (valve_times.filling_1 > rules.fill_time) & (measurement.pressure_1 < rules.filled_pressure)
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
-    left = holds_pressure(rules, measurement.pressure_1, slow_pressures.pressure_1) | holds_pressure(
-        rules, measurement.pressure_2, slow_pressures.pressure_2
-    )
+    left = holds_pressure(rules, measurement.pressure_1, slow_pressure_1)
+    left = left | (measurement.pressure_2 > rules.filled_pressure)
     no_fall = stands & (valve_times.venting > rules.vent_time) & left
     found = signs.NO_FALL if no_fall else NO_SIGN
     return signs.NO_RISE if no_rise_1 | no_rise_2 else found
@@ -242,15 +184,26 @@ def first_sign(some: float, others: float) -> float:
 
 
 def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState, sign: float) -> float:
-    """Good strides in a row after a sample: from a heel strike to the next in about the stride time, without a sign.
+    """Good strides in a row after a sample: in about the stride time, on heel and toes, without a sign.
 
     -1 after a sign, so that the rest of its stride does not count.
     """
     enters = (before.phase == SWING) & (phase.phase != SWING)
     usual = (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)
-    good = usual & (phase.phase == LANDING)
+    good = usual & (min(state.stance.heel_seen, state.stance.toe_seen) > 0.5)
     counted = (state.good_strides + 1.0 if good else 0.0) if enters else state.good_strides
     return -1.0 if sign > NO_SIGN else counted
+
+
+def level_after(rules: SafetyRules, state: SafetyState, good_strides: float, together: float) -> float:
+    """The level after good strides in a row, and heel and toes on the ground for a time [s]; a stop lasts.
+
+    A swing without end is that of who sits: standing up shows that both forces are sound.
+    """
+    resting = (state.level == PAUSED) & (state.finding.sign == signs.ENDLESS_PHASE)
+    resumes = (state.level < STOPPED) & (good_strides >= rules.resume_strides)
+    lifted = LIFTS if (state.level == PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
+    return HELPS if resumes | (resting & (together > STANDS_UP)) else lifted
 
 
 def monitor(
@@ -262,30 +215,35 @@ def monitor(
     period: float,
 ) -> SafetyState:
     """The state after a sample of ``period`` [s]; ``before`` and ``phase`` are the phases before and after it."""
-    readings = next_readings(state.readings, measurement, period)
+    seen = readings.next_readings(state.readings, measurement, period)
+    stance = next_stance(state.stance, before, phase, period)
     enters = (before.phase == SWING) & (phase.phase != SWING)
-    on_toes = phase.phase == MID_STANCE
+    on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
     toe_strides = (state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
     steady = (1.0 if usual else 0.0) if enters else state.steady
-    slow_pressures = next_slow_pressures(state.slow_pressures, measurement, period)
-    sign = first_sign(range_sign(rules, measurement), still_sign(rules, readings, before, phase))
-    sign = first_sign(sign, gait_sign(rules, before, phase, toe_strides, steady))
-    sign = first_sign(sign, valve_sign(rules, state.valve_times, slow_pressures, phase, measurement))
+    slow_pressure_1 = next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period)
+    sign = signs.TOE_STRIDES if toe_strides > rules.most_toe_strides else NO_SIGN
+    sign = first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if steady > 0.5 else sign
+    sign = first_sign(gait_sign(rules, before, phase, stance), sign)
+    sign = first_sign(readings.still_sign(rules, seen, before, phase), sign)
+    sign = first_sign(readings.gone_sign(rules, state.readings, measurement, period), sign)
+    sign = first_sign(readings.range_sign(rules, measurement), sign)
+    sign = first_sign(valve_sign(rules, state.valve_times, slow_pressure_1, phase, measurement), sign)
     good_strides = next_good_strides(state, before, phase, sign)
-    resumes = (state.level == PAUSED) & (good_strides >= rules.resume_strides)
-    level = max(HELPS if resumes else state.level, signs.level_of(sign))
+    level = max(level_after(rules, state, good_strides, stance.together), signs.level_of(sign))
     vents = level > state.level
     return SafetyState(
         level=level,
         good_strides=good_strides,
         ventings=state.ventings + (1.0 if vents else 0.0),
         finding=later_finding(vents, sign, measurement, state.finding),
-        readings=readings,
+        readings=seen,
+        stance=stance,
         toe_strides=toe_strides,
         steady=steady,
         valve_times=state.valve_times,
-        slow_pressures=slow_pressures,
+        slow_pressure_1=slow_pressure_1,
     )
 
 
@@ -306,9 +264,15 @@ def feed_time(since: float, opening: float, period: float) -> float:
     return since + opening * period if opening > MINIMUM_OPENING else 0.0
 
 
-def safe_command(state: SafetyState, command: float, period: float) -> tuple[float, SafetyState]:
-    """The command to the valve [-], ``VENT`` in a pause or a stop, and the state that records it for ``period`` [s]."""
-    sent = VENT if state.level > HELPS else command
+def permits(state: SafetyState, phase: float) -> bool:
+    """True where the device may act in a phase: a push needs a heel that was loaded in this stance and has risen."""
+    pushes = (state.level < LIFTS) & (state.stance.heel_seen > 0.5)
+    return (state.level < PAUSED) & (pushes | (phase != PUSH_OFF))
+
+
+def safe_command(state: SafetyState, phase: float, command: float, period: float) -> tuple[float, SafetyState]:
+    """The command to the valve [-], ``VENT`` where none is permitted, and the state that records it for a time [s]."""
+    sent = command if permits(state, phase) else VENT
     vents = sent > VENTS_ABOVE
     opening = 0.0 if vents else max(-1.0, min(1.0, sent))
     valve_times = ValveTimes(
@@ -322,8 +286,9 @@ def safe_command(state: SafetyState, command: float, period: float) -> tuple[flo
         ventings=state.ventings,
         finding=state.finding,
         readings=state.readings,
+        stance=state.stance,
         toe_strides=state.toe_strides,
         steady=state.steady,
         valve_times=valve_times,
-        slow_pressures=state.slow_pressures,
+        slow_pressure_1=state.slow_pressure_1,
     )

@@ -1,14 +1,17 @@
-"""The signs by which a controller of walking vents both chambers: what each is, and whether it pauses or stops.
+"""The signs by which a controller of walking helps less: what each is, and whether it lifts only, pauses or stops.
 
-A pause is for what walking does too: help comes back after some good strides. A stop is for what only a fault does: it
-is for good. A sign is a number in the lanes, and 0 is none.
+Where the heel is missed the foot is still held up in the swing, and not pushed. A pause vents both chambers, for what
+walking does too: help comes back after some good strides. A stop is for what only a fault does: it is for good. A sign
+is a number in the lanes, and 0 is none.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 HELPS = 0.0
-PAUSED = 1.0
-STOPPED = 2.0
+LIFTS = 1.0
+PAUSED = 2.0
+STOPPED = 3.0
 
 NO_SIGN = 0.0
 FORCE_RANGE = 1.0
@@ -19,17 +22,50 @@ NO_FALL = 5.0
 FROZEN_HEEL = 6.0
 FROZEN_TOE = 7.0
 FROZEN_ANGLE = 8.0
-STILL_HEEL = 9.0
-STILL_TOE = 10.0
-STILL_ANGLE = 11.0
-ENDLESS_PHASE = 12.0
-NO_TOES = 13.0
-NOT_FLAT = 14.0
-TOE_STRIDES = 15.0
-SHORT_SWING = 16.0
+FORCE_GONE = 9.0
+STILL_HEEL = 10.0
+STILL_TOE = 11.0
+STILL_ANGLE = 12.0
+ENDLESS_PHASE = 13.0
+RESTLESS = 14.0
+NO_TOES = 15.0
+NOT_FLAT = 16.0
+FLAT_ANGLE = 17.0
+SHORT_SWING = 18.0
+NO_HEEL = 19.0
+TOE_STRIDES = 20.0
 
 FORCES = ("heel_force", "toe_force")
 PRESSURES = ("pressure_1", "pressure_2")
+
+
+class SafetyRules(NamedTuple):
+    """What readings can be, and how long a contradiction may last; ``declaration.SAFETY_QUANTITIES`` says it of each.
+
+    Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``, ``shortest_swing``)
+    or [s], strides, and absolute pressures [Pa]. ``fill_time`` is that of a valve fully open; half open it takes twice
+    as long.
+    """
+
+    lowest_force: float
+    largest_force: float
+    lowest_angle: float
+    highest_angle: float
+    longest_phase: float
+    frozen_time: float
+    most_toe_strides: float
+    flat_from: float
+    flat_to: float
+    lowest_pressure: float
+    highest_pressure: float
+    filled_pressure: float
+    fill_time: float
+    vent_time: float
+    shortest_swing: float
+    resume_strides: float
+    largest_drop: float
+    lowest_flat_angle: float
+    highest_flat_angle: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,23 +99,41 @@ SIGNS: dict[float, Sign] = {
     FROZEN_HEEL: Sign("frozen_heel", "a heel force that stays the same while the toes move", FORCES, ("frozen_time",)),
     FROZEN_TOE: Sign("frozen_toe", "a toe force that stays the same while the heel moves", FORCES, ("frozen_time",)),
     FROZEN_ANGLE: Sign("frozen_angle", "an angle that stays the same for a whole stride", ("angle",), ()),
-    STILL_HEEL: Sign("still_heel", "a loaded heel whose force stays the same", FORCES, ("frozen_time",)),
-    STILL_TOE: Sign("still_toe", "loaded toes whose force stays the same", FORCES, ("frozen_time",)),
-    STILL_ANGLE: Sign("still_angle", "an angle in stance that stays the same", ("angle",), ("frozen_time",)),
-    ENDLESS_PHASE: Sign("endless_phase", "a stance or a swing without end", FORCES, ("longest_phase",)),
+    FORCE_GONE: Sign("force_gone", "a large force that is gone within a sample", FORCES, ("largest_drop",)),
+    STILL_HEEL: Sign(
+        "still_heel", "a loaded heel whose force stays the same, but not in standing", FORCES, ("frozen_time",)
+    ),
+    STILL_TOE: Sign(
+        "still_toe", "loaded toes whose force stays the same, but not in standing", FORCES, ("frozen_time",)
+    ),
+    STILL_ANGLE: Sign(
+        "still_angle", "an angle in stance that stays the same, but not in standing", ("angle",), ("frozen_time",)
+    ),
+    ENDLESS_PHASE: Sign(
+        "endless_phase", "a swing without end, or as long on heel or toes alone", FORCES, ("longest_phase",)
+    ),
+    RESTLESS: Sign("restless", "a stance without end in which heel or toes come and go", FORCES, ("longest_phase",)),
     NO_TOES: Sign("no_toes", "a swing right after the heel strike, without the toes", FORCES, ()),
     NOT_FLAT: Sign(
-        "not_flat", "a foot that must stand flat and loads only one sensor, or none", FORCES, ("flat_from", "flat_to")
+        "not_flat", "a foot that must stand flat and does not load the toes", FORCES, ("flat_from", "flat_to")
     ),
-    TOE_STRIDES: Sign(
-        "toe_strides", "strides that begin on the toes, one after the other", FORCES, ("most_toe_strides",)
+    FLAT_ANGLE: Sign(
+        "flat_angle",
+        "an angle that no ankle has while the foot must stand flat",
+        ("angle",),
+        ("lowest_flat_angle", "highest_flat_angle"),
     ),
     SHORT_SWING: Sign("short_swing", "a swing that is too short for its stride", FORCES, ("shortest_swing",)),
+    NO_HEEL: Sign(
+        "no_heel", "a foot that must stand flat and does not load the heel", FORCES, ("flat_from", "flat_to")
+    ),
+    TOE_STRIDES: Sign("toe_strides", "strides on the toes alone, one after the other", FORCES, ("most_toe_strides",)),
 }
-"""Every sign by its number: those up to ``FROZEN_ANGLE`` stop, the others pause."""
+"""Every sign by its number: those up to ``FORCE_GONE`` stop, from ``NO_HEEL`` on the foot is lifted only."""
 
 
 def level_of(sign: float) -> float:
-    """The level that a sign asks for: ``HELPS`` without one, ``STOPPED`` or ``PAUSED``."""
-    stopped = STOPPED if sign <= FROZEN_ANGLE else PAUSED
-    return stopped if sign > NO_SIGN else HELPS
+    """The level that a sign asks for: ``HELPS`` without one, ``STOPPED``, ``PAUSED`` or ``LIFTS``."""
+    level = LIFTS if sign >= NO_HEEL else PAUSED
+    level = STOPPED if sign <= FORCE_GONE else level
+    return level if sign > NO_SIGN else HELPS

@@ -16,7 +16,8 @@ from ppafo.control.walking import assistance, phases, safety
 from ppafo.control.walking.assistance import Assistance, TorqueRequest
 from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.safety import SafetyRules, SafetyState
+from ppafo.control.walking.safety import SafetyState
+from ppafo.control.walking.signs import SafetyRules
 from ppafo.errors import ScenarioError
 from ppafo.model.gait_sensors import GaitMeasurement
 

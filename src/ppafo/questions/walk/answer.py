@@ -69,8 +69,8 @@ _MEAN = (
     "has almost none."
 )
 _OVER_TIME = (
-    "Gas, toes and phases over the whole walk. The strip shows where the controller helps, pauses and has stopped; a "
-    "dashed line is where a sensor fails."
+    "Gas, toes and phases over the whole walk. The strip shows where the controller helps, lifts the foot only, "
+    "pauses and has stopped; a dashed line is where a sensor fails."
 )
 _LIMITS = (
     "The gait is prescribed: the device moves the ankle where the foot is free, and cannot change how the wearer walks."

@@ -8,7 +8,7 @@ import numpy as np
 from ppafo.answers.layout import Margins, figure_of_panels
 from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.control.walking.signs import HELPS, PAUSED, STOPPED
+from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.signals.recording import Floats
 from ppafo.walking.configuration import NEVER, Configuration
 from ppafo.walking.walk import WalkResult
@@ -20,7 +20,12 @@ if TYPE_CHECKING:
 _SIZE = (9.4, 5.6)
 _MARGINS = Margins(left=1.3, right=0.2, top=0.62, bottom=0.55, row_gap=0.16, label=0.6)
 _HEIGHTS = (1.0, 1.2, 1.0, 0.35)
-_LEVELS = {HELPS: ("help", "#cfe3c9"), PAUSED: ("pause", "#f3d27a"), STOPPED: ("stop", "#e08a8a")}
+_LEVELS = {
+    HELPS: ("help", "#cfe3c9"),
+    LIFTS: ("lift", "#e6e2a8"),
+    PAUSED: ("pause", "#f3d27a"),
+    STOPPED: ("stop", "#e08a8a"),
+}
 _PHASES = ("swing", "heel", "free", "push")
 _LONG = 120.0
 """Time [s] above which the axis is in minutes."""

@@ -90,7 +90,7 @@ def test_the_rate_of_the_angle_is_filtered_and_has_no_kick_at_the_start() -> Non
 
 def one_stride() -> list[GaitMeasurement]:
     """Landing, mid-stance, push-off and swing, with readings that change as those of sensors do."""
-    loads = [(300.0, 0.0)] * 60 + [(300.0, 300.0)] * 500 + [(0.0, 300.0)] * 90 + [(0.0, 0.0)] * 350
+    loads = [(250.0, 0.0)] * 60 + [(250.0, 250.0)] * 500 + [(0.0, 250.0)] * 90 + [(0.0, 0.0)] * 350
     return [
         seen(1.7 + 1e-5 * sample, 1.0, heel * (1.0 + 1e-5 * sample), toe * (1.0 + 1e-5 * sample))
         for sample, (heel, toe) in enumerate(loads)

@@ -4,10 +4,11 @@ import math
 
 import pytest
 
-from ppafo.control.walking import phases, safety, signs
+from ppafo.control.walking import phases, readings, safety, signs
 from ppafo.control.walking.declaration import SAFETY_QUANTITIES
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
-from ppafo.control.walking.safety import Finding, SafetyRules, SafetyState, SlowPressures, ValveTimes
+from ppafo.control.walking.safety import Finding, SafetyState, Stance, ValveTimes
+from ppafo.control.walking.signs import SafetyRules
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -59,8 +60,8 @@ def test_the_rules_are_declared_in_their_order() -> None:
         ({"toe_force": 3001.0}, signs.FORCE_RANGE),
         ({"angle": 0.29}, signs.ANGLE_RANGE),
         ({"angle": 2.41}, signs.ANGLE_RANGE),
-        ({"pressure_1": 5.9e4}, signs.PRESSURE_RANGE),
-        ({"pressure_2": 5.9e4}, signs.PRESSURE_RANGE),
+        ({"pressure_1": 1.9e3}, signs.PRESSURE_RANGE),
+        ({"pressure_2": 1.9e3}, signs.PRESSURE_RANGE),
         ({"pressure_1": 2.1e6}, signs.PRESSURE_RANGE),
         ({"pressure_2": 2.1e6}, signs.PRESSURE_RANGE),
     ],
@@ -77,14 +78,14 @@ def test_every_sign_says_what_it_goes_by_and_those_of_faults_come_first() -> Non
     assert len({sign.name for sign in signs.SIGNS.values()}) == len(numbers)
     levels = [signs.level_of(number) for number in numbers]
     assert levels == sorted(levels, reverse=True)
-    assert set(levels) == {signs.PAUSED, signs.STOPPED}
+    assert set(levels) == {signs.LIFTS, signs.PAUSED, signs.STOPPED}
     settings = {item.name for item in SAFETY_QUANTITIES}
     assert all(set(sign.settings) <= settings for sign in signs.SIGNS.values())
     assert all(set(sign.readings) < set(GaitMeasurement._fields) for sign in signs.SIGNS.values())
 
 
 def test_of_two_signs_the_one_that_stops_counts() -> None:
-    endless = phase(PUSH_OFF, 1.3, 0.0, in_phase=1.21)
+    endless = phase(SWING, 2.0, 0.0, 0.0, in_phase=1.21)
     assert found(now=endless) == signs.ENDLESS_PHASE
     assert found(GOOD._replace(angle=9.0), endless) == signs.ANGLE_RANGE
     paused = safety.monitor(RULES, safety.START, endless, endless, GOOD, PERIOD)
@@ -94,39 +95,81 @@ def test_of_two_signs_the_one_that_stops_counts() -> None:
     assert stopped.finding == Finding(signs.ANGLE_RANGE, 300.0, 200.0, 9.0, 1.1e5, 1.05e5)
 
 
-def still_for(seconds: float, seen: GaitMeasurement, now: PhaseState) -> bool:
+ON_TOES = phase(PUSH_OFF, 0.5, heel=0.0)
+
+
+def still_for(seconds: float, now: PhaseState, still: str, slope: float, seen: GaitMeasurement = GOOD) -> float:
+    """The last sign where one reading stays the same and the others change by a slope, in N/s and mrad/s."""
     state = safety.START
+    slopes = {"heel_force": -slope, "toe_force": slope, "angle": 1.0e-3 * slope}
     for sample in range(round(seconds / PERIOD)):
-        moving = seen._replace(angle=seen.angle + 1.0e-9 * sample)
-        state = safety.monitor(RULES, state, now, now, moving, PERIOD)
-    return state.level > signs.HELPS
+        moved = {name: getattr(seen, name) + by * sample * PERIOD for name, by in slopes.items() if name != still}
+        state = safety.monitor(RULES, state, now, now, seen._replace(**moved), PERIOD)
+    return state.finding.sign
 
 
-def test_a_loaded_force_that_stays_the_same_is_a_sign_and_an_unloaded_one_is_not() -> None:
-    assert not still_for(0.24, GOOD, phase(MID_STANCE, 0.1))
-    assert still_for(0.26, GOOD, phase(MID_STANCE, 0.1))
-    assert still_for(0.26, GOOD, phase(PUSH_OFF, 0.5, heel=0.0))
+@pytest.mark.parametrize(
+    ("still", "sign"),
+    [("heel_force", signs.STILL_HEEL), ("toe_force", signs.STILL_TOE), ("angle", signs.STILL_ANGLE)],
+)
+def test_one_quiet_sensor_while_others_move_is_a_sign_and_a_foot_that_stands_is_none(still: str, sign: float) -> None:
+    flat = phase(MID_STANCE, 0.1)
+    assert still_for(0.3, flat, still, 900.0) == sign
+    assert still_for(0.24, flat, still, 900.0) == signs.NO_SIGN
+    for quiet in (0.0, 1.0, 100.0):
+        assert still_for(0.7, flat, still, quiet) == signs.NO_SIGN, "who stands sways little"
+    assert still_for(0.3, ON_TOES, still, 0.0) in (signs.STILL_TOE, signs.STILL_ANGLE), (
+        "on the toes nobody stands still"
+    )
+
+
+def test_standing_with_readings_that_never_change_goes_on_for_long_without_a_sign() -> None:
+    before, flat = phase(SWING, 1.0, 0.0, 0.0, in_phase=0.4), phase(MID_STANCE, 0.0)
+    state = safety.monitor(RULES, safety.START, before, flat, GOOD, PERIOD)
+    for sample in range(20_000):
+        now = phase(MID_STANCE, sample * PERIOD, in_phase=sample * PERIOD)
+        state = safety.monitor(RULES, state, now, now, GOOD, PERIOD)
+    assert (state.level, state.ventings) == (signs.HELPS, 0.0)
+
+
+def test_an_unloaded_force_that_stays_the_same_is_no_sign() -> None:
     # A dead sensor may show some newtons for ever; that the foot never loads it is another sign.
-    assert not still_for(2.0, GOOD._replace(heel_force=5.0, toe_force=5.0), phase(SWING, 0.5, 0.0, 0.0))
+    unloaded = GOOD._replace(heel_force=5.0, toe_force=5.0)
+    assert still_for(1.0, phase(SWING, 0.5, 0.0, 0.0), "heel_force", 0.0, unloaded) == signs.NO_SIGN
 
 
-@pytest.mark.parametrize(("name", "is_sign"), [(SWING, False), (LANDING, True), (MID_STANCE, True), (PUSH_OFF, True)])
-def test_an_angle_that_stays_the_same_is_a_sign_but_in_the_swing(name: float, is_sign: bool) -> None:
+@pytest.mark.parametrize(("name", "is_sign"), [(SWING, False), (LANDING, False), (MID_STANCE, True), (PUSH_OFF, True)])
+def test_an_angle_that_stays_the_same_is_a_sign_but_while_the_foot_is_held(name: float, is_sign: bool) -> None:
     now = phase(name, 0.5, heel=0.0, toe=0.0)
     shown = safety.START.readings._replace(angle=GOOD.angle, angle_unchanged=0.25)
     assert vents(now=now, state=safety.START._replace(readings=shown)) is is_sign
+
+
+@pytest.mark.parametrize(("name", "sensor"), [("heel_force", "heel"), ("toe_force", "toe")])
+def test_a_large_force_that_is_gone_within_a_sample_stops_and_one_that_falls_quickly_does_not(
+    name: str, sensor: str
+) -> None:
+    def after(force: float, period: float = PERIOD) -> float:
+        last = readings.NOTHING_READ._replace(**{name: 500.0})
+        seen = GOOD._replace(**{name: force})
+        return readings.gone_sign(RULES, last, seen, period)
+
+    assert after(0.0) == signs.FORCE_GONE
+    assert signs.level_of(signs.FORCE_GONE) == signs.STOPPED
+    assert after(100.0) == signs.NO_SIGN, "no step of a foot that slaps"
+    assert after(0.0, period=0.01) == signs.NO_SIGN, "a slow controller sees a foot leave the ground in one sample"
 
 
 @pytest.mark.parametrize(
     ("still", "now", "before", "sign"),
     [
         ("heel", phase(MID_STANCE, 0.5, 1.0, 0.0), phase(MID_STANCE, 0.5), signs.FROZEN_HEEL),
-        ("heel", phase(MID_STANCE, 0.5), phase(MID_STANCE, 0.5), signs.STILL_HEEL),
+        ("heel", phase(LANDING, 0.1, 1.0, 0.0), phase(LANDING, 0.1, 1.0, 0.0), signs.STILL_HEEL),
         ("toe", phase(MID_STANCE, 0.5, 0.0, 1.0), phase(MID_STANCE, 0.5), signs.FROZEN_TOE),
-        ("toe", phase(MID_STANCE, 0.5), phase(MID_STANCE, 0.5), signs.STILL_TOE),
+        ("toe", ON_TOES, ON_TOES, signs.STILL_TOE),
         ("angle", phase(LANDING, 0.0, 1.0, 0.0), phase(SWING, 0.9, 0.0, 0.0), signs.FROZEN_ANGLE),
-        ("angle", phase(LANDING, 0.0, 1.0, 0.0), phase(SWING, 0.4, 0.0, 0.0), signs.STILL_ANGLE),
-        ("angle", phase(MID_STANCE, 0.5), phase(MID_STANCE, 0.5), signs.STILL_ANGLE),
+        ("angle", phase(LANDING, 0.0, 1.0, 0.0), phase(SWING, 0.4, 0.0, 0.0), signs.NO_SIGN),
+        ("angle", ON_TOES, ON_TOES, signs.STILL_ANGLE),
     ],
 )
 def test_a_reading_that_stays_the_same_pauses_and_stops_once_another_sensor_shows_a_step(
@@ -137,15 +180,27 @@ def test_a_reading_that_stays_the_same_pauses_and_stops_once_another_sensor_show
     assert found(now=now, before=before, state=safety.START._replace(readings=readings)) == sign
 
 
-@pytest.mark.parametrize(("heel", "toe"), [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
-def test_a_foot_that_must_stand_flat_loads_both_sensors(heel: float, toe: float) -> None:
+@pytest.mark.parametrize(
+    ("heel", "toe", "sign"),
+    [(0.0, 1.0, signs.NO_HEEL), (1.0, 0.0, signs.NOT_FLAT), (0.0, 0.0, signs.NOT_FLAT), (1.0, 1.0, signs.NO_SIGN)],
+)
+def test_a_foot_that_must_stand_flat_loads_both_sensors(heel: float, toe: float, sign: float) -> None:
     steady = safety.START._replace(steady=1.0)
     flat, early, late = (phase(MID_STANCE, since, heel, toe) for since in (0.2, 0.15, 0.26))
-    assert found(now=flat, state=steady) == signs.NOT_FLAT
+    assert found(now=flat, state=steady) == sign
     assert not vents(now=early, state=steady)
     assert not vents(now=late, state=steady)
     assert not vents(now=flat), "no usual stride came before"
-    assert not vents(now=phase(MID_STANCE, 0.2), state=steady)
+
+
+@pytest.mark.parametrize(
+    ("angle", "is_sign"), [(63.0, True), (71.0, False), (90.0, False), (109.0, False), (117.0, True)]
+)
+def test_a_flat_foot_in_mid_stance_bounds_the_ankle(angle: float, is_sign: bool) -> None:
+    steady, seen = safety.START._replace(steady=1.0), GOOD._replace(angle=math.radians(angle))
+    assert (found(seen, phase(MID_STANCE, 0.2), state=steady) == signs.FLAT_ANGLE) is is_sign
+    assert not vents(seen, phase(MID_STANCE, 0.3), state=steady), "the shank leans further later"
+    assert not vents(seen, phase(MID_STANCE, 0.2)), "no usual stride came before"
 
 
 @pytest.mark.parametrize(("last", "steady"), [(0.95, 1.0), (1.05, 1.0), (0.88, 0.0), (1.12, 0.0)])
@@ -154,23 +209,68 @@ def test_only_a_stride_that_took_about_the_stride_time_is_a_usual_one(last: floa
     assert safety.monitor(RULES, safety.START, before, now, GOOD, PERIOD).steady == steady
 
 
-def test_strides_that_begin_on_the_toes_are_counted_in_a_row() -> None:
-    swing, on_toes, on_heel = phase(SWING, 1.3), phase(MID_STANCE, 0.0, 0.0, 1.0), phase(LANDING, 0.0)
-    once = safety.monitor(RULES, safety.START, swing, on_toes, GOOD, PERIOD)
+def test_strides_without_the_heel_are_counted_in_a_row_and_those_that_only_begin_on_the_toes_are_not() -> None:
+    swing, on_toes = phase(SWING, 1.3, 0.0, 0.0), phase(MID_STANCE, 0.0, 0.0, 1.0)
+    missed = safety.START._replace(stance=Stance(0.0, 1.0, 0.0, 0.0))
+    once = safety.monitor(RULES, missed, swing, on_toes, GOOD, PERIOD)
     assert (once.toe_strides, once.level) == (1.0, signs.HELPS)
     assert found(now=on_toes, before=swing, state=once) == signs.TOE_STRIDES
-    assert not vents(now=on_heel, before=swing, state=once)
-    assert safety.monitor(RULES, once, swing, on_heel, GOOD, PERIOD).toe_strides == 0.0
+    assert signs.level_of(signs.TOE_STRIDES) == signs.LIFTS
+    came = once._replace(stance=Stance(1.0, 1.0, 0.0, 0.0))
+    assert not vents(now=on_toes, before=swing, state=came), "the heel came down after the toes"
+    assert safety.monitor(RULES, came, swing, on_toes, GOOD, PERIOD).toe_strides == 0.0
     assert not vents(now=on_toes, before=swing, state=once, rules=RULES._replace(most_toe_strides=2.0))
 
 
 def test_a_phase_without_end_and_a_stride_without_toes_pause() -> None:
-    assert found(now=phase(PUSH_OFF, 1.3, 0.0, in_phase=1.21)) == signs.ENDLESS_PHASE
     assert found(now=phase(SWING, 2.0, 0.0, 0.0, in_phase=1.21)) == signs.ENDLESS_PHASE
     assert not vents(now=phase(SWING, 2.0, 0.0, 0.0, in_phase=1.19))
-    assert found(now=phase(MID_STANCE, 1.21)) == signs.ENDLESS_PHASE, "a stance that the heel divides is one"
+    one_legged = safety.START._replace(stance=Stance(0.0, 1.0, 0.0, 1.2))
+    assert found(now=phase(PUSH_OFF, 1.3, 0.0), state=one_legged) == signs.ENDLESS_PHASE
+    assert not vents(now=phase(MID_STANCE, 9.0, in_phase=9.0), state=one_legged), "who stands on heel and toes"
     assert found(now=phase(SWING, 0.4, 0.0, 0.0), before=phase(LANDING, 0.4)) == signs.NO_TOES
     assert not vents(now=phase(MID_STANCE, 0.1), before=phase(LANDING, 0.1))
+
+
+@pytest.mark.parametrize(("heel", "toe"), [(0.0, 1.0), (1.0, 0.0)])
+def test_a_stance_without_end_in_which_a_force_comes_back_is_a_sign_and_leaving_it_is_none(
+    heel: float, toe: float
+) -> None:
+    name = MID_STANCE if heel else PUSH_OFF
+    assert found(now=phase(MID_STANCE, 1.25), before=phase(name, 1.25, heel, toe)) == signs.RESTLESS
+    assert not vents(now=phase(MID_STANCE, 1.1), before=phase(name, 1.1, heel, toe)), "a stride is as long"
+    assert not vents(now=phase(name, 5.0, heel, toe), before=phase(MID_STANCE, 5.0)), "the first step after standing"
+
+
+def test_who_sat_is_helped_again_after_standing_up_and_not_with_one_force() -> None:
+    sits = phase(SWING, 2.0, 0.0, 0.0, in_phase=1.21)
+    paused = safety.monitor(RULES, safety.START, sits, sits, GOOD, PERIOD)
+    assert paused.level == signs.PAUSED
+    for heel, toe, level in ((1.0, 1.0, signs.HELPS), (0.0, 1.0, signs.PAUSED), (1.0, 0.0, signs.PAUSED)):
+        state, stands = paused, phase(MID_STANCE, 0.1, heel, toe)
+        for sample in range(510):
+            seen = GOOD._replace(heel_force=300.0 + sample, toe_force=200.0 + sample, angle=1.5 + 1.0e-4 * sample)
+            state = safety.monitor(RULES, state, stands, stands, seen, PERIOD)
+        assert state.level == level
+
+
+def test_after_a_pause_the_foot_is_lifted_first_and_pushed_later() -> None:
+    state = safety.START._replace(level=signs.PAUSED, finding=safety.START.finding._replace(sign=signs.NO_TOES))
+    swing, lands = phase(SWING, 1.05, 0.0, 0.0, in_phase=0.4), phase(LANDING, 0.0, 1.0, 0.0)
+    allowed = []
+    for _ in range(3):
+        stood = state._replace(stance=Stance(1.0, 1.0, 0.0, 0.0))
+        allowed.append([safety.permits(stood, name) for name in (SWING, LANDING, PUSH_OFF)])
+        state = safety.monitor(RULES, stood, swing, lands, GOOD, PERIOD)
+    assert allowed == [[False, False, False], [True, True, False], [True, True, True]]
+
+
+def test_no_push_without_a_heel_that_was_loaded_in_this_stance() -> None:
+    rises = safety.START._replace(stance=Stance(1.0, 1.0, 0.0, 0.1))
+    assert safety.safe_command(rises, PUSH_OFF, 1.0, PERIOD)[0] == 1.0
+    missed = rises._replace(stance=Stance(0.0, 1.0, 0.0, 0.1))
+    assert safety.safe_command(missed, PUSH_OFF, 1.0, PERIOD)[0] == VENT
+    assert safety.safe_command(missed, SWING, -1.0, PERIOD)[0] == -1.0, "the foot is still held up"
 
 
 def test_a_swing_that_is_too_short_for_a_steady_stride_pauses() -> None:
@@ -184,7 +284,7 @@ def test_a_swing_that_is_too_short_for_a_steady_stride_pauses() -> None:
 def after_commands(command: float, seconds: float) -> SafetyState:
     state = safety.START
     for _ in range(round(seconds / PERIOD)):
-        _, state = safety.safe_command(state, command, PERIOD)
+        _, state = safety.safe_command(state, SWING, command, PERIOD)
     return state
 
 
@@ -212,9 +312,14 @@ def test_a_vented_chamber_shows_no_pressure_while_the_foot_stands_flat(name: str
         assert not vents(stuck, moving, state=after_commands(VENT, 0.252)), "the foot moves and presses gas out"
 
 
-@pytest.mark.parametrize("name", ["pressure_1", "pressure_2"])
-@pytest.mark.parametrize(("fall_time", "is_sign"), [(0.05, False), (0.11, False), (3.0, True), (1.0e9, True)])
-def test_a_chamber_that_still_vents_is_no_sign_and_one_that_has_stopped_is(
+@pytest.mark.parametrize(
+    ("name", "fall_time", "is_sign"),
+    [
+        *[("pressure_1", time, time > 1.0) for time in (0.05, 0.11, 3.0, 1.0e9)],
+        *[("pressure_2", time, True) for time in (0.11, 3.0, 1.0e9)],
+    ],
+)
+def test_a_chamber_that_the_ankle_compresses_may_still_vent_and_one_that_grows_may_not(
     name: str, fall_time: float, is_sign: bool
 ) -> None:
     state = after_commands(VENT, 0.252)
@@ -233,7 +338,7 @@ def stood(state: SafetyState, sample: int, **pressures: float) -> SafetyState:
 
 
 def test_a_pressure_that_freezes_while_the_chamber_vents_is_found_soon() -> None:
-    state = after_commands(VENT, 0.252)._replace(slow_pressures=SlowPressures(2.2e5, GOOD.pressure_2))
+    state = after_commands(VENT, 0.252)._replace(slow_pressure_1=2.2e5)
     for sample in range(100):
         state = stood(state, sample, pressure_1=2.0e5 - 500.0 * sample)
     assert state.level == signs.HELPS
@@ -257,12 +362,12 @@ def test_once_stopped_it_stays_so() -> None:
     state = safety.monitor(RULES, safety.START, phases.START, phases.START, GOOD._replace(angle=9.0), PERIOD)
     for command in (1.0, -0.3, 0.0):
         state = safety.monitor(RULES, state, phases.START, phases.START, GOOD, PERIOD)
-        given, state = safety.safe_command(state, command, PERIOD)
+        given, state = safety.safe_command(state, SWING, command, PERIOD)
         assert given == VENT
     assert state.valve_times == ValveTimes(0.0, 0.0, pytest.approx(3.0 * PERIOD))
 
 
 def test_a_change_of_direction_begins_to_fill_anew() -> None:
     state = after_commands(1.0, 0.04)
-    _, state = safety.safe_command(state, -1.0, PERIOD)
+    _, state = safety.safe_command(state, SWING, -1.0, PERIOD)
     assert state.valve_times == ValveTimes(0.0, pytest.approx(PERIOD), 0.0)

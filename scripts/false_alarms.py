@@ -1,0 +1,89 @@
+"""How often good sensors give an alarm: wearers on every course, and what is seen in them.
+
+    python scripts/false_alarms.py --wearers 1000 --out out/false-alarms
+
+A stop on good sensors is a false alarm, and the exit code is then 1. A pause, and a foot that is lifted only, are for
+what walking does; they are counted apart, by the last sign of each wearer. Every configuration and course that is done
+is kept in the folder, and a second call goes on where the first one ended. It prints a table of
+docs/walking-faults.md.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from ppafo.walking.course import list_courses
+from ppafo.walking.loading import load_walk
+from ppafo.walking.population import walk_population
+
+CONFIGURATIONS = ("solenoid", "proportional")
+SENSORS = {
+    "ideal": (),
+    "coarse": (
+        "sensors.force_resolution=15 N",
+        "sensors.angle_resolution=0.5 deg",
+        "sensors.pressure_resolution=1 psi_d",
+    ),
+    "noisy": ("sensors.force_noise=10 N", "sensors.angle_noise=0.2 deg", "sensors.pressure_noise=0.3 psi_d"),
+}
+"""Good sensors: what stands between foot and controller."""
+
+HEAD = ("Course", "Sensors", "Configuration", "Wearers", "Stops", "Not always helped", "Last sign of these")
+
+
+def counted(configuration: str, course: str, sensors: str, wearers: int) -> dict[str, object]:
+    """Walk a course with many wearers: how many there were, were stopped, had less help, and by which last sign."""
+    people = walk_population(load_walk(configuration, [f"course={course}", *SENSORS[sensors]]), None, wearers)
+    return {
+        "wearers": people.count,
+        "diverged": people.diverged,
+        "stops": people.vented,
+        "less": people.paused,
+        "signs": dict(people.signs),
+    }
+
+
+def line(course: str, sensors: str, configuration: str, found: dict[str, object]) -> str:
+    """One row of the table."""
+    seen = found["signs"]
+    assert isinstance(seen, dict), "as counted"
+    words = ", ".join(f"{name} {count}" for name, count in seen.items()) or "-"
+    cells = (course, sensors, configuration, found["wearers"], found["stops"], found["less"], words)
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def arguments() -> argparse.Namespace:
+    """What the command line asks for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--wearers", type=int, default=1000, help="wearers of each course and configuration")
+    parser.add_argument("--out", type=Path, default=Path("out/false-alarms"), help="folder of what is done")
+    parser.add_argument("--course", nargs="*", default=list_courses(), choices=list_courses(), help="which courses")
+    parser.add_argument("--sensors", nargs="*", default=["ideal"], choices=list(SENSORS), help="which good sensors")
+    parser.add_argument("--configuration", nargs="*", default=CONFIGURATIONS, help="which walks of the package")
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Walk what is not done yet, and print the table; 1 where a stop was found."""
+    given = arguments()
+    given.out.mkdir(parents=True, exist_ok=True)
+    print(f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}")
+    stops = 0
+    for configuration in given.configuration:
+        for sensors in given.sensors:
+            for course in given.course:
+                file = given.out / f"{configuration}-{sensors}-{course}-{given.wearers}.json"
+                if not file.exists():
+                    aside = file.with_suffix(".part")
+                    aside.write_text(json.dumps(counted(configuration, course, sensors, given.wearers)))
+                    aside.rename(file)
+                found = json.loads(file.read_text())
+                stops += found["stops"]
+                print(line(course, sensors, configuration, found), flush=True)
+    print(f"\n{stops} stops on good sensors", file=sys.stderr)
+    return 1 if stops else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

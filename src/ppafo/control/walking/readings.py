@@ -1,0 +1,128 @@
+"""Signs in the readings of forces and angle as such: out of range, gone at once, or the same while others move.
+
+Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
+"""
+
+from typing import NamedTuple
+
+from ppafo.control.walking import signs
+from ppafo.control.walking.phases import MID_STANCE, SWING, PhaseState, lifts
+from ppafo.control.walking.signs import NO_SIGN, SafetyRules
+from ppafo.model.gait_sensors import GaitMeasurement
+
+
+class LastReadings(NamedTuple):
+    """Last readings of heel, toe [N] and angle [rad], how long each has not changed [s], and each filtered."""
+
+    heel_force: float
+    toe_force: float
+    angle: float
+    heel_unchanged: float
+    toe_unchanged: float
+    angle_unchanged: float
+    slow_heel: float
+    slow_toe: float
+    slow_angle: float
+
+
+NOTHING_READ = LastReadings(
+    heel_force=0.0,
+    toe_force=0.0,
+    angle=0.0,
+    heel_unchanged=0.0,
+    toe_unchanged=0.0,
+    angle_unchanged=0.0,
+    slow_heel=0.0,
+    slow_toe=0.0,
+    slow_angle=0.0,
+)
+
+SLOW_TIME = 0.08
+"""Time constant [s] of the slow readings: a step has faded from them when a sensor counts as frozen."""
+
+MOVES, TURNS = 40.0, 0.05
+"""A force [N] and an angle [rad] move that are further than this from their slow reading: not those of who stands."""
+
+GONE = 0.1
+"""What is left of a force that is gone, as a fraction of ``largest_drop``."""
+
+QUICK_PERIOD = 0.005
+"""Sample period [s] above which a force may be gone within a sample: toes leave the ground in some 0.1 s."""
+
+HALF = 0.5
+"""A stride of less than this fraction of the stride time, or of more than its inverse, is not a good one."""
+
+
+def time_unchanged(last: float, reading: float, since: float, period: float) -> float:
+    """How long a reading has been the same to the last bit [s]."""
+    return since + period if reading == last else 0.0
+
+
+def slow_reading(last: float, reading: float, is_first: bool, period: float) -> float:
+    """A reading filtered with ``SLOW_TIME``, in its unit; the first one counts at once."""
+    followed = last + (reading - last) * period / (period + SLOW_TIME)
+    return reading if is_first else followed
+
+
+def next_readings(last: LastReadings, measurement: GaitMeasurement, period: float) -> LastReadings:
+    """The last readings after a sample, taken every ``period`` [s]."""
+    is_first = last.angle == 0.0
+    return LastReadings(
+        heel_force=measurement.heel_force,
+        toe_force=measurement.toe_force,
+        angle=measurement.angle,
+        heel_unchanged=time_unchanged(last.heel_force, measurement.heel_force, last.heel_unchanged, period),
+        toe_unchanged=time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, period),
+        angle_unchanged=time_unchanged(last.angle, measurement.angle, last.angle_unchanged, period),
+        slow_heel=slow_reading(last.slow_heel, measurement.heel_force, is_first, period),
+        slow_toe=slow_reading(last.slow_toe, measurement.toe_force, is_first, period),
+        slow_angle=slow_reading(last.slow_angle, measurement.angle, is_first, period),
+    )
+
+
+def range_sign(rules: SafetyRules, measurement: GaitMeasurement) -> float:
+    """The sign of a reading that no foot and no chamber gives."""
+    force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
+    force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
+    angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
+    low, high = min(measurement.pressure_1, measurement.pressure_2), max(measurement.pressure_1, measurement.pressure_2)
+    pressure = (low < rules.lowest_pressure) | (high > rules.highest_pressure)
+    found = signs.PRESSURE_RANGE if pressure else NO_SIGN
+    found = signs.ANGLE_RANGE if angle else found
+    return signs.FORCE_RANGE if force else found
+
+
+def is_gone(rules: SafetyRules, last: float, force: float) -> bool:
+    """True where a force [N] was large one sample ago and is nearly none now."""
+    return (last > rules.largest_drop) & (force < GONE * rules.largest_drop)
+
+
+def gone_sign(rules: SafetyRules, last: LastReadings, measurement: GaitMeasurement, period: float) -> float:
+    """The sign of a loose contact: a foot takes many samples of ``period`` [s] to leave the ground."""
+    gone = is_gone(rules, last.heel_force, measurement.heel_force)
+    gone = gone | is_gone(rules, last.toe_force, measurement.toe_force)
+    return signs.FORCE_GONE if gone & (period < QUICK_PERIOD) else NO_SIGN
+
+
+def still_sign(rules: SafetyRules, readings: LastReadings, before: PhaseState, phase: PhaseState) -> float:
+    """The sign of a reading that does not change; a fault only where another sensor shows a step meanwhile.
+
+    An unloaded force sensor shows the same for long, and so does the angle of a foot that is held up. Who
+    stands with heel and toes on the ground has no moving sensor: there one that is still counts only beside one that
+    moves. On heel or toes alone nobody stands still.
+    """
+    steps = (phase.phase != MID_STANCE) | (min(phase.heel.loaded, phase.toe.loaded) < 0.5)
+    heel_moves = abs(readings.heel_force - readings.slow_heel) > MOVES
+    toe_moves = abs(readings.toe_force - readings.slow_toe) > MOVES
+    turns = abs(readings.angle - readings.slow_angle) > TURNS
+    heel = (readings.heel_unchanged > rules.frozen_time) & (phase.heel.loaded > 0.5)
+    toe = (readings.toe_unchanged > rules.frozen_time) & (phase.toe.loaded > 0.5)
+    angle = readings.angle_unchanged > rules.frozen_time
+    held = lifts(phase.phase)
+    whole = (before.phase == SWING) & (phase.phase != SWING) & (before.since_strike > HALF * phase.stride_time)
+    found = signs.STILL_ANGLE if angle & (not held) & (heel_moves | toe_moves | steps) else NO_SIGN
+    found = signs.STILL_TOE if toe & (heel_moves | turns | steps) else found
+    found = signs.STILL_HEEL if heel & (toe_moves | turns | steps) else found
+    found = signs.FROZEN_ANGLE if angle & whole & (readings.angle_unchanged > before.since_strike) else found
+    found = signs.FROZEN_TOE if toe & (phase.heel.loaded != before.heel.loaded) else found
+    return signs.FROZEN_HEEL if heel & (phase.toe.loaded != before.toe.loaded) else found

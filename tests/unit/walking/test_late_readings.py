@@ -1,0 +1,35 @@
+"""Readings that come whole samples late: what the controller sees is what was there, as many samples ago."""
+
+import numpy as np
+import pytest
+
+from ppafo.model.gait_sensors import Fault, samples_late
+from ppafo.walking.loading import load_walk
+from ppafo.walking.walk import walk
+
+BEGINS, LATE = 3.2, 0.05
+
+
+@pytest.mark.parametrize(
+    ("time", "sample", "late"), [(1.9, 1900, 0), (2.0, 2000, 7), (2.4, 2400, 7), (2.6, 2600, 0), (3.1, 3100, 7)]
+)
+def test_a_delay_begins_with_the_fault_and_comes_and_goes_with_it(time: float, sample: int, late: int) -> None:
+    fault = Fault(2.0, 0.0, 0.0, distorts=1.0, delay=7.0, period=1.0)
+    assert samples_late(fault, time, sample) == late
+
+
+def test_nothing_is_older_than_the_walk() -> None:
+    assert samples_late(Fault(0.0, 0.0, 0.0, distorts=1.0, delay=100.0), 0.03, 30) == 30
+
+
+def test_a_late_heel_sensor_shows_the_next_strike_as_much_later() -> None:
+    late = [f"faults.heel.{item}" for item in ("kind=distorted", f"time={BEGINS} s", f"delay={LATE} s")]
+    sound = [f"faults.heel.{item}" for item in ("kind=distorted", f"time={BEGINS} s", "delay=0.001 s")]
+    strikes = []
+    for given in (sound, late):
+        recording = walk(load_walk("solenoid", given), 0.1).recording
+        begins = np.diff(recording["controller_phase"] == 1.0, prepend=False) & (recording["controller_phase"] == 1.0)
+        times = recording.time[begins]
+        # The heel is on the ground when the fault begins: the first strike after it is that of the next stride.
+        strikes.append(float(times[times > BEGINS + 0.3][0]))
+    assert strikes[1] - strikes[0] == pytest.approx(LATE - 0.001, abs=0.0051)
