@@ -19,7 +19,7 @@ from ppafo.control.controllers import (
 )
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, event_damped_learning, event_on_off, off, proportional
-from ppafo.control.walking.timing import fractional, thresholds
+from ppafo.control.walking.timing import estimated, fractional, thresholds
 from ppafo.control.walking.timing.kind import TimingKind
 from ppafo.control.walking.torque_law import bind, row_with, shared_settings, walking_law
 from ppafo.errors import ScenarioError
@@ -123,7 +123,7 @@ def law_that_walks(law: ControllerKind) -> ControllerKind:
 
 
 TIMINGS: Kinds[TimingKind] = Kinds(
-    "ppafo.walking_timings", "timing of walking", TimingKind, (thresholds.KIND, fractional.KIND)
+    "ppafo.walking_timings", "timing of walking", TimingKind, (thresholds.KIND, fractional.KIND, estimated.KIND)
 )
 """The ways to know the time in the stride. The first one is that of every controller unless another is chosen."""
 

@@ -169,6 +169,16 @@ def learnt_events(come: Events, seen: Events, found: Events, weight: float) -> E
     )
 
 
+def chosen_events(some: Events, others: Events, takes_some: bool) -> Events:
+    """Some events or the others: nothing is learnt in fractions of a stride before one was measured."""
+    return Events(
+        strike=0.0,
+        toes_on=some.toes_on if takes_some else others.toes_on,
+        heel_off=some.heel_off if takes_some else others.heel_off,
+        toes_off=some.toes_off if takes_some else others.toes_off,
+    )
+
+
 def next_strides(strides: Strides, ends: bool, taken: float, first_time: float, weight: float) -> Strides:
     """The mean of recent stride times after a sample at which a stride that has ``taken`` [s] may end.
 
@@ -195,6 +205,40 @@ def anchored_fraction(
     return anchored(fraction, seen.toes_off, come.toes_off, late.toes_off / stride_time, weight)
 
 
+def struck_fraction(fraction: float, target: float, weight: float) -> float:
+    """Fraction [turns] at a detected strike: moved towards ``target`` by a weight, all the way from far off."""
+    missed = target + 1.0 - fraction
+    return fraction + weight * missed - 1.0 if abs(missed) < TOO_FAR else target
+
+
+def next_clock(
+    delays: Delays,
+    phase_rules: PhaseRules,
+    clock: FractionalClock,
+    before: PhaseState,
+    phase: PhaseState,
+    weight: float,
+    strike_weight: float,
+    period: float,
+) -> FractionalClock:
+    """The clock after a sample; a detected strike moves it by ``strike_weight``, the events after it by ``weight``."""
+    late, seen = detection_delays(delays, phase_rules, period), seen_events(before, phase)
+    struck = seen.strike > 0.5
+    # The first strike ends no stride: when the walk began is not known.
+    ends = struck & (before.strikes > 0.5)
+    taken = before.since_strike + period
+    strides = next_strides(clock.strides, ends, taken, phase.stride_time, phase_rules.stride_weight)
+    stride = strides.mean_time
+    share = max(phase_rules.stride_weight, 1.0 / max(strides.count, 1.0))
+    found = learnt_events(clock.come, seen, events_found(phase.since_strike, stride, late), share)
+    come = chosen_events(found, clock.come, strides.count > 0.5)
+    passed = anchored_fraction(clock, seen, late, stride, weight, period)
+    set_anew = struck_fraction(passed, late.strike / stride, strike_weight)
+    fraction = set_anew if struck else min(passed, latest_fraction(phase, come))
+    event = last_event(clock, fraction, come, seen, phase.phase == phases.SWING)
+    return FractionalClock(fraction=fraction, event=event, come=come, strides=strides)
+
+
 def follow(
     rules: FractionalRules,
     phase_rules: PhaseRules,
@@ -204,24 +248,14 @@ def follow(
     measurement: GaitMeasurement,
     period: float,
 ) -> FractionalClock:
-    """The clock after a sample, taken every ``period`` [s]."""
-    late, seen = detection_delays(rules.delays, phase_rules, period), seen_events(before, phase)
-    struck, weight = seen.strike > 0.5, phase_rules.stride_weight
-    # The first strike ends no stride: when the walk began is not known.
-    ends = struck & (before.strikes > 0.5)
-    strides = next_strides(clock.strides, ends, before.since_strike + period, phase.stride_time, weight)
-    stride = strides.mean_time
-    come = learnt_events(clock.come, seen, events_found(phase.since_strike, stride, late), weight)
-    passed = anchored_fraction(clock, seen, late, stride, rules.anchor_weight, period)
-    fraction = late.strike / stride if struck else min(passed, latest_fraction(phase, come))
-    event = last_event(clock, fraction, come, seen, phase.phase == phases.SWING)
-    return FractionalClock(fraction=fraction, event=event, come=come, strides=strides)
+    """The clock after a sample, taken every ``period`` [s]; a detected strike sets it anew."""
+    return next_clock(rules.delays, phase_rules, clock, before, phase, rules.anchor_weight, 1.0, period)
 
 
 def place_in_stride(fraction: float, lead: float, phase: PhaseState) -> GaitTime:
     """The time in the stride at a fraction of it [turns], a ``lead`` [s] ahead; the strike is expected, not awaited.
 
-    It is the fraction of the stride time that the phases go by, so that this is what a law makes of it again; 0 s before the first sample.
+    It is the fraction of the stride time that the phases go by, as a law makes it of this time again; 0 s at the start.
     """
     stride_time = phase.stride_time if phase.stride_time > 0.0 else 1.0
     ahead = fraction + lead / stride_time
@@ -234,6 +268,10 @@ def gait_time(rules: FractionalRules, clock: FractionalClock, phase: PhaseState)
     """The time since the heel strike [s], ahead by the delay of the valve."""
     return place_in_stride(clock.fraction, rules.delays.valve_delay, phase)
 
+
+ANCHOR_WEIGHT = Quantity(
+    "anchor_weight", "1", "how far an event after the strike moves the clock, 1 wholly", 0.5, 0.0, 1.0
+)
 
 DELAY_QUANTITIES = (
     Quantity("heel_loading_rate", "N/s", "how fast the heel is loaded after its strike", 5.6e3, 100.0, 1.0e6),
@@ -250,7 +288,7 @@ KIND = TimingKind(
     source="fractional timing, usual in the field; anchored anew at each detected event",
     quantities=(
         *DELAY_QUANTITIES,
-        Quantity("anchor_weight", "1", "how far an event after the strike moves the clock, 1 wholly", 0.5, 0.0, 1.0),
+        ANCHOR_WEIGHT,
     ),
     parameters=FractionalRules,
     initial=START,
