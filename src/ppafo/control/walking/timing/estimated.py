@@ -200,7 +200,8 @@ def next_learnt(rules: EstimationRules, clock: EstimatedClock, before: PhaseStat
 
     A stride that is not good begins the learning anew, until it is done.
     """
-    ends = (before.strikes < phase.strikes) & (before.strikes > 1.5)
+    # In the stride before the time of a stride was known for the second time the clock may have waited.
+    ends = (before.strikes < phase.strikes) & (clock.clock.strides.count > 1.5)
     time = clock.clock.strides.mean_time
     good = (abs(before.since_strike - time) < EVEN * time) & (phase.heel.loaded > 0.5)
     counted = (clock.learnt + 1.0 if good else 0.0) if ends else clock.learnt

@@ -22,7 +22,7 @@ WAITS = 0.05
 """Fraction of the stride by which the clock runs past an event that was not detected, before it waits."""
 
 TOO_FAR = 0.15
-"""An event further than this fraction of the stride from where it came in recent strides is not taken for the same."""
+"""Fraction of the stride: an event further from where it came in recent strides than this does not move the clock."""
 
 STRUCK = 0.0
 TOES_ON = 1.0
@@ -109,10 +109,10 @@ def seen_events(before: PhaseState, phase: PhaseState) -> Events:
 
 def next_come(come: float, seen: float, found: float, weight: float) -> float:
     """Fraction of the stride at which an event comes [turns], after it may have been seen at ``found``."""
-    known = come > 0.0
-    moved = come + weight * (found - come) if known else found
-    takes = (seen > 0.5) & (found > 0.0) & (found < 1.0) & ((abs(found - come) < TOO_FAR) | (not known))
-    return moved if takes else come
+    # One stumble moves it by no more than a usual stride may.
+    missed = max(-TOO_FAR, min(TOO_FAR, found - come))
+    moved = come + weight * missed if come > 0.0 else found
+    return moved if (seen > 0.5) & (found > 0.0) & (found < 1.0) else come
 
 
 def anchored(fraction: float, seen: float, come: float, late: float, weight: float) -> float:
@@ -224,8 +224,8 @@ def next_clock(
     """The clock after a sample; a detected strike moves it by ``strike_weight``, the events after it by ``weight``."""
     late, seen = detection_delays(delays, phase_rules, period), seen_events(before, phase)
     struck = seen.strike > 0.5
-    # The first strike ends no stride: when the walk began is not known.
-    ends = struck & (before.strikes > 0.5)
+    # The first strike ends no stride, and the second one begins the first whole one: a walk may begin in mid-stance.
+    ends = struck & (before.strikes > 1.5)
     taken = before.since_strike + period
     strides = next_strides(clock.strides, ends, taken, phase.stride_time, phase_rules.stride_weight)
     stride = strides.mean_time
