@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.answers import Answer, Column, Section, Table
+from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import quantity_text
 from ppafo.control.walking.catalog import TIMINGS
+from ppafo.questions.timing.figure import timing_figure
 from ppafo.questions.timing.solve import STEADY, WEARERS, TimedWay, Timing
 from ppafo.version import __version__
 from ppafo.walking.event_times import EVENTS
@@ -51,7 +52,11 @@ def answer_of(timing: Timing) -> Answer:
         title=f"When the controller of {timing.file} knows of the events of a stride",
         lead=tuple(_sentence(timing, wearer) for wearer in WEARERS),
         sections=(
-            Section("Errors of event times (RMS)", table=Table(_POOLED, tuple(_pooled(timing)), left=2)),
+            Section(
+                "Errors of event times (RMS)",
+                table=Table(_POOLED, tuple(_pooled(timing)), left=2),
+                figure=Figure("timing", _CAPTION, lambda: timing_figure(timing)),
+            ),
             Section(
                 "By way and event",
                 paragraphs=(_METHOD,),
@@ -67,6 +72,7 @@ def answer_of(timing: Timing) -> Answer:
     )
 
 
+_CAPTION = "Heel strike, toes on, heel off and toes off together, for a healthy and an impaired wearer on each way."
 _METHOD = (
     "An error is the time at which the controller knows of an event less the time at which it happens, which the "
     "simulation knows: heel strike, foot flat (toes on), heel off, toes off. It counts from 6 s on. 'Missed' are those "
