@@ -80,6 +80,9 @@ def all_together(device: Device) -> Device:
     return higher_pressure(smaller_chambers(larger_valves(device)))
 
 
+LOW, HIGH, TRIES = 1.45, 1.95, 8
+"""Swing angles [rad] between which the foot is made to fall from as high as with the device as it is, in so many walks."""
+
 Change = tuple[str, Sequence[str], Callable[[Device], Device]]
 
 CHANGES: tuple[Change, ...] = (
@@ -101,9 +104,24 @@ def slap_sources(
     for number, (change, own, device) in enumerate(CHANGES):
         progress(Progress(f"slap, {change}", number, len(CHANGES) + 1))
         configuration = load_walk(file, (*overrides, *own), gait)
-        found.append(_walked(change, replace(configuration, device=device(configuration.device))))
+        changed = replace(configuration, device=device(configuration.device))
+        found.append(_fallen_as_far(change, changed, found[0].drop) if found else _walked(change, changed))
     progress(Progress("slap, device off", len(CHANGES), len(CHANGES) + 1))
     return (_walked("device off", with_device_off(load_walk(file, overrides, gait))), *found)
+
+
+def _fallen_as_far(change: str, configuration: Configuration, drop: float) -> SlapSource:
+    """Walk with the swing angle at which the foot falls as far [rad] as with the device as it is, or nearly so.
+
+    Else a change that lifts the foot higher would seem to make the slap.
+    """
+    low, high, tried = LOW, HIGH, []
+    for _ in range(TRIES):
+        angle = 0.5 * (low + high)
+        found = _walked(change, replace(configuration, settings={**configuration.settings, "swing_angle": angle}))
+        tried.append(found)
+        low, high = (angle, high) if found.drop > drop else (low, angle)
+    return min(tried, key=lambda item: abs(item.drop - drop))
 
 
 def _walked(change: str, configuration: Configuration) -> SlapSource:

@@ -127,9 +127,7 @@ def uneven_course(cadence: float) -> WalkingCourse:
     paces = cadence / (1.0 + VARIATION * np.clip(generator.standard_normal(UNEVEN_STRIDES), -2.0, 2.0))
     strides = (Segment("walk", {"cadence": pace, "strides": 1.0}) for pace in paces.tolist())
     begin = (Segment("start", {"strides": 1.0}), Segment("walk", {"strides": 6.0}))
-    return WalkingCourse(
-        "uneven", "Strides of uneven time.", (*begin, *strides, Segment("stop", {"strides": 1.0})), "uneven"
-    )
+    return WalkingCourse("uneven", "Strides of uneven time.", (*begin, *strides), "uneven")
 
 
 def timed_events(configuration: Configuration, minutes: float) -> dict[str, EventErrors]:

@@ -7,7 +7,9 @@ detected event the clock is anchored anew at the fraction at which that event ha
 delay. So an event is known when the clock passes its fraction, before the sensors show it.
 
 The clock waits for an event that does not come: for the toes to come down, the heel or the toes to rise, the next
-strike. Who stands has no percent of gait.
+strike. Who stands has no percent of gait. A stride whose heel and toes leave the ground late takes longer: the clock
+goes on at its pace. After a stride that was not even, as at starts, stops and stairs, nothing is predicted: events are
+known when they are detected.
 """
 
 from typing import NamedTuple
@@ -23,6 +25,12 @@ WAITS = 0.05
 
 TOO_FAR = 0.15
 """Fraction of the stride: an event further from where it came in recent strides than this does not move the clock."""
+
+EVEN = 0.1
+"""A stride that takes longer or shorter than recent ones by more than this fraction is odd: nothing is predicted."""
+
+FASTER = 0.3
+"""A stride is taken to be quicker or slower than recent ones by at most this fraction, by when the foot rises."""
 
 STRUCK = 0.0
 TOES_ON = 1.0
@@ -58,10 +66,16 @@ class Events(NamedTuple):
 
 
 class Strides(NamedTuple):
-    """The mean of recent stride times [s], and how many strides were measured."""
+    """The mean of recent stride times [s], how many count, the last [s], 1 where that was even, time of this one [s].
+
+    ``this_time`` is what the stride will take that has begun, by when its heel and its toes have left the ground.
+    """
 
     mean_time: float
     count: float
+    last: float
+    even: float
+    this_time: float
 
 
 class FractionalClock(NamedTuple):
@@ -76,7 +90,8 @@ class FractionalClock(NamedTuple):
     strides: Strides
 
 
-START = FractionalClock(fraction=0.0, event=TOES_OFF, come=Events(0.0, 0.0, 0.0, 0.0), strides=Strides(0.0, 0.0))
+NOT_KNOWN = Events(0.0, 0.0, 0.0, 0.0)
+START = FractionalClock(fraction=0.0, event=TOES_OFF, come=NOT_KNOWN, strides=Strides(0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 def detection_delays(delays: Delays, phase_rules: PhaseRules, period: float) -> Events:
@@ -122,25 +137,35 @@ def anchored(fraction: float, seen: float, come: float, late: float, weight: flo
     return fraction + weight * missed if usable else fraction
 
 
-def latest_fraction(phase: PhaseState, come: Events) -> float:
-    """Fraction [turns] at which the clock waits for the event that the sensors have to show next."""
+def latest_fraction(phase: PhaseState, come: Events, predicts: bool) -> float:
+    """Fraction [turns] at which the clock waits for the event that the sensors have to show next.
+
+    It waits before a strike that it does not predict.
+    """
     on_ground = come.toes_off if phase.heel.loaded < 0.5 else come.heel_off
     on_ground = come.toes_on if phase.phase == phases.LANDING else on_ground
-    awaited = 1.0 if phase.phase == phases.SWING else on_ground
-    return (awaited if awaited > 0.0 else 1.0) + WAITS
+    awaited = on_ground if on_ground > 0.0 else 1.0
+    strike = 1.0 + WAITS if predicts else 1.0 - WAITS
+    return strike if phase.phase == phases.SWING else awaited + WAITS
 
 
-def last_event(clock: FractionalClock, fraction: float, come: Events, seen: Events, is_swing: bool) -> float:
+def last_event(clock: FractionalClock, fraction: float, come: Events, seen: Events, phase: PhaseState) -> float:
     """The last event that has been passed; one whose fraction is not known is passed where it is detected."""
+    is_swing = phase.phase == phases.SWING
     struck = (seen.strike > 0.5) | (is_swing & (clock.event == TOES_OFF) & (fraction >= 1.0))
     expected = is_swing & (clock.event == STRUCK)
-    passed = clock.event if expected else event_of_stance(clock.event, fraction, come, seen)
+    passed = clock.event if expected else event_of_stance(clock.event, fraction, come, seen, phase.toe.loaded)
     return STRUCK if struck else passed
 
 
-def event_of_stance(event: float, fraction: float, come: Events, seen: Events) -> float:
+def event_of_stance(event: float, fraction: float, come: Events, seen: Events, toe_loaded: float) -> float:
     """The last event passed in a stance: one after the other."""
-    toes_on = (seen.toes_on > 0.5) | ((come.toes_on > 0.0) & (fraction >= come.toes_on))
+    # A foot that comes down on its toes has them on the ground at once.
+    toes_on = (
+        (seen.toes_on > 0.5)
+        | ((come.toes_on <= 0.0) & (toe_loaded > 0.5))
+        | ((come.toes_on > 0.0) & (fraction >= come.toes_on))
+    )
     heel_off = (seen.heel_off > 0.5) & (come.heel_off <= 0.0) | ((come.heel_off > 0.0) & (fraction >= come.heel_off))
     toes_off = (seen.toes_off > 0.5) | ((come.toes_off > 0.0) & (fraction >= come.toes_off))
     found = max(event, TOES_ON) if toes_on else event
@@ -170,7 +195,7 @@ def learnt_events(come: Events, seen: Events, found: Events, weight: float) -> E
 
 
 def chosen_events(some: Events, others: Events, takes_some: bool) -> Events:
-    """Some events or the others: nothing is learnt in fractions of a stride before one was measured."""
+    """Some events or the others: nothing is learnt in fractions of a stride whose time is not known."""
     return Events(
         strike=0.0,
         toes_on=some.toes_on if takes_some else others.toes_on,
@@ -179,18 +204,50 @@ def chosen_events(some: Events, others: Events, takes_some: bool) -> Events:
     )
 
 
-def next_strides(strides: Strides, ends: bool, taken: float, first_time: float, weight: float) -> Strides:
+def next_strides(
+    strides: Strides, struck: bool, ends: bool, on_heel: bool, taken: float, first_time: float, weight: float
+) -> Strides:
     """The mean of recent stride times after a sample at which a stride that has ``taken`` [s] may end.
 
-    The first strides count evenly, then a new one with its ``weight``. One that takes less than half or more than
-    twice the mean does not count.
+    The first strides count evenly, then a new one with its ``weight``. An odd one does not count, until a second one
+    is like it: the wearer walks at another pace. What begins with the toes, or does not end, is no even stride.
     """
     known = strides.mean_time if strides.count > 0.5 else first_time
     usual = ends & (taken > 0.5 * known) & (taken < 2.0 * known)
+    first = strides.count < 0.5
+    near = abs(taken - known) < EVEN * known
+    repeats = abs(taken - strides.last) < EVEN * strides.last
     share = max(weight, 1.0 / (strides.count + 1.0))
+    moved = known + share * (taken - known) if near else 0.5 * (taken + strides.last)
+    moved = taken if first else moved
+    counts = usual & (first | near | repeats)
+    mean_time = moved if counts else known
+    even = counts & on_heel & (not first)
     return Strides(
-        mean_time=known + share * (taken - known) if usual else known,
-        count=strides.count + 1.0 if usual else strides.count,
+        mean_time=mean_time,
+        count=strides.count + 1.0 if counts else strides.count,
+        last=taken if ends else strides.last,
+        even=(1.0 if even else 0.0) if struck else strides.even,
+        this_time=mean_time if struck | (strides.this_time <= 0.0) else strides.this_time,
+    )
+
+
+def paced(strides: Strides, seen: Events, found: Events, come: Events, weight: float) -> Strides:
+    """What the stride that has begun will take, after its heel or its toes have left the ground early or late.
+
+    ``found`` are the fractions of the mean stride at which they did, ``come`` those of recent strides.
+    """
+    heel = (seen.heel_off > 0.5) & (come.heel_off > 0.0)
+    toes = (seen.toes_off > 0.5) & (come.toes_off > 0.0)
+    pace = found.heel_off / come.heel_off if heel else 1.0
+    pace = found.toes_off / come.toes_off if toes else pace
+    told = strides.mean_time * (1.0 + weight * (max(1.0 - FASTER, min(1.0 + FASTER, pace)) - 1.0))
+    return Strides(
+        mean_time=strides.mean_time,
+        count=strides.count,
+        last=strides.last,
+        even=strides.even,
+        this_time=told if heel | toes else strides.this_time,
     )
 
 
@@ -227,15 +284,18 @@ def next_clock(
     # The first strike ends no stride, and the second one begins the first whole one: a walk may begin in mid-stance.
     ends = struck & (before.strikes > 1.5)
     taken = before.since_strike + period
-    strides = next_strides(clock.strides, ends, taken, phase.stride_time, phase_rules.stride_weight)
-    stride = strides.mean_time
-    share = max(phase_rules.stride_weight, 1.0 / max(strides.count, 1.0))
-    found = learnt_events(clock.come, seen, events_found(phase.since_strike, stride, late), share)
-    come = chosen_events(found, clock.come, strides.count > 0.5)
+    on_heel, usual = phase.heel.loaded > 0.5, phase_rules.stride_weight
+    strides = next_strides(clock.strides, struck, ends, on_heel, taken, phase.stride_time, usual)
+    found = events_found(phase.since_strike, strides.mean_time, late)
+    strides = paced(strides, seen, found, clock.come, weight)
+    stride, predicts = strides.this_time, strides.even > 0.5
+    learnt = learnt_events(clock.come, seen, found, max(usual, 1.0 / max(strides.count, 1.0)))
+    come = chosen_events(learnt, clock.come, predicts | (strides.count < 1.5) & (strides.count > 0.5))
     passed = anchored_fraction(clock, seen, late, stride, weight, period)
     set_anew = struck_fraction(passed, late.strike / stride, strike_weight)
-    fraction = set_anew if struck else min(passed, latest_fraction(phase, come))
-    event = last_event(clock, fraction, come, seen, phase.phase == phases.SWING)
+    fraction = set_anew if struck else min(passed, latest_fraction(phase, come, predicts))
+    told = chosen_events(come, NOT_KNOWN, predicts)
+    event = last_event(clock, fraction, told, seen, phase)
     return FractionalClock(fraction=fraction, event=event, come=come, strides=strides)
 
 
@@ -270,7 +330,7 @@ def gait_time(rules: FractionalRules, clock: FractionalClock, phase: PhaseState)
 
 
 ANCHOR_WEIGHT = Quantity(
-    "anchor_weight", "1", "how far an event after the strike moves the clock, 1 wholly", 0.5, 0.0, 1.0
+    "anchor_weight", "1", "how far an event after the strike moves the clock, 1 wholly", 0.8, 0.0, 1.0
 )
 
 DELAY_QUANTITIES = (
