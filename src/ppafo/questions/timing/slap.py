@@ -81,7 +81,7 @@ def all_together(device: Device) -> Device:
 
 
 LOW, HIGH, TRIES = 1.45, 1.95, 8
-"""Swing angles [rad] between which the foot is made to fall from as high as with the device as it is, in so many walks."""
+"""Swing angles [rad] between which the foot is made to fall as far as with the device as it is, in so many walks."""
 
 Change = tuple[str, Sequence[str], Callable[[Device], Device]]
 

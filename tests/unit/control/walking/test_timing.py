@@ -14,6 +14,7 @@ from ppafo.control.walking.timing.estimated import EstimationRules, LearntStride
 from ppafo.control.walking.timing.kind import TimingKind
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
+from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 
 Floats = NDArray[np.float64]
@@ -191,3 +192,28 @@ def test_a_timing_changes_no_controller_without_a_time_in_the_stride() -> None:
             timed = [with_timing(kind, timing) for timing in TIMINGS.values()]
             assert timed[0] is kind
             assert len({len(item.quantities) for item in timed}) == 3
+
+
+@pytest.mark.parametrize("timing", list(TIMINGS.values())[1:], ids=lambda timing: timing.name)
+@pytest.mark.parametrize("name", ["event_on_off", "event_pid"])
+def test_nothing_pushes_on_a_loaded_heel_and_a_stop_is_for_good_whatever_is_predicted(
+    timing: TimingKind, name: str
+) -> None:
+    kind = with_timing(WALKING_CONTROLLERS[name], timing)
+    values = {item.name: item.default for item in kind.quantities} | GIVEN | {"fill_time": 10.0, "vent_time": 10.0}
+    parameters, state = rebuilt(kind.parameters, list(values.values())), kind.initial
+    phase = np.concatenate([np.arange(0.5, 5.2, PERIOD), np.full(600, 5.2), np.arange(5.2, 7.3, 1.3 * PERIOD)])
+    heel, toe = forces(phase % 1.0, 1.0)
+    noise = 1.0 + 1.0e-6 * np.random.default_rng(3).standard_normal((phase.size, 3))
+    pushed = 0
+    for angle, on_heel, on_toe, wrong in zip(angles(phase % 1.0), heel, toe, noise, strict=True):
+        measurement = GaitMeasurement(angle * wrong[0], 1.4e5, 1.4e5, 0.0, on_heel * wrong[1], on_toe * wrong[2])
+        command, state = kind.update(parameters, state, 0.0, measurement, PERIOD)
+        pushed += command > 0.0 and command <= 1.0 and state.phase.phase == phases.PUSH_OFF
+        assert state.phase.heel.loaded < 0.5 or not 0.0 < command <= 1.0
+    assert pushed > 100
+    broken = GaitMeasurement(1.6, 1.4e5, 1.4e5, 0.0, 9.0e3, 0.0)
+    for on_heel, on_toe in zip(heel[:3000].tolist(), toe[:3000].tolist(), strict=True):
+        command, state = kind.update(parameters, state, 0.0, broken._replace(toe_force=on_toe), PERIOD)
+        assert command == VENT
+        broken = broken._replace(heel_force=on_heel)
