@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from ppafo.questions.size.solve import Sizing, size
     from ppafo.questions.sweep.results import StudyResults, load_study_results
     from ppafo.questions.sweep.solve import sweep
+    from ppafo.questions.timing.solve import Timing, event_timing
     from ppafo.questions.tune.file import list_tunings, load_tuning
     from ppafo.questions.tune.solve import Tuning, tune
     from ppafo.questions.unreported.solve import infer_settings
@@ -98,6 +99,7 @@ __all__ = [
     "Status",
     "StudyError",
     "StudyResults",
+    "Timing",
     "Tuning",
     "UnitError",
     "Validation",
@@ -109,6 +111,7 @@ __all__ = [
     "endurance",
     "endurance_of_walk",
     "evaluate",
+    "event_timing",
     "find",
     "identify",
     "infer_settings",
@@ -193,6 +196,7 @@ _HOMES = {
     "ppafo.questions.sensitivity.solve": ("sensitivity",),
     "ppafo.questions.unreported.solve": ("infer_settings",),
     "ppafo.questions.validate.solve": ("Validation", "validate"),
+    "ppafo.questions.timing.solve": ("Timing", "event_timing"),
     "ppafo.questions.tune.file": ("list_tunings", "load_tuning"),
     "ppafo.questions.tune.solve": ("Tuning", "tune"),
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk", "walk_population"),

@@ -23,6 +23,7 @@ FOLDERS: dict[str, list[str]] = {
     "walk --wearers": ["--wearers", "2"],
     "league": [],
     "league --walk": ["--walk"],
+    "timing": ["--minutes", "0.2"],
     "validate": ["ppafo2011", "bench.csv"],
     "rig": ["record", "step-response"],
     "identify": ["problem.toml"],

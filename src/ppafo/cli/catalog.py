@@ -14,6 +14,7 @@ COMMANDS: dict[str, str] = {
     "tune": QUESTIONS["tune"],
     "walk": QUESTIONS["walk"],
     "league": QUESTIONS["league"],
+    "timing": QUESTIONS["timing"],
     "validate": QUESTIONS["validate"],
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": QUESTIONS["identify"],
@@ -46,7 +47,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "endurance",
         "league",
     ),
-    "walk": ("walk", "gait"),
+    "walk": ("walk", "gait", "timing"),
     "tools": ("cache", "schema"),
 }
 """The commands as the help shows them, by what somebody has come for."""

@@ -15,6 +15,7 @@ QUESTIONS: dict[str, str] = {
     "identify": "identify a parameter set, with uncertainty, from bench recordings",
     "validate": "compare a parameter set with recordings, channel by channel",
     "walk": "simulate walking with the device, without it, and healthy",
+    "timing": "find how far a controller is off in time, and what the slap of the foot comes from",
     "endurance": "compute how long a bottle of gas lasts, and why it ends",
     "design": "find Pareto-optimal parts and settings: error, gas and mass",
     "size": "find the smallest valve, pressure and bottle for a torque profile and hours of use",

@@ -1,11 +1,14 @@
 """Every value that a walk file can hold beside those of its controller and its wearer."""
 
-from ppafo.control.walking.catalog import walking_controllers
+from ppafo.control.walking.catalog import TIMINGS, walking_controllers
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import supply_line
 from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, THERMAL_GAS
 from ppafo.walking import bottle_supply
 from ppafo.walking.wearer import WEARER
+
+THRESHOLDS = next(iter(TIMINGS))
+"""The way to know the time in the stride of a walk file that names none."""
 
 LARGEST_SEED = 2**32 - 1
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
@@ -74,11 +77,17 @@ def controller_settings(kind: str) -> tuple[Quantity, ...]:
     return known[kind].quantities if kind in known else ()
 
 
-def quantities(controller: str) -> dict[str, Quantity]:
-    """Return the declaration of every number that a walk file with this controller can hold, by path."""
+def timing_settings(kind: str) -> tuple[Quantity, ...]:
+    """Return the settings of a way to know the time in the stride, none where it is unknown."""
+    return TIMINGS[kind].quantities if kind in TIMINGS else ()
+
+
+def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]:
+    """Return the declaration of every number that a walk file with this controller and timing can hold, by path."""
     sections = {
         "wearer": WEARER,
         "controller": (RATE, PERIOD, *controller_settings(controller)),
+        "timing": timing_settings(timing),
         "sensors": (*WALK_SENSORS, *BANDWIDTHS, SEED),
         "run": (STEP,),
         "gas_model": THERMAL_GAS,

@@ -3,11 +3,13 @@
 import copy
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ppafo.control.walking.catalog import load_walking_controller, walking_controllers
+from ppafo.control.kind import ControllerKind
+from ppafo.control.walking.catalog import TIMINGS, load_walking_controller, walking_controllers, with_timing
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
@@ -39,12 +41,14 @@ from ppafo.walking.declaration import (
     READINGS,
     SEED,
     STEP,
+    THRESHOLDS,
     WALK_SENSORS,
     controller_settings,
     quantities,
+    timing_settings,
 )
 from ppafo.walking.gait_subject import read_wearer, wearer_origin
-from ppafo.walking.planning import course_of_walk
+from ppafo.walking.planning import course_of_walk, walking_valve
 from ppafo.walking.schema import walk_file
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
@@ -55,6 +59,7 @@ _TEXTS = (
     "device.set",
     "device.valve",
     "controller.kind",
+    "timing.kind",
     "gas_model.kind",
     bottle_supply.NAME,
     *(f"faults.{sensor}.kind" for sensor in FAULTY),
@@ -89,12 +94,14 @@ def load_walk(
     validate(walk_file(), document, file, ScenarioError)
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
-    kind = walking_controllers()[kind_at(document, "controller")]
+    law = walking_controllers()[kind_at(document, "controller")]
+    kind = _timed(law, reading)
     device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
     walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
     is_named = gait is not None or "gait" in document
     carried = read_bottle(reading, device, folder if bottle is None else Path())
     lines = _lines(reading, document, device, carried)
+    gait_sensors = _gait_sensors(reading)
     configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
@@ -102,9 +109,9 @@ def load_walk(
         gait=walked,
         wearer=read_wearer(reading, walked, is_named),
         controller=kind,
-        settings=reading.section("controller", kind.quantities),
+        settings=reading.section("controller", law.quantities) | _timing_settings(reading, device, gait_sensors),
         sensors=_sensors(reading),
-        gait_sensors=_gait_sensors(reading),
+        gait_sensors=gait_sensors,
         period=_period(reading),
         step=reading.number("run.step", STEP),
         assumed=dict(document.get("assumed", {}))
@@ -129,7 +136,7 @@ def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file:
     for override in overrides:
         path, text = split_override(override)
         load_walking_controller(text if path == "controller.kind" else kind_at(changed, "controller"))
-        known = (*quantities(kind_at(changed, "controller")), *_TEXTS)
+        known = (*quantities(kind_at(changed, "controller"), _timing_kind(changed, path, text)), *_TEXTS)
         if path in known:
             _set(changed, path, text)
         elif path in bottle_supply.OVERRIDES:
@@ -141,6 +148,28 @@ def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file:
     return changed
 
 
+def _timing_kind(document: dict[str, Any], path: str = "", text: str = "") -> str:
+    """Return how the time in the stride is known, also by an override that is about to say it."""
+    return text if path == "timing.kind" else kind_at(document, "timing") or THRESHOLDS
+
+
+def _timed(law: ControllerKind, reading: Reading) -> ControllerKind:
+    """Return the controller with the timing of the file; ScenarioError where it goes by no time in the stride."""
+    try:
+        return with_timing(law, TIMINGS[_timing_kind(dict(reading.document))])
+    except ScenarioError as error:
+        raise ScenarioError(f"{reading.file}: {error}") from error
+
+
+def _timing_settings(reading: Reading, device: Device, sensors: GaitSensors) -> dict[str, float]:
+    """Return the settings of the timing [SI]; lags that are not given are those of the sensors and of the valve."""
+    valve = walking_valve(device.valve)
+    known = {"sensor_lag": 1.0 / sensors.follow_rate, "valve_delay": valve.command_delay(device.valve.settings)}
+    items = timing_settings(_timing_kind(dict(reading.document)))
+    given = tuple(replace(item, default=known.get(item.name, item.default)) for item in items)
+    return reading.section("timing", given)
+
+
 def _set(document: dict[str, Any], path: str, text: str) -> None:
     section, _, name = path.rpartition(".")
     table = document
@@ -150,6 +179,10 @@ def _set(document: dict[str, Any], path: str, text: str) -> None:
         table.clear()
     if path == "controller.kind" and table.get("kind") != text:
         kept = {item.name for item in (RATE, PERIOD, *controller_settings(text))}
+        for key in set(table) - kept:
+            del table[key]
+    if path == "timing.kind":
+        kept = {item.name for item in timing_settings(text)}
         for key in set(table) - kept:
             del table[key]
     table.pop({"controller.rate": "period", "controller.period": "rate"}.get(path, ""), None)

@@ -15,6 +15,7 @@ from ppafo.signals import Channel, Recording
 from ppafo.simulation.simulate import gas_channels
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_planning import pace_in_time
+from ppafo.walking.event_times import EVENT_ROW, FRACTION_ROW, clock_row
 from ppafo.walking.gait_series import truncate
 from ppafo.walking.on_bottle import UNITS, SupplyCourse
 from ppafo.walking.posture import AnklePath, ankle_path
@@ -77,6 +78,9 @@ def recording_of_walk(
         channels["safe_state"] = (record[SAFE_ROW], "-")
     if REQUEST_ROW in record:
         channels["reference"] = (record[REQUEST_ROW], "N m")
+    fraction, event = clock_row(record, FRACTION_ROW), clock_row(record, EVENT_ROW)
+    if fraction is not None and event is not None:
+        channels["gait_fraction"], channels["gait_event"] = (fraction, "-"), (event, "-")
     if run.walk.course is not None:
         channels |= _course_channels(configuration, run, path, time, record)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}

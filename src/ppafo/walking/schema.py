@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.walking.catalog import WALKING_CONTROLLERS, walking_controllers
+from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS, walking_controllers
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.simulation import supply_line
 from ppafo.simulation.declaration import SAMPLING
@@ -34,6 +34,14 @@ def _controller() -> Any:
             for name, kind in walking_controllers().items()
         ]
     )
+
+
+def _timing() -> Any:
+    found = []
+    for name, kind in TIMINGS.items():
+        fields = {item.name: optional(number_type(item), item.summary) for item in kind.quantities}
+        found.append(table(f"{model_name(name)}Timing", kind_field(name, kind.summary) | fields))
+    return one_of(found)
 
 
 def _fault(sensor: str) -> Any:
@@ -81,6 +89,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         ),
         "device": (table("WalkDevice", device_fields()), Field(description="the hardware")),
         "controller": (_controller(), Field(description="what commands the valve")),
+        "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
         "wearer": optional(
             table("Wearer", quantity_fields(WEARER)),
             "who walks; the subject of the gait that is named, else the paper's, unless given",

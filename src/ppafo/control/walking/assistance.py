@@ -4,12 +4,14 @@ Landing: a profile in dorsiflexion against the slap, about a spring and damper t
 Push-off: a profile in plantarflexion. Swing: a profile in dorsiflexion about the same spring and damper.
 """
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SafetyRules
+from ppafo.control.walking.timing.kind import GaitTime
+from ppafo.control.walking.timing.thresholds import follow, gait_time
 from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
@@ -44,9 +46,11 @@ class TorqueRequest(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """One sample: phase, safety, request; 1 where the task is that of the sample before; 1 where the device acts."""
+    """One sample: phase, clock and time in the stride, safety, request; 1 where the task goes on; 1 where it acts."""
 
     phase: PhaseState
+    clock: Any
+    time: GaitTime
     safety: SafetyState
     request: TorqueRequest
     continues: float
@@ -68,6 +72,10 @@ class AssistingParameters(Protocol):
     def safety(self) -> SafetyRules:
         """Rules of safety."""
 
+    @property
+    def timing(self) -> Any:
+        """How the time in the stride is known."""
+
 
 class AssistingState(Protocol):
     """State of every law that assists."""
@@ -79,6 +87,10 @@ class AssistingState(Protocol):
     @property
     def safety(self) -> SafetyState:
         """The state of the safety checks."""
+
+    @property
+    def clock(self) -> Any:
+        """What the timing remembers."""
 
     @property
     def request(self) -> TorqueRequest:
@@ -97,13 +109,13 @@ LARGEST_PRESS = 0.7
 """Largest torque in plantarflexion [N m] that is requested in the swing."""
 
 
-def requested_torque(rules: Assistance, phase: PhaseState, angle: float, rate: float) -> float:
+def requested_torque(rules: Assistance, phase: PhaseState, time: GaitTime, angle: float, rate: float) -> float:
     """Requested torque [N m], above 0 in plantarflexion, at an angle [rad] and its rate [rad/s]; 0 in mid-stance."""
-    fraction = phase.since_strike / phase.stride_time
+    fraction = time.since_strike / phase.stride_time
     hold = rules.hold
     held = hold.stiffness * (hold.swing_angle - angle) - hold.damping * rate
     landing, swing = profile_torque(rules.landing, fraction), profile_torque(rules.swing, fraction)
-    lands = phase.phase == phases.LANDING
+    lands = time.lands > 0.5
     lifted = held - (landing if lands else swing)
     # On the heel nothing presses the toes down, and in the air little: an angle that is read too low asks for it.
     lifted = min(lifted, 0.0 if lands else LARGEST_PRESS)
@@ -117,24 +129,38 @@ def same_task(before: float, after: float) -> bool:
     return phases.lifts(before) == phases.lifts(after) and (before == phases.PUSH_OFF) == (after == phases.PUSH_OFF)
 
 
+def timed_phase(
+    parameters: Any, phase: PhaseState, clock: Any, measurement: GaitMeasurement, period: float
+) -> tuple[PhaseState, Any, GaitTime]:
+    """Phase, clock and time in the stride after a sample, taken every ``period`` [s].
+
+    A way to know the time puts its own functions in the place of ``follow`` and ``gait_time``.
+    """
+    passed = gait_time(parameters.timing, clock, phase).since_strike + period
+    heel, toe = measurement.heel_force, measurement.toe_force
+    after = phases.timed_phase_state(parameters.phases, phase, heel, toe, passed, period)
+    followed = follow(parameters.timing, parameters.phases, clock, phase, after, measurement, period)
+    return after, followed, gait_time(parameters.timing, followed, after)
+
+
 def assess(
     parameters: AssistingParameters, state: AssistingState, measurement: GaitMeasurement, period: float
 ) -> Assessment:
     """Phase, safety and requested torque [N m] after a sample, taken every ``period`` [s]."""
-    phase = phases.next_phase_state(
-        parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period
-    )
+    phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period)
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     last = state.request
     turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
     rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
-    torque = requested_torque(parameters.assistance, phase, measurement.angle, rate)
+    torque = requested_torque(parameters.assistance, phase, time, measurement.angle, rate)
     # A foot that comes down on its toes turns far, and what is left in the chamber would then push on a loaded heel.
     on_toes = phase.phase == phases.MID_STANCE and phase.in_phase >= phase.since_strike
     bends = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
     works = phases.lifts(phase.phase) or phase.phase == phases.PUSH_OFF or bends
     return Assessment(
         phase=phase,
+        clock=clock,
+        time=time,
         safety=watch,
         request=TorqueRequest(measurement.angle, rate, torque),
         continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,

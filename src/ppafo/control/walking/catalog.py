@@ -5,7 +5,8 @@ with ideas of its own of the phases is a module of this folder with a KIND, list
 sensors with ``safety.monitor`` and passes its command through ``safety.safe_command``.
 """
 
-from dataclasses import dataclass
+import functools
+from dataclasses import dataclass, replace
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers import (
@@ -17,8 +18,11 @@ from ppafo.control.controllers import (
     sliding_mode,
 )
 from ppafo.control.kind import ControllerKind
-from ppafo.control.walking import event_damped_learning, event_on_off, off, proportional
-from ppafo.control.walking.torque_law import shared_settings, walking_law
+from ppafo.control.walking import assistance, event_damped_learning, event_on_off, off, proportional
+from ppafo.control.walking.timing import estimated, fractional, thresholds
+from ppafo.control.walking.timing.kind import TimingKind
+from ppafo.control.walking.torque_law import bind, row_with, shared_settings, walking_law
+from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds
 
 
@@ -116,3 +120,38 @@ def law_that_walks(law: ControllerKind) -> ControllerKind:
         return _EVENT_BASED[law.name]
     summary = f"Torque profiles for each phase, tracked by the law {law.name} with its own gains."
     return walking_law(law, law.name, summary, ())
+
+
+TIMINGS: Kinds[TimingKind] = Kinds(
+    "ppafo.walking_timings", "timing of walking", TimingKind, (thresholds.KIND, fractional.KIND, estimated.KIND)
+)
+"""The ways to know the time in the stride. The first one is that of every controller unless another is chosen."""
+
+
+def keeps_time(kind: ControllerKind) -> bool:
+    """Tell whether a controller of walking goes by a time in the stride that can be known in several ways."""
+    return "clock" in getattr(kind.initial, "_fields", ())
+
+
+@functools.cache
+def with_timing(kind: ControllerKind, timing: TimingKind) -> ControllerKind:
+    """Return a controller of walking that knows the time in the stride in another way; ScenarioError if it has none."""
+    if timing is thresholds.KIND:
+        return kind
+    if not keeps_time(kind):
+        raise ScenarioError(f"controller '{kind.name}' goes by no time in the stride: timing.kind cannot be given")
+    name, before = f"{kind.name}_{timing.name}", type(kind.initial)
+    title = timing.name.capitalize()
+    state = row_with(f"{before.__name__}{title}", before, clock=type(timing.initial))
+    parameters = row_with(f"{kind.parameters.__name__}{title}", kind.parameters, timing=timing.parameters)
+    own = {"follow": timing.follow, "gait_time": timing.gait_time}
+    timed = {"timed_phase": bind(assistance.timed_phase, f"timed_phase_{timing.name}", own)}
+    pieces = timed | {"assess": bind(assistance.assess, f"assess_{timing.name}", timed)}
+    made = {word: state for word, value in kind.update.__globals__.items() if value is before}
+    return replace(
+        kind,
+        quantities=(*kind.quantities, *timing.quantities),
+        parameters=parameters,
+        initial=state(**kind.initial._asdict() | {"clock": timing.initial}),
+        update=bind(kind.update, f"update_{name}", pieces | made),
+    )

@@ -9,30 +9,33 @@ from ppafo.control.controllers import damped_proportional
 from ppafo.control.controllers.damped_proportional import DampedGains, TorqueSlope, damped_command
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, learnt_table, phases, safety
-from ppafo.control.walking.assistance import Assistance, TorqueRequest
+from ppafo.control.walking.assistance import Assistance, TorqueRequest, assess
 from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
 from ppafo.control.walking.learnt_table import LearningRules, LearntTable
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SafetyRules
+from ppafo.control.walking.timing.thresholds import ThresholdClock, ThresholdRules
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
 
 
 class EventDampedLearningParameters(NamedTuple):
-    """Gains of the law and of learning, what is requested, and the rules of phases and safety."""
+    """Gains of the law and of learning, what is requested, and the rules of phases, safety and timing."""
 
     law: DampedGains
     learning: LearningRules
     assistance: Assistance
     phases: PhaseRules
     safety: SafetyRules
+    timing: ThresholdRules
 
 
 class EventDampedLearningState(NamedTuple):
-    """Phase, safety, the requested torque, the torque's course, and what was learnt."""
+    """Phase, clock, safety, the requested torque, the torque's course, and what was learnt."""
 
     phase: PhaseState
+    clock: ThresholdClock
     safety: SafetyState
     request: TorqueRequest
     law: TorqueSlope
@@ -47,19 +50,20 @@ def update(
     period: float,
 ) -> tuple[float, EventDampedLearningState]:
     """Command from -1 to 1, or ``VENT``; the reference is not used."""
-    assessment = assistance.assess(parameters, state, measurement, period)
+    assessment = assess(parameters, state, measurement, period)
     phase, torque, profile = assessment.phase, measurement.torque, parameters.assistance.push_off
+    since_strike = assessment.time.since_strike
     pushes = phase.phase == phases.PUSH_OFF
     table = learnt_table.learn(
         parameters.learning,
         state.table,
         profile,
-        phase.since_strike,
+        since_strike,
         phase.stride_time,
         assessment.request.torque - torque if pushes else 0.0,
         period * assessment.acts if pushes else 0.0,
     )
-    place = learnt_table.place_in_table(profile, phase.since_strike, phase.stride_time)
+    place = learnt_table.place_in_table(profile, since_strike, phase.stride_time)
     ahead = learnt_table.command_at(table, place) if pushes else 0.0
     law = TorqueSlope(
         state.law.torque, state.law.slope * assessment.continues, state.law.started * assessment.continues
@@ -67,7 +71,12 @@ def update(
     command, law = damped_command(parameters.law, law, assessment.request.torque, torque, ahead, period)
     command, watch = assistance.valve_command(assessment, command, period)
     return command, EventDampedLearningState(
-        phase=phase, safety=watch, request=assessment.request, law=law, table=table
+        phase=phase,
+        clock=assessment.clock,
+        safety=watch,
+        request=assessment.request,
+        law=law,
+        table=table,
     )
 
 
@@ -92,6 +101,7 @@ KIND = ControllerKind(
     parameters=EventDampedLearningParameters,
     initial=EventDampedLearningState(
         phase=phases.START,
+        clock=ThresholdClock(),
         safety=safety.START,
         request=assistance.START,
         law=TorqueSlope(0.0, 0.0, 0.0),

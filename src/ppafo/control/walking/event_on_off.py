@@ -9,29 +9,33 @@ from typing import NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import phases, safety
+from ppafo.control.walking.assistance import timed_phase
 from ppafo.control.walking.declaration import PHASE_QUANTITIES, SAFETY_QUANTITIES
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SafetyRules
+from ppafo.control.walking.timing.thresholds import ThresholdClock, ThresholdRules
 from ppafo.model.command import VENT
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
 
 
 class EventOnOffParameters(NamedTuple):
-    """Angle of the lifted foot [rad], band about it [rad], end of push-off [turns], rules of phases and safety."""
+    """Angle of the lifted foot [rad], band about it [rad], end of push-off [turns], rules of phases, safety, timing."""
 
     swing_angle: float
     band: float
     push_off_end: float
     phases: PhaseRules
     safety: SafetyRules
+    timing: ThresholdRules
 
 
 class EventOnOffState(NamedTuple):
-    """Phase, safety, and whether the foot is to be lifted (1)."""
+    """Phase, clock, safety, and whether the foot is to be lifted (1)."""
 
     phase: PhaseState
+    clock: ThresholdClock
     safety: SafetyState
     lifting: float
 
@@ -44,20 +48,18 @@ def update(
     period: float,
 ) -> tuple[float, EventOnOffState]:
     """Command [-]: 1 plantarflexion, -1 dorsiflexion, ``VENT`` for free motion; the reference is not used."""
-    phase = phases.next_phase_state(
-        parameters.phases, state.phase, measurement.heel_force, measurement.toe_force, period
-    )
+    phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period)
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     above = measurement.angle > parameters.swing_angle + parameters.band
     below = measurement.angle < parameters.swing_angle - parameters.band
     lifting = 0.0 if below else (1.0 if above else state.lifting)
     held = phases.lifts(phase.phase)
-    command = -1.0 if lifting > 0.5 or phase.phase == phases.LANDING else VENT
+    command = -1.0 if lifting > 0.5 or time.lands > 0.5 else VENT
     command = command if held else VENT
-    in_time = phase.since_strike < parameters.push_off_end * phase.stride_time
+    in_time = time.since_strike < parameters.push_off_end * phase.stride_time
     command = 1.0 if phase.phase == phases.PUSH_OFF and in_time else command
     command, watch = safety.safe_command(watch, phase.phase, command, period)
-    return command, EventOnOffState(phase, watch, lifting if held else 0.0)
+    return command, EventOnOffState(phase=phase, clock=clock, safety=watch, lifting=lifting if held else 0.0)
 
 
 KIND = ControllerKind(
@@ -74,7 +76,7 @@ KIND = ControllerKind(
         *SAFETY_QUANTITIES,
     ),
     parameters=EventOnOffParameters,
-    initial=EventOnOffState(phases.START, safety.START, 0.0),
+    initial=EventOnOffState(phase=phases.START, clock=ThresholdClock(), safety=safety.START, lifting=0.0),
     update=update,
     only_switches=True,
 )

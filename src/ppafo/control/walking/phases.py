@@ -68,11 +68,11 @@ def next_switch(rules: PhaseRules, switch: Switch, force: float, period: float) 
     return Switch(indicated if switches else switch.loaded, 0.0 if switches else against)
 
 
-def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float) -> float:
-    """Next phase [-] from the present one and both switches (0 or 1); times [s] as in ``state``."""
+def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float, passed: float) -> float:
+    """Next phase [-] from the present one and both switches (0 or 1), ``passed`` [s] after the strike."""
     on_heel = heel > 0.5
     on_toe = toe > 0.5
-    late = state.since_strike >= rules.push_off_start * state.stride_time
+    late = passed >= rules.push_off_start * state.stride_time
     phase = state.phase
     after_swing = LANDING if on_heel else (MID_STANCE if on_toe else SWING)
     after_landing = MID_STANCE if on_toe else (LANDING if on_heel else SWING)
@@ -89,6 +89,16 @@ def next_phase_state(
     rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, period: float
 ) -> PhaseState:
     """State after a sample of both forces [N]; ``period`` [s]."""
+    return timed_phase_state(rules, state, heel_force, toe_force, state.since_strike + period, period)
+
+
+def timed_phase_state(
+    rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, passed: float, period: float
+) -> PhaseState:
+    """State after a sample of both forces [N]; ``period`` [s].
+
+    ``passed`` is the time since the heel strike [s] by which the push-off may begin, as known apart.
+    """
     heel = next_switch(rules, state.heel, heel_force, period)
     toe = next_switch(rules, state.toe, toe_force, period)
     since = state.since_strike + period
@@ -102,7 +112,7 @@ def next_phase_state(
         stride_time=known,
         strikes=state.strikes,
     )
-    phase = next_phase(rules, aged, heel.loaded, toe.loaded)
+    phase = next_phase(rules, aged, heel.loaded, toe.loaded, passed)
     # A foot that comes down on its toes, or with a lost heel sensor, begins a stride too.
     strikes = state.phase == SWING and phase != SWING
     plausible = state.strikes > 0.5 and since > 0.5 * known and since < 2.0 * known

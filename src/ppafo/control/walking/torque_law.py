@@ -13,28 +13,31 @@ from typing import Any, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, phases, safety
-from ppafo.control.walking.assistance import Assistance, TorqueRequest
+from ppafo.control.walking.assistance import Assistance, TorqueRequest, assess
 from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SafetyRules
+from ppafo.control.walking.timing.thresholds import ThresholdClock, ThresholdRules
 from ppafo.errors import ScenarioError
 from ppafo.model.gait_sensors import GaitMeasurement
 
 
 class LawParameters(NamedTuple):
-    """The law, what is requested, and the rules of phases and safety; ``row_with_law`` makes one for each law."""
+    """The law, what is requested, rules of phases, safety and timing; ``row_with`` makes one for each law."""
 
     law: Any
     assistance: Assistance
     phases: PhaseRules
     safety: SafetyRules
+    timing: Any
 
 
 class LawState(NamedTuple):
-    """Phase, safety, the requested torque, and the state of the law; ``row_with_law`` makes one for each law."""
+    """Phase, clock, safety, the requested torque, and the state of the law; ``row_with`` makes one for each law."""
 
     phase: PhaseState
+    clock: Any
     safety: SafetyState
     request: TorqueRequest
     law: Any
@@ -68,13 +71,15 @@ def update(
     parameters: Any, state: LawState, reference: float, measurement: GaitMeasurement, period: float
 ) -> tuple[float, LawState]:
     """Command from -1 to 1, or ``VENT``; the reference is not used."""
-    assessment = assistance.assess(parameters, state, measurement, period)
+    assessment = assess(parameters, state, measurement, period)
     requested = assessment.request.torque
     law = law_restart(state.law, requested, assessment.continues)
     sample = assistance.torque_measurement(measurement)
     command, law = law_update(parameters.law, law, requested, sample, period)
     command, watch = assistance.valve_command(assessment, command, period)
-    return command, LawState(phase=assessment.phase, safety=watch, request=assessment.request, law=law)
+    return command, LawState(
+        phase=assessment.phase, clock=assessment.clock, safety=watch, request=assessment.request, law=law
+    )
 
 
 def bind(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Callable[..., Any]:
@@ -90,11 +95,11 @@ def bind(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Cal
     return made
 
 
-def row_with_law(name: str, row: Any, law: type) -> Any:
-    """Return a NamedTuple class as ``row`` is one, whose field ``law`` is of the class that one law has."""
+def row_with(name: str, row: Any, **classes: type) -> Any:
+    """Return a NamedTuple class as ``row`` is one, whose named fields are of the given classes."""
     namedtuple: Any = collections.namedtuple
     made = namedtuple(name, row._fields, module=__name__)
-    made.__annotations__ = {**row.__annotations__, "law": law}
+    made.__annotations__ = {**row.__annotations__, **classes}
     return made
 
 
@@ -116,8 +121,8 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
             f"controller of walking has"
         )
     title = "".join(part.capitalize() for part in name.split("_"))
-    parameters = row_with_law(f"{title}Parameters", LawParameters, law.parameters)
-    state = row_with_law(f"{title}State", LawState, type(law.initial))
+    parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=ThresholdRules)
+    state = row_with(f"{title}State", LawState, law=type(law.initial), clock=ThresholdClock)
     anew = bind(restart, f"restart_{name}", {"LAW_START": law.initial}) if len(law.initial) else keep
     pieces = {"law_update": law.update, "law_restart": law.restart or anew, "LawState": state}
     return replace(
@@ -127,7 +132,13 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
         source=f"the paper, figure 1A (phases); {law.source}",
         quantities=(*with_defaults(law.quantities, dict(gains)), *ASSISTING_QUANTITIES),
         parameters=parameters,
-        initial=state(phase=phases.START, safety=safety.START, request=assistance.START, law=law.initial),
+        initial=state(
+            phase=phases.START,
+            clock=ThresholdClock(),
+            safety=safety.START,
+            request=assistance.START,
+            law=law.initial,
+        ),
         update=bind(update, f"update_{name}", pieces),
         restart=None,
     )

@@ -8,7 +8,8 @@ the proportional valve; only another valve takes a line.
 from dataclasses import dataclass
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS
+from ppafo.control.walking.timing.kind import TimingKind
 
 PROPORTIONAL = ("device.valve=proportional", "controller.rate=1 kHz")
 SOLENOID = ("device.valve=solenoid", "controller.rate=20 Hz")
@@ -108,9 +109,22 @@ ENTRANTS = (
 )
 """On the torque task, in the order of the catalogue; tables sort by error."""
 
-WALKING_ENTRANTS = tuple(
-    Entrant(kind if valve == "proportional" else f"{kind}-{valve}", kind, valve, source=controller.source)
-    for kind, controller in WALKING_CONTROLLERS.items()
-    for valve in VALVES.get(kind, ("proportional",))
+TIMED = (("event_pid_feedforward", "proportional"), ("event_on_off", "solenoid"))
+"""Walking laws that enter with every timing of the stride, one for each valve; the others detect it by thresholds."""
+
+
+def _walking_entrant(kind: str, valve: str, timing: TimingKind | None = None) -> Entrant:
+    name = kind if valve == "proportional" else f"{kind}-{valve}"
+    source = WALKING_CONTROLLERS[kind].source
+    if timing is None:
+        return Entrant(name, kind, valve, source=source)
+    return Entrant(
+        f"{name}-{timing.name}", kind, valve, (f"timing.kind={timing.name}",), source=f"{source}; {timing.source}"
+    )
+
+
+WALKING_ENTRANTS = (
+    *(_walking_entrant(kind, valve) for kind in WALKING_CONTROLLERS for valve in VALVES.get(kind, ("proportional",))),
+    *(_walking_entrant(*law, timing) for law in TIMED for timing in list(TIMINGS.values())[1:]),
 )
 """On a leg that walks."""

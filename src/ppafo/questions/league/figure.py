@@ -20,7 +20,7 @@ _MARGIN, _LEAST_RANGE = 1.2, 4.0
 _NAMED = ((10.0, (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)), (200.0, (1.0, 2.0, 5.0)), (float("inf"), (1.0,)))
 """Which multiples of the powers of ten are named on an axis that spans less than a factor."""
 _COLOURS = {"proportional": BLUE, "solenoid": VERMILION}
-_MARKERS = "osD^v<>PX*hd"
+_MARKERS = "osD^v<>PX*hdpH8"
 
 
 def league_figure(league: League, look: Look) -> "Figure":

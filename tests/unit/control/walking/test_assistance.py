@@ -10,6 +10,7 @@ from ppafo.control.walking import assistance
 from ppafo.control.walking.assistance import Assistance, Hold
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
+from ppafo.control.walking.timing.thresholds import ThresholdClock, ThresholdRules, gait_time
 from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
 from ppafo.engine.rows import rebuild
 from ppafo.model.command import VENT
@@ -27,6 +28,10 @@ RULES = Assistance(
 FOLLOWING = [
     name for name, kind in WALKING_CONTROLLERS.items() if "peak_time" in {item.name for item in kind.quantities}
 ]
+
+
+def wanted(phase: PhaseState, angle: float, rate: float, rules: Assistance = RULES) -> float:
+    return assistance.requested_torque(rules, phase, gait_time(ThresholdRules(), ThresholdClock(), phase), angle, rate)
 
 
 def at(phase: float, share: float) -> PhaseState:
@@ -49,25 +54,25 @@ def test_a_profile_rises_from_zero_to_its_peak_and_falls_to_zero() -> None:
 
 def test_each_phase_wants_its_own_torque() -> None:
     angle = RULES.hold.swing_angle
-    assert assistance.requested_torque(RULES, at(PUSH_OFF, 0.5), angle, 0.0) == pytest.approx(4.0)
-    assert assistance.requested_torque(RULES, at(MID_STANCE, 0.5), angle, 9.0) == 0.0
-    assert assistance.requested_torque(RULES, at(LANDING, 0.05), angle, 0.0) == pytest.approx(-1.0)
-    assert assistance.requested_torque(RULES, at(SWING, 0.8), angle, 0.0) == pytest.approx(-2.0)
+    assert wanted(at(PUSH_OFF, 0.5), angle, 0.0) == pytest.approx(4.0)
+    assert wanted(at(MID_STANCE, 0.5), angle, 9.0) == 0.0
+    assert wanted(at(LANDING, 0.05), angle, 0.0) == pytest.approx(-1.0)
+    assert wanted(at(SWING, 0.8), angle, 0.0) == pytest.approx(-2.0)
 
 
 def test_a_lifted_foot_is_held_by_a_spring_and_a_damper_up_to_the_largest_torque() -> None:
     bare = RULES._replace(swing=PROFILE._replace(peak_torque=0.0))
-    assert assistance.requested_torque(bare, at(SWING, 0.8), 1.6, 0.0) == pytest.approx(-1.0)
-    assert assistance.requested_torque(bare, at(SWING, 0.8), 1.5, 2.0) == pytest.approx(-1.0)
-    assert assistance.requested_torque(bare, at(SWING, 0.8), 3.0, 0.0) == -5.0
-    assert assistance.requested_torque(bare, at(SWING, 0.8), 1.45, 0.0) == pytest.approx(0.5)
-    assert assistance.requested_torque(bare, at(SWING, 0.8), 0.5, 0.0) == assistance.LARGEST_PRESS
+    assert wanted(at(SWING, 0.8), 1.6, 0.0, bare) == pytest.approx(-1.0)
+    assert wanted(at(SWING, 0.8), 1.5, 2.0, bare) == pytest.approx(-1.0)
+    assert wanted(at(SWING, 0.8), 3.0, 0.0, bare) == -5.0
+    assert wanted(at(SWING, 0.8), 1.45, 0.0, bare) == pytest.approx(0.5)
+    assert wanted(at(SWING, 0.8), 0.5, 0.0, bare) == assistance.LARGEST_PRESS
 
 
 def test_nothing_presses_the_toes_down_while_the_foot_stands_on_its_heel() -> None:
     for angle, rate in ((0.5, 0.0), (1.5, -9.0)):
-        assert assistance.requested_torque(RULES, at(SWING, 0.05), angle, rate) > 0.0
-        assert assistance.requested_torque(RULES, at(LANDING, 0.05), angle, rate) == 0.0
+        assert wanted(at(SWING, 0.05), angle, rate) > 0.0
+        assert wanted(at(LANDING, 0.05), angle, rate) == 0.0
 
 
 def test_landing_and_swing_are_one_task_and_the_others_are_not() -> None:

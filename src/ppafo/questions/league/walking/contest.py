@@ -41,7 +41,7 @@ class WalkingContest:
     def evaluate(self, entrant: Entrant, draws: int, seed: int, progress: Report) -> Standing:
         """Return how an entrant walks, over drawn wearers and devices too; a PpafoError states why it cannot."""
         task = self.task
-        configuration = task.configuration(entrant.kind, entrant.valve)
+        configuration = task.configuration(entrant.kind, entrant.valve, entrant.overrides)
         return Standing(
             entrant=entrant,
             settings=dict(configuration.settings),
@@ -65,7 +65,7 @@ class WalkingContest:
         task = self.task
         words = ["ppafo", "walk", task.file, *(() if task.gait is None else ("--gait", task.gait))]
         words += ["--minutes", f"{task.seconds / 60.0:g}"]
-        overrides = task.overrides_for(entrant.kind, entrant.valve)
+        overrides = task.overrides_for(entrant.kind, entrant.valve, entrant.overrides)
         return shlex.join([*words, *(word for override in overrides for word in ("--set", override))])
 
 

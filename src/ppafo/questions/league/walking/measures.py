@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from ppafo.model.plant import PlantParameters, chamber_pressures
 from ppafo.questions.league.walking.stride import free_window, push_off_window
 from ppafo.questions.league.walking.task import WalkingTask
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.event_times import EVENTS, TOO_FAR, Samples, event_errors, known_events, true_events, within
 from ppafo.walking.gait_series import gait_timing, truncate
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.posture import AnklePath, ankle_path
@@ -42,6 +43,8 @@ MEASURES = {
     "slap_rate": ("rad/s", "rate of the foot as it comes down, below 0 with the toes falling, mean over the strides"),
     "push_off_work": ("J", "work of T_ex while the foot rolls over the toes, in one stride"),
     "gas": ("kg", "gas taken from the supply in one stride"),
+    "event_error": ("s", "RMS of the times at which the controller knows of the events of the stride, less the true"),
+    "strike_error": ("s", "the same of the heel strikes alone"),
     "switchings": ("-", "changes of the valve's path in one stride: to chamber 1, to chamber 2, vented"),
     "safe_state": ("-", "1 if the controller paused or stopped"),
 }
@@ -57,6 +60,7 @@ _PHASES = np.linspace(0.0, 1.0, 1001)
 class Course:
     """A walk as samples (samples,): phase in turns, contact, angles [rad], torque [N m], command, height of toes [m].
 
+    ``known_events`` are the samples at which the controller knows of each event, {} where it knows of none.
     Running totals: gas [kg], slap rates [rad/s] and landings, strikes with the toes first, work [J]; ``vented`` 1 once
     the controller has paused or stopped.
     """
@@ -74,6 +78,8 @@ class Course:
     toe_landings: Floats
     push_off_work: Floats
     vented: Floats
+    true_events: Mapping[str, Samples] = field(default_factory=dict)
+    known_events: Mapping[str, Samples] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,6 +139,8 @@ def course_of(
         toe_landings=record["walk.toe_landings"],
         push_off_work=record["walk.push_off_work"],
         vented=record.get(SAFE_ROW, np.zeros_like(phase)),
+        true_events=true_events(record["walk.contact"]),
+        known_events=known_events(record),
     )
 
 
@@ -172,7 +180,7 @@ def measures(course: Course, profile: TorqueProfile, timing: GaitTiming, strides
     swings = course.contact[part] == SWING
     lowest, clear, struck = _toes(course, timing, strides)
     landings = max(_gain(course.landings, part), 1.0)
-    return {
+    return _event_errors(course, part, len(strides), timing) | {
         "torque_error": errors[0],
         "torque_lag": float(LAGS[best]),
         "lagged_error": errors[best],
@@ -187,6 +195,21 @@ def measures(course: Course, profile: TorqueProfile, timing: GaitTiming, strides
         "switchings": switchings(course.command[part]) / len(strides),
         "safe_state": float(course.vented[part].any()),
     }
+
+
+def _event_errors(course: Course, part: slice, strides: int, timing: GaitTiming) -> dict[str, float]:
+    """RMS errors [s] of the event times; {} for a controller that knows of no events."""
+    if not course.known_events:
+        return {}
+    stride_time = 1.0 / timing.frequency
+    interval = strides * stride_time / (part.stop - part.start)
+    true, room = within(course.true_events, part), round(TOO_FAR * stride_time / interval)
+    known = within(course.known_events, slice(part.start - room, part.stop + room))
+    found = {name: event_errors(true[name], known[name], interval, stride_time).errors for name in EVENTS}
+    every = np.concatenate(list(found.values()))
+    if not (every.size and found[EVENTS[0]].size):
+        return {}
+    return {"event_error": _rms(every), "strike_error": _rms(found[EVENTS[0]])}
 
 
 def switchings(command: Floats) -> float:

@@ -132,8 +132,10 @@ WALKING = Presentation(
     format="ppafo walking league",
     introduction=(
         "Every controller was simulated on the same device and wearer, with a torque to follow in push-off and toes "
-        "to lift in the swing. Slap, work, gas and switchings are per stride. 'Lag' is the delay of the torque, "
-        "'error at lag' the error that remains without it. 'Above minimum' is the distance to the lower bound of the "
+        "to lift in the swing. Slap, work, gas and switchings are per stride. The desired torque lies at the true "
+        "events of the gait, whatever a controller detects. 'Lag' is the delay of the torque, 'error at lag' the "
+        "error that remains without it, 'events' the RMS error of the times at which the controller knows of heel "
+        "strike, toes on, heel off and toes off. 'Above minimum' is the distance to the lower bound of the "
         "controller's own valve: to the minimum error of any control with toes above the ground, and to the minimum "
         "gas of a stride with its own lag, error at lag and toe clearance."
     ),
@@ -160,6 +162,7 @@ WALKING = Presentation(
         TableColumn(Column("above minimum", "torque", ".3f"), League.error_above_least),
         measure("lag", "torque_lag", "time", ".3f"),
         measure("error at lag", "lagged_error", "torque", ".3f"),
+        measure("events", "event_error", "time", ".4f"),
         measure("toes", "toe_height", "length", "z.0f"),
         measure("slap", "slap_rate", "angular velocity", "z.0f"),
         measure("work", "push_off_work", "energy", "z.2f"),

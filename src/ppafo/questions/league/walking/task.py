@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS, keeps_time
 from ppafo.control.walking.declaration import PHASE_QUANTITIES, PUSH_OFF_QUANTITIES, SAFETY_QUANTITIES
 from ppafo.control.walking.torque_profile import TorqueProfile
 from ppafo.errors import ScenarioError, nearest_name, one_line
@@ -22,9 +22,12 @@ SHORTEST, LONGEST = 0.1, 1.0
 PROFILE_KIND, PROFILE_VALVE = "event_proportional", "proportional"
 """The controller whose settings say what is desired, on the valve that suits it; every other gets the same."""
 SWING_ANGLE = "swing_angle"
+DESIRED = "desired"
+"""Section of the overrides that change what is desired; ``controller`` only changes what the controllers are told."""
 COMMON = (*PUSH_OFF_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES, RATE, PERIOD)
 SHORTEST_PUSH_OFF = 0.1
 """Fraction of the stride that there must be between the first torque and toe-off, also of a gait that is drawn."""
+_PUSH_OFF = tuple(f"controller.{item.name}" for item in PUSH_OFF_QUANTITIES)
 _OWN = ("controller.kind", "device.valve")
 
 
@@ -32,7 +35,9 @@ _OWN = ("controller.kind", "device.valve")
 class WalkingTask:
     """What every entrant has to do: a walk file by name or path with overrides, another gait or None, the profile.
 
-    ``seconds`` of walking; the second half of the strides counts.
+    ``profile`` is judged at the true events of the gait and no controller moves it; ``told`` is what they are told,
+    the same unless an override of ``controller`` says otherwise. ``seconds`` of walking; the second half of the
+    strides counts.
     """
 
     file: str
@@ -40,25 +45,27 @@ class WalkingTask:
     overrides: tuple[str, ...]
     profile: TorqueProfile
     seconds: float
+    told: TorqueProfile
 
-    def overrides_for(self, kind: str, valve: str) -> tuple[str, ...]:
-        """Overrides of the walk file that put a controller and a valve in, with what is desired."""
+    def overrides_for(self, kind: str, valve: str, own: Sequence[str] = ()) -> tuple[str, ...]:
+        """Overrides of the walk file that put a controller and a valve in, with what it is told and its ``own``."""
         known = {item.name for item in (*WALKING_CONTROLLERS[kind].quantities, RATE, PERIOD)}
         wanted = [
             _override_text(item.name, item.unit, value)
-            for item, value in zip(PUSH_OFF_QUANTITIES, self.profile, strict=True)
+            for item, value in zip(PUSH_OFF_QUANTITIES, self.told, strict=True)
         ]
         paths = [split_override(text)[0].partition(".") for text in (*wanted, *self.overrides)]
+        has_time = keeps_time(WALKING_CONTROLLERS[kind])
         kept = [
             text
             for text, (section, _, name) in zip((*wanted, *self.overrides), paths, strict=True)
-            if section != "controller" or name in known
+            if (section != "controller" or name in known) and (section != "timing" or has_time)
         ]
-        return (f"controller.kind={kind}", f"device.valve={valve}", *kept)
+        return (f"controller.kind={kind}", f"device.valve={valve}", *kept, *own)
 
-    def configuration(self, kind: str, valve: str) -> Configuration:
+    def configuration(self, kind: str, valve: str, own: Sequence[str] = ()) -> Configuration:
         """The walk of one controller on one valve; ScenarioError or ParameterError where it cannot be."""
-        return load_walk(self.file, self.overrides_for(kind, valve), self.gait)
+        return load_walk(self.file, self.overrides_for(kind, valve, own), self.gait)
 
 
 def walking_task(
@@ -75,25 +82,44 @@ def walking_task(
         raise ScenarioError(f"{minutes:g} minutes: a league can walk for {SHORTEST:g} to {LONGEST:g} minutes")
     for override in overrides:
         _check(override)
-    judged = load_walk(file, [f"controller.kind={PROFILE_KIND}", f"device.valve={PROFILE_VALVE}", *overrides], gait)
+    own = [override for override in overrides if not _is_desired(override)]
+    desired = [override.replace(DESIRED, "controller", 1) for override in overrides if _is_desired(override)]
+    for_all = [override for override in own if split_override(override)[0] not in _PUSH_OFF]
+    judged = _with_profile(file, [*for_all, *desired], gait)
+    told = _with_profile(file, [*desired, *own], gait)
     if judged.course is not None:
         raise ScenarioError(f"{file}: course: a league compares equal strides; leave the course away")
-    profile = TorqueProfile(**{name: judged.settings[name] for name in TorqueProfile._fields})
+    profile, told_profile = (
+        TorqueProfile(**{name: walk.settings[name] for name in TorqueProfile._fields}) for walk in (judged, told)
+    )
     if profile.peak_torque <= 0.0:
-        raise ScenarioError("controller.peak_torque: a league needs a desired torque; give one above 0 N m")
+        raise ScenarioError("desired.peak_torque: a league needs a desired torque; give one above 0 N m")
     latest = judged.gait.stance_share - SHORTEST_PUSH_OFF
     if profile.peak_time - profile.rise_time > latest:
         raise ScenarioError(
-            f"controller.peak_time: the torque begins at {profile.peak_time - profile.rise_time:g} of the stride, "
+            f"desired.peak_time: the torque begins at {profile.peak_time - profile.rise_time:g} of the stride, "
             f"too late for a push-off that ends at {judged.gait.stance_share:g}; at most {latest:g}"
         )
     seconds = walk_duration(judged, minutes)
-    return WalkingTask(str(file), None if gait is None else str(gait), tuple(overrides), profile, seconds)
+    return WalkingTask(str(file), None if gait is None else str(gait), tuple(own), profile, seconds, told_profile)
+
+
+def _with_profile(file: str | Path, overrides: Sequence[str], gait: str | Path | None) -> Configuration:
+    """Return the walk of the controller whose settings say what torque is wanted."""
+    return load_walk(file, [f"controller.kind={PROFILE_KIND}", f"device.valve={PROFILE_VALVE}", *overrides], gait)
+
+
+def _is_desired(override: str) -> bool:
+    return split_override(override)[0].startswith(f"{DESIRED}.")
 
 
 def _check(override: str) -> None:
     path, _ = split_override(override)
     section, _, name = path.partition(".")
+    wanted = [item.name for item in PUSH_OFF_QUANTITIES]
+    if section == DESIRED and name not in wanted:
+        hint = nearest_name(name, wanted)
+        raise ScenarioError(f"override '{one_line(override)}': no '{name}' is desired{hint}; {', '.join(wanted)} are")
     if path in _OWN:
         raise ScenarioError(f"override '{one_line(override)}': every controller of the league has its own")
     common = [item.name for item in COMMON] + [SWING_ANGLE]

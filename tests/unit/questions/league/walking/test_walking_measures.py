@@ -10,6 +10,7 @@ from ppafo.model.command import VENT
 from ppafo.model.contact import SWING, TOE
 from ppafo.model.gait import GaitTiming
 from ppafo.questions.league.walking.measures import MEASURES, Course, last_strides, measures, switchings
+from ppafo.walking.event_times import EVENTS
 
 PROFILE = TorqueProfile(5.0, 0.5, 0.2, 0.1)
 TIMING = GaitTiming(1.0, 0.0, 0.4, 0.6, 0.7, 0.9, 0.0)
@@ -45,6 +46,20 @@ def measured(course: Course) -> dict[str, float]:
     return measures(course, PROFILE, TIMING, last_strides(course.phase))
 
 
+def with_events(course: Course, late: int) -> Course:
+    """The course with its events known so many samples late."""
+    places = dict(zip(EVENTS, (0, 10, 40, 60), strict=True))
+    true = {name: place + SAMPLES * np.arange(STRIDES) for name, place in places.items()}
+    return replace(course, true_events=true, known_events={name: found + late for name, found in true.items()})
+
+
+def test_events_that_are_known_late_are_an_error_of_that_time_and_no_events_are_none() -> None:
+    found = measured(with_events(walked(), 3))
+    assert found["event_error"] == pytest.approx(0.03)
+    assert found["strike_error"] == pytest.approx(0.03)
+    assert "event_error" not in measured(walked())
+
+
 def test_only_whole_strides_of_the_second_half_count() -> None:
     strides = last_strides(walked().phase)
     assert [(stride.start, stride.stop) for stride in strides] == [(300, 400), (400, 500)]
@@ -52,8 +67,8 @@ def test_only_whole_strides_of_the_second_half_count() -> None:
 
 
 def test_every_measure_is_there_and_a_perfect_walk_has_no_errors() -> None:
-    found = measured(walked())
-    assert list(found) == list(MEASURES)
+    found = measured(with_events(walked(), 0))
+    assert set(found) == set(MEASURES)
     assert found["torque_error"] == pytest.approx(0.0, abs=1e-4)
     assert found["swing_error"] == 0.0
     assert found["gas"] == pytest.approx(3.0e-4)

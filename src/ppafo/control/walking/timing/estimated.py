@@ -1,0 +1,286 @@
+"""State estimation: a window of ankle angle, heel and toe force is fitted to a stride that was learnt.
+
+The stride is learnt at equal fractions of it ("knots") from the first good strides, by fractional timing. Then, knot
+after knot, the last readings are compared with the learnt stride at the fractions where the clock has taken them, and
+with the learnt stride shifted by some knots either way: the shift with the least sum of squares is the error of the
+clock, to a part of a knot by one Gauss-Newton step. The clock is moved by a part of it. Where even the best shift fits
+badly nothing is moved: the wearer does something else than walk. Li et al. (2011) correlate a window in the same way.
+
+The learnt stride is kept as a ring: its first knot is the next to come, its last one the one just passed.
+"""
+
+from typing import Annotated, NamedTuple
+
+from ppafo.control.walking.phases import PhaseRules, PhaseState
+from ppafo.control.walking.timing import fractional
+from ppafo.control.walking.timing.fractional import (
+    DELAY_QUANTITIES,
+    Delays,
+    FractionalClock,
+    next_clock,
+    place_in_stride,
+)
+from ppafo.control.walking.timing.kind import GaitTime, TimingKind
+from ppafo.model.declaration import Quantity
+from ppafo.model.gait_sensors import GaitMeasurement
+
+KNOTS = 32
+WINDOW = 8
+FURTHEST = 3
+"""Knots of a stride, of the window that is compared, and by which the learnt stride is shifted at most either way."""
+
+
+EVEN = 0.05
+"""A stride that is longer or shorter than recent ones by less than this fraction may be learnt from."""
+
+
+KEEPS = 0.2
+"""How far a detected strike moves the clock once a stride is learnt: so both cannot drift away together."""
+
+
+class EstimationRules(NamedTuple):
+    """Strides to learn from, weight of a later one, misfits that count as one [rad], [N], and how they are used.
+
+    ``clock_trust`` is the sum of squares that a shift by one knot costs: what the readings say of time has to outweigh
+    it, which forces that rise and fall do, and the angle of the swing alone hardly does.
+    """
+
+    learning_strides: float
+    relearning: float
+    angle_scale: float
+    force_scale: float
+    largest_misfit: float
+    clock_trust: float
+    estimate_weight: float
+
+
+class EstimatedRules(NamedTuple):
+    """The known delays, how far a detected event moves the clock while nothing is learnt [-], and the estimation."""
+
+    delays: Delays
+    anchor_weight: float
+    estimation: EstimationRules
+
+
+class LearntStride(NamedTuple):
+    """Ankle angle [rad], heel and toe force [N] at the knots of a stride, the next one first."""
+
+    angle: Annotated[tuple[float, ...], KNOTS]
+    heel_force: Annotated[tuple[float, ...], KNOTS]
+    toe_force: Annotated[tuple[float, ...], KNOTS]
+
+
+class Window(NamedTuple):
+    """The same readings at the last knots, the latest one last, and how far estimates had moved the clock [turns]."""
+
+    angle: Annotated[tuple[float, ...], WINDOW]
+    heel_force: Annotated[tuple[float, ...], WINDOW]
+    toe_force: Annotated[tuple[float, ...], WINDOW]
+    moved: Annotated[tuple[float, ...], WINDOW]
+
+
+class EstimatedClock(NamedTuple):
+    """Fractional timing, the learnt stride, the window and the next knot.
+
+    Knots in the window, strides learnt from, and by how much estimates have moved the clock since the start [turns].
+    """
+
+    clock: FractionalClock
+    stride: LearntStride
+    window: Window
+    next_knot: float
+    filled: float
+    learnt: float
+    moved: float
+
+
+_NO_STRIDE = (0.0,) * KNOTS
+_NO_WINDOW = (0.0,) * WINDOW
+START = EstimatedClock(
+    clock=fractional.START,
+    stride=LearntStride(_NO_STRIDE, _NO_STRIDE, _NO_STRIDE),
+    window=Window(_NO_WINDOW, _NO_WINDOW, _NO_WINDOW, _NO_WINDOW),
+    next_knot=0.0,
+    filled=0.0,
+    learnt=0.0,
+    moved=0.0,
+)
+
+
+def misfit(stride: LearntStride, window: Window, rules: EstimationRules, shift: int) -> float:
+    """Mean square misfit [-] of the window to the learnt stride ``shift`` knots on."""
+    total = 0.0
+    for back in range(WINDOW):
+        place, knot = WINDOW - 1 - back, (KNOTS - 1 - back + shift) % KNOTS
+        angle = (window.angle[place] - stride.angle[knot]) / rules.angle_scale
+        heel = (window.heel_force[place] - stride.heel_force[knot]) / rules.force_scale
+        toe = (window.toe_force[place] - stride.toe_force[knot]) / rules.force_scale
+        total += angle * angle + heel * heel + toe * toe
+    return total / (3.0 * WINDOW)
+
+
+def finer_shift(stride: LearntStride, window: Window, rules: EstimationRules, shift: int) -> float:
+    """What is left of the shift [knots] after a whole number of them: one Gauss-Newton step, at most a knot."""
+    along, square = -rules.clock_trust * shift, 1.0e-12 + rules.clock_trust
+    for back in range(WINDOW):
+        place, knot = WINDOW - 1 - back, (KNOTS - 1 - back + shift) % KNOTS
+        after, before = (knot + 1) % KNOTS, (knot + KNOTS - 1) % KNOTS
+        angle_slope = 0.5 * (stride.angle[after] - stride.angle[before]) / rules.angle_scale
+        heel_slope = 0.5 * (stride.heel_force[after] - stride.heel_force[before]) / rules.force_scale
+        toe_slope = 0.5 * (stride.toe_force[after] - stride.toe_force[before]) / rules.force_scale
+        angle = (window.angle[place] - stride.angle[knot]) / rules.angle_scale
+        heel = (window.heel_force[place] - stride.heel_force[knot]) / rules.force_scale
+        toe = (window.toe_force[place] - stride.toe_force[knot]) / rules.force_scale
+        along += angle_slope * angle + heel_slope * heel + toe_slope * toe
+        square += angle_slope * angle_slope + heel_slope * heel_slope + toe_slope * toe_slope
+    return max(-1.0, min(1.0, along / square))
+
+
+def estimated_shift(stride: LearntStride, window: Window, rules: EstimationRules) -> float:
+    """By how much of a stride [turns] the wearer is ahead of the clock; 0 where no shift fits well."""
+    least, best = misfit(stride, window, rules, 0), 0
+    for distance in range(1, FURTHEST + 1):
+        for side in range(2):
+            shift = distance if side == 0 else -distance
+            found = misfit(stride, window, rules, shift) + rules.clock_trust * shift * shift / (3.0 * WINDOW)
+            best = shift if found < least else best
+            least = min(found, least)
+    fits = least < rules.largest_misfit
+    return (best + finer_shift(stride, window, rules, best)) / KNOTS if fits else 0.0
+
+
+def moved_since(window: Window) -> float:
+    """By how much the clock was moved since the readings of the window were taken, on average [turns].
+
+    So much of the shift that they show is mended.
+    """
+    total = 0.0
+    for place in range(WINDOW):
+        total += window.moved[WINDOW - 1] - window.moved[place]
+    return total / WINDOW
+
+
+def turned(stride: LearntStride, measurement: GaitMeasurement, weight: float) -> LearntStride:
+    """The learnt stride a knot on; the knot that is passed moves towards the readings by a weight [-]."""
+    angle = stride.angle[0] + weight * (measurement.angle - stride.angle[0])
+    heel = stride.heel_force[0] + weight * (measurement.heel_force - stride.heel_force[0])
+    toe = stride.toe_force[0] + weight * (measurement.toe_force - stride.toe_force[0])
+    return LearntStride(
+        (*stride.angle[1:], angle),
+        (*stride.heel_force[1:], heel),
+        (*stride.toe_force[1:], toe),
+    )
+
+
+def longer_window(window: Window, measurement: GaitMeasurement, moved: float) -> Window:
+    """The window with the readings of a knot, without its oldest ones; ``moved`` [turns] by estimates until then."""
+    return Window(
+        (*window.angle[1:], measurement.angle),
+        (*window.heel_force[1:], measurement.heel_force),
+        (*window.toe_force[1:], measurement.toe_force),
+        (*window.moved[1:], moved),
+    )
+
+
+def knots_passed(fraction: float, next_knot: float) -> float:
+    """Knots by which a fraction of the stride [turns] is beyond the next one, from minus to plus half of them."""
+    within = fraction - 1.0 if fraction >= 1.0 else fraction
+    ahead = within * KNOTS - next_knot
+    ahead = ahead - KNOTS if ahead > 0.5 * KNOTS else ahead
+    return ahead + KNOTS if ahead <= -0.5 * KNOTS else ahead
+
+
+def is_learnt(rules: EstimationRules, clock: EstimatedClock) -> bool:
+    """True once the stride was learnt."""
+    return clock.learnt >= rules.learning_strides
+
+
+def next_learnt(rules: EstimationRules, clock: EstimatedClock, before: PhaseState, phase: PhaseState) -> float:
+    """Good strides in a row that were learnt from, after a sample: from one strike with the heel to the next.
+
+    A stride that is not good begins the learning anew, until it is done.
+    """
+    # In the stride before the time of a stride was known for the second time the clock may have waited.
+    ends = (before.strikes < phase.strikes) & (clock.clock.strides.count > 1.5)
+    time = clock.clock.strides.mean_time
+    good = (abs(before.since_strike - time) < EVEN * time) & (phase.heel.loaded > 0.5)
+    counted = (clock.learnt + 1.0 if good else 0.0) if ends else clock.learnt
+    return clock.learnt if is_learnt(rules, clock) else counted
+
+
+def passed_knot(
+    rules: EstimationRules, clock: EstimatedClock, at: FractionalClock, learnt: float, measurement: GaitMeasurement
+) -> EstimatedClock:
+    """The clock where its fraction passes a knot: learning, or moved by a part of the estimated shift."""
+    ready = is_learnt(rules, clock)
+    stride = turned(clock.stride, measurement, rules.relearning if ready else 1.0 / (clock.learnt + 1.0))
+    window = longer_window(clock.window, measurement, clock.moved)
+    # A clock that was set anew by more than a knot runs after it, and its window is not of one piece.
+    together = knots_passed(at.fraction, clock.next_knot) < 1.0
+    filled = clock.filled + 1.0 if together else 0.0
+    shift = estimated_shift(stride, window, rules) - moved_since(window) if ready & (filled >= WINDOW) else 0.0
+    moved = max(rules.estimate_weight * shift, -at.fraction)
+    following = clock.next_knot + 1.0
+    return EstimatedClock(
+        clock=FractionalClock(fraction=at.fraction + moved, event=at.event, come=at.come, strides=at.strides),
+        stride=stride,
+        window=window,
+        next_knot=following - KNOTS if following >= KNOTS else following,
+        filled=filled,
+        learnt=learnt,
+        moved=clock.moved + moved,
+    )
+
+
+def follow(
+    rules: EstimatedRules,
+    phase_rules: PhaseRules,
+    clock: EstimatedClock,
+    before: PhaseState,
+    phase: PhaseState,
+    measurement: GaitMeasurement,
+    period: float,
+) -> EstimatedClock:
+    """The clock after a sample, taken every ``period`` [s]: fractional until a stride is learnt, then estimated."""
+    ready = is_learnt(rules.estimation, clock) & (clock.filled >= WINDOW)
+    weight, strike_weight = 0.0 if ready else rules.anchor_weight, KEEPS if ready else 1.0
+    at = next_clock(rules.delays, phase_rules, clock.clock, before, phase, weight, strike_weight, period)
+    learnt = next_learnt(rules.estimation, clock, before, phase)
+    if knots_passed(at.fraction, clock.next_knot) >= 0.0:
+        return passed_knot(rules.estimation, clock, at, learnt, measurement)
+    return EstimatedClock(
+        clock=at,
+        stride=clock.stride,
+        window=clock.window,
+        next_knot=clock.next_knot,
+        filled=clock.filled,
+        learnt=learnt,
+        moved=clock.moved,
+    )
+
+
+def gait_time(rules: EstimatedRules, clock: EstimatedClock, phase: PhaseState) -> GaitTime:
+    """The time since the heel strike [s], ahead by the delay of the valve."""
+    return place_in_stride(clock.clock.fraction, rules.delays.valve_delay, phase)
+
+
+KIND = TimingKind(
+    name="estimated",
+    summary="State estimation: a window of angle and forces fitted to a learnt stride by least squares.",
+    source="Li, Becker, Shorter, Bretl, Hsiao-Wecksler, IEEE/ASME Trans Mechatronics 16 (2011) 835",
+    quantities=(
+        *DELAY_QUANTITIES,
+        fractional.ANCHOR_WEIGHT,
+        Quantity("learning_strides", "1", "good strides in a row from which the stride is learnt", 3.0, 1.0, 100.0),
+        Quantity("relearning", "1", "weight of a later stride in the learnt one", 0.1, 0.0, 1.0),
+        Quantity("angle_scale", "rad", "a difference of the angle that counts as one", 0.1, 1.0e-3, 10.0),
+        Quantity("force_scale", "N", "a difference of a force that counts as one", 150.0, 1.0, 1.0e5),
+        Quantity("largest_misfit", "1", "mean square misfit beyond which nothing is estimated", 1.0, 0.0, 1.0e3),
+        Quantity("clock_trust", "1", "sum of squares that a shift by one knot costs", 4.0, 0.0, 1.0e6),
+        Quantity("estimate_weight", "1", "how far an estimate moves the clock, 1 wholly", 0.5, 0.0, 1.0),
+    ),
+    parameters=EstimatedRules,
+    initial=START,
+    follow=follow,
+    gait_time=gait_time,
+)

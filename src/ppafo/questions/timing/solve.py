@@ -1,0 +1,149 @@
+"""Walks of a healthy and an impaired wearer, each with every timing of the stride: how far its events are off."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.answers import Solved
+from ppafo.control.walking.catalog import TIMINGS
+from ppafo.engine.lanes import Floats, run_batch
+from ppafo.engine.rows import row_numbers
+from ppafo.engine.run import NEVER_FAILED, batch_of
+from ppafo.errors import ScenarioError, SimulationError
+from ppafo.progress import Progress, Report, report_nothing
+from ppafo.questions.timing.slap import SlapSource, slap_sources
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.course import Segment, WalkingCourse, list_courses, load_course
+from ppafo.walking.event_times import EVENTS, EventErrors, event_errors, known_events, true_events, within
+from ppafo.walking.loading import load_walk
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.walk import REMEDY, plan_of, walk_duration
+
+WEARERS = {"healthy": ("wearer.keeps_gait=1",), "impaired": ("wearer.keeps_gait=0",)}
+"""A wearer whose muscles keep the measured gait, and the one of the walk file, whose foot drops."""
+
+STEADY, UNEVEN = "steady", "uneven"
+SETTLED = 6.0
+"""Time [s] from which events count: strides are learnt by then."""
+
+LONGEST = 2.0
+UNEVEN_STRIDES = 24
+VARIATION = 0.025
+"""Standard deviation of stride times over their mean in steady walking, as published for healthy adults (Hausdorff
+et al. 1995, J Appl Physiol 78:349, and later: 1 to 3 %)."""
+SEED = 20110501
+
+
+@dataclass(frozen=True, slots=True)
+class TimedWay:
+    """One wearer on one way with one timing: errors of each event."""
+
+    wearer: str
+    way: str
+    timing: str
+    events: Mapping[str, EventErrors]
+
+    @property
+    def rms(self) -> float:
+        """Root mean square [s] of the errors of all events."""
+        return rms_of([item.errors for item in self.events.values()])
+
+
+@dataclass(frozen=True, slots=True)
+class Timing(Solved):
+    """What every timing knows of the events, and what the slap comes from; ``minutes`` of each way at most."""
+
+    file: str
+    overrides: tuple[str, ...]
+    minutes: float
+    ways: tuple[TimedWay, ...]
+    slap: tuple[SlapSource, ...]
+
+    def pooled(self, wearer: str, timing: str, ways: Sequence[str] | None = None) -> float:
+        """Root mean square [s] of all errors of a wearer with a timing, on some ways or on all."""
+        chosen = [
+            item
+            for item in self.ways
+            if (item.wearer, item.timing) == (wearer, timing) and (ways is None or item.way in ways)
+        ]
+        return rms_of([found.errors for item in chosen for found in item.events.values()])
+
+    def reduction(self, wearer: str, timing: str, ways: Sequence[str] | None = None) -> float:
+        """Fraction by which a timing lowers the error of thresholds."""
+        return 1.0 - self.pooled(wearer, timing, ways) / self.pooled(wearer, next(iter(TIMINGS)), ways)
+
+
+def rms_of(parts: Sequence[Floats]) -> float:
+    """Root mean square of several arrays together; nan without any number."""
+    every = np.concatenate([np.asarray(part) for part in parts]) if parts else np.empty(0)
+    return float(np.sqrt(np.mean(every**2))) if every.size else float("nan")
+
+
+def event_timing(
+    configuration: str | Path = "solenoid",
+    gait: str | Path | None = None,
+    minutes: float | None = None,
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+) -> Timing:
+    """How far a controller is off in time at heel strike, toes on, heel off and toes off, with every timing.
+
+    ``configuration`` is the name of a walk or a file, with another ``gait`` and ``overrides`` as for a walk. A healthy
+    and an impaired wearer walk ``minutes`` [min] (default 1, at most 2) steadily, unevenly and on the courses that come
+    with the package. The result has ``ways``, each with errors [s] by event, and ``slap``, what the foot's slap comes
+    from. ScenarioError, ParameterError or DataError for bad input, SimulationError where a walk diverges.
+    """
+    tell, length = progress or report_nothing, 1.0 if minutes is None else minutes
+    if not 0.2 <= length <= LONGEST:
+        raise ScenarioError(f"{length:g} minutes: events are timed over 0.2 to {LONGEST:g} minutes")
+    if any(text.partition("=")[0].strip() in ("timing.kind", "wearer.keeps_gait") for text in overrides):
+        raise ScenarioError("timing.kind and wearer.keeps_gait: every timing and both wearers are tried")
+    ways = ways_of(load_walk(configuration, overrides, gait))
+    found = []
+    for timing in TIMINGS:
+        for wearer, own in WEARERS.items():
+            for way, course in ways.items():
+                tell(Progress(f"{timing}, {wearer}, {way}", len(found), len(TIMINGS) * len(WEARERS) * len(ways)))
+                walk = load_walk(configuration, (*overrides, *own, f"timing.kind={timing}"), gait)
+                walk = replace(walk, course=course)
+                found.append(TimedWay(wearer, way, timing, timed_events(walk, length)))
+    slap = slap_sources(str(configuration), tuple(overrides), gait, tell)
+    return Timing(str(configuration), tuple(overrides), length, tuple(found), slap)
+
+
+def ways_of(configuration: Configuration) -> dict[str, WalkingCourse | None]:
+    """The ways to walk: steadily, unevenly, and the courses that come with the package."""
+    if configuration.course is not None:
+        raise ScenarioError(f"{configuration.file}: course: events are timed on courses of their own; leave it away")
+    cadence = 2.0 / configuration.gait.stride_time
+    return {STEADY: None, UNEVEN: uneven_course(cadence)} | {name: load_course(name) for name in list_courses()}
+
+
+def uneven_course(cadence: float) -> WalkingCourse:
+    """Strides whose times vary as those of people do, about a cadence [1/s] of steps."""
+    generator = np.random.default_rng(SEED)
+    paces = cadence / (1.0 + VARIATION * np.clip(generator.standard_normal(UNEVEN_STRIDES), -2.0, 2.0))
+    strides = (Segment("walk", {"cadence": pace, "strides": 1.0}) for pace in paces.tolist())
+    begin = (Segment("start", {"strides": 1.0}), Segment("walk", {"strides": 6.0}))
+    return WalkingCourse("uneven", "Strides of uneven time.", (*begin, *strides), "uneven")
+
+
+def timed_events(configuration: Configuration, minutes: float) -> dict[str, EventErrors]:
+    """Errors of the events of one walk of at most so many minutes; SimulationError where it diverges."""
+    longest = walk_duration(configuration, None if configuration.course is not None else minutes)
+    run = plan_walk(replace(plan_of(configuration, min(longest, 60.0 * minutes)), record_interval=1.0e-3))
+    outcome = run_batch(batch_of(run))
+    rows = row_numbers(run.program.state_rows())
+    if outcome.states[rows["result.failure_time"], 0] < NEVER_FAILED or not np.isfinite(outcome.states).all():
+        raise SimulationError(f"{configuration.name} diverged; {REMEDY}")
+    record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
+    interval = run.step * run.record_every
+    settled = slice(round(SETTLED / interval), outcome.record.shape[0])
+    true = within(true_events(record["walk.contact"]), settled)
+    known = within(known_events(record), settled)
+    if not known:
+        raise ScenarioError(f"{configuration.file}: controller.kind '{configuration.controller.name}' knows no events")
+    stride_time = configuration.gait.stride_time
+    return {name: event_errors(true[name], known[name], interval, stride_time) for name in EVENTS}
