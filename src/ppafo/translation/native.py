@@ -3,37 +3,23 @@
 import ctypes
 import subprocess
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
 from ppafo.errors import ProgramError
 from ppafo.translation.c99 import FLAGS
 
-Values = NDArray[np.float64]
-
 
 class _Array(ctypes.Structure):
     _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
 
 
-@dataclass(frozen=True, slots=True)
-class NativeProgram:
-    """The compiled ``advance`` of one program."""
-
-    library: ctypes.CDLL
-
-    def advance(self, *given: Any) -> None:
-        """Take a block on, as ``advance`` of the lanes does, with the same arguments."""
-        self.library.advance(*(_handed(value) for value in given))
-
-
-def build(source: str, folder: Path, compiler: str = "gcc", flags: Sequence[str] = FLAGS) -> NativeProgram:
+def build(source: str, folder: Path, compiler: str = "gcc", flags: Sequence[str] = FLAGS) -> ModuleType:
     """Compile C into a library in ``folder`` and load it; ProgramError where the compiler refuses it."""
     written, library = folder / "program.c", folder / "program.so"
     written.write_text(source, encoding="utf-8")
@@ -41,10 +27,13 @@ def build(source: str, folder: Path, compiler: str = "gcc", flags: Sequence[str]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise ProgramError(f"{compiler} refuses the program: {(done.stderr.strip().splitlines() or [''])[0]}")
-    return NativeProgram(ctypes.CDLL(str(library)))
+    entry = ctypes.CDLL(str(library)).advance
+    module = ModuleType(library.stem)
+    vars(module)["advance"] = lambda *given: entry(*map(_handed, given))
+    return module
 
 
-def run_native(program: NativeProgram, batch: Batch) -> BatchResult:
+def run_native(program: ModuleType, batch: Batch) -> BatchResult:
     """Results of a batch, block after block, on this thread."""
     runs, lanes = batch.states.shape[1], lanes_of(batch.program)
     results = []

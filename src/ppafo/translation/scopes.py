@@ -1,4 +1,4 @@
-"""Which assignments of a function are needed, and where its local names are declared: as far in and as late as can be."""
+"""Which assignments of a function are needed, and where its names are declared: as far in and as late as can be."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -63,32 +63,37 @@ class Scopes:
             return
         if _begins(mentions[0], name):
             self.first[id(mentions[0])] = "const " if self.changes[id(body)][name] == 1 else "let "
-        elif self.only_counts(name, mentions):
-            self.counted |= {id(loop) for loop in mentions}
-        elif self.is_divided(name, mentions):
-            for inner in self.blocks(name, mentions):
-                self.place(name, inner)
-        else:
+        elif not self.is_divided(name, mentions):
             self.before.setdefault(id(body), []).append(name)
+        else:
+            loops = {id(statement) for statement in mentions if self.counts(name, statement)}
+            self.counted |= loops
+            for inner in self.blocks(name, tuple(item for item in mentions if id(item) not in loops)):
+                self.place(name, inner)
 
     def is_divided(self, name: str, mentions: Block) -> bool:
-        """True where a name is mentioned in inner blocks alone, each of which gives it its value before it reads it."""
-        is_direct = any(name in self.direct[id(statement)] for statement in mentions)
-        return not is_direct and all(self.is_defined_first(name, inner) for inner in self.blocks(name, mentions))
+        """True where each statement that mentions a name gives it its value in its own blocks before it reads it."""
+        return all(
+            self.counts(name, statement)
+            or (
+                name not in self.direct[id(statement)]
+                and all(self.is_defined_first(name, inner) for inner in self.blocks(name, (statement,)))
+            )
+            for statement in mentions
+        )
 
     def is_defined_first(self, name: str, body: Block) -> bool:
         """True where a block gives a name its value before it reads it, so that it can be the block's own."""
         mentions = self.mentions(name, body)
-        return _begins(mentions[0], name) or self.only_counts(name, mentions) or self.is_divided(name, mentions)
+        return _begins(mentions[0], name) or self.is_divided(name, mentions)
 
-    def only_counts(self, name: str, mentions: Block) -> bool:
-        """True where a name is that of loops alone, which do not change it otherwise."""
-        return all(
-            isinstance(loop, typed.Count)
-            and loop.name == name
-            and name not in self.changes[id(loop.body)]
-            and not any(name in _names(term) for term in _terms(loop))
-            for loop in mentions
+    def counts(self, name: str, statement: Statement) -> bool:
+        """True for a loop of that name, which does not change it otherwise."""
+        return (
+            isinstance(statement, typed.Count)
+            and statement.name == name
+            and name not in self.changes[id(statement.body)]
+            and name not in _names_of(statement)
         )
 
     def blocks(self, name: str, mentions: Block) -> list[Block]:
