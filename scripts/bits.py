@@ -1,7 +1,8 @@
-"""Whether the same runs have the same bits, compiled by Numba for several processors.
+"""Whether the same runs have the same bits, compiled by Numba for several processors, and from C by several compilers.
 
     python scripts/bits.py
     python scripts/bits.py torque-task-solenoid --processors generic host --runs 200
+    python scripts/bits.py --processors host --compilers "gcc -O1 -fsanitize=address,undefined"
 
 Every shipped scenario and walk is run as it is, and with ``--runs`` draws of all its numbers, some of which fail. The
 table has a hash of the final states and the records of each; what a NaN is made of is free and left out. The rows of
@@ -15,8 +16,11 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from shutil import which
 
 import numpy as np
 
@@ -26,6 +30,8 @@ from ppafo.engine.lanes import Batch, BatchResult, run_batch
 from ppafo.engine.run import batch_of
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
+from ppafo.translation.c99 import FLAGS, program_source
+from ppafo.translation.native import build, run_native
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import plan_of
@@ -35,7 +41,10 @@ COURSES = {"first-steps": "proportional"}
 """Courses, and the walk that takes each."""
 NAMES = (*SCENARIOS, *WALKS, *COURSES)
 HOST = "host"
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
 PROCESSORS = ("generic", "haswell", "skylake-avx512", HOST)
+COMPILERS = ("gcc -O0", "gcc -O3", "gcc -O3 -march=native", "clang -O3", "clang -O3 -march=native")
+"""Compilers of C; those that are not on this machine are left out. More flags than these are those of the emitter."""
 WALKED = 4.0
 SEED = 15
 SPREAD = (0.7, 1.4)
@@ -77,21 +86,35 @@ def failures(result: BatchResult) -> int:
     return int((result.states[1] < 1.0e300).sum())
 
 
-def hashes(names: list[str], runs: int) -> dict[str, list[str | int]]:
-    """Hash of each run alone, hash of its draws, how many of those failed."""
+def hashes(names: list[str], runs: int, compiler: str) -> dict[str, list[str | int]]:
+    """Hash of each run alone, hash of its draws, how many of those failed; by the lanes, or from C."""
     found: dict[str, list[str | int]] = {}
     for name in names:
         batch = plain_batch(name)
-        drawn = run_batch(drawn_batch(batch, runs))
-        found[name] = [digest(run_batch(batch)), digest(drawn), failures(drawn)]
+        run = _from_c(batch, compiler) if compiler else run_batch
+        drawn = run(drawn_batch(batch, runs))
+        found[name] = [digest(run(batch)), digest(drawn), failures(drawn)]
     return found
 
 
-def hashes_on(processor: str, names: list[str], runs: int) -> dict[str, list[str | int]]:
-    """As ``hashes``, compiled for a processor in a process of its own."""
+def _from_c(batch: Batch, compiler: str) -> Callable[[Batch], BatchResult]:
+    """What runs batches of the program of one from its C."""
+    with tempfile.TemporaryDirectory() as folder:
+        command, *flags = compiler.split()
+        own = [flag for flag in FLAGS if not flag.startswith("-O") and not (command.endswith("++") and "std" in flag)]
+        native = build(program_source(batch.program), Path(folder), command, [*own, *WARNINGS, *flags])
+    return lambda given: run_native(native, given)
+
+
+def hashes_on(target: str, names: list[str], runs: int) -> dict[str, list[str | int]]:
+    """As ``hashes``, for a processor or by a compiler of C, in a process of its own."""
+    compiler = target if " " in target else ""
     # Without a list of features Numba would add those of this machine.
-    chosen = {} if processor == HOST else {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
-    command = [sys.executable, __file__, *names, "--runs", str(runs), "--print-hashes"]
+    chosen = {} if compiler or target == HOST else {"NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
+    if "address" in compiler:
+        sanitizer = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
+        chosen = {"LD_PRELOAD": sanitizer.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
+    command = [sys.executable, __file__, *names, "--runs", str(runs), "--print-hashes", compiler]
     done = subprocess.run(command, env={**os.environ, **chosen}, stdout=subprocess.PIPE, text=True, check=True)
     printed: dict[str, list[str | int]] = json.loads(done.stdout)
     return printed
@@ -103,21 +126,28 @@ def main() -> int:
     parser.add_argument("names", metavar="NAME", nargs="*", help="scenarios, walks and courses (default: all)")
     parser.add_argument("--processors", nargs="*", default=list(PROCESSORS), help="names that LLVM knows, or 'host'")
     parser.add_argument("--runs", type=int, default=64, help="draws of each (default: %(default)s)")
-    parser.add_argument("--print-hashes", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument(
+        "--compilers",
+        nargs="*",
+        default=[item for item in COMPILERS if which(item.split()[0])],
+        help="command and flags",
+    )
+    parser.add_argument("--print-hashes", metavar="COMPILER", help=argparse.SUPPRESS)
     parsed = parser.parse_args()
     names = parsed.names or list(NAMES)
-    if parsed.print_hashes:
-        sys.stdout.write(json.dumps(hashes(names, parsed.runs)))
+    if parsed.print_hashes is not None:
+        sys.stdout.write(json.dumps(hashes(names, parsed.runs, parsed.print_hashes)))
         return 0
-    found = {processor: hashes_on(processor, names, parsed.runs) for processor in parsed.processors}
+    targets = [*parsed.processors, *parsed.compilers]
+    found = {target: hashes_on(target, names, parsed.runs) for target in targets}
     differing = 0
     for name in names:
-        alone, drawn, failed = found[parsed.processors[0]][name]
-        others = [processor for processor in parsed.processors if found[processor][name] != [alone, drawn, failed]]
+        alone, drawn, failed = found[targets[0]][name]
+        others = [target for target in targets if found[target][name] != [alone, drawn, failed]]
         differing += bool(others)
-        verdict = f"differs on {', '.join(others)}" if others else "the same"
+        verdict = f"differs: {', '.join(others)}" if others else "the same"
         sys.stdout.write(f"{name:30} {alone} {drawn} ({failed} of {parsed.runs} failed): {verdict}\n")
-    sys.stdout.write(f"{differing} of {len(names)} differ among {', '.join(parsed.processors)}\n")
+    sys.stdout.write(f"{differing} of {len(names)} differ among {', '.join(targets)}\n")
     return int(differing > 0)
 
 

@@ -129,7 +129,7 @@ class _Writer:
         body = _Body(self, item, scopes_of(item)).text()
         returns = "void" if item.returns is None else self.type_name(item.returns)
         given = ", ".join(f"{self.type_name(kind)}{TIED}{c_name(name)}" for name, kind in item.parameters)
-        linkage = "void" if item.returns is None else f"PPAFO_INLINE {returns}"
+        linkage = "PPAFO_ENTRY void" if item.returns is None else f"PPAFO_INLINE {returns}"
         head = _wrapped(f"{linkage} {item.name}({given or 'void'})")
         bound = [f"Here {text}." for text in item.bound]
         said = _comment(self.documents.get(item.source, ""), bound)
@@ -209,6 +209,8 @@ class _Body:
         name = c_name(item.name)
         is_own = id(item) in self.scopes.counted
         counter = name if is_own else f"{name}_next"
+        while not is_own and counter in self.kinds:
+            counter += "_"
         sign, change = ("<", f"++{counter}") if item.step == 1 else (">", f"{counter} += {item.step}")
         sign = "<" if item.step > 0 else ">"
         start, stop = self.terms.term(item.start), self.terms.term(item.stop, 6)

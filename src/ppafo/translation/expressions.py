@@ -1,6 +1,7 @@
 """Expressions of a composed module as typed terms."""
 
 import ast
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -31,6 +32,7 @@ SIGN_OF: dict[type[ast.AST], str] = {
     **{ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="},
     **{ast.And: "and", ast.Or: "or"},
 }
+CONSTANTS = {"inf": math.inf, "nan": math.nan, "pi": math.pi}
 WHOLE_ONLY = frozenset({"&", "|", "^", ">>"})
 
 
@@ -99,13 +101,11 @@ class Expressions:
         raise self.refused(node, f"'{node.id}' has no value")
 
     def _of_attribute(self, node: ast.Attribute) -> Term:
-        numbers = {"math.inf": float("inf"), "math.nan": float("nan"), "math.pi": 3.141592653589793}
-        written = ast.unparse(node)
-        if written in numbers:
-            return Term("number", FLOAT, (), numbers[written])
+        if isinstance(node.value, ast.Name) and node.value.id == "math" and node.attr in CONSTANTS:
+            return Term("number", FLOAT, (), CONSTANTS[node.attr])
         owner = self.term(node.value)
         if not isinstance(owner.type, Row) or node.attr not in dict(owner.type.fields):
-            raise self.refused(node, f"'{written}' is no field")
+            raise self.refused(node, f"'{ast.unparse(node)}' is no field")
         return typed.field_of(owner, node.attr)
 
     def _of_subscript(self, node: ast.Subscript) -> Term:
@@ -178,7 +178,7 @@ class Expressions:
         return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
 
     def _of_call(self, node: ast.Call) -> Term:
-        name = ast.unparse(node.func)
+        name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if any(isinstance(item, ast.Starred) for item in node.args):
             raise self.refused(node, f"'{ast.unparse(node)}' hands over a tuple as arguments")
         handed = self.types.get(name)

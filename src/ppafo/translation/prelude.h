@@ -18,6 +18,12 @@
 #define PPAFO_SIDE_BY_SIDE
 #endif
 
+#if defined(__cplusplus)
+#define PPAFO_ENTRY extern "C"
+#else
+#define PPAFO_ENTRY extern
+#endif
+
 /* Numbers one after another, the last index running quickest. */
 typedef struct {
     double *values;

@@ -1,6 +1,5 @@
 """Which assignments of a function are needed, and where its names are declared: as far in and as late as can be."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from ppafo.translation import typed
@@ -138,7 +137,7 @@ def _needed_in_loop(loop: typed.Count | typed.While, after: frozenset[str]) -> t
 
 def _names_of(statement: Statement) -> frozenset[str]:
     """Names that a statement itself reads."""
-    return frozenset(name for term in _terms(statement) for name in _names(term))
+    return frozenset().union(*(term.reads for term in _terms(statement)))
 
 
 def scopes_of(function: Function) -> Scopes:
@@ -152,7 +151,7 @@ def scopes_of(function: Function) -> Scopes:
 
 def _begins(statement: Statement, name: str) -> bool:
     """True for an assignment of a name that does not read it."""
-    return isinstance(statement, typed.Assign) and statement.name == name and name not in set(_names(statement.value))
+    return isinstance(statement, typed.Assign) and statement.name == name and name not in statement.value.reads
 
 
 def _made(statement: Statement) -> tuple[str, Type] | None:
@@ -180,11 +179,3 @@ def _terms(statement: Statement) -> list[Term]:
     if isinstance(statement, typed.Count):
         return [statement.start, statement.stop]
     return [statement.test] if isinstance(statement, typed.If | typed.While) else []
-
-
-def _names(term: Term) -> Iterator[str]:
-    """Names that a term reads."""
-    if term.kind == "name":
-        yield term.detail
-    for part in term.parts:
-        yield from _names(part)

@@ -53,6 +53,9 @@ class Handed:
 Type: TypeAlias = Scalar | Row | Items | Array | Handed
 
 
+_NONE: frozenset[str] = frozenset()
+
+
 @dataclass(frozen=True, slots=True)
 class Term:
     """A value: what makes it, its type, the terms that it is made of, and a name or number where it has one.
@@ -65,6 +68,12 @@ class Term:
     type: Type
     parts: tuple["Term", ...] = ()
     detail: Any = None
+    reads: frozenset[str] = field(init=False, compare=False, repr=False)
+    """Local names whose values it takes."""
+
+    def __post_init__(self) -> None:
+        names = frozenset((self.detail,)) if self.kind == "name" else _NONE
+        object.__setattr__(self, "reads", names.union(*(part.reads for part in self.parts)) if self.parts else names)
 
 
 SIGNS = frozenset({"+", "-", "*", "/", "//", "%", "&", "|", "^", ">>", "<", "<=", ">", ">=", "==", "!=", "and", "or"})

@@ -101,6 +101,7 @@ class _FunctionWalk:
         self.module = module
         self.definition = definition
         self.types: dict[str, Type] = {}
+        self.names = {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)}
         self.values = Expressions(
             self.types, module.rows, module.definitions, made=module.function, refused=module.refused
         )
@@ -196,7 +197,7 @@ class _FunctionWalk:
         places = range(len(owner.type.types))
         if isinstance(node.iter, ast.Subscript):
             places = places[self.values.part(node.iter.slice)]
-        counter = f"{name}_place"
+        counter = self.fresh(f"{name}_place", INT)
         self.note_type(counter, INT, node)
         item = Term("item", owner.type.types[0], (owner, Term("name", INT, (), counter)))
         taken = self.assign(name, item, node)
@@ -211,7 +212,7 @@ class _FunctionWalk:
             made = [make()]
         else:
             self.flags += 1
-            flag = self.flag = f"was_left_{self.flags}"
+            flag = self.flag = self.fresh(f"was_left_{self.flags}", BOOL)
             before = self.assign(flag, Term("number", BOOL, (), False), node)
             test = Term("not", BOOL, (Term("name", BOOL, (), flag),))
             made = [before, make()]
@@ -229,8 +230,8 @@ class _FunctionWalk:
         if len(node.targets) != 1:
             raise self.refused(node, "one value for several names")
         target = node.targets[0]
-        if isinstance(target, ast.Name) and ast.unparse(node.value).startswith("np.empty("):
-            return [self.reserve(target.id, node)]
+        if isinstance(target, ast.Name) and isinstance(node.value, ast.Call) and _is_empty_array(node.value):
+            return [self.reserve(target.id, node.value)]
         value = self.values.term(node.value)
         if isinstance(target, ast.Name):
             return [self.assign(target.id, value, node)]
@@ -240,10 +241,9 @@ class _FunctionWalk:
             raise self.refused(node, f"'{ast.unparse(target)}' on the left")
         return self.assign_items(target, value, node)
 
-    def reserve(self, name: str, node: ast.Assign) -> Statement:
+    def reserve(self, name: str, node: ast.Call) -> Statement:
         """A local array, whose shape is a literal."""
-        assert isinstance(node.value, ast.Call)
-        kind = Array(2, ast.literal_eval(node.value.args[0]))
+        kind = Array(2, ast.literal_eval(node.args[0]))
         self.note_type(name, kind, node)
         return typed.Reserve(name, kind)
 
@@ -251,6 +251,12 @@ class _FunctionWalk:
         """A name gets a value, as the type that holds all that it ever gets."""
         self.note_type(name, value.type, node)
         return typed.Assign(name, converted(value, self.types[name]))
+
+    def fresh(self, wanted: str, kind: Type) -> str:
+        """A name that the text does not have, for values of one form."""
+        while wanted in self.names or joined(self.types.get(wanted, kind), kind) is None:
+            wanted += "_"
+        return wanted
 
     def note_type(self, name: str, kind: Type, node: ast.AST) -> None:
         """Widen the type of a name where it must be."""
@@ -271,10 +277,15 @@ class _FunctionWalk:
         before: list[Statement] = []
         read = {item.id for item in ast.walk(node.value) if isinstance(item, ast.Name)}
         if value.kind != "build" or read & set(names):
-            whole = "_and_".join(name for name in names if name != "_")
+            whole = self.fresh("_and_".join(name for name in names if name != "_"), kind)
             before = [self.assign(whole, value, node)]
             value = Term("name", self.types[whole], (), whole)
         return [
             *before,
             *(self.assign(name, typed.item_of(value, at), node) for at, name in enumerate(names) if name != "_"),
         ]
+
+
+def _is_empty_array(node: ast.Call) -> bool:
+    """True for ``np.empty(...)``."""
+    return isinstance(node.func, ast.Attribute) and node.func.attr == "empty"
