@@ -3,11 +3,14 @@
     python scripts/bits.py
     python scripts/bits.py torque-task-solenoid --processors generic host --runs 200
     python scripts/bits.py --processors host --compilers "gcc -O1 -fsanitize=address,undefined"
+    python scripts/bits.py --translate 200
 
 Every shipped scenario and walk is run as it is, and with ``--runs`` draws of all its numbers, some of which fail. The
 table has a hash of the final states and the records of each; what a NaN is made of is free and left out. The rows of
 the runs come from one plan on this machine: only the time stepping is compared. A machine that lacks the instructions
 of a processor cannot run what is compiled for it.
+
+``--translate`` draws programs from the catalogues, takes each to C, and lets gcc compile it with warnings as errors.
 """
 
 import argparse
@@ -17,6 +20,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -26,20 +30,39 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from ppafo.engine.lane_source import INLINE, write_lanes
 from ppafo.engine.lanes import Batch, BatchResult, run_batch
 from ppafo.engine.run import batch_of
+from ppafo.engine.source_text import SourceCollector
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.translation.c99 import FLAGS, program_source
+from ppafo.translation.c99 import FLAGS, program_source, translated
 from ppafo.translation.native import build, run_native
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import plan_of
 from scripts.record_results import SCENARIOS, WALKS
+from tests.composed_programs import drawn_programs
 
+VARIED = {
+    "noisy-sensors": (
+        "torque-task-proportional",
+        ("sensors.delay=2.3 ms", "sensors.pressure_noise=0.1 psi_d", "sensors.pressure_resolution=0.05 psi_d"),
+    ),
+    "thermal-gas-behind-lines": (
+        "step-response",
+        (
+            "gas_model.kind=thermal",
+            "gas_model.heat_transfer_coefficient=50 W/(m^2 K)",
+            "gas_model.wall_area_per_volume=100 1/m",
+            "supply_line.plantarflexion.droop=3e6 Pa s/kg",
+        ),
+    ),
+}
+"""Scenarios with settings of their own, for what no shipped one has."""
 COURSES = {"first-steps": "proportional"}
 """Courses, and the walk that takes each."""
-NAMES = (*SCENARIOS, *WALKS, *COURSES)
+NAMES = (*SCENARIOS, *VARIED, *WALKS, *COURSES)
 HOST = "host"
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
 PROCESSORS = ("generic", "haswell", "skylake-avx512", HOST)
@@ -55,6 +78,8 @@ def plain_batch(name: str) -> Batch:
     """One run of a scenario, or some seconds of a walk."""
     if name in SCENARIOS:
         return batch_of(plan_run(load_scenario(name)))
+    if name in VARIED:
+        return batch_of(plan_run(load_scenario(*VARIED[name])))
     walk = load_walk(COURSES[name], course=name) if name in COURSES else load_walk(name)
     return batch_of(plan_walk(plan_of(walk, WALKED)))
 
@@ -120,6 +145,25 @@ def hashes_on(target: str, names: list[str], runs: int) -> dict[str, list[str | 
     return printed
 
 
+def translate_drawn(count: int) -> int:
+    """Take drawn programs of the catalogues to C and compile them; 1 where a compiler complains."""
+    seconds, complaints = [], 0
+    for program in drawn_programs(count):
+        collector = SourceCollector(INLINE)
+        composed = write_lanes(program, collector)
+        start = time.thread_time()
+        source = translated(composed, collector)
+        seconds.append(time.thread_time() - start)
+        own = [flag for flag in FLAGS if not flag.startswith("-O")]
+        command = ["gcc", *own, "-O1", *WARNINGS, "-xc", "-", "-c", "-o", os.devnull]
+        done = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
+        complaints += done.returncode != 0
+        sys.stdout.write(done.stderr)
+    said = f"{count} programs, {complaints} with a complaint; translation takes {np.median(seconds):.2f} s each"
+    sys.stdout.write(f"{said}, at most {max(seconds):.2f} s\n")
+    return int(complaints > 0)
+
+
 def main() -> int:
     """Print the table; 1 where any bits differ."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -132,12 +176,15 @@ def main() -> int:
         default=[item for item in COMPILERS if which(item.split()[0])],
         help="command and flags",
     )
+    parser.add_argument("--translate", metavar="COUNT", type=int, default=0, help="only translate drawn programs")
     parser.add_argument("--print-hashes", metavar="COMPILER", help=argparse.SUPPRESS)
     parsed = parser.parse_args()
     names = parsed.names or list(NAMES)
     if parsed.print_hashes is not None:
         sys.stdout.write(json.dumps(hashes(names, parsed.runs, parsed.print_hashes)))
         return 0
+    if parsed.translate:
+        return translate_drawn(parsed.translate)
     targets = [*parsed.processors, *parsed.compilers]
     found = {target: hashes_on(target, names, parsed.runs) for target in targets}
     differing = 0

@@ -47,7 +47,12 @@ def program_source(program: Program) -> str:
     ProgramError for what is outside the subset, with file and line.
     """
     collector = SourceCollector(INLINE)
-    module = walk_module(write_lanes(program, collector))
+    return translated(write_lanes(program, collector), collector)
+
+
+def translated(composed: str, collector: SourceCollector) -> str:
+    """The same of a composed module that ``collector`` gathered."""
+    module = walk_module(composed)
     documents = {name: inspect.getdoc(item) or "" for name, item in collector.owners.items()}
     return c_source(module, documents, "Generated from the functions of ppafo. Not to be edited.")
 
