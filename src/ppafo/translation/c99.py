@@ -67,7 +67,9 @@ def c_source(module: Module, documents: Mapping[str, str], title: str) -> str:
 
 def _comment(text: str, further: Iterable[str] = ()) -> str:
     """A block comment."""
-    lines = [line.rstrip() for line in text.replace("*/", "* /").strip().splitlines()] + list(further)
+    lines = [line.rstrip() for line in text.replace("*/", "* /").replace("/*", "/ *").strip().splitlines()] + list(
+        further
+    )
     return "/* " + "\n * ".join(lines).replace(" * \n", " *\n") + " */" if lines else ""
 
 

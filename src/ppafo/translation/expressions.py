@@ -89,7 +89,8 @@ class Expressions:
 
     def _of_constant(self, node: ast.Constant) -> Term:
         kinds: dict[type, Type] = {bool: BOOL, int: INT, float: FLOAT}
-        if type(node.value) not in kinds:
+        is_too_large = type(node.value) is int and node.value >= 2**63
+        if type(node.value) not in kinds or is_too_large:
             raise self.refused(node, f"the constant {node.value!r}")
         return Term("number", kinds[type(node.value)], (), node.value)
 

@@ -1,6 +1,11 @@
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+
+#if defined(__FAST_MATH__) || (defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0)
+#error "strict arithmetic in 64 bits is needed: no -ffast-math, no x87"
+#endif
 
 #if defined(__GNUC__)
 #define PPAFO_INLINE static inline __attribute__((always_inline, unused))

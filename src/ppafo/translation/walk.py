@@ -186,7 +186,12 @@ class _FunctionWalk:
         start, stop = (Term("number", INT, (), 0), bounds[0]) if len(bounds) == 1 else bounds[:2]
         step = ast.literal_eval(call.args[2]) if len(bounds) == 3 else 1
         self.note_type(name, INT, node)
-        return self.loop(node, lambda: typed.Count(name, start, stop, step, self.block(node.body)))
+        before: list[Statement] = []
+        if stop.reads & {name, *_changed(node.body)}:
+            # Python asks for the end of a range once.
+            end = self.fresh(f"{name}_stop", INT)
+            before, stop = [self.assign(end, stop, node)], Term("name", INT, (), end)
+        return [*before, *self.loop(node, lambda: typed.Count(name, start, stop, step, self.block(node.body)))]
 
     def loop_over_items(self, name: str, node: ast.For) -> list[Statement]:
         """A loop over the items of a tuple, or of a part of it, as one that counts."""
@@ -194,6 +199,8 @@ class _FunctionWalk:
         owner = self.values.term(whole)
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
             raise self.refused(node, f"'{ast.unparse(node.iter)}' is no tuple of one type")
+        if owner.reads & {name, *_changed(node.body)}:
+            raise self.refused(node, f"a loop over '{ast.unparse(node.iter)}' that changes it")
         places = range(len(owner.type.types))
         if isinstance(node.iter, ast.Subscript):
             places = places[self.values.part(node.iter.slice)]
@@ -222,7 +229,7 @@ class _FunctionWalk:
         return made
 
     def do_augassign(self, node: ast.AugAssign) -> list[Statement]:
-        left = ast.copy_location(ast.Name(ast.unparse(node.target), ast.Load()), node)
+        left = ast.copy_location(ast.parse(ast.unparse(node.target), mode="eval").body, node)
         value = ast.copy_location(ast.BinOp(left, node.op, node.value), node)
         return self.do_assign(ast.copy_location(ast.Assign([node.target], value), node))
 
@@ -289,3 +296,9 @@ class _FunctionWalk:
 def _is_empty_array(node: ast.Call) -> bool:
     """True for ``np.empty(...)``."""
     return isinstance(node.func, ast.Attribute) and node.func.attr == "empty"
+
+
+def _changed(body: Sequence[ast.stmt]) -> set[str]:
+    """Names that some statements give values."""
+    nodes = (node for statement in body for node in ast.walk(statement))
+    return {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}

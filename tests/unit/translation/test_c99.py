@@ -85,6 +85,10 @@ def loops(first: float, last: float) -> tuple[float, float, float]:
         found = 1.0
     for part in (first, last, 0.5)[1:]:
         found += part
+    size = int(last) - 80
+    for place in range(size):
+        size -= 2
+        found += place
     number = 0
     while True:
         number += 1
