@@ -1,0 +1,246 @@
+"""C99, which is C++ too, from the typed functions of a composed module.
+
+One C function for each of Python's, with its docstring and its names; rows become structs that are handed over by
+value. There is no heap, no global that changes, no recursion, and no library function but ``sqrt`` and ``fabs``, which
+are exact. Built as ``FLAGS`` say, it gives the bits of the lanes.
+"""
+
+import inspect
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
+
+from ppafo.engine.lane_source import INLINE, write_lanes
+from ppafo.engine.program import Program
+from ppafo.engine.source_text import SourceCollector
+from ppafo.translation import typed
+from ppafo.translation.c_terms import CTerms, c_name
+from ppafo.translation.scopes import Scopes, scopes_of
+from ppafo.translation.typed import (
+    Array,
+    Function,
+    Items,
+    Module,
+    Row,
+    Statement,
+    Type,
+    is_empty,
+)
+from ppafo.translation.walk import walk_module
+
+FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
+"""Flags of gcc and clang: strict arithmetic; without the third last gcc is up to 20 times slower."""
+
+WIDTH = 118
+TIED = "\N{NO-BREAK SPACE}"
+"""Stands between two words that stay on one line."""
+
+_SCALARS = {"bool": "bool", "int": "int64_t", "float": "double"}
+LANE = "lane"
+"""Loops over this name see no other turn of themselves, which the compiler is told."""
+
+
+def program_source(program: Program) -> str:
+    """A translation unit whose ``advance`` takes one block of a program through its steps, as that of the lanes does.
+
+    ProgramError for what is outside the subset, with file and line.
+    """
+    collector = SourceCollector(INLINE)
+    return translated(write_lanes(program, collector), collector)
+
+
+def translated(composed: str, collector: SourceCollector) -> str:
+    """The same of a composed module that ``collector`` gathered."""
+    module = walk_module(composed)
+    documents = {name: inspect.getdoc(item) or "" for name, item in collector.owners.items()}
+    return c_source(module, documents, "Generated from the functions of ppafo. Not to be edited.")
+
+
+def c_source(module: Module, documents: Mapping[str, str], title: str) -> str:
+    """A translation unit with all functions of a module; ``documents`` has the docstrings of rows and functions."""
+    writer = _Writer(documents)
+    prelude = files("ppafo.translation").joinpath("prelude.h").read_text(encoding="utf-8")
+    bodies = [writer.function(item) for item in module.functions]
+    return "\n".join([_comment(title), prelude, *writer.structs, *bodies])
+
+
+def _comment(text: str, further: Iterable[str] = ()) -> str:
+    """A block comment."""
+    lines = [line.rstrip() for line in text.replace("*/", "* /").replace("/*", "/ *").strip().splitlines()] + list(
+        further
+    )
+    return "/* " + "\n * ".join(lines).replace(" * \n", " *\n") + " */" if lines else ""
+
+
+@dataclass(slots=True)
+class _Writer:
+    """What has been written so far: structs by type, and the names that are taken."""
+
+    documents: Mapping[str, str]
+    structs: list[str] = field(default_factory=list)
+    names: dict[Type, str] = field(default_factory=dict)
+    taken: dict[str, int] = field(default_factory=dict)
+    owner: str = ""
+
+    def type_name(self, kind: Type) -> str:
+        """Name of a type in C; a struct is written where it is met first."""
+        if isinstance(kind, typed.Scalar):
+            return _SCALARS[kind.name]
+        if isinstance(kind, Array):
+            return "ppafo_array"
+        if kind not in self.names:
+            wanted = self.struct_name(kind)
+            self.taken[wanted] = self.taken.get(wanted, 0) + 1
+            number = self.taken[wanted]
+            self.names[kind] = wanted if number == 1 else f"{wanted}_{number}"
+            self.structs.append(self.struct(kind, self.names[kind]))
+        return self.names[kind]
+
+    def struct_name(self, kind: Type) -> str:
+        """What a struct would be called if no other were."""
+        if isinstance(kind, Row):
+            return kind.name
+        assert isinstance(kind, Items)
+        if kind.is_uniform:
+            return f"{self.type_name(kind.types[0]).removesuffix('_t')}s_{len(kind.types)}"
+        return f"{self.owner}_result"
+
+    def members(self, kind: Type) -> list[tuple[str, Type]]:
+        """Members of a struct that hold something, by their names in C."""
+        if isinstance(kind, Row):
+            return [(c_name(name), inner) for name, inner in kind.fields if not is_empty(inner)]
+        assert isinstance(kind, Items)
+        return [(f"item_{place}", inner) for place, inner in enumerate(kind.types) if not is_empty(inner)]
+
+    def struct(self, kind: Type, name: str) -> str:
+        """A struct, and the function that makes one."""
+        if isinstance(kind, Items) and kind.is_uniform:
+            inner, count = self.type_name(kind.types[0]), len(kind.types)
+            members = [("", f"{inner} item[{count}]")]
+            given = [f"{inner}{TIED}item_{place}" for place in range(count)]
+            fill = [f"made.item[{place}] = item_{place};" for place in range(count)]
+        else:
+            members = [(own, f"{self.type_name(inner)}{TIED}{own}") for own, inner in self.members(kind)]
+            given = [declared for _, declared in members]
+            fill = [f"made.{own} = {own};" for own, _ in members]
+        said = _comment(self.documents.get(name, "")) if isinstance(kind, Row) else ""
+        declared = [f"    {text};".replace(TIED, " ") for _, text in members]
+        head = _wrapped(f"PPAFO_INLINE {name} make_{name}({', '.join(given)})")
+        body = ["{", f"    {name} made;", *(f"    {line}" for line in fill), "    return made;", "}", ""]
+        return "\n".join([*([said] if said else []), "typedef struct {", *declared, f"}} {name};", "", *head, *body])
+
+    def function(self, item: Function) -> str:
+        """One function with its comment."""
+        self.owner = item.source
+        body = _Body(self, item, scopes_of(item)).text()
+        returns = "void" if item.returns is None else self.type_name(item.returns)
+        given = ", ".join(f"{self.type_name(kind)}{TIED}{c_name(name)}" for name, kind in item.parameters)
+        linkage = "PPAFO_ENTRY void" if item.returns is None else f"PPAFO_INLINE {returns}"
+        head = _wrapped(f"{linkage} {item.name}({given or 'void'})")
+        bound = [f"Here {text}." for text in item.bound]
+        said = _comment(self.documents.get(item.source, ""), bound)
+        prototype = [*head[:-1], f"{head[-1]};", ""] if item.returns is None else []
+        return "\n".join([*prototype, *([said] if said else []), *head, "{", *body, "}", ""])
+
+
+class _Body:
+    """The lines of one function."""
+
+    def __init__(self, writer: _Writer, item: Function, scopes: Scopes) -> None:
+        self.writer = writer
+        self.terms = CTerms(writer.type_name)
+        self.item = item
+        self.scopes = scopes
+        self.kinds: dict[str, Type] = dict(item.parameters) | scopes.types
+
+    def text(self) -> list[str]:
+        unused = [name for name, _ in self.item.parameters if name not in self.scopes.read]
+        return [*(f"    (void){c_name(name)};" for name in unused), *self.block(self.item.body, 1)]
+
+    def block(self, body: tuple[Statement, ...], level: int) -> list[str]:
+        """Some statements, with what must be declared before them."""
+        margin = "    " * level
+        lines = [f"{margin}{self.declared(name)};" for name in self.scopes.at_start(body)]
+        for statement in body:
+            writer: Callable[..., Iterator[str]] = getattr(self, f"write_{type(statement).__name__.lower()}")
+            lines += writer(statement, level)
+        return lines
+
+    def declared(self, name: str) -> str:
+        """A declaration without a value of its own: a number begins as 0, so that no compiler fears for it."""
+        kind = self.kinds[name]
+        begin = {"bool": " = false", "int": " = 0", "float": " = 0.0"}
+        value = begin[kind.name] if isinstance(kind, typed.Scalar) else ""
+        return f"{self.writer.type_name(kind)} {c_name(name)}{value}"
+
+    def line(self, text: str, level: int) -> Iterator[str]:
+        yield from _wrapped("    " * level + text, "    " * (level + 1))
+
+    def write_assign(self, item: typed.Assign, level: int) -> Iterator[str]:
+        if item.name in self.scopes.read and not is_empty(item.value.type):
+            starts = self.scopes.first.get(id(item), "")
+            declared = f"{starts}{self.writer.type_name(item.value.type)} " if starts else ""
+            yield from self.line(
+                f"{declared.replace('let ', '')}{c_name(item.name)} = {self.terms.term(item.value)};", level
+            )
+
+    def write_reserve(self, item: typed.Reserve, level: int) -> Iterator[str]:
+        extents = "".join(f"[{extent}]" for extent in item.type.shape)
+        yield from self.line(f"double {c_name(item.name)}{extents};", level)
+
+    def write_store(self, item: typed.Store, level: int) -> Iterator[str]:
+        yield from self.line(f"{self.terms.term(item.element)} = {self.terms.term(item.value)};", level)
+
+    def write_return(self, item: typed.Return, level: int) -> Iterator[str]:
+        yield from self.line(f"return {self.terms.term(item.value)};", level)
+
+    def write_leave(self, item: typed.Leave, level: int) -> Iterator[str]:
+        yield from self.line(f"{item.word};", level)
+
+    def write_if(self, item: typed.If, level: int) -> Iterator[str]:
+        yield from self.line(f"if ({self.terms.term(item.test)}) {{", level)
+        yield from self.block(item.body, level + 1)
+        if item.otherwise:
+            yield from self.line("} else {", level)
+            yield from self.block(item.otherwise, level + 1)
+        yield from self.line("}", level)
+
+    def write_while(self, item: typed.While, level: int) -> Iterator[str]:
+        yield from self.line(f"while ({self.terms.term(item.test)}) {{", level)
+        yield from self.block(item.body, level + 1)
+        yield from self.line("}", level)
+
+    def write_count(self, item: typed.Count, level: int) -> Iterator[str]:
+        """A loop that counts; a name that lives beyond it gets the number from a counter of its own."""
+        name = c_name(item.name)
+        is_own = id(item) in self.scopes.counted
+        counter = name if is_own else f"{name}_next"
+        while not is_own and counter in self.kinds:
+            counter += "_"
+        sign, change = ("<", f"++{counter}") if item.step == 1 else (">", f"{counter} += {item.step}")
+        sign = "<" if item.step > 0 else ">"
+        start, stop = self.terms.term(item.start), self.terms.term(item.stop, 6)
+        if item.name == LANE:
+            yield from self.line("PPAFO_SIDE_BY_SIDE", level)
+        yield from self.line(f"for (int64_t {counter} = {start}; {counter} {sign} {stop}; {change}) {{", level)
+        if not is_own:
+            yield from self.line(f"{name} = {counter};", level + 1)
+        yield from self.block(item.body, level + 1)
+        yield from self.line("}", level)
+
+
+def _wrapped(line: str, further: str = "    ") -> list[str]:
+    """A line of C as lines that are not too long."""
+    if len(line) <= WIDTH:
+        return [line.replace(TIED, " ")]
+    margin = line[: len(line) - len(line.lstrip())]
+    lines = textwrap.wrap(
+        line.strip(),
+        WIDTH,
+        initial_indent=margin,
+        subsequent_indent=further,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [item.replace(TIED, " ") for item in lines]

@@ -1,0 +1,231 @@
+"""Typed terms as text of C."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ppafo.translation.typed import BOOL, FLOAT, INT, Array, Items, Term, Type, is_empty
+
+_RESERVED = frozenset(
+    {
+        *(
+            "auto",
+            "break",
+            "case",
+            "char",
+            "const",
+            "continue",
+            "default",
+            "do",
+            "double",
+            "else",
+            "enum",
+            "extern",
+        ),
+        *(
+            "float",
+            "for",
+            "goto",
+            "if",
+            "inline",
+            "int",
+            "long",
+            "register",
+            "restrict",
+            "return",
+            "short",
+            "signed",
+        ),
+        *(
+            "sizeof",
+            "static",
+            "struct",
+            "switch",
+            "typedef",
+            "union",
+            "unsigned",
+            "void",
+            "volatile",
+            "while",
+            "bool",
+        ),
+        *(
+            "true",
+            "false",
+            "and",
+            "and_eq",
+            "asm",
+            "bitand",
+            "bitor",
+            "catch",
+            "class",
+            "compl",
+            "constexpr",
+        ),
+        *(
+            "decltype",
+            "delete",
+            "explicit",
+            "export",
+            "friend",
+            "mutable",
+            "namespace",
+            "new",
+            "noexcept",
+            "not",
+        ),
+        *(
+            "not_eq",
+            "nullptr",
+            "operator",
+            "or",
+            "or_eq",
+            "private",
+            "protected",
+            "public",
+            "template",
+            "this",
+            "throw",
+        ),
+        *(
+            "try",
+            "typeid",
+            "typename",
+            "using",
+            "virtual",
+            "wchar_t",
+            "xor",
+            "xor_eq",
+            "unix",
+            "linux",
+            "gamma",
+            "main",
+        ),
+        *(
+            "fabs",
+            "sqrt",
+        ),
+    }
+)
+_WORDS = {"and": "&&", "or": "||"}
+_LEVELS = {"or": 2, "and": 3, **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 5), "+": 8, "-": 8, "*": 9, "/": 9}
+_CHOICE, _SIGN, _ATOM = 1, 10, 11
+_HELPERS = {
+    "min": "ppafo_smaller",
+    "max": "ppafo_larger",
+    "abs": "ppafo_whole_size",
+    "//": "ppafo_floor_quotient",
+    "%": "ppafo_floor_remainder",
+}
+
+
+def c_name(name: str) -> str:
+    """A name of Python as C can have it."""
+    return f"{name}_" if name in _RESERVED else name
+
+
+@dataclass(frozen=True, slots=True)
+class CTerms:
+    """Writes terms; ``type_name`` gives the name of a type in C."""
+
+    type_name: Callable[[Type], str]
+
+    def term(self, item: Term, least: int = 0) -> str:
+        """A term as text, in brackets where what is around it binds more than ``least``."""
+        text, level = self.written(item)
+        return f"({text})" if level < least else text
+
+    def written(self, item: Term) -> tuple[str, int]:
+        """A term as text, and how strongly it holds together."""
+        writer: Callable[[Term], tuple[str, int]] | None = getattr(self, f"_of_{item.kind}", None)
+        if writer is not None:
+            return writer(item)
+        if item.kind in _HELPERS and (item.type == INT or item.kind != "abs"):
+            return self.helper(item), _ATOM
+        if item.kind in ("sqrt", "abs"):
+            return f"{'sqrt' if item.kind == 'sqrt' else 'fabs'}({self.term(item.parts[0])})", _ATOM
+        if item.kind == "*" and item.type == INT:
+            return f"ppafo_wrapped_product({self.term(item.parts[0])}, {self.term(item.parts[1])})", _ATOM
+        # Signs that many misread get brackets around what they join, those of sums and products as they need them.
+        level = _LEVELS.get(item.kind, 0)
+        inner = level if level >= _LEVELS["+"] else _LEVELS["+"] if level else _SIGN
+        if item.kind in _WORDS:
+            left, right = (self.term(part, level if part.kind == item.kind else _LEVELS["<"]) for part in item.parts)
+        else:
+            left, right = self.term(item.parts[0], inner), self.term(item.parts[1], inner + 1)
+        return f"{left} {_WORDS.get(item.kind, item.kind)} {right}", level or _CHOICE
+
+    def helper(self, item: Term) -> str:
+        """A call of a function of the prelude."""
+        given = ", ".join(self.term(part) for part in item.parts)
+        if item.kind in ("min", "max") and item.type == INT:
+            first, second = (self.term(part, 6) for part in item.parts)
+            sign = "<" if item.kind == "min" else ">"
+            return f"({second} {sign} {first} ? {second} : {first})"
+        return f"{_HELPERS[item.kind]}({given})"
+
+    def _of_number(self, item: Term) -> tuple[str, int]:
+        value = item.detail
+        if item.type == BOOL:
+            return ("true" if value else "false"), _ATOM
+        if item.type == INT:
+            is_wide = abs(value) > 2**31 - 1
+            return (f"INT64_C({value})" if is_wide else str(value)), _ATOM if value >= 0 else _SIGN
+        if math.isnan(value):
+            return "(double)NAN", _SIGN
+        if math.isinf(value):
+            return ("(double)INFINITY", _SIGN) if value > 0.0 else ("-(double)INFINITY", _SIGN)
+        return repr(float(value)), _ATOM if math.copysign(1.0, value) > 0.0 else _SIGN
+
+    def _of_name(self, item: Term) -> tuple[str, int]:
+        return c_name(item.detail), _ATOM
+
+    def _of_field(self, item: Term) -> tuple[str, int]:
+        return f"{self.term(item.parts[0], _ATOM)}.{c_name(item.detail)}", _ATOM
+
+    def _of_item(self, item: Term) -> tuple[str, int]:
+        owner = self.term(item.parts[0], _ATOM)
+        kind = item.parts[0].type
+        place = str(item.detail) if len(item.parts) == 1 else self.term(item.parts[1])
+        is_uniform = isinstance(kind, Items) and kind.is_uniform
+        return (f"{owner}.item[{place}]" if is_uniform else f"{owner}.item_{place}"), _ATOM
+
+    def _of_element(self, item: Term) -> tuple[str, int]:
+        owner, *places = item.parts
+        assert isinstance(owner.type, Array)
+        name = c_name(owner.detail)
+        if owner.type.shape:
+            return name + "".join(f"[{self.term(place)}]" for place in places), _ATOM
+        index = self.term(places[0], 9 if len(places) > 1 else 0)
+        for number, place in enumerate(places[1:], 1):
+            index = f"{index if number == 1 else f'({index})'} * {name}.extent[{number}] + {self.term(place, 9)}"
+        return f"{name}.values[{index}]", _ATOM
+
+    def _of_extent(self, item: Term) -> tuple[str, int]:
+        return f"{c_name(item.parts[0].detail)}.extent[{item.detail}]", _ATOM
+
+    def _of_build(self, item: Term) -> tuple[str, int]:
+        name = self.type_name(item.type)
+        return f"make_{name}({', '.join(self.term(part) for part in item.parts if not is_empty(part.type))})", _ATOM
+
+    def _of_call(self, item: Term) -> tuple[str, int]:
+        return f"{item.detail}({', '.join(self.term(part) for part in item.parts)})", _ATOM
+
+    def _of_choice(self, item: Term) -> tuple[str, int]:
+        test, yes, no = (self.term(part, _CHOICE + 1) for part in item.parts)
+        return f"{test} ? {yes} : {no}", _CHOICE
+
+    def _of_convert(self, item: Term) -> tuple[str, int]:
+        given = item.parts[0]
+        if given.type == FLOAT:
+            return f"ppafo_whole_part({self.term(given)})", _ATOM
+        if given.type == BOOL:
+            one, none = ("1.0", "0.0") if item.type == FLOAT else ("1", "0")
+            return f"{self.term(given, _CHOICE + 1)} ? {one} : {none}", _CHOICE
+        return f"(double){self.term(given, _SIGN)}", _SIGN
+
+    def _of_negative(self, item: Term) -> tuple[str, int]:
+        return f"-{self.term(item.parts[0], _ATOM)}", _SIGN
+
+    def _of_not(self, item: Term) -> tuple[str, int]:
+        return f"!{self.term(item.parts[0], _ATOM)}", _SIGN

@@ -1,0 +1,243 @@
+"""Expressions of a composed module as typed terms."""
+
+import ast
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ppafo.errors import ProgramError
+from ppafo.translation import typed
+from ppafo.translation.typed import (
+    BOOL,
+    FLOAT,
+    FUNCTIONS,
+    INT,
+    Array,
+    Function,
+    Handed,
+    Items,
+    Row,
+    Scalar,
+    Term,
+    Type,
+    converted,
+    is_empty,
+    joined,
+)
+
+SIGN_OF: dict[type[ast.AST], str] = {
+    **{ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%"},
+    **{ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.RShift: ">>"},
+    **{ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="},
+    **{ast.And: "and", ast.Or: "or"},
+}
+CONSTANTS = {"inf": math.inf, "nan": math.nan, "pi": math.pi}
+WHOLE_ONLY = frozenset({"&", "|", "^", ">>"})
+
+
+@dataclass(frozen=True, slots=True)
+class Expressions:
+    """Expressions of one function: its names with their types, the rows and functions of the module.
+
+    ``made`` gives a function for types of its parameters, ``refused`` the error for a place.
+    """
+
+    types: Mapping[str, Type]
+    rows: Mapping[str, Sequence[str]]
+    definitions: Mapping[str, ast.FunctionDef]
+    made: Callable[[str, tuple[Type, ...]], Function]
+    refused: Callable[[ast.AST, str], ProgramError]
+
+    def term(self, node: ast.expr) -> Term:
+        """The value of an expression."""
+        handler: Callable[[Any], Term] | None = getattr(self, f"_of_{type(node).__name__.lower()}", None)
+        if handler is None:
+            raise self.refused(node, f"'{ast.unparse(node)}' is no expression of the subset")
+        return handler(node)
+
+    def scalar(self, node: ast.expr, least: Scalar = BOOL) -> Term:
+        """The value of an expression that must be one number, as ``least`` or a wider type."""
+        found = self.term(node)
+        if not isinstance(found.type, Scalar):
+            raise self.refused(node, f"'{ast.unparse(node)}' is not one number")
+        kind = joined(found.type, least)
+        assert kind is not None
+        return converted(found, kind)
+
+    def whole(self, node: ast.expr) -> Term:
+        """The value of an expression that must be a whole number."""
+        found = self.scalar(node, INT)
+        if found.type != INT:
+            raise self.refused(node, f"'{ast.unparse(node)}' is no whole number")
+        return found
+
+    def condition(self, node: ast.expr) -> Term:
+        """Whether an expression is true."""
+        found = self.scalar(node)
+        return (
+            found
+            if found.type == BOOL
+            else Term("!=", BOOL, (found, converted(Term("number", INT, (), 0), found.type)))
+        )
+
+    def part(self, node: ast.expr) -> slice:
+        """A part of a tuple, whose bounds are literal."""
+        if not isinstance(node, ast.Slice) or node.step is not None:
+            raise self.refused(node, f"'{ast.unparse(node)}' is no part of a tuple")
+        return slice(*(None if item is None else ast.literal_eval(item) for item in (node.lower, node.upper)))
+
+    def _of_constant(self, node: ast.Constant) -> Term:
+        kinds: dict[type, Type] = {bool: BOOL, int: INT, float: FLOAT}
+        is_too_large = type(node.value) is int and node.value >= 2**63
+        if type(node.value) not in kinds or is_too_large:
+            raise self.refused(node, f"the constant {node.value!r}")
+        return Term("number", kinds[type(node.value)], (), node.value)
+
+    def _of_name(self, node: ast.Name) -> Term:
+        if node.id in self.types:
+            return Term("name", self.types[node.id], (), node.id)
+        if node.id in self.definitions:
+            return Term("name", Handed(node.id), (), node.id)
+        raise self.refused(node, f"'{node.id}' has no value")
+
+    def _of_attribute(self, node: ast.Attribute) -> Term:
+        if isinstance(node.value, ast.Name) and node.value.id == "math" and node.attr in CONSTANTS:
+            return Term("number", FLOAT, (), CONSTANTS[node.attr])
+        owner = self.term(node.value)
+        if not isinstance(owner.type, Row) or node.attr not in dict(owner.type.fields):
+            raise self.refused(node, f"'{ast.unparse(node)}' is no field")
+        return typed.field_of(owner, node.attr)
+
+    def _of_subscript(self, node: ast.Subscript) -> Term:
+        if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
+            assert isinstance(node.value.value, ast.Name)
+            return Term("extent", INT, (self._of_name(node.value.value),), ast.literal_eval(node.slice))
+        owner = self.term(node.value)
+        if isinstance(owner.type, Array):
+            places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+            return Term("element", FLOAT, (owner, *(self.whole(place) for place in places)))
+        if not isinstance(owner.type, Items | Row):
+            raise self.refused(node, f"'{ast.unparse(node.value)}' has no items")
+        count = len(owner.type.types) if isinstance(owner.type, Items) else len(owner.type.fields)
+        if isinstance(node.slice, ast.Slice):
+            parts = tuple(typed.item_of(owner, place) for place in range(count)[self.part(node.slice)])
+            return Term("build", Items(tuple(part.type for part in parts)), parts)
+        place = self.whole(node.slice)
+        number = -place.parts[0].detail if place.kind == "negative" else place.detail
+        if place.kind in ("number", "negative"):
+            return typed.item_of(owner, range(count)[number])
+        if not isinstance(owner.type, Items) or not owner.type.is_uniform:
+            raise self.refused(node, f"'{ast.unparse(node)}' takes an item of a tuple of several types by a variable")
+        return Term("item", owner.type.types[0], (owner, place))
+
+    def _of_tuple(self, node: ast.Tuple) -> Term:
+        parts = tuple(self.term(item) for item in node.elts)
+        return Term("build", Items(tuple(part.type for part in parts)), parts)
+
+    def _of_unaryop(self, node: ast.UnaryOp) -> Term:
+        if isinstance(node.op, ast.Not):
+            return Term("not", BOOL, (self.condition(node.operand),))
+        if not isinstance(node.op, ast.USub):
+            raise self.refused(node, f"'{ast.unparse(node)}'")
+        value = self.scalar(node.operand, INT)
+        return Term("negative", value.type, (value,))
+
+    def _of_binop(self, node: ast.BinOp) -> Term:
+        sign = SIGN_OF.get(type(node.op), "")
+        left, right = self.scalar(node.left, INT), self.scalar(node.right, INT)
+        is_whole = left.type == right.type == INT
+        if not sign or (not is_whole and sign in WHOLE_ONLY | {"//", "%"}):
+            raise self.refused(node, f"'{ast.unparse(node)}' needs a library function")
+        kind = INT if is_whole and sign != "/" else FLOAT
+        return Term(sign, kind, (converted(left, kind), converted(right, kind)))
+
+    def _of_boolop(self, node: ast.BoolOp) -> Term:
+        parts = [self.condition(item) for item in node.values]
+        made = parts[0]
+        for part in parts[1:]:
+            made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
+        return made
+
+    def _of_compare(self, node: ast.Compare) -> Term:
+        values = [self.scalar(item, INT) for item in (node.left, *node.comparators)]
+        made: Term | None = None
+        for sign, left, right in zip(node.ops, values, values[1:], strict=False):
+            kind = joined(left.type, right.type)
+            if type(sign) not in SIGN_OF or kind is None:
+                raise self.refused(node, f"'{ast.unparse(node)}'")
+            one = Term(SIGN_OF[type(sign)], BOOL, (converted(left, kind), converted(right, kind)))
+            made = one if made is None else Term("and", BOOL, (made, one))
+        assert made is not None
+        return made
+
+    def _of_ifexp(self, node: ast.IfExp) -> Term:
+        test, yes, no = self.condition(node.test), self.term(node.body), self.term(node.orelse)
+        kind = joined(yes.type, no.type)
+        if kind is None:
+            raise self.refused(node, "a choice between values of different forms")
+        return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
+
+    def _of_call(self, node: ast.Call) -> Term:
+        name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
+        if any(isinstance(item, ast.Starred) for item in node.args):
+            raise self.refused(node, f"'{ast.unparse(node)}' hands over a tuple as arguments")
+        handed = self.types.get(name)
+        name = handed.name if isinstance(handed, Handed) else name
+        if name in self.rows:
+            return self.build(name, node)
+        if name in self.definitions:
+            return self.call(name, node)
+        return self.built_in(name, node)
+
+    def build(self, name: str, node: ast.Call) -> Term:
+        """A row from its fields."""
+        fields = self.rows[name]
+        given = dict(zip(fields, map(self.term, node.args), strict=False))
+        given |= {str(item.arg): self.term(item.value) for item in node.keywords}
+        if set(given) != set(fields):
+            raise self.refused(node, f"'{ast.unparse(node)}' does not give every field")
+        parts = tuple(given[item] for item in fields)
+        return Term("build", Row(name, tuple((item, given[item].type) for item in fields)), parts)
+
+    def call(self, name: str, node: ast.Call) -> Term:
+        """A call of another function of the module."""
+        takes = self.definitions[name].args
+        names = [item.arg for item in (*takes.posonlyargs, *takes.args, *takes.kwonlyargs)]
+        placed = [item.arg for item in (*takes.posonlyargs, *takes.args)]
+        defaults = dict(zip(placed[::-1], takes.defaults[::-1], strict=False))
+        defaults |= {item.arg: value for item, value in zip(takes.kwonlyargs, takes.kw_defaults, strict=True) if value}
+        given = {item: self.term(value) for item, value in defaults.items()}
+        given |= dict(zip(names, map(self.term, node.args), strict=False))
+        given |= {str(item.arg): self.term(item.value) for item in node.keywords}
+        if set(given) != set(names):
+            raise self.refused(node, f"'{ast.unparse(node)}' does not give every argument")
+        function = self.made(name, tuple(given[item].type for item in names))
+        if function.returns is None:
+            raise self.refused(node, f"'{name}' returns nothing")
+        parts = tuple(given[item] for item in names if not is_empty(given[item].type))
+        return Term("call", function.returns, parts, function.name)
+
+    def built_in(self, name: str, node: ast.Call) -> Term:
+        """A call of a function that every language has."""
+        own = name.removeprefix("math.")
+        least = FLOAT if own in ("sqrt", "float") else INT
+        if own not in FUNCTIONS | {"float", "int", "bool", "len"} or node.keywords:
+            raise self.refused(node, f"'{name}' is a function of a library")
+        if own == "len":
+            kind = self.term(node.args[0]).type
+            return Term("number", INT, (), len(kind.types if isinstance(kind, Items) else getattr(kind, "fields", ())))
+        if own == "bool":
+            return self.condition(node.args[0])
+        values = [self.scalar(item, least) for item in node.args]
+        if own == "float":
+            return values[0]
+        if own == "int":
+            return values[0] if values[0].type == INT else Term("convert", INT, (values[0],))
+        kind = FLOAT if any(value.type == FLOAT for value in values) else INT
+        made, *others = [converted(value, kind) for value in values]
+        if not others:
+            return Term(own, kind, (made,))
+        for other in others:
+            made = Term(own, kind, (made, other))
+        return made

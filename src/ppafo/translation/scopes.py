@@ -1,0 +1,181 @@
+"""Which assignments of a function are needed, and where its names are declared: as far in and as late as can be."""
+
+from dataclasses import dataclass, field, replace
+
+from ppafo.translation import typed
+from ppafo.translation.typed import Function, Statement, Term, Type, is_empty
+
+Block = tuple[Statement, ...]
+
+
+@dataclass(slots=True)
+class Scopes:
+    """Names that are read at all, types, names that a block declares before its first line or with an assignment.
+
+    Blocks and statements are known by their identity; ``counted`` are the loops whose name lives in them alone.
+    """
+
+    read: set[str] = field(default_factory=set)
+    types: dict[str, Type] = field(default_factory=dict)
+    before: dict[int, list[str]] = field(default_factory=dict)
+    first: dict[int, str] = field(default_factory=dict)
+    counted: set[int] = field(default_factory=set)
+    direct: dict[int, set[str]] = field(default_factory=dict)
+    inside: dict[int, set[str]] = field(default_factory=dict)
+    changes: dict[int, dict[str, int]] = field(default_factory=dict)
+
+    def at_start(self, body: Block) -> list[str]:
+        """Names that are declared before the first line of a block."""
+        return [name for name in self.before.get(id(body), []) if name in self.read and not is_empty(self.types[name])]
+
+    def look(self, body: Block) -> tuple[set[str], dict[str, int]]:
+        """Note which names each statement mentions, itself and in its blocks, and how often a block changes each."""
+        every: set[str] = set()
+        changes: dict[str, int] = {}
+        for statement in body:
+            terms = _names_of(statement)
+            self.read |= terms
+            made = _made(statement)
+            own = set(terms) | ({made[0]} if made else set())
+            within = set(own)
+            if made:
+                self.types[made[0]] = made[1]
+                changes[made[0]] = changes.get(made[0], 0) + 1
+            for inner in _blocks(statement):
+                names, inner_changes = self.look(inner)
+                within |= names
+                for name, count in inner_changes.items():
+                    changes[name] = changes.get(name, 0) + count
+            self.direct[id(statement)], self.inside[id(statement)] = own, within
+            every |= within
+        self.changes[id(body)] = changes
+        return every, changes
+
+    def mentions(self, name: str, body: Block) -> Block:
+        """Statements of a block that mention a name, themselves or in their blocks."""
+        return tuple(statement for statement in body if name in self.inside[id(statement)])
+
+    def place(self, name: str, body: Block) -> None:
+        """Declare a name in a block in which it is mentioned, or further in."""
+        mentions = self.mentions(name, body)
+        if isinstance(mentions[0], typed.Reserve):
+            return
+        if _begins(mentions[0], name):
+            self.first[id(mentions[0])] = "const " if self.changes[id(body)][name] == 1 else "let "
+        elif not self.is_divided(name, mentions):
+            self.before.setdefault(id(body), []).append(name)
+        else:
+            loops = {id(statement) for statement in mentions if self.counts(name, statement)}
+            self.counted |= loops
+            for inner in self.blocks(name, tuple(item for item in mentions if id(item) not in loops)):
+                self.place(name, inner)
+
+    def is_divided(self, name: str, mentions: Block) -> bool:
+        """True where each statement that mentions a name gives it its value in its own blocks before it reads it."""
+        return all(
+            self.counts(name, statement)
+            or (
+                name not in self.direct[id(statement)]
+                and all(self.is_defined_first(name, inner) for inner in self.blocks(name, (statement,)))
+            )
+            for statement in mentions
+        )
+
+    def is_defined_first(self, name: str, body: Block) -> bool:
+        """True where a block gives a name its value before it reads it, so that it can be the block's own."""
+        mentions = self.mentions(name, body)
+        return _begins(mentions[0], name) or self.is_divided(name, mentions)
+
+    def counts(self, name: str, statement: Statement) -> bool:
+        """True for a loop of that name, which does not change it otherwise."""
+        return (
+            isinstance(statement, typed.Count)
+            and statement.name == name
+            and name not in self.changes[id(statement.body)]
+            and name not in _names_of(statement)
+        )
+
+    def blocks(self, name: str, mentions: Block) -> list[Block]:
+        """Blocks of some statements that mention a name."""
+        return [inner for statement in mentions for inner in _blocks(statement) if self.mentions(name, inner)]
+
+
+def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozenset()) -> tuple[Block, frozenset[str]]:
+    """A block without assignments that nothing reads, and the names that it reads.
+
+    ``after`` are the names that are read later, ``leaving`` those after ``break`` and ``continue``.
+    """
+    kept: list[Statement] = []
+    live = after
+    for statement in reversed(body):
+        if isinstance(statement, typed.Assign) and statement.name not in live:
+            continue
+        if isinstance(statement, typed.If):
+            (yes, read), (no, others) = (needed(inner, live, leaving) for inner in _blocks(statement))
+            kept.append(replace(statement, body=yes, otherwise=no))
+            live = read | others | _names_of(statement)
+        elif isinstance(statement, typed.Count | typed.While):
+            turn, live = _needed_in_loop(statement, live)
+            kept.append(replace(statement, body=turn))
+        else:
+            made = _made(statement)
+            live = leaving if isinstance(statement, typed.Leave) else live
+            live = (live - {made[0]} if made else live) | _names_of(statement)
+            kept.append(statement)
+    return tuple(kept[::-1]), live
+
+
+def _needed_in_loop(loop: typed.Count | typed.While, after: frozenset[str]) -> tuple[Block, frozenset[str]]:
+    """The same of a loop: what one turn leaves may be read by the next."""
+    live = after | _names_of(loop)
+    while True:
+        turn, read = needed(loop.body, live, live)
+        if live >= read:
+            return turn, live
+        live |= read
+
+
+def _names_of(statement: Statement) -> frozenset[str]:
+    """Names that a statement itself reads."""
+    return frozenset().union(*(term.reads for term in _terms(statement)))
+
+
+def scopes_of(function: Function) -> Scopes:
+    """Where each local name of a function is declared."""
+    found = Scopes()
+    found.look(function.body)
+    for name in found.types.keys() - {name for name, _ in function.parameters}:
+        found.place(name, function.body)
+    return found
+
+
+def _begins(statement: Statement, name: str) -> bool:
+    """True for an assignment of a name that does not read it."""
+    return isinstance(statement, typed.Assign) and statement.name == name and name not in statement.value.reads
+
+
+def _made(statement: Statement) -> tuple[str, Type] | None:
+    """The name that a statement gives a value, with its type."""
+    if isinstance(statement, typed.Assign):
+        return statement.name, statement.value.type
+    if isinstance(statement, typed.Reserve):
+        return statement.name, statement.type
+    return (statement.name, typed.INT) if isinstance(statement, typed.Count) else None
+
+
+def _blocks(statement: Statement) -> list[Block]:
+    """Blocks in a statement."""
+    if isinstance(statement, typed.If):
+        return [statement.body, statement.otherwise]
+    return [statement.body] if isinstance(statement, typed.Count | typed.While) else []
+
+
+def _terms(statement: Statement) -> list[Term]:
+    """Terms of a statement itself, without those of its blocks."""
+    if isinstance(statement, typed.Assign | typed.Return):
+        return [statement.value]
+    if isinstance(statement, typed.Store):
+        return [statement.element, statement.value]
+    if isinstance(statement, typed.Count):
+        return [statement.start, statement.stop]
+    return [statement.test] if isinstance(statement, typed.If | typed.While) else []

@@ -1,0 +1,233 @@
+"""What the typed walk finds in a composed module: types, terms and statements that say the same in every language."""
+
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """One number: ``bool``, ``int`` (64 bits, products wrap) or ``float`` (64 bits)."""
+
+    name: str
+
+
+BOOL, INT, FLOAT = Scalar("bool"), Scalar("int"), Scalar("float")
+_ORDER = (BOOL, INT, FLOAT)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A NamedTuple with the types that its fields have in one place."""
+
+    name: str
+    fields: tuple[tuple[str, "Type"], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Items:
+    """A tuple without names."""
+
+    types: tuple["Type", ...]
+
+    @property
+    def is_uniform(self) -> bool:
+        """True where all items are of one type."""
+        return len(set(self.types)) == 1
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """An array of floats; ``shape`` is () for one that is handed over, whose extents are known when it runs."""
+
+    dimensions: int
+    shape: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Handed:
+    """A function that was handed over: it is bound when the call is translated."""
+
+    name: str
+
+
+Type: TypeAlias = Scalar | Row | Items | Array | Handed
+
+
+_NONE: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """A value: what makes it, its type, the terms that it is made of, and a name or number where it has one.
+
+    Kinds: number, name, field, item, build, call, choice, convert, negative, not, element (of an array), extent,
+    and the signs and functions of ``SIGNS`` and ``FUNCTIONS``.
+    """
+
+    kind: str
+    type: Type
+    parts: tuple["Term", ...] = ()
+    detail: Any = None
+    reads: frozenset[str] = field(init=False, compare=False, repr=False)
+    """Local names whose values it takes."""
+
+    def __post_init__(self) -> None:
+        names = frozenset((self.detail,)) if self.kind == "name" else _NONE
+        object.__setattr__(self, "reads", names.union(*(part.reads for part in self.parts)) if self.parts else names)
+
+
+SIGNS = frozenset({"+", "-", "*", "/", "//", "%", "&", "|", "^", ">>", "<", "<=", ">", ">=", "==", "!=", "and", "or"})
+FUNCTIONS = frozenset({"abs", "min", "max", "sqrt"})
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """A local name gets a value."""
+
+    name: str
+    value: Term
+
+
+@dataclass(frozen=True, slots=True)
+class Reserve:
+    """A local array without values yet."""
+
+    name: str
+    type: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Store:
+    """An element of an array gets a value."""
+
+    element: Term
+    value: Term
+
+
+@dataclass(frozen=True, slots=True)
+class If:
+    """A branch."""
+
+    test: Term
+    body: tuple["Statement", ...]
+    otherwise: tuple["Statement", ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """A loop of ``name`` from ``start`` by ``step`` up to ``stop``, which it does not reach."""
+
+    name: str
+    start: Term
+    stop: Term
+    step: int
+    body: tuple["Statement", ...]
+
+
+@dataclass(frozen=True, slots=True)
+class While:
+    """A loop as long as ``test`` holds."""
+
+    test: Term
+    body: tuple["Statement", ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Leave:
+    """``break`` or ``continue``."""
+
+    word: str
+
+
+@dataclass(frozen=True, slots=True)
+class Return:
+    """The end of a function, with its value."""
+
+    value: Term
+
+
+Statement: TypeAlias = Assign | Reserve | Store | If | Count | While | Leave | Return
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """One function for one choice of types; ``source`` is its name in the composed module.
+
+    ``bound`` lists the functions that were handed over. What is empty is no parameter. ``returns`` None is nothing.
+    """
+
+    name: str
+    source: str
+    parameters: tuple[tuple[str, Type], ...]
+    returns: Type | None
+    body: tuple[Statement, ...]
+    bound: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class Module:
+    """All functions, callees first."""
+
+    functions: list[Function] = field(default_factory=list)
+
+
+def is_empty(kind: Type) -> bool:
+    """True for what holds no number: a function, a row or a tuple of nothing."""
+    if isinstance(kind, Row):
+        return all(is_empty(inner) for _, inner in kind.fields)
+    if isinstance(kind, Items):
+        return all(map(is_empty, kind.types))
+    return isinstance(kind, Handed)
+
+
+def joined(one: Type, other: Type) -> Type | None:
+    """The type that holds both, as where two branches meet; None where there is none."""
+    if one == other:
+        return one
+    if isinstance(one, Scalar) and isinstance(other, Scalar):
+        return max(one, other, key=_ORDER.index)
+    if isinstance(one, Items) and isinstance(other, Items) and len(one.types) == len(other.types):
+        types = [joined(*pair) for pair in zip(one.types, other.types, strict=True)]
+        return None if None in types else Items(tuple(item for item in types if item is not None))
+    if isinstance(one, Row) and isinstance(other, Row) and one.name == other.name:
+        pairs = zip(one.fields, other.fields, strict=True)
+        found = [(name, joined(inner, outer)) for (name, inner), (_, outer) in pairs]
+        fields = tuple((name, kind) for name, kind in found if kind is not None)
+        return Row(one.name, fields) if len(fields) == len(found) else None
+    return None
+
+
+def converted(term: Term, kind: Type) -> Term:
+    """The value of a term as another type that holds it."""
+    if term.type == kind:
+        return term
+    if isinstance(kind, Scalar):
+        if term.kind == "number":
+            return Term("number", kind, (), float(term.detail) if kind == FLOAT else int(term.detail))
+        return Term("convert", kind, (term,))
+    return Term("build", kind, tuple(converted(part, inner) for part, inner in parts_of(term, kind)))
+
+
+def parts_of(term: Term, kind: Type) -> list[tuple[Term, Type]]:
+    """The values in a row or tuple, each with the type that it has in another one of the same form."""
+    if isinstance(term.type, Row) and isinstance(kind, Row):
+        pairs = zip(term.type.fields, kind.fields, strict=True)
+        return [(field_of(term, name), inner) for (name, _), (_, inner) in pairs]
+    assert isinstance(term.type, Items)
+    assert isinstance(kind, Items)
+    return [(item_of(term, place), inner) for place, inner in enumerate(kind.types)]
+
+
+def field_of(term: Term, name: str) -> Term:
+    """A field of a row."""
+    assert isinstance(term.type, Row)
+    place = [own for own, _ in term.type.fields].index(name)
+    return term.parts[place] if term.kind == "build" else Term("field", term.type.fields[place][1], (term,), name)
+
+
+def item_of(term: Term, place: int) -> Term:
+    """An item of a row or tuple by its place."""
+    if isinstance(term.type, Row):
+        return field_of(term, term.type.fields[place][0])
+    assert isinstance(term.type, Items)
+    return term.parts[place] if term.kind == "build" else Term("item", term.type.types[place], (term,), place)

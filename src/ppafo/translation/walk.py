@@ -1,0 +1,304 @@
+"""The typed walk over a composed module: which types its names have, and what each line does with them.
+
+A function is walked once for each choice of types that it is called with; a function that is handed over counts as a
+type, so that it is bound here. What is outside the subset is refused with the file and the line that it comes from.
+"""
+
+import ast
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ppafo.engine.compile_errors import place_in
+from ppafo.engine.plain_python import refusal
+from ppafo.errors import ProgramError
+from ppafo.translation import typed
+from ppafo.translation.expressions import Expressions
+from ppafo.translation.scopes import needed
+from ppafo.translation.typed import (
+    BOOL,
+    FLOAT,
+    INT,
+    Array,
+    Function,
+    Handed,
+    Items,
+    Module,
+    Row,
+    Statement,
+    Term,
+    Type,
+    converted,
+    is_empty,
+    joined,
+)
+
+_ARRAY = re.compile(r"float64\[(.*?)\]|int64|float64")
+
+
+def walk_module(source: str) -> Module:
+    """All functions of a composed module that its entries need. ProgramError for what is outside the subset."""
+    walk = _ModuleWalk(source.split("\n"))
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and isinstance(node.targets[0], ast.Name):
+            walk.rows[node.targets[0].id] = ast.literal_eval(node.value.args[1])
+        elif isinstance(node, ast.FunctionDef):
+            walk.definitions[node.name] = node
+    for name, node in walk.definitions.items():
+        types = _entry_types(node)
+        if types is not None:
+            walk.function(name, types)
+    return walk.module
+
+
+def _entry_types(node: ast.FunctionDef) -> tuple[Type, ...] | None:
+    """Types of the parameters that an entry states in its decorator; None for what only others call."""
+    stated = [item.args[0] for item in node.decorator_list if isinstance(item, ast.Call) and item.args]
+    if not stated:
+        return None
+    written = ast.literal_eval(stated[0]).partition("(")[2].rpartition(")")[0]
+    found = _ARRAY.finditer(written)
+    plain: dict[str, Type] = {"int64": INT, "float64": FLOAT}
+    return tuple(plain.get(item[0]) or Array(item[1].count(":") - 1) for item in found)
+
+
+@dataclass(slots=True)
+class _ModuleWalk:
+    lines: list[str]
+    rows: dict[str, list[str]] = field(default_factory=dict)
+    definitions: dict[str, ast.FunctionDef] = field(default_factory=dict)
+    done: dict[tuple[str, tuple[Type, ...]], Function] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+    module: Module = field(default_factory=Module)
+
+    def function(self, name: str, types: tuple[Type, ...]) -> Function:
+        """A function for some types of its parameters."""
+        key = name, types
+        if key not in self.done:
+            definition = self.definitions[name]
+            self.counts[name] = self.counts.get(name, 0) + 1
+            number = self.counts[name]
+            own = name if number == 1 else f"{name}_{number}"
+            self.done[key] = _FunctionWalk(self, definition).walked(own, types)
+            self.module.functions.append(self.done[key])
+        return self.done[key]
+
+    def refused(self, where: ast.AST, problem: str) -> ProgramError:
+        """The error for a place in the composed text, in terms of the file that it was written in."""
+        number = getattr(where, "lineno", 0)
+        found = place_in(self.lines, number)
+        problem = f"{problem}, which cannot be translated"
+        if found is None:
+            return ProgramError(f"the lane loop, line {number} of the composed module: {problem}")
+        return refusal(found.file, found.line, problem)
+
+
+class _FunctionWalk:
+    """One function for one choice of types; gone through again where a name turns out to hold a wider type."""
+
+    def __init__(self, module: _ModuleWalk, definition: ast.FunctionDef) -> None:
+        self.module = module
+        self.definition = definition
+        self.types: dict[str, Type] = {}
+        self.names = {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)}
+        self.values = Expressions(
+            self.types, module.rows, module.definitions, made=module.function, refused=module.refused
+        )
+        self.returns: Type | None = None
+        self.has_widened = False
+        self.flags = 0
+        self.flag = ""
+
+    def walked(self, name: str, types: tuple[Type, ...]) -> Function:
+        """The function as typed statements."""
+        given = self.definition.args
+        names = [item.arg for item in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+        self.types.update(zip(names, types, strict=True))
+        for _ in range(10):
+            self.has_widened, self.flags = False, 0
+            body = self.block(self.definition.body)
+            if not self.has_widened:
+                break
+        for parameter, kind in zip(names, types, strict=True):
+            if self.types[parameter] != kind:
+                problem = f"'{parameter}' is given as one type and becomes another; give the second a name of its own"
+                raise self.refused(self.definition, problem)
+        kept = tuple((item, self.types[item]) for item in names if not is_empty(self.types[item]))
+        bound = tuple(
+            f"{item} is {kind.name}" for item, kind in zip(names, types, strict=True) if isinstance(kind, Handed)
+        )
+        return Function(name, self.definition.name, kept, self.returns, needed(body, frozenset())[0], bound)
+
+    def refused(self, where: ast.AST, problem: str) -> ProgramError:
+        """The error for a place in this function."""
+        return self.module.refused(where, problem)
+
+    def block(self, body: Sequence[ast.stmt]) -> tuple[Statement, ...]:
+        """Some statements."""
+        found: list[Statement] = []
+        for node in body:
+            handler: Callable[[Any], list[Statement]] | None = getattr(self, f"do_{type(node).__name__.lower()}", None)
+            if handler is None:
+                raise self.refused(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of the subset")
+            found += handler(node)
+        return tuple(found)
+
+    def do_pass(self, _node: ast.Pass) -> list[Statement]:
+        return []
+
+    def do_expr(self, _node: ast.Expr) -> list[Statement]:
+        return []
+
+    def do_break(self, node: ast.Break) -> list[Statement]:
+        marks = [self.assign(self.flag, Term("number", BOOL, (), True), node)] if self.flag else []
+        return [*marks, typed.Leave("break")]
+
+    def do_continue(self, _node: ast.Continue) -> list[Statement]:
+        return [typed.Leave("continue")]
+
+    def do_return(self, node: ast.Return) -> list[Statement]:
+        if node.value is None:
+            raise self.refused(node, "'return' without a value")
+        value = self.values.term(node.value)
+        kind = value.type if self.returns is None else joined(self.returns, value.type)
+        if kind is None:
+            raise self.refused(node, "a function that returns values of different forms")
+        self.has_widened |= self.returns is not None and kind != self.returns
+        self.returns = kind
+        return [typed.Return(converted(value, kind))]
+
+    def do_if(self, node: ast.If) -> list[Statement]:
+        test = self.values.condition(node.test)
+        return [typed.If(test, self.block(node.body), self.block(node.orelse))]
+
+    def do_while(self, node: ast.While) -> list[Statement]:
+        test = self.values.condition(node.test)
+        return self.loop(node, lambda: typed.While(test, self.block(node.body)))
+
+    def do_for(self, node: ast.For) -> list[Statement]:
+        if not isinstance(node.target, ast.Name):
+            raise self.refused(node, f"'for {ast.unparse(node.target)}'")
+        call, name = node.iter, node.target.id
+        if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "range"):
+            return self.loop_over_items(name, node)
+        bounds = [self.values.whole(item) for item in call.args]
+        start, stop = (Term("number", INT, (), 0), bounds[0]) if len(bounds) == 1 else bounds[:2]
+        step = ast.literal_eval(call.args[2]) if len(bounds) == 3 else 1
+        self.note_type(name, INT, node)
+        before: list[Statement] = []
+        if stop.reads & {name, *_changed(node.body)}:
+            # Python asks for the end of a range once.
+            end = self.fresh(f"{name}_stop", INT)
+            before, stop = [self.assign(end, stop, node)], Term("name", INT, (), end)
+        return [*before, *self.loop(node, lambda: typed.Count(name, start, stop, step, self.block(node.body)))]
+
+    def loop_over_items(self, name: str, node: ast.For) -> list[Statement]:
+        """A loop over the items of a tuple, or of a part of it, as one that counts."""
+        whole = node.iter.value if isinstance(node.iter, ast.Subscript) else node.iter
+        owner = self.values.term(whole)
+        if not isinstance(owner.type, Items) or not owner.type.is_uniform:
+            raise self.refused(node, f"'{ast.unparse(node.iter)}' is no tuple of one type")
+        if owner.reads & {name, *_changed(node.body)}:
+            raise self.refused(node, f"a loop over '{ast.unparse(node.iter)}' that changes it")
+        places = range(len(owner.type.types))
+        if isinstance(node.iter, ast.Subscript):
+            places = places[self.values.part(node.iter.slice)]
+        counter = self.fresh(f"{name}_place", INT)
+        self.note_type(counter, INT, node)
+        item = Term("item", owner.type.types[0], (owner, Term("name", INT, (), counter)))
+        taken = self.assign(name, item, node)
+        start, stop = (Term("number", INT, (), place) for place in (places.start, places.stop))
+        return self.loop(node, lambda: typed.Count(counter, start, stop, 1, (taken, *self.block(node.body))))
+
+    def loop(self, node: ast.For | ast.While, make: Callable[[], Statement]) -> list[Statement]:
+        """A loop; what follows where it was not left is under a flag, which each ``break`` of it sets."""
+        around = self.flag
+        if not node.orelse:
+            self.flag = ""
+            made = [make()]
+        else:
+            self.flags += 1
+            flag = self.flag = self.fresh(f"was_left_{self.flags}", BOOL)
+            before = self.assign(flag, Term("number", BOOL, (), False), node)
+            test = Term("not", BOOL, (Term("name", BOOL, (), flag),))
+            made = [before, make()]
+            self.flag = around
+            made.append(typed.If(test, self.block(node.orelse), ()))
+        self.flag = around
+        return made
+
+    def do_augassign(self, node: ast.AugAssign) -> list[Statement]:
+        left = ast.copy_location(ast.parse(ast.unparse(node.target), mode="eval").body, node)
+        value = ast.copy_location(ast.BinOp(left, node.op, node.value), node)
+        return self.do_assign(ast.copy_location(ast.Assign([node.target], value), node))
+
+    def do_assign(self, node: ast.Assign) -> list[Statement]:
+        if len(node.targets) != 1:
+            raise self.refused(node, "one value for several names")
+        target = node.targets[0]
+        if isinstance(target, ast.Name) and isinstance(node.value, ast.Call) and _is_empty_array(node.value):
+            return [self.reserve(target.id, node.value)]
+        value = self.values.term(node.value)
+        if isinstance(target, ast.Name):
+            return [self.assign(target.id, value, node)]
+        if isinstance(target, ast.Subscript):
+            return [typed.Store(self.values.term(target), converted(value, FLOAT))]
+        if not isinstance(target, ast.Tuple):
+            raise self.refused(node, f"'{ast.unparse(target)}' on the left")
+        return self.assign_items(target, value, node)
+
+    def reserve(self, name: str, node: ast.Call) -> Statement:
+        """A local array, whose shape is a literal."""
+        kind = Array(2, ast.literal_eval(node.args[0]))
+        self.note_type(name, kind, node)
+        return typed.Reserve(name, kind)
+
+    def assign(self, name: str, value: Term, node: ast.AST) -> Statement:
+        """A name gets a value, as the type that holds all that it ever gets."""
+        self.note_type(name, value.type, node)
+        return typed.Assign(name, converted(value, self.types[name]))
+
+    def fresh(self, wanted: str, kind: Type) -> str:
+        """A name that the text does not have, for values of one form."""
+        while wanted in self.names or joined(self.types.get(wanted, kind), kind) is None:
+            wanted += "_"
+        return wanted
+
+    def note_type(self, name: str, kind: Type, node: ast.AST) -> None:
+        """Widen the type of a name where it must be."""
+        before = self.types.get(name, kind)
+        found = joined(before, kind)
+        if found is None:
+            raise self.refused(node, f"'{name}' holds values of different forms")
+        self.has_widened |= found != before
+        self.types[name] = found
+
+    def assign_items(self, target: ast.Tuple, value: Term, node: ast.Assign) -> list[Statement]:
+        """Several names get the items of a tuple; what is on the right has its value before any name changes."""
+        names = [item.id for item in target.elts if isinstance(item, ast.Name)]
+        kind = value.type
+        length = len(kind.types) if isinstance(kind, Items) else len(kind.fields) if isinstance(kind, Row) else -1
+        if len(names) != len(target.elts) or length != len(names):
+            raise self.refused(node, f"'{ast.unparse(target)}' does not fit what is on the right")
+        before: list[Statement] = []
+        read = {item.id for item in ast.walk(node.value) if isinstance(item, ast.Name)}
+        if value.kind != "build" or read & set(names):
+            whole = self.fresh("_and_".join(name for name in names if name != "_"), kind)
+            before = [self.assign(whole, value, node)]
+            value = Term("name", self.types[whole], (), whole)
+        return [
+            *before,
+            *(self.assign(name, typed.item_of(value, at), node) for at, name in enumerate(names) if name != "_"),
+        ]
+
+
+def _is_empty_array(node: ast.Call) -> bool:
+    """True for ``np.empty(...)``."""
+    return isinstance(node.func, ast.Attribute) and node.func.attr == "empty"
+
+
+def _changed(body: Sequence[ast.stmt]) -> set[str]:
+    """Names that some statements give values."""
+    nodes = (node for statement in body for node in ast.walk(statement))
+    return {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
