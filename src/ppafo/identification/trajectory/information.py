@@ -158,15 +158,27 @@ class Mixture:
 
 def inverse_with_root(precision: Floats) -> tuple[Floats, Floats]:
     """Return the inverse of a precision [unit^2] and a root of it; huge along a direction that nothing fixes."""
-    scale, values, vectors = principal_axes(precision)
-    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
-    root = vectors / np.sqrt(kept) / scale[:, None]
+    root = _root_of_inverse(*principal_axes(precision))
     return root @ root.T, root
 
 
 def solution(precision: Floats, product: Floats) -> Floats:
     """Return the solution of a linear system, in units of the coordinates; it does not move where nothing fixes it."""
-    scale, values, vectors = principal_axes(precision)
+    return _solution_along(*principal_axes(precision), product)
+
+
+def solution_with_root(precision: Floats, product: Floats) -> tuple[Floats, Floats]:
+    """Return what ``solution`` does, and the root of the inverse that ``inverse_with_root`` does, at half the cost."""
+    axes = principal_axes(precision)
+    return _solution_along(*axes, product), _root_of_inverse(*axes)
+
+
+def _root_of_inverse(scale: Floats, values: Floats, vectors: Floats) -> Floats:
+    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
+    return np.asarray(vectors / np.sqrt(kept) / scale[:, None])
+
+
+def _solution_along(scale: Floats, values: Floats, vectors: Floats, product: Floats) -> Floats:
     is_fixed = values > FIXED * values[-1]
     inverses = np.where(is_fixed, 1.0 / np.where(is_fixed, values, 1.0), 0.0)
     return np.asarray((vectors * inverses) @ (vectors.T @ (product / scale)) / scale)

@@ -18,7 +18,7 @@ from ppafo.identification.trajectory.information import (
     Mixture,
     inverse_with_root,
     principal_axes,
-    solution,
+    solution_with_root,
 )
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.sensor_noise import (
@@ -45,6 +45,7 @@ CHAINS, DRAWS, SETTLING = 2, 100, 20
 _PROPOSALS, _SHOWN = 3, 10
 _STEP = 0.3
 _SHARE_OF_ERROR = 1.5
+_SMALLEST_PIVOT = 1.0e-4
 _FEW, _LARGEST = 3, 0.99999
 """Samples of an autoregression that is drawn with the columns left out, and its largest reflection coefficient."""
 
@@ -189,9 +190,9 @@ def _products(model: LinearModel, noise: SensorNoise, weights: Sequence[Floats],
     width = model.columns.shape[1]
     products, spread = np.zeros((width, width)), 0.0
     for place, level, weight in zip(model.sensors[sensor], noise.levels, weights, strict=True):
-        rows, spreads = noise.shape.rows(model.columns[place], weight)
+        rows, logarithm = noise.shape.rows(model.columns[place], weight)
         products += rows.T @ rows / level**2
-        spread += float(np.sum(spreads))
+        spread += logarithm
     return products, spread
 
 
@@ -228,9 +229,8 @@ def _with_level(state: _State, draw: Floats, count: int, random: np.random.Gener
 def _distribution_given_noise(model: LinearModel, states: Sequence[_State]) -> tuple[Floats, Floats, Floats]:
     """Return mean, covariance and a root of it of the columns given the noise."""
     products = np.sum([state.products for state in states], axis=0)
-    precision = products[:-1, :-1] + model.precision
-    covariance, root = inverse_with_root(precision)
-    return -solution(precision, products[:-1, -1] + model.pull), covariance, root
+    mean, root = solution_with_root(products[:-1, :-1] + model.precision, products[:-1, -1] + model.pull)
+    return -mean, root @ root.T, root
 
 
 def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random.Generator) -> list[_State]:
@@ -263,13 +263,28 @@ def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random
 
 def _without_columns(model: LinearModel, products: Floats) -> float:
     """Return the log likelihood of noise with all columns integrated out, but for a constant."""
-    precision = products[:-1, :-1] + model.precision
-    pull = products[:-1, -1] + model.pull
-    scale, values, vectors = principal_axes(precision)
+    whole = products.copy()
+    whole[:-1, :-1] += model.precision
+    whole[:-1, -1] += model.pull
+    whole[-1, :-1] += model.pull
+    scale = np.sqrt(np.maximum(np.diag(whole), LEAST))
+    try:
+        pivots = np.diag(np.linalg.cholesky(whole / np.outer(scale, scale)))
+    except np.linalg.LinAlgError:
+        return _without_loose_columns(whole)
+    if pivots.min() < _SMALLEST_PIVOT:
+        return _without_loose_columns(whole)
+    # The last pivot is what is left of the residuals when the columns have taken their part.
+    return -0.5 * float((pivots[-1] * scale[-1]) ** 2) - float(np.sum(np.log(pivots[:-1] * scale[:-1])))
+
+
+def _without_loose_columns(whole: Floats) -> float:
+    """Return the same where some columns, or all the residuals, are nearly those of others."""
+    scale, values, vectors = principal_axes(whole[:-1, :-1])
     kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
-    along = vectors.T @ (pull / scale)
+    along = vectors.T @ (whole[:-1, -1] / scale)
     size = float(np.sum(np.where(values > FIXED * values[-1], along * along / kept, 0.0)))
-    return 0.5 * (size - float(products[-1, -1]) - float(np.sum(np.log(kept)))) - float(np.sum(np.log(scale)))
+    return 0.5 * (size - float(whole[-1, -1]) - float(np.sum(np.log(kept)))) - float(np.sum(np.log(scale)))
 
 
 def _tails(
@@ -307,8 +322,8 @@ def _regression(
 
 
 def _first(shape: AutoRegression, values: Floats, weights: Floats) -> float:
-    errors, spreads = shape.rows(values[:, None], weights)
-    return -0.5 * float(np.sum(errors * errors)) - float(np.sum(spreads))
+    square, spread = shape.square(values, weights)
+    return -0.5 * square - spread
 
 
 def _proposal(numbers: Floats, is_zeroed: bool, scaled: Sequence[Floats], weights: Sequence[Floats]) -> Floats:
@@ -330,10 +345,7 @@ def _with_levels(
 ) -> SensorNoise:
     """Return the noise with its levels drawn, one for all recordings or one for each."""
     sums = np.array(
-        [
-            float(np.sum(np.square(noise.shape.rows(one[:, None], weight)[0])))
-            for one, weight in zip(segments, weights, strict=True)
-        ]
+        [noise.shape.square(one, weight)[0] for one, weight in zip(segments, weights, strict=True)]
     )
     counts = np.array([float(len(one)) for one in segments])
     if noise.is_shared:
