@@ -8,6 +8,7 @@ levels. Given the noise the coordinates are normal, so that the whole is a mixtu
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,7 @@ from ppafo.identification.trajectory.whitening import (
     AutoRegression,
     Drift,
     Shape,
+    compiled,
     from_coefficients,
     from_reflections,
 )
@@ -267,15 +269,33 @@ def _without_columns(model: LinearModel, products: Floats) -> float:
     whole[:-1, :-1] += model.precision
     whole[:-1, -1] += model.pull
     whole[-1, :-1] += model.pull
-    scale = np.sqrt(np.maximum(np.diag(whole), LEAST))
-    try:
-        pivots = np.diag(np.linalg.cholesky(whole / np.outer(scale, scale)))
-    except np.linalg.LinAlgError:
-        return _without_loose_columns(whole)
-    if pivots.min() < _SMALLEST_PIVOT:
-        return _without_loose_columns(whole)
-    # The last pivot is what is left of the residuals when the columns have taken their part.
-    return -0.5 * float((pivots[-1] * scale[-1]) ** 2) - float(np.sum(np.log(pivots[:-1] * scale[:-1])))
+    found: float = _likelihood_left(whole, _SMALLEST_PIVOT)
+    return _without_loose_columns(whole) if math.isnan(found) else found
+
+
+@compiled
+def _likelihood_left(whole: Any, smallest: float) -> float:
+    """Return the same from the factor of Cholesky, NaN where columns, or the residuals, are nearly those of others.
+
+    The last pivot is what is left of the residuals when the columns have taken their part.
+    """
+    count, logs = len(whole), 0.0
+    root = np.zeros((count, count))
+    for row in range(count):
+        for column in range(row):
+            total = whole[row, column]
+            for before in range(column):
+                total -= root[row, before] * root[column, before]
+            root[row, column] = total / root[column, column]
+        pivot = whole[row, row]
+        for before in range(row):
+            pivot -= root[row, before] * root[row, before]
+        if not pivot > smallest * smallest * whole[row, row]:
+            return np.nan
+        root[row, row] = np.sqrt(pivot)
+        if row < count - 1:
+            logs += np.log(root[row, row])
+    return -0.5 * root[-1, -1] ** 2 - logs
 
 
 def _without_loose_columns(whole: Floats) -> float:

@@ -287,7 +287,8 @@ def _heavy_drift(segments: list[Floats], normal: SensorNoise) -> SensorNoise:
     simplex = np.vstack([start, start + np.diag([1.0, 0.7, -0.4, 0.7])])
     options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 220, "initial_simplex": simplex}
     found = minimize(cost, start, method="Nelder-Mead", options=options)
-    freedom, shape = 1.5 + math.exp(min(float(found.x[3]), 5.0)), drift_of(_within(found.x, longest)[0], white.is_zeroed)
+    freedom = 1.5 + math.exp(min(float(found.x[3]), 5.0))
+    shape = drift_of(_within(found.x, longest)[0], white.is_zeroed)
     return _of(shape, math.exp(found.x[2]), len(segments), -cost(found.x), freedom)
 
 
