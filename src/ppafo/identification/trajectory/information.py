@@ -45,6 +45,18 @@ def loss_weights(residuals: Floats, loss: str) -> Floats:
     return np.ones_like(residuals)
 
 
+def robust_cost(residuals: Floats, loss: str) -> float:
+    """Return half the sum of the squares of residuals [-], or what a robust loss makes of it."""
+    squares = np.square(residuals / ROBUST_SCALE)
+    if loss == "huber":
+        costs = np.where(squares <= 1.0, squares, 2.0 * np.sqrt(squares) - 1.0)
+    elif loss == "soft_l1":
+        costs = 2.0 * (np.sqrt(1.0 + squares) - 1.0)
+    else:
+        costs = squares
+    return 0.5 * ROBUST_SCALE**2 * float(np.sum(costs))
+
+
 def data_information(jacobian: Floats, weights: Floats) -> Floats:
     """Return the information matrix of the samples (coordinates, coordinates), in inverse squares of their units."""
     return np.asarray(jacobian.T @ (weights[:, None] * jacobian))

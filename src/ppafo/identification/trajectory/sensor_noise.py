@@ -35,6 +35,7 @@ _UNEQUAL = 5.0
 _ERROR_OF_LEVEL = 1.2
 _REWEIGHED = 6
 _ROUNDS_OF_T = 12
+_LARGE_PRODUCT = 1.0e100
 _LEAST = 1.0e-30
 LOG_RATIO = (-20.0, 12.0)
 
@@ -110,8 +111,7 @@ def t_likelihood(errors: Floats, freedoms: Floats) -> Floats:
 
     half = 0.5 * freedoms
     constant = gammaln(half + 0.5) - gammaln(half) - 0.5 * np.log(freedoms * np.pi)
-    logs = np.log1p(np.square(errors)[:, None] / freedoms)
-    return np.asarray(len(errors) * constant - (half + 0.5) * logs.sum(axis=0))
+    return np.asarray(len(errors) * constant - (half + 0.5) * _sums_of_logs(np.square(errors), freedoms))
 
 
 def previous_samples(segment: Floats, order: int) -> Floats:
@@ -222,7 +222,7 @@ def _fit_scaled_t(errors: Floats) -> tuple[Floats, Floats]:
 @compiled
 def _scales_of_t(squares: Any, freedoms: Any, start: float) -> Any:
     """Return the best variance for each of the degrees of freedom, and the sum of log(1 + square / variance / them)."""
-    variances, logs = np.full(len(freedoms), start), np.zeros(len(freedoms))
+    variances = np.full(len(freedoms), start)
     for place in range(len(freedoms)):
         freedom = freedoms[place]
         for _ in range(_ROUNDS_OF_T):
@@ -230,9 +230,22 @@ def _scales_of_t(squares: Any, freedoms: Any, start: float) -> Any:
             for square in squares:
                 total += square / (freedom + square * inverse)
             variances[place] = total * (freedom + 1.0) / len(squares)
+    return variances, _sums_of_logs(squares, freedoms * variances)
+
+
+@compiled
+def _sums_of_logs(squares: Any, scales: Any) -> Any:
+    """Return the sum of log(1 + square / scale) for each scale; products of many need one logarithm."""
+    totals = np.zeros(len(scales))
+    for place in range(len(scales)):
+        inverse, product = 1.0 / scales[place], 1.0
         for square in squares:
-            logs[place] += np.log1p(square / variances[place] / freedom)
-    return variances, logs
+            product *= 1.0 + square * inverse
+            if product > _LARGE_PRODUCT:
+                totals[place] += np.log(product)
+                product = 1.0
+        totals[place] += np.log(product)
+    return totals
 
 
 def _heavy_autoregression(segments: list[Floats], normal: SensorNoise) -> SensorNoise:
