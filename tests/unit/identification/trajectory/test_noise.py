@@ -42,7 +42,7 @@ def test_an_autoregression_whitens_like_the_root_of_its_covariance() -> None:
     covariance = by_lag[np.abs(np.subtract.outer(np.arange(count), np.arange(count)))]
     rows, spreads = shape.rows(np.eye(count), np.ones(count))
     assert rows @ covariance @ rows.T == pytest.approx(np.eye(count), abs=1e-9)
-    assert 2.0 * float(np.sum(spreads)) == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+    assert 2.0 * spreads == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
 
 
 @pytest.mark.parametrize("is_zeroed", [False, True])
@@ -57,7 +57,7 @@ def test_a_drift_whitens_like_the_root_of_its_covariance(is_zeroed: bool) -> Non
     covariance = response @ change @ response.T + np.diag(1.0 / weights)
     rows, spreads = drift.rows(np.eye(count), weights)
     assert rows @ covariance @ rows.T == pytest.approx(np.eye(count), abs=1e-9)
-    assert 2.0 * float(np.sum(spreads)) == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+    assert 2.0 * spreads == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
 
 
 def test_the_mean_of_a_drift_given_samples_is_that_of_its_covariance() -> None:
