@@ -269,12 +269,12 @@ def _without_columns(model: LinearModel, products: Floats) -> float:
     whole[:-1, :-1] += model.precision
     whole[:-1, -1] += model.pull
     whole[-1, :-1] += model.pull
-    found: float = _likelihood_left(whole, _SMALLEST_PIVOT)
+    found = float(_likelihood_left(whole, _SMALLEST_PIVOT))
     return _without_loose_columns(whole) if math.isnan(found) else found
 
 
 @compiled
-def _likelihood_left(whole: Any, smallest: float) -> float:
+def _likelihood_left(whole: Any, smallest: float) -> Any:
     """Return the same from the factor of Cholesky, NaN where columns, or the residuals, are nearly those of others.
 
     The last pivot is what is left of the residuals when the columns have taken their part.
