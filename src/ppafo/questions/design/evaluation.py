@@ -16,7 +16,7 @@ from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.numbers import TIMES, declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.draws import Uncertainty
-from ppafo.studies.noise import NOISE
+from ppafo.studies.noise import NOISE, with_noise
 
 Members = NDArray[np.intp]
 
@@ -170,7 +170,7 @@ def _excess(values: Floats, limit: float | None, sign: float) -> Floats:
 def noise_streams(problem: DesignProblem, first: int, count: int) -> Floats:
     """Return the seeds of streams of noise, from number ``first`` on; none where no controller receives noise."""
     scenarios = [scenario for task in problem.tasks for scenario in task.scenarios.values()]
-    noise = Uncertainty(()).with_noise_of(scenarios)
+    noise = Uncertainty(with_noise((), None, scenarios, [item.path for item in problem.variables])[0])
     return noise.random_columns(first, count, problem.search.seed)[NOISE] if noise.has_noise else np.zeros(0)
 
 
