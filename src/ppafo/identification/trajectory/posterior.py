@@ -364,9 +364,7 @@ def _with_levels(
     noise: SensorNoise, segments: Sequence[Floats], weights: Sequence[Floats], random: np.random.Generator
 ) -> SensorNoise:
     """Return the noise with its levels drawn, one for all recordings or one for each."""
-    sums = np.array(
-        [noise.shape.square(one, weight)[0] for one, weight in zip(segments, weights, strict=True)]
-    )
+    sums = np.array([noise.shape.square(one, weight)[0] for one, weight in zip(segments, weights, strict=True)])
     counts = np.array([float(len(one)) for one in segments])
     if noise.is_shared:
         level = math.sqrt(0.5 * sums.sum() / random.gamma(0.5 * counts.sum()))
