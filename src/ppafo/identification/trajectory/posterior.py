@@ -8,17 +8,14 @@ levels. Given the noise the coordinates are normal, so that the whole is a mixtu
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ppafo.identification.trajectory.information import (
-    FIXED,
     LEAST,
-    SMALLEST_FRACTION,
     Mixture,
     inverse_with_root,
-    principal_axes,
+    likelihood_without_columns,
     solution_with_root,
 )
 from ppafo.identification.trajectory.preparation import Floats
@@ -38,7 +35,6 @@ from ppafo.identification.trajectory.whitening import (
     AutoRegression,
     Drift,
     Shape,
-    compiled,
     from_coefficients,
     from_reflections,
 )
@@ -47,7 +43,6 @@ CHAINS, DRAWS, SETTLING = 2, 100, 20
 _PROPOSALS, _SHOWN = 3, 10
 _STEP = 0.3
 _SHARE_OF_ERROR = 1.5
-_SMALLEST_PIVOT = 1.0e-4
 _FEW, _LARGEST = 3, 0.99999
 """Samples of an autoregression that is drawn with the columns left out, and its largest reflection coefficient."""
 
@@ -269,42 +264,7 @@ def _without_columns(model: LinearModel, products: Floats) -> float:
     whole[:-1, :-1] += model.precision
     whole[:-1, -1] += model.pull
     whole[-1, :-1] += model.pull
-    found = float(_likelihood_left(whole, _SMALLEST_PIVOT))
-    return _without_loose_columns(whole) if math.isnan(found) else found
-
-
-@compiled
-def _likelihood_left(whole: Any, smallest: float) -> Any:
-    """Return the same from the factor of Cholesky, NaN where columns, or the residuals, are nearly those of others.
-
-    The last pivot is what is left of the residuals when the columns have taken their part.
-    """
-    count, logs = len(whole), 0.0
-    root = np.zeros((count, count))
-    for row in range(count):
-        for column in range(row):
-            total = whole[row, column]
-            for before in range(column):
-                total -= root[row, before] * root[column, before]
-            root[row, column] = total / root[column, column]
-        pivot = whole[row, row]
-        for before in range(row):
-            pivot -= root[row, before] * root[row, before]
-        if not pivot > smallest * smallest * whole[row, row]:
-            return np.nan
-        root[row, row] = np.sqrt(pivot)
-        if row < count - 1:
-            logs += np.log(root[row, row])
-    return -0.5 * root[-1, -1] ** 2 - logs
-
-
-def _without_loose_columns(whole: Floats) -> float:
-    """Return the same where some columns, or all the residuals, are nearly those of others."""
-    scale, values, vectors = principal_axes(whole[:-1, :-1])
-    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
-    along = vectors.T @ (whole[:-1, -1] / scale)
-    size = float(np.sum(np.where(values > FIXED * values[-1], along * along / kept, 0.0)))
-    return 0.5 * (size - float(whole[-1, -1]) - float(np.sum(np.log(kept)))) - float(np.sum(np.log(scale)))
+    return likelihood_without_columns(whole)
 
 
 def _tails(
