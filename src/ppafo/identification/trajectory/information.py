@@ -5,11 +5,13 @@ All matrices are those of the coordinates of ``Range``: logarithms, or numbers o
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.residuals import Mask, Neighbourhood, Residuals, prior_coordinates
+from ppafo.identification.trajectory.whitening import compiled
 
 ROBUST_SCALE = 1.345
 """Residual, in standard deviations, beyond which a robust loss counts less: 95 % efficient for normal noise."""
@@ -23,6 +25,8 @@ SMALLEST_FRACTION = 1.0e-12
 
 FIXED = 1.0e-9
 """Share below which an eigenvalue fixes nothing, so that a solution does not move along its direction."""
+
+_SMALLEST_PIVOT = 1.0e-4
 
 LEAST = 1.0e-12
 """Information of a coordinate that changes nothing at all, so that its variance stays a number."""
@@ -43,6 +47,18 @@ def loss_weights(residuals: Floats, loss: str) -> Floats:
     if loss == "soft_l1":
         return np.asarray(1.0 / np.sqrt(1.0 + size * size))
     return np.ones_like(residuals)
+
+
+def robust_cost(residuals: Floats, loss: str) -> float:
+    """Return half the sum of the squares of residuals [-], or what a robust loss makes of it."""
+    squares = np.square(residuals / ROBUST_SCALE)
+    if loss == "huber":
+        costs = np.where(squares <= 1.0, squares, 2.0 * np.sqrt(squares) - 1.0)
+    elif loss == "soft_l1":
+        costs = 2.0 * (np.sqrt(1.0 + squares) - 1.0)
+    else:
+        costs = squares
+    return 0.5 * ROBUST_SCALE**2 * float(np.sum(costs))
 
 
 def data_information(jacobian: Floats, weights: Floats) -> Floats:
@@ -158,15 +174,69 @@ class Mixture:
 
 def inverse_with_root(precision: Floats) -> tuple[Floats, Floats]:
     """Return the inverse of a precision [unit^2] and a root of it; huge along a direction that nothing fixes."""
-    scale, values, vectors = principal_axes(precision)
-    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
-    root = vectors / np.sqrt(kept) / scale[:, None]
+    root = _root_of_inverse(*principal_axes(precision))
     return root @ root.T, root
 
 
 def solution(precision: Floats, product: Floats) -> Floats:
     """Return the solution of a linear system, in units of the coordinates; it does not move where nothing fixes it."""
-    scale, values, vectors = principal_axes(precision)
+    return _solution_along(*principal_axes(precision), product)
+
+
+def solution_with_root(precision: Floats, product: Floats) -> tuple[Floats, Floats]:
+    """Return what ``solution`` does, and the root of the inverse that ``inverse_with_root`` does, at half the cost."""
+    axes = principal_axes(precision)
+    return _solution_along(*axes, product), _root_of_inverse(*axes)
+
+
+def _root_of_inverse(scale: Floats, values: Floats, vectors: Floats) -> Floats:
+    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
+    return np.asarray(vectors / np.sqrt(kept) / scale[:, None])
+
+
+def _solution_along(scale: Floats, values: Floats, vectors: Floats, product: Floats) -> Floats:
     is_fixed = values > FIXED * values[-1]
     inverses = np.where(is_fixed, 1.0 / np.where(is_fixed, values, 1.0), 0.0)
     return np.asarray((vectors * inverses) @ (vectors.T @ (product / scale)) / scale)
+
+
+def likelihood_without_columns(whole: Floats) -> float:
+    """Return the log likelihood of residuals with all columns integrated out, but for a constant.
+
+    ``whole`` has the products of the columns with each other, priors in them, and with the residuals, which come last.
+    """
+    found = float(_likelihood_left(whole, _SMALLEST_PIVOT))
+    return _likelihood_along_axes(whole) if math.isnan(found) else found
+
+
+@compiled
+def _likelihood_left(whole: Any, smallest: float) -> Any:
+    """Return the same from the factor of Cholesky, NaN where columns, or the residuals, are nearly those of others.
+
+    The last pivot is what is left of the residuals when the columns have taken their part.
+    """
+    count, logs = len(whole), 0.0
+    root = np.zeros((count, count))
+    for row in range(count):
+        for column in range(row):
+            total = whole[row, column]
+            for before in range(column):
+                total -= root[row, before] * root[column, before]
+            root[row, column] = total / root[column, column]
+        pivot = whole[row, row]
+        for before in range(row):
+            pivot -= root[row, before] * root[row, before]
+        if not pivot > smallest * smallest * whole[row, row]:
+            return np.nan
+        root[row, row] = np.sqrt(pivot)
+        if row < count - 1:
+            logs += np.log(root[row, row])
+    return -0.5 * root[-1, -1] ** 2 - logs
+
+
+def _likelihood_along_axes(whole: Floats) -> float:
+    scale, values, vectors = principal_axes(whole[:-1, :-1])
+    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
+    along = vectors.T @ (whole[:-1, -1] / scale)
+    size = float(np.sum(np.where(values > FIXED * values[-1], along * along / kept, 0.0)))
+    return 0.5 * (size - float(whole[-1, -1]) - float(np.sum(np.log(kept)))) - float(np.sum(np.log(scale)))

@@ -12,13 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.identification.trajectory.information import (
-    FIXED,
     LEAST,
-    SMALLEST_FRACTION,
     Mixture,
     inverse_with_root,
-    principal_axes,
-    solution,
+    likelihood_without_columns,
+    solution_with_root,
 )
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.sensor_noise import (
@@ -189,9 +187,9 @@ def _products(model: LinearModel, noise: SensorNoise, weights: Sequence[Floats],
     width = model.columns.shape[1]
     products, spread = np.zeros((width, width)), 0.0
     for place, level, weight in zip(model.sensors[sensor], noise.levels, weights, strict=True):
-        rows, spreads = noise.shape.rows(model.columns[place], weight)
+        rows, logarithm = noise.shape.rows(model.columns[place], weight)
         products += rows.T @ rows / level**2
-        spread += float(np.sum(spreads))
+        spread += logarithm
     return products, spread
 
 
@@ -228,9 +226,8 @@ def _with_level(state: _State, draw: Floats, count: int, random: np.random.Gener
 def _distribution_given_noise(model: LinearModel, states: Sequence[_State]) -> tuple[Floats, Floats, Floats]:
     """Return mean, covariance and a root of it of the columns given the noise."""
     products = np.sum([state.products for state in states], axis=0)
-    precision = products[:-1, :-1] + model.precision
-    covariance, root = inverse_with_root(precision)
-    return -solution(precision, products[:-1, -1] + model.pull), covariance, root
+    mean, root = solution_with_root(products[:-1, :-1] + model.precision, products[:-1, -1] + model.pull)
+    return -mean, root @ root.T, root
 
 
 def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random.Generator) -> list[_State]:
@@ -263,13 +260,11 @@ def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random
 
 def _without_columns(model: LinearModel, products: Floats) -> float:
     """Return the log likelihood of noise with all columns integrated out, but for a constant."""
-    precision = products[:-1, :-1] + model.precision
-    pull = products[:-1, -1] + model.pull
-    scale, values, vectors = principal_axes(precision)
-    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
-    along = vectors.T @ (pull / scale)
-    size = float(np.sum(np.where(values > FIXED * values[-1], along * along / kept, 0.0)))
-    return 0.5 * (size - float(products[-1, -1]) - float(np.sum(np.log(kept)))) - float(np.sum(np.log(scale)))
+    whole = products.copy()
+    whole[:-1, :-1] += model.precision
+    whole[:-1, -1] += model.pull
+    whole[-1, :-1] += model.pull
+    return likelihood_without_columns(whole)
 
 
 def _tails(
@@ -307,8 +302,8 @@ def _regression(
 
 
 def _first(shape: AutoRegression, values: Floats, weights: Floats) -> float:
-    errors, spreads = shape.rows(values[:, None], weights)
-    return -0.5 * float(np.sum(errors * errors)) - float(np.sum(spreads))
+    square, spread = shape.square(values, weights)
+    return -0.5 * square - spread
 
 
 def _proposal(numbers: Floats, is_zeroed: bool, scaled: Sequence[Floats], weights: Sequence[Floats]) -> Floats:
@@ -329,12 +324,7 @@ def _with_levels(
     noise: SensorNoise, segments: Sequence[Floats], weights: Sequence[Floats], random: np.random.Generator
 ) -> SensorNoise:
     """Return the noise with its levels drawn, one for all recordings or one for each."""
-    sums = np.array(
-        [
-            float(np.sum(np.square(noise.shape.rows(one[:, None], weight)[0])))
-            for one, weight in zip(segments, weights, strict=True)
-        ]
-    )
+    sums = np.array([noise.shape.square(one, weight)[0] for one, weight in zip(segments, weights, strict=True)])
     counts = np.array([float(len(one)) for one in segments])
     if noise.is_shared:
         level = math.sqrt(0.5 * sums.sum() / random.gamma(0.5 * counts.sum()))

@@ -4,33 +4,50 @@ import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lanes import Batch, BatchResult, run_batch
-from ppafo.engine.replay import StepInputs, replay
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.program import Program
+from ppafo.engine.replay import replay
+from ppafo.engine.rows import row_numbers
+from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.experiment import TIME_OFFSET, with_numbers
 from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment
 from ppafo.identification.trajectory.problem import Range
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
+from ppafo.model.columns import at, over_runs
+from ppafo.model.plant import PlantParameters
 from ppafo.model.valves.catalog import VALVES
+from ppafo.model.valves.kind import ValveKind
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import exact_orifice, initial_lines, initial_state, plant_behind_lines, thermal_parameters
-from ppafo.simulation.sampled import state_row_numbers
+from ppafo.simulation.plan import (
+    exact_orifice,
+    initial_lines,
+    initial_state,
+    plant_behind_lines,
+    thermal_parameters,
+    valve_parameters,
+)
 from ppafo.simulation.scenario import FreeMotion
 
-_OF_PRESSURE = ("gas_product", "volume_per_angle", "angle_min", "angle_max", "dead_volume_1", "dead_volume_2")
+_KEPT = ("angle", "mass_1", "mass_2")
 
 
 def numbers_in(label: str, ranges: Sequence[Range], point: Floats) -> dict[str, float]:
     """Return the numbers in SI units, by path, that a point of coordinates gives to the experiment with a label."""
-    acting = [pair for pair in zip(ranges, point, strict=True) if pair[0].acts_in(label)]
-    return {item.path: item.number(float(z)) for item, z in acting}
+    return {path: float(column[0]) for path, column in _columns_in(label, ranges, point[None, :]).items()}
+
+
+def _columns_in(label: str, ranges: Sequence[Range], points: Floats) -> dict[str, Floats]:
+    """Return the same as columns, one number for each of many points (points, coordinates)."""
+    acting = [pair for pair in zip(ranges, points.T, strict=True) if pair[0].acts_in(label)]
+    return {item.path: np.array([item.number(z) for z in column.tolist()]) for item, column in acting}
 
 
 def trajectories(
@@ -42,7 +59,7 @@ def trajectories(
     """
 
     def one(prepared: PreparedExperiment) -> dict[str, Floats]:
-        return _trajectories(prepared, [numbers_in(prepared.label, ranges, point) for point in points])
+        return _trajectories(prepared, _columns_in(prepared.label, ranges, points), len(points))
 
     workers = min(len(experiments), os.cpu_count() or 1)
     if workers == 1:
@@ -51,18 +68,18 @@ def trajectories(
         return list(pool.map(one, experiments))
 
 
-def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
-    """Return the run of an experiment with other numbers [SI], on the program and clock of all columns.
+def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
+    """Return the run of an experiment with other numbers [SI], on its program and clock.
 
-    IdentificationError where a setting of the valve goes to or from 0.
+    A number may be an array (runs,), one for each of many runs. IdentificationError where a setting of the valve goes
+    to or from 0.
     """
     base = prepared.run
     scenario = with_numbers(prepared.scenario, numbers)
     device, motion = scenario.device, scenario.motion
-    kind = VALVES[device.valve.kind]
-    valve = kind.choose(device.valve.settings)
-    delay = valve.command_delay(device.valve.settings)
-    if valve != base.program.valve or (delay > 0.0) != base.program.late_commands:
+    settings = device.valve.settings
+    delay = base.program.valve.command_delay(settings)
+    if not _keeps_program(base, VALVES[device.valve.kind], settings):
         raise IdentificationError(
             f"experiment '{prepared.label}': a setting of the valve went to or from 0, which is another "
             f"model of the valve; start above 0 and give a lower bound above 0"
@@ -70,7 +87,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
     bare = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     plant = plant_behind_lines(bare, scenario.supply_lines)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
-    allowed = supply_range(base.plant) / supply_range(plant)
+    allowed = supply_range(base.plant) / _supply_ranges(plant)
     return replace(
         base,
         plant=plant,
@@ -79,51 +96,68 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> Run:
         valve_orifice=exact_orifice(device.valve.orifice, device),
         leak_orifice=exact_orifice(device.actuator.leak, device),
         initial=initial_state(scenario, plant),
-        valve=valve.prepare(device.valve.settings),
+        valve=valve_parameters(base.program.valve, settings),
         command_delay=delay,
         lines=initial_lines(plant, scenario.supply_lines),
     )
 
 
-def _trajectories(prepared: PreparedExperiment, columns: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
-    runs = [run_with(prepared, numbers) for numbers in columns]
-    outcomes = _outcomes(runs, prepared.inputs)
-    rows = state_row_numbers(prepared.run)
-    ends = np.concatenate([outcome.states for outcome in outcomes], axis=1)
-    failed = (ends[rows["result.failure_time"]] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
-    offsets = np.array([numbers.get(TIME_OFFSET, prepared.time_offset) for numbers in columns])
+def _keeps_program(base: Run, kind: ValveKind, settings: Mapping[str, Any]) -> bool:
+    """Return whether all runs with these settings of the valve have the program of another run."""
+    counts = [value.size for value in settings.values() if isinstance(value, np.ndarray)]
+    for run in range(max(counts, default=1)):
+        own = {name: at(value, run) for name, value in settings.items()}
+        valve = kind.choose(own)
+        if valve != base.program.valve or (valve.command_delay(own) > 0.0) != base.program.late_commands:
+            return False
+    return True
 
-    def at_samples(name: str) -> Floats:
-        whole = [outcome.record[:, rows[f"state.{name}"]] for outcome in outcomes]
-        return _at_samples(whole[0] if len(whole) == 1 else np.concatenate(whole, axis=1), prepared, offsets)
 
-    found = _signals(runs, at_samples("angle"), at_samples("mass_1"), at_samples("mass_2"))
+def _supply_ranges(plant: PlantParameters) -> Any:
+    """Return the pressure [Pa] of the higher supply over the atmosphere, an array where any of them is one."""
+    pressures = plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure
+
+    def one(first: float, second: float, atmosphere: float) -> float:
+        return supply_range(
+            plant._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
+        )
+
+    return over_runs(one, *pressures)
+
+
+def _trajectories(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+    run = run_with(prepared, columns)
+    kept, failure = _rows_of(run.program)
+    records: Floats | None = None
+    failed = np.zeros(count, dtype=np.bool_)
+    for members, batch in batches_of(run, count):
+        outcome = run_batch(batch, threads=1) if prepared.inputs is None else replay(batch, prepared.inputs)
+        ends = outcome.states
+        failed[members] = (ends[failure] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
+        if records is None:
+            records = np.empty((len(kept), len(outcome.record), count))
+        for place, row in enumerate(kept):
+            records[place][:, members] = outcome.record[:, row]
+    assert records is not None
+    offsets = np.broadcast_to(columns.get(TIME_OFFSET, np.array(prepared.time_offset)), (count,))
+    found = _signals(run, *(_at_samples(one, prepared, offsets) for one in records))
     return {channel.name: np.where(failed, np.nan, found[channel.name]) for channel in prepared.channels}
 
 
-def _outcomes(runs: Sequence[Run], inputs: StepInputs | None) -> list[BatchResult]:
-    """Return all outcomes in order; neighbours of one clock share a block, and a fitted dead time changes the clock."""
-    batches = [batch_of(run) for run in runs]
-    outcomes, first = [], 0
-    for last in range(1, len(batches) + 1):
-        if last < len(batches) and batches[last].clock == batches[first].clock:
-            continue
-        members = batches[first:last]
-        parameters = np.concatenate([batch.parameters for batch in members], axis=1)
-        states = np.concatenate([batch.states for batch in members], axis=1)
-        joint = Batch(members[0].program, members[0].clock, parameters, states)
-        outcomes.append(run_batch(joint, threads=1) if inputs is None else replay(joint, inputs))
-        first = last
-    return outcomes
+@lru_cache(maxsize=16)
+def _rows_of(program: Program) -> tuple[tuple[int, ...], int]:
+    """Return the rows of the state that channels are made of, and that of the time of a failure."""
+    rows = row_numbers(program.state_rows())
+    return tuple(rows[f"state.{name}"] for name in _KEPT), rows["result.failure_time"]
 
 
-def _signals(runs: Sequence[Run], angle: Any, mass_1: Any, mass_2: Any) -> dict[str, Floats]:
+def _signals(run: Run, angle: Any, mass_1: Any, mass_2: Any) -> dict[str, Floats]:
     """Return angle and pressures from angle and masses, all (samples, runs)."""
-    plant: dict[str, Any] = {name: np.array([getattr(run.plant, name) for run in runs]) for name in _OF_PRESSURE}
-    volume_1 = chamber_1_volume(angle, plant["angle_min"], plant["volume_per_angle"], plant["dead_volume_1"])
-    volume_2 = chamber_2_volume(angle, plant["angle_max"], plant["volume_per_angle"], plant["dead_volume_2"])
-    pressure_1: Any = chamber_pressure(mass_1, volume_1, plant["gas_product"])
-    pressure_2: Any = chamber_pressure(mass_2, volume_2, plant["gas_product"])
+    plant = run.plant
+    volume_1 = chamber_1_volume(angle, plant.angle_min, plant.volume_per_angle, plant.dead_volume_1)
+    volume_2 = chamber_2_volume(angle, plant.angle_max, plant.volume_per_angle, plant.dead_volume_2)
+    pressure_1: Any = chamber_pressure(mass_1, volume_1, plant.gas_product)
+    pressure_2: Any = chamber_pressure(mass_2, volume_2, plant.gas_product)
     return {"angle": angle, "pressure_1": pressure_1, "pressure_2": pressure_2}
 
 
@@ -190,6 +224,13 @@ class Residuals:
         """Return the residuals [-] of the priors, one for each parameter that has one."""
         mean, deviation, has = prior_coordinates(self.ranges)
         return (point[has] - mean[has]) / deviation[has]
+
+    def quick(self) -> "Residuals":
+        """Return the same from runs that are allowed the usual error [-]: a third of the time, far from an optimum."""
+        experiments = (
+            replace(one, run=replace(one.run, tolerance=max(1.0, one.run.tolerance))) for one in self.experiments
+        )
+        return replace(self, experiments=tuple(experiments))
 
     def channel_slices(self) -> tuple[slice, ...]:
         """Return the place of each channel among the residuals of the samples."""

@@ -1,5 +1,6 @@
 """The search for the optimum: several starts, each refined with scipy's bounded least squares."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,7 +8,13 @@ import numpy as np
 
 from ppafo.engine.lane_rows import LANES
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.information import ROBUST_SCALE, directions_for, precision, standard_errors
+from ppafo.identification.trajectory.information import (
+    ROBUST_SCALE,
+    directions_for,
+    precision,
+    robust_cost,
+    standard_errors,
+)
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.problem import Range, Search, is_nuisance
 from ppafo.identification.trajectory.residuals import FIRST_STEP, Mask, Neighbourhood, Residuals, coordinate_bounds
@@ -158,9 +165,15 @@ def _descend_holding(residuals: Residuals, start: Floats, is_held: Mask, search:
     fewer = residuals.hold({index: float(point[index]) for index in np.flatnonzero(is_held).tolist()})
     if not np.isfinite(fewer.of_data(point[None, free])).all():
         return None
-    found = descend(fewer, point[free], np.diag(np.full(int(free.sum()), FIRST_STEP)), search, _TOLERANCES[0])
+    found = descend(fewer.quick(), point[free], np.diag(np.full(int(free.sum()), FIRST_STEP)), search, _TOLERANCES[0])
     point[free] = found.point
-    return Descent(point, found.cost, found.evaluations, found.has_converged)
+    return Descent(point, _cost_at(fewer, found.point, search), found.evaluations, found.has_converged)
+
+
+def _cost_at(residuals: Residuals, point: Floats, search: Search) -> float:
+    """Return the cost at a point, infinite where the model diverges there."""
+    left = np.concatenate([residuals.of_data(point[None, :])[:, 0], residuals.of_priors(point)])
+    return robust_cost(left, search.loss) if np.isfinite(left).all() else math.inf
 
 
 def is_at_bound(point: Floats, ranges: Sequence[Range]) -> Mask:
@@ -174,7 +187,8 @@ def _refine(residuals: Residuals, start: Floats, search: Search) -> Optimum:
     directions = np.diag(np.full(len(start), FIRST_STEP))
     evaluations = 0
     for stage in range(STAGES):
-        found = descend(residuals, start, directions, search, _TOLERANCES[min(stage, 1)])
+        used, tolerance = (residuals, _TOLERANCES[1]) if stage else (residuals.quick(), _TOLERANCES[0])
+        found = descend(used, start, directions, search, tolerance)
         evaluations += found.evaluations
         information, directions = _information(residuals, found.point, directions, search)
         moved = np.abs(found.point - start) / standard_errors(information)
@@ -186,9 +200,9 @@ def _refine(residuals: Residuals, start: Floats, search: Search) -> Optimum:
 
 def _information(residuals: Residuals, point: Floats, directions: Floats, search: Search) -> tuple[Floats, Floats]:
     """Return the information at a point and the steps that suit it; two passes, since each needs the other."""
-    fixed = is_at_bound(point, residuals.ranges)
+    fixed, quick = is_at_bound(point, residuals.ranges), residuals.quick()
     for _ in range(PASSES):
-        directions = directions_for(precision(residuals.around(point, directions), search.loss), fixed)
+        directions = directions_for(precision(quick.around(point, directions), search.loss), fixed)
     return precision(residuals.around(point, directions), search.loss), directions
 
 

@@ -7,6 +7,7 @@ Ornstein-Uhlenbeck drift compete; each may have innovations with a t distributio
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ppafo.identification.trajectory.whitening import (
     AutoRegression,
     Drift,
     Shape,
+    compiled,
     from_coefficients,
     from_reflections,
     reflections_of,
@@ -32,6 +34,8 @@ _UNEQUAL = 5.0
 """Standard errors by which the levels of two recordings differ before each gets its own."""
 _ERROR_OF_LEVEL = 1.2
 _REWEIGHED = 6
+_ROUNDS_OF_T = 12
+_LARGE_PRODUCT = 1.0e100
 _LEAST = 1.0e-30
 LOG_RATIO = (-20.0, 12.0)
 
@@ -107,8 +111,7 @@ def t_likelihood(errors: Floats, freedoms: Floats) -> Floats:
 
     half = 0.5 * freedoms
     constant = gammaln(half + 0.5) - gammaln(half) - 0.5 * np.log(freedoms * np.pi)
-    logs = np.log1p(np.square(errors)[:, None] / freedoms)
-    return np.asarray(len(errors) * constant - (half + 0.5) * logs.sum(axis=0))
+    return np.asarray(len(errors) * constant - (half + 0.5) * _sums_of_logs(np.square(errors), freedoms))
 
 
 def previous_samples(segment: Floats, order: int) -> Floats:
@@ -121,15 +124,13 @@ def profile_likelihood(shape: Shape, segments: Sequence[Floats], weights: Sequen
     """Return the log likelihood [-] at the best common level, and that level."""
     squares, logs, count = 0.0, 0.0, 0
     for one, weight in zip(segments, weights, strict=True):
-        whitened, spread = shape.rows(one[:, None], weight)
-        squares += float(np.sum(whitened * whitened))
-        logs += float(np.sum(spread))
-        count += len(one)
+        square, spread = shape.square(one, weight)
+        squares, logs, count = squares + square, logs + spread, count + len(one)
     variance = max(squares / count, _LEAST)
     return -0.5 * count * (math.log(2.0 * math.pi * variance) + 1.0) - logs, math.sqrt(variance)
 
 
-def drift_of(numbers: Floats, is_zeroed: bool) -> Drift:
+def drift_of(numbers: Floats | tuple[float, float], is_zeroed: bool) -> Drift:
     """Return the drift with these logarithms of the ratio [-] and of the memory in samples."""
     return Drift(math.exp(float(numbers[0])), math.exp(-math.exp(-float(numbers[1]))), is_zeroed)
 
@@ -179,24 +180,22 @@ def _drift(segments: list[Floats], is_zeroed: bool) -> SensorNoise:
     ones, longest = [np.ones(len(one)) for one in segments], longest_memory(segments)
 
     def cost(numbers: Floats) -> float:
-        return -profile_likelihood(drift_of(_within(numbers, longest), is_zeroed), segments, ones)[0] + _outside(
-            numbers, longest
-        )
+        inside, away = _within(numbers, longest)
+        return away - profile_likelihood(drift_of(inside, is_zeroed), segments, ones)[0]
 
     grid = [np.array([ratio, memory]) for ratio in (-9.0, -6.0, -3.0, 0.0) for memory in (1.5, 3.5, 5.5)]
     start = min(grid, key=cost)
     found = minimize(cost, start, method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.02, "maxfev": 120})
-    shape = drift_of(_within(found.x, longest), is_zeroed)
+    shape = drift_of(_within(found.x, longest)[0], is_zeroed)
     likelihood, level = profile_likelihood(shape, segments, ones)
     return _of(shape, level, len(segments), likelihood)
 
 
-def _within(numbers: Floats, longest: float) -> Floats:
-    return np.array([np.clip(numbers[0], *LOG_RATIO), np.clip(numbers[1], 0.0, longest)])
-
-
-def _outside(numbers: Floats, longest: float) -> float:
-    return float(np.sum(np.square(numbers[:2] - _within(numbers, longest))))
+def _within(numbers: Floats, longest: float) -> tuple[tuple[float, float], float]:
+    """Return the logarithms of a drift inside their bounds, and the square of the distance to them."""
+    ratio, memory = float(numbers[0]), float(numbers[1])
+    inside = min(max(ratio, LOG_RATIO[0]), LOG_RATIO[1]), min(max(memory, 0.0), longest)
+    return inside, (ratio - inside[0]) ** 2 + (memory - inside[1]) ** 2
 
 
 def _tails(noise: SensorNoise, segments: Sequence[Floats]) -> tuple[float, float]:
@@ -210,15 +209,43 @@ def _tails(noise: SensorNoise, segments: Sequence[Floats]) -> tuple[float, float
 
 def _fit_scaled_t(errors: Floats) -> tuple[Floats, Floats]:
     """Return log likelihood and best scale for each of the degrees of freedom that are tried."""
-    squares = np.square(errors)[:, None]
-    variances = np.full(len(FREEDOMS), float(np.median(squares)) / 0.45 + _LEAST)
-    for _ in range(2 * _REWEIGHED):
-        variances = np.mean(squares * (FREEDOMS + 1.0) / (FREEDOMS + squares / variances), axis=0)
-    likelihoods = [
-        t_likelihood(errors / math.sqrt(variance), np.array([freedom]))[0] - 0.5 * len(errors) * math.log(variance)
-        for freedom, variance in zip(FREEDOMS, variances, strict=True)
-    ]
-    return np.array(likelihoods), np.sqrt(variances)
+    from scipy.special import gammaln
+
+    squares, count = np.square(errors), len(errors)
+    variances, logs = _scales_of_t(squares, FREEDOMS, float(np.median(squares)) / 0.45 + _LEAST)
+    half = 0.5 * FREEDOMS
+    constant = gammaln(half + 0.5) - gammaln(half) - 0.5 * np.log(FREEDOMS * np.pi)
+    likelihoods = count * (constant - 0.5 * np.log(variances)) - (half + 0.5) * logs
+    return np.asarray(likelihoods), np.sqrt(variances)
+
+
+@compiled
+def _scales_of_t(squares: Any, freedoms: Any, start: float) -> Any:
+    """Return the best variance for each of the degrees of freedom, and the sum of log(1 + square / variance / them)."""
+    variances = np.full(len(freedoms), start)
+    for place in range(len(freedoms)):
+        freedom = freedoms[place]
+        for _ in range(_ROUNDS_OF_T):
+            inverse, total = 1.0 / variances[place], 0.0
+            for square in squares:
+                total += square / (freedom + square * inverse)
+            variances[place] = total * (freedom + 1.0) / len(squares)
+    return variances, _sums_of_logs(squares, freedoms * variances)
+
+
+@compiled
+def _sums_of_logs(squares: Any, scales: Any) -> Any:
+    """Return the sum of log(1 + square / scale) for each scale; products of many need one logarithm."""
+    totals = np.zeros(len(scales))
+    for place in range(len(scales)):
+        inverse, product = 1.0 / scales[place], 1.0
+        for square in squares:
+            product *= 1.0 + square * inverse
+            if product > _LARGE_PRODUCT:
+                totals[place] += np.log(product)
+                product = 1.0
+        totals[place] += np.log(product)
+    return totals
 
 
 def _heavy_autoregression(segments: list[Floats], normal: SensorNoise) -> SensorNoise:
@@ -240,7 +267,7 @@ def _heavy_of_order(segments: list[Floats], order: int) -> SensorNoise:
             break
         weights = [_heavy_weights(shape, one / levels[best], FREEDOMS[best]) for one in segments]
         shape = from_coefficients(regression_of(segments, weights, order)[0]) or shape
-    logs = sum(float(np.sum(shape.rows(one[:, None], np.ones(len(one)))[1])) for one in segments)
+    logs = sum(shape.square(one, np.ones(len(one)))[1] for one in segments)
     return _of(shape, float(levels[best]), len(segments), float(likelihoods[best]) - logs, float(FREEDOMS[best]))
 
 
@@ -263,10 +290,10 @@ def _heavy_drift(segments: list[Floats], normal: SensorNoise) -> SensorNoise:
     assert isinstance(white, Drift)
 
     def cost(numbers: Floats) -> float:
-        shape = drift_of(_within(numbers, longest), white.is_zeroed)
+        inside, away = _within(numbers, longest)
+        shape = drift_of(inside, white.is_zeroed)
         level, freedom = math.exp(numbers[2]), 1.5 + math.exp(min(float(numbers[3]), 5.0))
-        total = sum(shape.heavy_likelihood(one, level, freedom) for one in segments)
-        return -total + _outside(numbers, longest)
+        return away - sum(shape.heavy_likelihood(one, level, freedom) for one in segments)
 
     memory = -math.log(-math.log(white.memory))
     start = np.array([math.log(white.ratio) + 1.0, memory, math.log(normal.levels[0]) - 0.4, 0.7])
@@ -274,10 +301,8 @@ def _heavy_drift(segments: list[Floats], normal: SensorNoise) -> SensorNoise:
     options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 220, "initial_simplex": simplex}
     found = minimize(cost, start, method="Nelder-Mead", options=options)
     freedom = 1.5 + math.exp(min(float(found.x[3]), 5.0))
-    likelihood = -cost(found.x)
-    return _of(
-        drift_of(_within(found.x, longest), white.is_zeroed), math.exp(found.x[2]), len(segments), likelihood, freedom
-    )
+    shape = drift_of(_within(found.x, longest)[0], white.is_zeroed)
+    return _of(shape, math.exp(found.x[2]), len(segments), -cost(found.x), freedom)
 
 
 def _heavy_weights(shape: Shape, segment: Floats, freedom: float) -> Floats:

@@ -35,12 +35,15 @@ class AutoRegression:
         """Samples from which the next is predicted."""
         return len(self.spreads) - 1
 
-    def rows(self, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
-        """Return whitened columns [-] (samples, columns) and the logarithm of the spread of each sample."""
-        roots = np.sqrt(weights)
-        whitened = _prediction_errors(values, self.predictors, self.spreads) * roots[:, None]
-        stages = np.minimum(np.arange(len(values)), self.order)
-        return whitened, np.log(self.spreads[stages]) - np.log(roots)
+    def rows(self, values: Floats, weights: Floats) -> tuple[Floats, float]:
+        """Return whitened columns [-] (samples, columns) and the logarithm of the product of the samples' spreads."""
+        found: tuple[Floats, float] = _prediction_errors(values, weights, self.predictors, self.spreads)
+        return found
+
+    def square(self, segment: Floats, weights: Floats) -> tuple[float, float]:
+        """Return the sum of the squares of the whitened samples, and what ``rows`` returns of the spreads."""
+        errors, spread = self.rows(segment[:, None], weights)
+        return float(np.vdot(errors, errors)), spread
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +74,15 @@ class Drift:
         """Variance of the drift at the first sample over that of the white noise [-]."""
         return self.ratio if self.is_zeroed else self.stationary
 
-    def rows(self, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
-        """Return whitened columns [-] (samples, columns) and the logarithm of the spread of each sample."""
-        gains, spreads = _gains(1.0 / weights, self.memory, self.ratio, self.first)
-        return _innovations(values, gains, spreads, self.memory), np.log(spreads)
+    def rows(self, values: Floats, weights: Floats) -> tuple[Floats, float]:
+        """Return whitened columns [-] (samples, columns) and the logarithm of the product of the samples' spreads."""
+        found: tuple[Floats, float] = _innovations(values, weights, self.memory, self.ratio, self.first)
+        return found
+
+    def square(self, segment: Floats, weights: Floats) -> tuple[float, float]:
+        """Return the sum of the squares of the whitened samples, and what ``rows`` returns of the spreads."""
+        found: tuple[float, float] = _sum_of_innovations(segment, weights, self.memory, self.ratio, self.first)
+        return found
 
     def path(self, values: Floats, weights: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Return the drift [unit of values], drawn given the samples, and its variance; normals of 0 give its mean."""
@@ -143,17 +151,20 @@ def reflections_of(segments: list[Floats], most: int) -> tuple[Floats, Floats]:
     return reflections, np.maximum(left, _LEAST)
 
 
-def _compile(function: Any) -> Any:
+def compiled(function: Any) -> Any:
+    """Return a function compiled once for this computer."""
     return njit(cache=True, error_model="numpy")(function)
 
 
-@_compile
-def _prediction_errors(values: Any, predictors: Any, spreads: Any) -> Any:
+@compiled
+def _prediction_errors(values: Any, weights: Any, predictors: Any, spreads: Any) -> Any:
     count, width = values.shape
     order = len(spreads) - 1
-    out = np.empty((count, width))
+    out, total = np.empty((count, width)), 0.0
     for sample in range(count):
         stage = min(sample, order)
+        root = np.sqrt(weights[sample]) / spreads[stage]
+        total -= np.log(root)
         for column in range(width):
             out[sample, column] = values[sample, column]
         for back in range(stage):
@@ -161,11 +172,11 @@ def _prediction_errors(values: Any, predictors: Any, spreads: Any) -> Any:
             for column in range(width):
                 out[sample, column] -= coefficient * values[sample - 1 - back, column]
         for column in range(width):
-            out[sample, column] /= spreads[stage]
-    return out
+            out[sample, column] *= root
+    return out, total
 
 
-@_compile
+@compiled
 def _step_down(coefficients: Any) -> Any:
     order = len(coefficients)
     found = np.zeros(order)
@@ -182,32 +193,37 @@ def _step_down(coefficients: Any) -> Any:
     return found
 
 
-@_compile
-def _gains(variances: Any, memory: float, change: float, first: float) -> Any:
-    count = len(variances)
-    gains, spreads = np.empty(count), np.empty(count)
-    unknown = first
-    for sample in range(count):
-        total = unknown + variances[sample]
-        gains[sample] = unknown / total
-        spreads[sample] = np.sqrt(total)
-        unknown = memory * memory * unknown * (1.0 - gains[sample]) + change
-    return gains, spreads
-
-
-@_compile
-def _innovations(values: Any, gains: Any, spreads: Any, memory: float) -> Any:
+@compiled
+def _innovations(values: Any, weights: Any, memory: float, change: float, first: float) -> Any:
     count, width = values.shape
     out, expected = np.empty((count, width)), np.zeros(width)
+    unknown, logs = first, 0.0
     for sample in range(count):
+        total = unknown + 1.0 / weights[sample]
+        gain, spread = unknown / total, np.sqrt(total)
+        logs += np.log(spread)
         for column in range(width):
             new = values[sample, column] - expected[column]
-            out[sample, column] = new / spreads[sample]
-            expected[column] = memory * (expected[column] + gains[sample] * new)
-    return out
+            out[sample, column] = new / spread
+            expected[column] = memory * (expected[column] + gain * new)
+        unknown = memory * memory * unknown * (1.0 - gain) + change
+    return out, logs
 
 
-@_compile
+@compiled
+def _sum_of_innovations(segment: Any, weights: Any, memory: float, change: float, first: float) -> Any:
+    expected, unknown, squares, logs = 0.0, first, 0.0, 0.0
+    for sample in range(len(segment)):
+        total = unknown + 1.0 / weights[sample]
+        gain, new = unknown / total, segment[sample] - expected
+        squares += new * new / total
+        logs += 0.5 * np.log(total)
+        expected = memory * (expected + gain * new)
+        unknown = memory * memory * unknown * (1.0 - gain) + change
+    return squares, logs
+
+
+@compiled
 def _smooth(values: Any, variances: Any, memory: float, change: float, first: float, normals: Any) -> Any:
     count = len(values)
     mean, left = np.empty(count), np.empty(count)
@@ -230,7 +246,7 @@ def _smooth(values: Any, variances: Any, memory: float, change: float, first: fl
     return path, spread
 
 
-@_compile
+@compiled
 def _mixture_likelihood(values: Any, memory: float, change: float, first: float, weights: Any, nodes: Any) -> float:
     expected, unknown, total = 0.0, first, 0.0
     for sample in range(len(values)):

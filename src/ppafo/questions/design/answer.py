@@ -6,6 +6,7 @@ from typing import Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import quantity_of_unit
+from ppafo.questions.design.evaluation import SEARCHED_STREAMS
 from ppafo.questions.design.figure import design_figure
 from ppafo.questions.design.search import PATIENCE
 from ppafo.questions.design.solve import SHOWN_OBJECTIVES, Design, DesignPoint
@@ -38,7 +39,9 @@ def answer_of(design: Design) -> Answer:
         sections=(
             Section("The front", (_front_sentence(design),), is_detail=True),
             Section("Designs", table=Table(_head(design), rows, marked, left=2)),
-            Section(remarks=(f"suggested: {design.reason}", _search_sentence(design), *_failures(design))),
+            Section(
+                remarks=(f"suggested: {design.reason}", _search_sentence(design), *_noise(design), *_failures(design))
+            ),
             Section("Error, gas and mass", figure=figure, is_detail=True),
             _method_section(design),
             *doubts_sections(design.doubtful),
@@ -54,17 +57,19 @@ def front_table(design: Design) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     numbers = [f"{item.path} [{item.unit or '-'}]" for item in design.problem.variables]
-    writer.writerow(["valve", "actuator", "error [N m]", "gas [kg]", "mass [kg]", *numbers])
+    spread = ["error from noise [N m]", "gas from noise [kg]"] if design.streams else []
+    writer.writerow(["valve", "actuator", "error [N m]", "gas [kg]", "mass [kg]", *spread, *numbers])
     for point in design.front:
         values = [point.numbers.get(item.path, "") for item in design.problem.variables]
-        writer.writerow([point.valve.name, point.actuator.name, *point.objectives, *values])
+        writer.writerow([point.valve.name, point.actuator.name, *point.objectives, *(point.spread or ()), *values])
     return buffer.getvalue()
 
 
 def _head(design: Design) -> tuple[Column, ...]:
     titles = zip(("error", "gas per task", "mass"), SHOWN_OBJECTIVES.values(), (".3g", ".3g", ".4g"), strict=True)
     objectives = [Column(*title) for title in titles]
-    return Column("valve"), Column("actuator"), *objectives, *map(_variable_column, design.problem.variables)
+    spread = [Column("error from noise", SHOWN_OBJECTIVES["error"], ".2g")] if design.streams else []
+    return Column("valve"), Column("actuator"), *objectives, *spread, *map(_variable_column, design.problem.variables)
 
 
 def _variable_column(variable: Variable) -> Column:
@@ -77,7 +82,8 @@ def _variable_column(variable: Variable) -> Column:
 def _row(design: Design, point: DesignPoint) -> tuple[str | float | None, ...]:
     """Return parts, objectives and chosen numbers; None where a number means nothing for the valve."""
     numbers = [point.numbers.get(item.path) for item in design.problem.variables]
-    return point.valve.name, point.actuator.name, *point.objectives, *numbers
+    spread = [] if point.spread is None else [point.spread[0]]
+    return point.valve.name, point.actuator.name, *point.objectives, *spread, *numbers
 
 
 def _front_sentence(design: Design) -> str:
@@ -101,6 +107,18 @@ def _search_sentence(design: Design) -> str:
         f"are not dominated by any other; they cover {design.growth[-1][1]:.4f} of the box of the first designs, "
         f"and {ending}"
     )
+
+
+def _noise(design: Design) -> list[str]:
+    """Return how noise was dealt with; nothing without it."""
+    if not design.streams:
+        return []
+    fallen = f"; {design.fallen} that were good in the first streams alone are left out" if design.fallen else ""
+    return [
+        f"sensors are noisy: every design was tried in the same {SEARCHED_STREAMS} noise streams, keeping the "
+        f"constraints in each; error and gas above are means over {design.streams} new ones, in which the front was "
+        f"made again{fallen}. Error from noise is the standard deviation from one stream to another"
+    ]
 
 
 def _failures(design: Design) -> list[str]:
@@ -144,6 +162,7 @@ def _data(design: Design) -> dict[str, Any]:
         "suggested": design.knee,
         "reason": design.reason,
         "shown": list(design.shown),
+        "noise_streams": design.streams,
         "front": [_point_data(point) for point in design.front],
         "search": {
             "designs": design.designs,
@@ -167,5 +186,6 @@ def _point_data(point: DesignPoint) -> dict[str, Any]:
         "error": point.error,
         "gas": point.gas,
         "mass": point.mass,
+        "from_noise": None if point.spread is None else {"error": point.spread[0], "gas": point.spread[1]},
         "tasks": {name: {"error": error, "gas": gas} for name, (error, gas) in point.tasks.items()},
     }

@@ -1,6 +1,7 @@
 """What designs are worth: every candidate runs every task; error, gas, mass and violated constraints."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -14,47 +15,76 @@ from ppafo.questions.design.variables import DEAD_VOLUME, OWN, SIZE
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.numbers import TIMES, declared_numbers
 from ppafo.simulation.scenario import Scenario
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.noise import NOISE, with_noise
 
 Members = NDArray[np.intp]
 
+SEARCHED_STREAMS, FRESH_STREAMS = 16, 64
+"""Noise streams over which every candidate of a noisy task is judged, and those, all new, over which a front is."""
 _MAXIMUM_REASONS = 20
 _CHUNK = 16_384
 """Runs handed to the lanes at once: enough to fill them, little enough memory."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """What candidates are worth over all streams of noise, and what each task says of them.
+
+    ``tasks`` has the metrics (streams, candidates) by name for each task, ``error`` and ``gas`` (streams, candidates)
+    their weighted means over the tasks [N m], [kg]. There is one stream where no sensor is noisy.
+    """
+
+    worth: Worth
+    tasks: tuple[Mapping[str, Floats], ...]
+    error: Floats
+    gas: Floats
+
+
 @final
 class Evaluation:
-    """Evaluates candidates of a problem and remembers how many runs that took and why some failed."""
+    """Evaluates candidates of a problem and remembers how many runs that took and why some failed.
+
+    ``seeds`` (streams,) name the streams of noise that every candidate meets, the same for all; none where no
+    controller receives noise.
+    """
 
     def __init__(self, problem: DesignProblem, threads: int | None = None) -> None:
         self.problem = problem
         self.runs = 0
         self.failed = 0
         self.reasons: dict[str, str] = {}
+        self.seeds = noise_streams(problem, 0, SEARCHED_STREAMS)
         self._threads = threads
         own = (item.name for item in problem.constraints if item.name not in OBJECTIVES)
         self._metrics = tuple(dict.fromkeys([problem.error, GAS, *own]))
 
     def __call__(self, candidates: Candidates) -> Worth:
         """Return objectives (error [N m], gas [kg], mass [kg]) and the violation of the constraints."""
+        return self.judge(candidates, self.seeds).worth
+
+    def judge(self, candidates: Candidates, seeds: Floats) -> Judged:
+        """Return what candidates are worth over streams of noise: means of error and gas, constraints kept in each."""
         problem = self.problem
-        metrics = [self.metrics(task, candidates) for task in problem.tasks]
+        metrics = tuple(self.metrics(task, candidates, seeds) for task in problem.tasks)
         weights = [task.weight for task in problem.tasks]
         error, gas = (
-            sum(weight * found[name] for weight, found in zip(weights, metrics, strict=True))
+            np.sum([weight * found[name] for weight, found in zip(weights, metrics, strict=True)], axis=0)
             for name in (problem.error, GAS)
         )
-        objectives = np.stack([np.asarray(error), np.asarray(gas), self.masses(candidates)], axis=1)
-        return Worth(objectives, self._violation(candidates, objectives, metrics))
+        objectives = np.stack([error.mean(axis=0), gas.mean(axis=0), self.masses(candidates)], axis=1)
+        worth = Worth(objectives, self._violation(candidates, objectives, metrics))
+        return Judged(worth, metrics, error, gas)
 
-    def metrics(self, task: Task, candidates: Candidates) -> dict[str, Floats]:
-        """Return the metrics (candidates,) of a task by name; nan where a run failed."""
-        found = {name: np.full(len(candidates), np.nan) for name in self._metrics}
+    def metrics(self, task: Task, candidates: Candidates, seeds: Floats) -> dict[str, Floats]:
+        """Return the metrics (streams, candidates) of a task by name; nan where a run failed."""
+        streams = max(1, seeds.size)
+        found = {name: np.full((streams, len(candidates)), np.nan) for name in self._metrics}
         for valve, members in self._by_valve(candidates):
             scenario = task.scenarios[valve.kind]
-            for start in range(0, members.size, _CHUNK):
-                part = members[start : start + _CHUNK]
-                self._run(task, scenario, candidates.at(part), part, found)
+            for start in range(0, members.size, max(1, _CHUNK // streams)):
+                part = members[start : start + max(1, _CHUNK // streams)]
+                self._run(task, scenario, candidates.at(part), part, seeds, found)
         return found
 
     def masses(self, candidates: Candidates) -> Floats:
@@ -73,24 +103,35 @@ class Evaluation:
         return [(valves[str(name)], np.flatnonzero(names == name)) for name in np.unique(names)]
 
     def _run(
-        self, task: Task, scenario: Scenario, candidates: Candidates, members: Members, found: dict[str, Floats]
+        self,
+        task: Task,
+        scenario: Scenario,
+        candidates: Candidates,
+        members: Members,
+        seeds: Floats,
+        found: dict[str, Floats],
     ) -> None:
         columns = design_columns(self.problem, scenario, candidates)
+        streams = max(1, seeds.size)
+        if seeds.size:
+            columns = {path: np.tile(values, streams) for path, values in columns.items()}
+            columns[NOISE] = np.repeat(seeds, members.size)
         result = run_ensemble(scenario, columns, self._metrics, threads=self._threads)
         for name, values in result.metrics.items():
-            found[name][members] = values
-        self.runs += members.size
+            found[name][:, members] = values.reshape(streams, members.size)
+        self.runs += streams * members.size
         self.failed += int(np.count_nonzero(result.status != COMPLETED))
         for reason in list(result.reasons.values())[: _MAXIMUM_REASONS - len(self.reasons)]:
             self.reasons.setdefault(reason, task.name)
 
-    def _violation(self, candidates: Candidates, objectives: Floats, metrics: list[dict[str, Floats]]) -> Floats:
+    def _violation(self, candidates: Candidates, objectives: Floats, metrics: Sequence[Mapping[str, Floats]]) -> Floats:
         total = np.zeros(len(candidates))
-        own: Mapping[str, Floats] = dict(zip(OBJECTIVES, objectives.T, strict=True))
+        own: Mapping[str, Floats] = dict(zip(OBJECTIVES, objectives.T[:, None, :], strict=True))
         for item in self.problem.constraints:
             series = [own[item.name]] if item.name in own else [found[item.name] for found in metrics]
             for values in series:
-                total += _excess(values, item.most, 1.0) + _excess(values, item.least, -1.0)
+                beyond = _excess(values, item.most, 1.0) + _excess(values, item.least, -1.0)
+                total += beyond.max(axis=0)
         total += self._over_rating(candidates)
         return np.where(np.isfinite(objectives).all(axis=1) & np.isfinite(total), total, np.inf)
 
@@ -120,10 +161,17 @@ class Evaluation:
 
 
 def _excess(values: Floats, limit: float | None, sign: float) -> Floats:
-    """Return by what fraction of a limit (candidates,) values are beyond it; 0 where they keep it or there is none."""
+    """Return by what fraction of a limit values are beyond it, each; 0 where they keep it or there is none."""
     if limit is None:
-        return np.zeros(values.size)
+        return np.zeros_like(values)
     return np.maximum(0.0, sign * (values - limit) / max(abs(limit), 1.0e-12))
+
+
+def noise_streams(problem: DesignProblem, first: int, count: int) -> Floats:
+    """Return the seeds of streams of noise, from number ``first`` on; none where no controller receives noise."""
+    scenarios = [scenario for task in problem.tasks for scenario in task.scenarios.values()]
+    noise = Uncertainty(with_noise((), None, scenarios, [item.path for item in problem.variables])[0])
+    return noise.random_columns(first, count, problem.search.seed)[NOISE] if noise.has_noise else np.zeros(0)
 
 
 def values_of(problem: DesignProblem, candidates: Candidates) -> dict[str, Floats]:

@@ -20,6 +20,7 @@ from ppafo.questions.design.variables import Variable, VariableTable, read_varia
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.studies.noise import NOISE
 from ppafo.units import parse_quantity
 
 FILE = TomlKind("design", "design", resources.files("ppafo.questions.design") / "library", StudyError)
@@ -183,6 +184,8 @@ def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProb
         raise StudyError(
             f"{file}: error = '{document.error}' is not an error in N m{hint}; available are {', '.join(_errors())}"
         )
+    if NOISE in document.variables:
+        raise StudyError(f"{file}: variables.'{NOISE}': every design meets the same noise, so it cannot be searched")
     search = document.search
     by_kind = {kind: [task.scenarios[kind] for task in tasks] for kind in tasks[0].scenarios}
     valves = [item.valve for item in combinations]

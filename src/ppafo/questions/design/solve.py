@@ -12,9 +12,16 @@ from ppafo.answers.display_units import change_text
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
 from ppafo.progress import Report, report_nothing
-from ppafo.questions.design.evaluation import Evaluation, values_of
+from ppafo.questions.design.evaluation import (
+    FRESH_STREAMS,
+    SEARCHED_STREAMS,
+    Evaluation,
+    Judged,
+    noise_streams,
+    values_of,
+)
 from ppafo.questions.design.file import GAS, DesignProblem, load_design, with_seed
-from ppafo.questions.design.front import Candidates, Floats, knee, representatives
+from ppafo.questions.design.front import Candidates, Floats, knee, non_dominated, representatives
 from ppafo.questions.design.search import Front, search_front
 
 SHOWN_OBJECTIVES = {"error": "torque", "gas": "gas mass", "mass": "part mass"}
@@ -25,7 +32,8 @@ SHOWN_OBJECTIVES = {"error": "torque", "gas": "gas mass", "mass": "part mass"}
 class DesignPoint:
     """A design that no other design found beats: parts, chosen numbers [SI] by path, error [N m], gas and mass [kg].
 
-    ``tasks`` has error and gas of each task by its name.
+    ``tasks`` has error and gas of each task by its name. Where sensors are noisy all are means over ``FRESH_STREAMS``
+    new streams of noise, and ``spread`` has the standard deviations of error and gas from one stream to another.
     """
 
     valve: Part
@@ -35,6 +43,7 @@ class DesignPoint:
     gas: float
     mass: float
     tasks: Mapping[str, tuple[float, float]]
+    spread: tuple[float, float] | None = None
 
     @property
     def objectives(self) -> tuple[float, float, float]:
@@ -48,7 +57,8 @@ class Design(Solved):
 
     ``front`` is in order of error. ``shown`` are places in it that stand for all of it in a table, ``knee`` is the
     place of the suggestion and ``reason`` states why. ``growth`` has pairs of designs evaluated and hypervolume [-];
-    ``failures`` maps the reason of a failed run to the task it failed in.
+    ``failures`` maps the reason of a failed run to the task it failed in. ``streams`` is how many new streams of noise
+    the front was judged over, 0 without noise, and ``fallen`` how many of its designs did not stand there.
     """
 
     problem: DesignProblem
@@ -63,6 +73,8 @@ class Design(Solved):
     failed: int
     failures: Mapping[str, str]
     seconds: float
+    streams: int = 0
+    fallen: int = 0
 
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
@@ -96,7 +108,13 @@ def design(
     front = search_front(evaluation, len(chosen.combinations), len(chosen.variables), chosen.search, report)
     if len(front.candidates) == 0:
         raise StudyError(_reason_for_no_design(chosen, evaluation, front))
-    points = _points(evaluation, front)
+    candidates, judged = _standing(evaluation, front)
+    if len(candidates) == 0:
+        raise StudyError(
+            f"{chosen.file}: none of {len(front.candidates)} designs of the front keeps the constraints in "
+            f"{FRESH_STREAMS} new streams of sensor noise; relax them"
+        )
+    points = _points(evaluation.problem, candidates, judged)
     table = objective_table(points)
     return Design(
         problem=chosen,
@@ -111,16 +129,35 @@ def design(
         failed=evaluation.failed,
         failures=dict(evaluation.reasons),
         seconds=time.perf_counter() - begun,
+        streams=FRESH_STREAMS if evaluation.seeds.size else 0,
+        fallen=len(front.candidates) - len(points),
     )
 
 
-def _points(evaluation: Evaluation, front: Front) -> tuple[DesignPoint, ...]:
-    """Return the front in order of error, with what each task reports of each design."""
-    problem = evaluation.problem
-    order = np.lexsort(front.worth.objectives.T[::-1])
-    candidates, objectives = front.candidates.at(order), front.worth.objectives[order]
-    numbers = values_of(problem, candidates)
-    tasks = {task.name: evaluation.metrics(task, candidates) for task in problem.tasks}
+def _standing(evaluation: Evaluation, front: Front) -> tuple[Candidates, Judged]:
+    """Return the designs of a front in order of error, as they are judged; with noise over streams that are new.
+
+    The search chose what was good in its own streams, by luck too; of the new ones the front is made again.
+    """
+    chosen = front.candidates
+    judged = evaluation.judge(chosen, noise_streams(evaluation.problem, SEARCHED_STREAMS, FRESH_STREAMS))
+    worth = judged.worth
+    stand = (
+        np.flatnonzero(non_dominated(worth) & worth.is_feasible) if evaluation.seeds.size else np.arange(len(chosen))
+    )
+    order = stand[np.lexsort(worth.objectives[stand].T[::-1])]
+    tasks = tuple({name: values[:, order] for name, values in task.items()} for task in judged.tasks)
+    return chosen.at(order), Judged(worth.at(order), tasks, judged.error[:, order], judged.gas[:, order])
+
+
+def _points(problem: DesignProblem, candidates: Candidates, judged: Judged) -> tuple[DesignPoint, ...]:
+    """Return designs with what each task reports of each."""
+    objectives, numbers = judged.worth.objectives, values_of(problem, candidates)
+    means = {
+        task.name: (found[problem.error].mean(axis=0), found[GAS].mean(axis=0))
+        for task, found in zip(problem.tasks, judged.tasks, strict=True)
+    }
+    is_noisy = len(judged.error) > 1
     return tuple(
         DesignPoint(
             valve=problem.combinations[int(candidates.choice[row])].valve,
@@ -131,10 +168,15 @@ def _points(evaluation: Evaluation, front: Front) -> tuple[DesignPoint, ...]:
             error=float(objectives[row, 0]),
             gas=float(objectives[row, 1]),
             mass=float(objectives[row, 2]),
-            tasks={name: (float(found[problem.error][row]), float(found[GAS][row])) for name, found in tasks.items()},
+            tasks={name: (float(error[row]), float(gas[row])) for name, (error, gas) in means.items()},
+            spread=_spread(judged, row) if is_noisy else None,
         )
         for row in range(len(candidates))
     )
+
+
+def _spread(judged: Judged, row: int) -> tuple[float, float]:
+    return float(judged.error[:, row].std(ddof=1)), float(judged.gas[:, row].std(ddof=1))
 
 
 def _applies(problem: DesignProblem, candidates: Candidates, row: int, path: str) -> bool:

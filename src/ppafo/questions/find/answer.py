@@ -73,11 +73,23 @@ def remarks(found: Found) -> list[str]:
             f"the condition changes {found.changes} times over the range, so it is not met everywhere "
             f"{'below' if found.is_highest else 'above'} this value; see the table and the figure"
         )
+    if found.streams:
+        said.append(_noise(found))
     if found.failures:
-        said.append(
-            f"{found.failures} of {found.values.size} runs failed and count as not met; the first: {found.reason}"
-        )
+        runs = found.values.size * max(1, found.streams)
+        said.append(f"{found.failures} of {runs} runs failed and count as not met; the first: {found.reason}")
     return said
+
+
+def _noise(found: Found) -> str:
+    said = f"sensors are noisy: the metric is the mean over {found.streams} noise streams, the same for all values"
+    if found.value is None:
+        return said
+    change = change_text(found.spread_at(found.value), metric_quantity(found.condition.metric))
+    return (
+        f"{said}; at the value that was found it varies by {change} (standard deviation) from stream to stream, so a "
+        "single run may miss the condition there"
+    )
 
 
 def stretches(found: Found) -> list[tuple[float, float]]:
@@ -124,7 +136,8 @@ def _data(found: Found) -> dict[str, Any]:
         "changes": found.changes,
         "met": [list(ends) for ends in stretches(found)],
         "remarks": remarks(found),
-        "runs": found.values.size,
+        "noise_streams": found.streams,
+        "runs": found.values.size * max(1, found.streams),
         "failed": found.failures,
         "tried": [
             {"value": value, "metric": metric, "is_of_grid": bool(on_grid)}

@@ -14,6 +14,8 @@ from ppafo.progress import Report
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.configurations import with_overrides
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.noise import NOISE, with_noise
 from ppafo.studies.outcomes import Outcomes, Tally, check_metrics, level_of, scenario_model
 from ppafo.studies.varying import VariedPath, varied_path
 from ppafo.units import split_quantity
@@ -23,9 +25,12 @@ Floats = NDArray[np.float64]
 DEFAULT_GRID, FEWEST, MOST = 64, 3, 100_000
 PARTS = 32
 """Parts into which a bracket is divided: that many runs side by side take little longer than one."""
+STREAMS = 16
+"""Noise streams over which every value is tried where sensors are noisy, the same for all."""
 ACCURACY = 1.0e-6
 """Width of the last bracket, as a fraction of the range."""
 
+_SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
@@ -51,7 +56,9 @@ class Found(Solved):
     ``value`` meets the condition and ``beyond`` does not, the next one that was tried; None where the range ends there.
     ``values`` and ``metrics`` [SI] (runs,) are all that were tried, in ascending order, nan where a run failed;
     ``grid`` (runs,) is true for those of the first grid. ``changes`` counts how often neighbours among them differ in
-    meeting the condition: more than once says that the condition is met in several stretches.
+    meeting the condition: more than once says that the condition is met in several stretches. Where sensors are noisy
+    metrics are means over ``streams`` streams of noise, and ``spread`` (runs,) is the standard deviation from one to
+    another; else there are no streams and no spread.
     """
 
     scenario: Scenario
@@ -65,6 +72,8 @@ class Found(Solved):
     grid: NDArray[np.bool_]
     failures: int
     reason: str
+    streams: int
+    spread: Floats
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
@@ -79,6 +88,10 @@ class Found(Solved):
     def metric_at(self, value: float) -> float:
         """Return the metric [SI] at a value that was tried."""
         return float(self.metrics[np.searchsorted(self.values, value)])
+
+    def spread_at(self, value: float) -> float:
+        """Return the standard deviation of the metric [SI] from one stream of noise to another, at a value tried."""
+        return float(self.spread[np.searchsorted(self.values, value)])
 
 
 def find(
@@ -105,7 +118,10 @@ def find(
     condition = _condition(such_that, base)
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
-    search = _Search(path.path, condition, scenario_model(base, [condition.metric], threads, Tally(grid, progress).add))
+    noise = Uncertainty(with_noise((), None, [base], [path.path])[0])
+    seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
+    tally = Tally(grid * max(1, seeds.size), progress)
+    search = _Search(path.path, condition, scenario_model(base, [condition.metric], threads, tally.add), seeds)
     search.run(np.linspace(low, high, grid))
     if not np.isfinite(search.metrics).any():
         raise StudyError(
@@ -130,23 +146,34 @@ def find(
         order < grid,
         search.failures,
         search.reason,
+        seeds.size,
+        search.spread[order],
     )
 
 
 class _Search:
     """What was tried so far."""
 
-    def __init__(self, path: str, condition: Condition, model: Callable[[dict[str, Floats]], Outcomes]) -> None:
-        self._path, self._condition, self._model = path, condition, model
+    def __init__(
+        self, path: str, condition: Condition, model: Callable[[dict[str, Floats]], Outcomes], seeds: Floats
+    ) -> None:
+        self._path, self._condition, self._model, self._seeds = path, condition, model, seeds
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
+        self.spread: Floats = np.empty(0)
         self.failures, self.reason = 0, ""
 
     def run(self, values: Floats) -> None:
-        """Try values."""
-        outcomes = self._model({self._path: values})
+        """Try values, each over all streams of noise."""
+        streams = max(1, self._seeds.size)
+        columns = {self._path: np.tile(values, streams)}
+        if self._seeds.size:
+            columns[NOISE] = np.repeat(self._seeds, values.size)
+        outcomes = self._model(columns)
+        found = outcomes.metrics[self._condition.metric].reshape(streams, values.size)
         self.values = np.concatenate([self.values, values])
-        self.metrics = np.concatenate([self.metrics, outcomes.metrics[self._condition.metric]])
+        self.metrics = np.concatenate([self.metrics, found.mean(axis=0)])
+        self.spread = np.concatenate([self.spread, found.std(axis=0, ddof=min(1, streams - 1))])
         self.failures += outcomes.failures
         self.reason = self.reason or outcomes.reason
 

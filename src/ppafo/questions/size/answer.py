@@ -147,6 +147,11 @@ def _remarks(sizing: Sizing) -> list[str]:
     failed = sum(sizing.failures.values())
     failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
     remarks = [f"{item.valve.name}: {item.remark}" for item in sizing.valves if item.remark]
+    if sizing.streams:
+        remarks.append(
+            f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; its error is the "
+            "largest of them, its gas the mean"
+        )
     return [*remarks, f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}"]
 
 
@@ -189,6 +194,7 @@ def _data(sizing: Sizing, suggestion: str) -> dict[str, Any]:
         "summary": suggestion,
         "valves": [_valve_data(item) for item in sizing.valves],
         "other_chambers": [asdict(one) for one in sizing.others],
+        "noise_streams": sizing.streams,
         "runs": sizing.runs,
         "failures": [{"reason": reason, "runs": count} for reason, count in sizing.failures.items()],
         "doubtful": doubts_data(sizing.doubtful),

@@ -16,6 +16,8 @@ from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
 from ppafo.questions.size.file import SizingProblem
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.noise import NOISE
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +35,9 @@ _OPENINGS = ("valve.area", "valve.sonic_conductance")
 _CHUNK = 16_384
 """Runs handed to the lanes at once."""
 
+STREAMS = 16
+"""Noise streams in each of which a limit must be kept, the same for all trials, where sensors are noisy."""
+_SEED = 1
 GRID = 17
 """Pressures of a grid."""
 FINENESS = 0.1 * PASCALS_PER_PSI
@@ -67,7 +72,8 @@ class Trial:
 class Trials:
     """Runs trials of a problem and counts the runs and their failures.
 
-    ``gain_sets`` (sets, gains) has every combination of the gain factors, one for each gain.
+    ``gain_sets`` (sets, gains) has every combination of the gain factors, one for each gain. ``seeds`` name the streams
+    of noise that every trial meets, its error being the largest and its gas the mean; none where there is no noise.
     """
 
     def __init__(self, problem: SizingProblem, threads: int | None = None) -> None:
@@ -75,11 +81,13 @@ class Trials:
         self.gain_sets: Floats = np.array(list(product(problem.gain_factors, repeat=len(problem.gains))))
         self.runs = 0
         self.failures: dict[str, int] = {}
+        self.seeds = _noise_streams(problem)
         self._threads = threads
 
     def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
         """Return what came of a valve at pressures [Pa absolute], with sets of gains and factors on its opening."""
-        parts = [slice(start, start + _CHUNK) for start in range(0, pressure.size, _CHUNK)]
+        chunk = max(1, _CHUNK // max(1, self.seeds.size))
+        parts = [slice(start, start + chunk) for start in range(0, pressure.size, chunk)]
         found = [self._run(valve, pressure[part], gains[part], opening[part]) for part in parts]
         error, gas = (np.concatenate([item[name] for item in found]) for name in (ERROR, GAS))
         return Trial(error, gas / self.problem.simulated, gains)
@@ -106,12 +114,16 @@ class Trials:
         return {path: float(factor * settings[path.rpartition(".")[2]]) for path, factor in pairs}
 
     def _run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
-        columns = self.columns(valve, pressure, gains, opening)
+        columns, streams = self.columns(valve, pressure, gains, opening), max(1, self.seeds.size)
+        if self.seeds.size:
+            columns = {path: np.tile(values, streams) for path, values in columns.items()}
+            columns[NOISE] = np.repeat(self.seeds, pressure.size)
         result = run_ensemble(self.problem.scenario, columns, (ERROR, GAS), threads=self._threads)
-        self.runs += pressure.size
+        self.runs += streams * pressure.size
         for reason in result.reasons.values():
             self.failures[reason] = self.failures.get(reason, 0) + 1
-        return result.metrics
+        error, gas = (result.metrics[name].reshape(streams, pressure.size) for name in (ERROR, GAS))
+        return {ERROR: error.max(axis=0), GAS: gas.mean(axis=0)}
 
     def columns(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
         """Return the columns of trials in SI: figures of the parts, both supply pressures, gains."""
@@ -250,3 +262,8 @@ def flow_margin(trials: Trials, valve: Part, pressure: float) -> float:
             break
         smallest = opening
     return 1.0 - smallest
+
+
+def _noise_streams(problem: SizingProblem) -> Floats:
+    noise = Uncertainty(()).with_noise_of([problem.scenario])
+    return noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)

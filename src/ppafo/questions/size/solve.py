@@ -78,6 +78,7 @@ class Sizing(Solved):
 
     ``recording`` is the suggestion on the profile, None without one. ``failures`` maps reasons of failed runs to how
     many had them. ``others`` is the suggestion with other readings of the paper's chambers.
+    ``streams`` of noise were met by every trial, its error the largest of them; 0 without noise.
     """
 
     problem: SizingProblem
@@ -88,6 +89,7 @@ class Sizing(Solved):
     failures: Mapping[str, int]
     seconds: float
     others: tuple[OtherChambers, ...]
+    streams: int = 0
 
     @property
     def choice(self) -> SizedValve | None:
@@ -132,6 +134,7 @@ def size(problem: SizingProblem | str | Path, threads: int | None = None, progre
         failures=dict(trials.failures),
         seconds=time.perf_counter() - begun,
         others=others,
+        streams=trials.seeds.size,
     )
 
 

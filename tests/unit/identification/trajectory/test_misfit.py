@@ -167,8 +167,11 @@ def test_the_posterior_is_a_tree_that_arviz_reads(right: list[TrajectoryFit]) ->
     # Of 200 draws 95 % with a standard error of 1.5 %.
     assert 0.89 < float(np.mean(inside)) < 0.995
     assert tree["posterior"].attrs["kind"] == "synthetic"
-    arviz = pytest.importorskip("arviz", reason="arviz is not installed")
-    assert "foot_plate.inertia" in arviz.summary(tree, var_names=["foot_plate.inertia"]).index
+    arviz = pytest.importorskip("arviz_stats", reason="ArviZ is not installed, or is older than its DataTree")
+    told = arviz.summary(tree).loc["foot_plate.inertia"]
+    # ArviZ judges the draws: two chains of one distribution, and nearly as good as independent ones.
+    assert told["r_hat"] < 1.03
+    assert told["ess_bulk"] > 80.0
 
 
 def test_a_bench_richer_than_the_model_identifies_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,8 @@ from scipy.signal import lfilter
 from benchmarks.intervals.calibration import FIVE_PARAMETERS, Task, repetition
 from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit
-from ppafo.identification.trajectory.posterior import LinearModel, draw_posterior
+from ppafo.identification.trajectory.information import inverse_with_root, solution
+from ppafo.identification.trajectory.posterior import LinearModel, _without_columns, draw_posterior
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.sensor_noise import SensorNoise, sensor_noise, t_likelihood
 from ppafo.identification.trajectory.weighing import hum_of
@@ -42,7 +43,7 @@ def test_an_autoregression_whitens_like_the_root_of_its_covariance() -> None:
     covariance = by_lag[np.abs(np.subtract.outer(np.arange(count), np.arange(count)))]
     rows, spreads = shape.rows(np.eye(count), np.ones(count))
     assert rows @ covariance @ rows.T == pytest.approx(np.eye(count), abs=1e-9)
-    assert 2.0 * float(np.sum(spreads)) == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+    assert 2.0 * spreads == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
 
 
 @pytest.mark.parametrize("is_zeroed", [False, True])
@@ -57,7 +58,7 @@ def test_a_drift_whitens_like_the_root_of_its_covariance(is_zeroed: bool) -> Non
     covariance = response @ change @ response.T + np.diag(1.0 / weights)
     rows, spreads = drift.rows(np.eye(count), weights)
     assert rows @ covariance @ rows.T == pytest.approx(np.eye(count), abs=1e-9)
-    assert 2.0 * float(np.sum(spreads)) == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+    assert 2.0 * spreads == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
 
 
 def test_the_mean_of_a_drift_given_samples_is_that_of_its_covariance() -> None:
@@ -98,6 +99,34 @@ def test_statsmodels_gives_the_same_likelihood_of_an_autoregression() -> None:
     judge = arima.ARIMA(values, order=(order, 0, 0), trend="n")
     numbers = np.append(noise.shape.predictors[order, :order], noise.levels[0] ** 2)
     assert judge.loglike(numbers) == pytest.approx(noise.likelihood, rel=1e-6)
+
+
+def test_statsmodels_gives_the_same_likelihood_of_a_drift_under_white_noise() -> None:
+    structural = pytest.importorskip("statsmodels.tsa.statespace.structural", reason="statsmodels is not installed")
+    (values,) = drawn("drift", 6, 1)
+    drift, level = Drift(0.3, 0.9), 1.1
+    judge = structural.UnobservedComponents(values, irregular=True, autoregressive=1)
+    judge.ssm.initialize_stationary()
+    judge.loglikelihood_burn = 0
+    numbers = np.array([level**2, drift.ratio * level**2, drift.memory])
+    square, spread = drift.square(values / level, np.ones(COUNT))
+    own = -0.5 * square - spread - COUNT * (0.5 * math.log(2.0 * math.pi) + math.log(level))
+    assert judge.loglike(numbers) == pytest.approx(own, rel=1e-9)
+
+
+def test_statsmodels_gives_the_same_generalised_least_squares() -> None:
+    linear = pytest.importorskip("statsmodels.regression.linear_model", reason="statsmodels is not installed")
+    process = pytest.importorskip("statsmodels.tsa.arima_process", reason="statsmodels is not installed")
+    slopes = np.vander(np.linspace(-1.0, 1.0, COUNT), 3)
+    values = slopes @ [0.5, -1.0, 2.0] + drawn("slow", 8, 1)[0]
+    shape = from_coefficients(np.array([0.9, 0.05, -0.1]))
+    assert shape is not None
+    by_lag = process.ArmaProcess(ar=[1.0, -0.9, -0.05, 0.1]).acovf(COUNT)
+    judge = linear.GLS(values, slopes, sigma=by_lag[np.abs(np.subtract.outer(range(COUNT), range(COUNT)))]).fit()
+    rows, _ = shape.rows(np.column_stack([slopes, values]), np.ones(COUNT))
+    products = rows.T @ rows
+    assert solution(products[:3, :3], products[:3, 3]) == pytest.approx(judge.params, rel=1e-7)
+    assert inverse_with_root(products[:3, :3])[0] == pytest.approx(judge.normalized_cov_params, rel=1e-7)
 
 
 def test_reflection_coefficients_of_an_autoregression_are_found() -> None:
@@ -149,6 +178,36 @@ def test_noise_that_was_given_is_not_taken_to_be_less() -> None:
     small = [0.5 * one for one in drawn("white", 13)]
     assert sensor_noise(small, is_given=True).levels == pytest.approx([1.0, 1.0])
     assert sensor_noise(small).levels == pytest.approx([0.5, 0.5], rel=0.1)
+
+
+@pytest.mark.parametrize("twin", [False, True])
+def test_the_likelihood_without_columns_is_that_of_the_covariance_with_them(twin: bool) -> None:
+    random = np.random.default_rng(5)
+    slopes = random.standard_normal((30, 3))
+    if twin:
+        slopes[:, 2] = slopes[:, 1] * (1.0 + 1.0e-6)
+    values, precision = random.standard_normal(30), np.diag([2.0, 0.5, 1.0])
+    model = LinearModel(np.column_stack([slopes, values]), ((slice(0, 30),),), np.zeros(3), precision)
+    products = model.columns.T @ model.columns
+    # Columns of normal size integrated out widen the covariance of the samples.
+    covariance = np.eye(30) + slopes @ np.linalg.inv(precision) @ slopes.T
+    sign, logarithm = np.linalg.slogdet(covariance)
+    expected = -0.5 * float(values @ np.linalg.solve(covariance, values)) - 0.5 * logarithm
+    constant = 0.5 * float(np.linalg.slogdet(precision)[1])
+    assert sign > 0.0
+    assert _without_columns(model, products) + constant == pytest.approx(expected, rel=1e-9)
+
+
+def test_columns_that_nothing_tells_apart_are_left_to_the_eigenvalues() -> None:
+    random = np.random.default_rng(5)
+    slopes = random.standard_normal((30, 2))
+    model = LinearModel(
+        np.column_stack([slopes, slopes[:, 1], random.standard_normal(30)]),
+        ((slice(0, 30),),),
+        np.zeros(3),
+        np.zeros((3, 3)),
+    )
+    assert math.isfinite(_without_columns(model, model.columns.T @ model.columns))
 
 
 def test_with_white_noise_the_posterior_is_that_of_least_squares() -> None:

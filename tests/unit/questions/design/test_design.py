@@ -8,11 +8,13 @@ import jsonschema
 import numpy as np
 import pytest
 
-from ppafo.errors import PpafoError
-from ppafo.questions.design.evaluation import Evaluation, design_columns
+from ppafo.errors import PpafoError, StudyError
+from ppafo.questions.design.answer import answer_of, front_table
+from ppafo.questions.design.evaluation import Evaluation, design_columns, noise_streams
 from ppafo.questions.design.file import json_schema, load_design
 from ppafo.questions.design.front import Candidates
 from ppafo.questions.design.solve import Design, design
+from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
 
@@ -131,6 +133,56 @@ def test_the_same_seed_gives_the_same_designs(study: Design, folder: Path) -> No
     again = design(load_design(folder / "small.toml"), threads=1)
     assert [point.objectives for point in again.front] == [point.objectives for point in study.front]
     assert study.designs == 64 + 2 * 16
+
+
+NOISY = (
+    FILE.replace('[variables."controller.rate"]\nvalues = ["200 Hz", "1 kHz"]\n', "")
+    .replace('reference.level=4 N m"]', 'reference.level=4 N m", "sensors.pressure_noise=1 kPa_d"]')
+    .replace('"1.5 N m"', '"2.5 N m"')
+)
+
+
+def test_a_noisy_design_is_worth_its_mean_over_noise_that_the_search_never_met(folder: Path) -> None:
+    (folder / "noisy.toml").write_text(NOISY)
+    (folder / "seed.toml").write_text(NOISY.replace("1 kPa_d", '1 kPa_d", "sensors.seed=9'))
+    study, other = design(folder / "noisy.toml"), design(folder / "seed.toml")
+    # The seed of the scenario is one realisation of many: it decides nothing.
+    assert [point.objectives for point in other.front] == [point.objectives for point in study.front]
+    point, fresh = study.front[0], noise_streams(study.problem, 16, 64)
+    assert not set(fresh) & set(noise_streams(study.problem, 0, 16))
+    size, pressure = point.numbers["actuator.size"], point.numbers["supply.pressure"]
+    numbers = point.valve.model_numbers | {
+        "actuator.torque_constant": size * point.actuator.values["torque_constant"],
+        "actuator.volume_per_angle": size * point.actuator.values["volume_per_angle"],
+        "actuator.dead_volume_1": point.numbers["actuator.dead_volume"],
+        "actuator.dead_volume_2": point.numbers["actuator.dead_volume"],
+        "supply.pressure": pressure,
+        "supply.dorsiflexion_pressure": pressure,
+    }
+    columns = {path: np.full(64, number) for path, number in numbers.items()} | {"sensors.seed": fresh}
+    error = np.zeros(64)
+    for task in study.problem.tasks:
+        error += task.weight * run_ensemble(task.scenarios["proportional"], columns, ["rms_error"]).metrics["rms_error"]
+    assert point.error == pytest.approx(error.mean(), rel=1e-9)
+    assert point.spread is not None
+    assert point.spread[0] == pytest.approx(error.std(ddof=1), rel=1e-6)
+    assert point.spread[0] > 0.0
+    assert study.streams == 64
+    text = front_table(study).splitlines()[0]
+    assert "error from noise [N m]" in text
+    assert any("noise streams" in remark for remark in answer_of(study).sections[2].remarks)
+
+
+def test_without_noise_there_is_one_run_of_each_design_and_no_word_of_noise(study: Design) -> None:
+    assert study.streams == 0
+    assert all(point.spread is None for point in study.front)
+    assert "noise" not in front_table(study)
+
+
+def test_noise_cannot_be_searched(folder: Path) -> None:
+    (folder / "searched.toml").write_text(f'{NOISY}\n[variables."sensors.seed"]\nlowest = "1"\nhighest = "9"\n')
+    with pytest.raises(StudyError, match="every design meets the same noise"):
+        load_design(folder / "searched.toml")
 
 
 def test_a_part_without_dynamics_on_its_data_sheet_is_ideal(folder: Path) -> None:

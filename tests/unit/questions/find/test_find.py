@@ -153,3 +153,37 @@ def test_the_command_prints_the_value_and_fails_where_there_is_none(capsys: pyte
     assert "no supply.pressure from 40 psi_g to 55 psi_g meets" in capsys.readouterr().out
     assert main([*words, "--set", "reference.level=4 N m", "--highest", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["wanted"] == "highest"
+
+
+def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenario(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A formula [N m] whose noise is 0.5 N m, a function of the seed alone, in place of a simulation."""
+    seen: list[Floats] = []
+
+    def noise(seeds: Floats) -> Floats:
+        return np.array([0.5 * np.random.default_rng(int(seed)).standard_normal() for seed in seeds])
+
+    def model(columns: Mapping[str, Floats]) -> Outcomes:
+        pressure, seeds = columns["supply.pressure"] / BAR, columns["sensors.seed"]
+        seen.append(seeds)
+        return Outcomes({"final_error": 6.3 - pressure + noise(seeds)}, np.zeros(pressure.size, dtype=bool), "")
+
+    monkeypatch.setattr(solve, "scenario_model", lambda *_: model)
+    found = [
+        find(TASK, RANGE, LIMIT, overrides=["sensors.pressure_noise=1 kPa_d", f"sensors.seed={seed}"])
+        for seed in (1, 2)
+    ]
+    streams = np.unique(np.concatenate(seen))
+    assert streams.size == found[0].streams == 16
+    assert found[0].value is not None
+    assert found[0].value / BAR == pytest.approx(5.3 + noise(streams).mean(), abs=8.0 * ACCURACY)
+    assert found[1].value == found[0].value
+    assert found[0].spread_at(found[0].value) == pytest.approx(noise(streams).std(ddof=1))
+    assert "mean over 16 noise streams" in remarks(found[0])[-1]
+
+
+def test_ideal_sensors_need_one_run_of_each_value(of_curve: Callable[..., Found]) -> None:
+    found = of_curve(lambda p: 6.3 - p)
+    assert found.streams == 0
+    assert not any("noise" in remark for remark in remarks(found))

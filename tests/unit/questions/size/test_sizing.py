@@ -4,6 +4,7 @@ import dataclasses
 import re
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import jsonschema
 import numpy as np
@@ -13,9 +14,10 @@ from ppafo.answers.text import text_of
 from ppafo.control.tabulated import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
+from ppafo.questions.size import search
 from ppafo.questions.size.file import json_schema, load_sizing
 from ppafo.questions.size.profile import choose_knots
-from ppafo.questions.size.search import Trials, ceiling, ceiling_pressure, cut_error
+from ppafo.questions.size.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.questions.size.solve import Sizing, size, smallest_bottle
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -272,3 +274,29 @@ def test_an_actuator_of_its_own_has_no_other_chambers(folder: Path) -> None:
     found = size(path)
     assert found.choice is not None
     assert found.others == ()
+
+
+def test_a_limit_is_kept_in_every_noise_stream_and_the_seed_of_the_scenario_decides_nothing(
+    sizing: Sizing, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Error [N m] and gas [kg] from the seed alone stand in for runs."""
+    problem, seen = sizing.problem, []
+
+    def run(_scenario: object, columns: dict[str, Floats], _metrics: object, threads: int | None = None) -> object:
+        seeds = columns["sensors.seed"]
+        seen.append(seeds)
+        error = np.array([np.random.default_rng(int(seed)).random() for seed in seeds])
+        return SimpleNamespace(metrics={"rms_error": error, "gas_supplied": 2.0 * error}, reasons={})
+
+    monkeypatch.setattr(search, "run_ensemble", run)
+    found = []
+    for seed in (1, 2):
+        noisy = dataclasses.replace(problem.scenario.sensors, pressure_noise=1000.0, seed=seed)
+        own = dataclasses.replace(problem, scenario=dataclasses.replace(problem.scenario, sensors=noisy))
+        found.append(Trials(own).run(problem.valves[0], np.full(3, 5e5), np.zeros(3, dtype=np.intp), np.ones(3)))
+    streams = np.array([np.random.default_rng(int(seed)).random() for seed in np.unique(seen[0])])
+    assert streams.size == 16
+    assert found[0].error == pytest.approx(np.full(3, streams.max()))
+    assert found[0].gas == pytest.approx(np.full(3, 2.0 * streams.mean() / problem.simulated))
+    assert np.array_equal(found[0].error, found[1].error)
+    assert Trials(problem).seeds.size == 0
