@@ -93,6 +93,10 @@ def valves(draw: random.Random) -> Iterator[Entry]:
             yield Entry(f"{name}_settle", model.settle, events)
             if model.shift is not None:
                 yield Entry(f"{name}_shift", model.shift, shifts)
+            if model.joint is not None and number == 0:
+                shown = [(model.advance(*arguments)[0],) for arguments in stepped]
+                yield Entry(f"{name}_joint_opening", model.joint.opening, shown)
+                yield Entry(f"{name}_joint_instant", model.joint.instant, instants)
 
 
 def sensors(draw: random.Random) -> Iterator[Entry]:
@@ -144,9 +148,9 @@ def meters(draw: random.Random) -> Iterator[Entry]:
 
 
 def entries() -> list[Entry]:
-    """All that there is, drawn anew in the same way each time."""
-    draw = random.Random(20260)
-    return [entry for part in (controllers, profiles, valves, sensors, meters) for entry in part(draw)]
+    """All that there is, drawn anew in the same way each time; a new entry of one part moves no draw of another."""
+    parts = (controllers, profiles, valves, sensors, meters)
+    return [entry for part in parts for entry in part(random.Random(f"20261 {part.__name__}"))]
 
 
 ENTRIES = {f"{number}_{entry.name}": entry for number, entry in enumerate(entries())}
