@@ -18,6 +18,7 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.model.cold_gas import DRY_ICE, SupplyNow, SupplyState, advance_supply, open_share
 from ppafo.model.fluid_table import has_liquid
+from ppafo.model.plant import PlantParameters
 from ppafo.model.source import bottle_content
 from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle_supply import BottleSupply
@@ -25,8 +26,13 @@ from ppafo.walking.bottle_supply import BottleSupply
 EndKind = Literal["walk's end", "empty", "too cold", "frozen", "iced", "too little flow"]
 WALKED: EndKind = "walk's end"
 
-OFFERED = ("plant.gas_product", "plant.valve_conductance", "plant.leak_conductance", "plant.supply_pressure")
-_PARAMETERS = (*OFFERED, "lines.largest_flow_1")
+_PARAMETERS = (
+    "plant.gas_product",
+    "plant.valve_conductance",
+    "plant.leak_conductance",
+    "plant.supply_pressure",
+    "lines.largest_flow_1",
+)
 """Parameters of the lanes that follow the supply."""
 
 _STRIDES = 2.0
@@ -124,17 +130,17 @@ def run_on_bottle(
     batch = batch_of(run)
     count = batch.clock.step_count
     block = LaneBlock(load_program(batch.program), batch.clock, batch.parameters, batch.states)
-    offered = _OfferedRows(run)
     states = row_numbers(batch.program.state_rows())
     regulated, line = states["line_state.regulated_mass"], states["line_state.mass_1"]
     every = max(1, round(supply.coupling / run.step))
     state, table = supply.start(), supply.bottle.fluid.table
     met = [(0.0, state, supply.offers_first())]
+    lanes = _lanes_of(run, met[0][2])
     gauges = [1.0] * max(2, math.ceil(_STRIDES * stride_time / (every * run.step)))
     ending, done = None, 0
     while ending is None and done < count:
         steps, before = min(every, count - done), float(block.states[regulated, 0])
-        block.set_parameters(offered.rows, offered.values(met[-1][2]))
+        block.set_parameters(lanes.rows, lanes.offered(met[-1][2]))
         block.advance(steps)
         done += steps
         progress(done * run.step / 60.0, count * run.step / 60.0)
@@ -145,7 +151,7 @@ def run_on_bottle(
         state = advance_supply(table, supply.line, supply.bottle.supply, state, content, mass, steps * run.step)
         now = supply.offers(state, content.temperature)
         met.append((done * run.step, state, now))
-        gauges = [*gauges[1:], offered.gauge(float(block.states[line, 0]), now)]
+        gauges = [*gauges[1:], lanes.gauge(float(block.states[line, 0]), now)]
         ending = _ending(supply, state, now, max(gauges), done * run.step)
     result = block.result()
     record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
@@ -154,31 +160,34 @@ def run_on_bottle(
     return BatchResult(result.states, record), _course(supply, met, let_through, last)
 
 
-class _OfferedRows:
-    """Which parameters of the lanes follow a supply, and how: those of the start, at another temperature."""
+@dataclass(frozen=True, slots=True)
+class _Lanes:
+    """The lanes as their supply sees them: rows that follow it, and the numbers with gas of the ``start`` [K]."""
 
-    def __init__(self, run: Run) -> None:
-        assert run.lines is not None, "a bottle feeds lines"
-        names = row_numbers(run.program.parameter_rows())
-        self.rows = [names[path] for path in _PARAMETERS]
-        self._plant, self._volume = run.plant, run.lines.parameters.volume_1
-        self._start: float | None = None
+    rows: list[int]
+    plant: PlantParameters
+    volume: float
+    start: float
 
-    def values(self, now: SupplyNow) -> Floats:
+    def offered(self, now: SupplyNow) -> Floats:
         """Return the parameters: gas of its temperature, flows through openings with 1 over its root, the regulator."""
-        plant = self._plant
-        self._start = now.gas_temperature if self._start is None else self._start
-        warmth = now.gas_temperature / self._start
+        plant, warmth = self.plant, now.gas_temperature / self.start
         slower = 1.0 / math.sqrt(warmth)
         product, valve, leak = plant.gas_product, plant.valve_conductance, plant.leak_conductance
         return np.array([product * warmth, valve * slower, leak * slower, now.set_pressure, now.largest_flow])
 
     def gauge(self, mass: float, now: SupplyNow) -> float:
         """Return the gauge pressure of the line with a mass [kg] in it over that to which the regulator is set [-]."""
-        plant = self._plant
-        start = now.gas_temperature if self._start is None else self._start
-        pressure = mass * plant.gas_product * now.gas_temperature / (start * self._volume)
+        plant = self.plant
+        pressure = mass * plant.gas_product * now.gas_temperature / (self.start * self.volume)
         return (pressure - plant.atmospheric_pressure) / (plant.supply_pressure - plant.atmospheric_pressure)
+
+
+def _lanes_of(run: Run, first: SupplyNow) -> _Lanes:
+    assert run.lines is not None, "a bottle feeds lines"
+    names = row_numbers(run.program.parameter_rows())
+    rows = [names[path] for path in _PARAMETERS]
+    return _Lanes(rows, run.plant, run.lines.parameters.volume_1, first.gas_temperature)
 
 
 def _ending(
