@@ -31,7 +31,7 @@ def errors(result: WalkResult) -> dict[str, float]:
         "heel off": times_of(time, contact == TOE),
         "toes off": times_of(time, contact == SWING),
     }
-    if "gait_event" in recording.names:
+    if "gait_event" in recording.channels:
         event = recording["gait_event"]
         known = {"strike": event == 0.0, "heel off": event == 2.0, "toes off": event == 3.0}
     else:

@@ -82,8 +82,8 @@ _METHOD = (
 _SLAP_METHOD = (
     "'Slap' is the rate of the foot as it comes down on its sole, below 0 with the toes falling; 'less slap' is what "
     "the change takes off the slap of the device as it is; 'falls through' is how far the foot is tilted up at the "
-    "heel strike. With each change the swing angle is the one at which it falls as far as before, as nearly as there is "
-    "one, because a foot that is held higher comes down faster. Without the device the toes hang low."
+    "heel strike. With each change the swing angle is the one at which it falls nearly as far as before, because "
+    "a foot that is held higher comes down faster. Without the device the toes hang low."
 )
 
 

@@ -100,7 +100,7 @@ def slap_sources(
     file: str, overrides: Sequence[str], gait: str | Path | None, progress: Report
 ) -> tuple[SlapSource, ...]:
     """Walk with the device off, as it is, and with each change; SimulationError where a walk diverges."""
-    found = []
+    found: list[SlapSource] = []
     for number, (change, own, device) in enumerate(CHANGES):
         progress(Progress(f"slap, {change}", number, len(CHANGES) + 1))
         configuration = load_walk(file, (*overrides, *own), gait)
@@ -115,7 +115,8 @@ def _fallen_as_far(change: str, configuration: Configuration, drop: float) -> Sl
 
     Else a change that lifts the foot higher would seem to make the slap.
     """
-    low, high, tried = LOW, HIGH, []
+    tried: list[SlapSource] = []
+    low, high = LOW, HIGH
     for _ in range(TRIES):
         angle = 0.5 * (low + high)
         found = _walked(change, replace(configuration, settings={**configuration.settings, "swing_angle": angle}))

@@ -101,7 +101,7 @@ def event_timing(
     if any(text.partition("=")[0].strip() in ("timing.kind", "wearer.keeps_gait") for text in overrides):
         raise ScenarioError("timing.kind and wearer.keeps_gait: every timing and both wearers are tried")
     ways = ways_of(load_walk(configuration, overrides, gait))
-    found = []
+    found: list[TimedWay] = []
     for timing in TIMINGS:
         for wearer, own in WEARERS.items():
             for way, course in ways.items():

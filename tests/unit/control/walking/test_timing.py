@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ppafo.control.walking import phases
 from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS, keeps_time, with_timing
 from ppafo.control.walking.phases import PhaseRules
+from ppafo.control.walking.timing import clock as gait_clock
 from ppafo.control.walking.timing import estimated, fractional
 from ppafo.control.walking.timing.estimated import EstimationRules, LearntStride, Window
 from ppafo.control.walking.timing.kind import TimingKind
@@ -65,12 +66,12 @@ def late(clocks: list[Any], phase: Floats) -> Floats:
 
 
 def test_a_force_that_rises_evenly_is_detected_as_late_as_the_known_delays_say() -> None:
-    late_by = fractional.detection_delays(settings(fractional.KIND).delays, RULES, PERIOD)
+    late_by = gait_clock.detection_delays(settings(fractional.KIND).delays, RULES, PERIOD)
     heel, toe = forces(np.arange(0.0, 1.0, PERIOD), 1.0)
     seen, times = phases.START, {}
     for sample, (on_heel, on_toe) in enumerate(zip(heel.tolist(), toe.tolist(), strict=True)):
         after = phases.next_phase_state(RULES, seen, on_heel, on_toe, PERIOD)
-        marks = fractional.seen_events(seen, after)
+        marks = gait_clock.seen_events(seen, after)
         times |= {name: sample * PERIOD for name, mark in marks._asdict().items() if mark > 0.5}
         seen = after
     for name, time in times.items():
@@ -97,7 +98,7 @@ def test_the_clock_waits_for_who_stands() -> None:
     walking = np.arange(0.5, 5.25, PERIOD)
     phase = np.concatenate([walking, np.full(3000, 5.25)])
     clock = followed(fractional.KIND, phase)[-1]
-    assert clock.fraction == pytest.approx(clock.come.heel_off + fractional.WAITS)
+    assert clock.fraction == pytest.approx(clock.come.heel_off + gait_clock.WAITS)
 
 
 def test_a_strike_that_does_not_come_is_no_landing_for_ever() -> None:
@@ -107,11 +108,11 @@ def test_a_strike_that_does_not_come_is_no_landing_for_ever() -> None:
     rules = settings(fractional.KIND)
     lands = [fractional.gait_time(rules, clock, swing).lands for clock in clocks[-500:]]
     assert lands[-1] == 0.0
-    assert sum(lands) * PERIOD == pytest.approx(fractional.WAITS, abs=2.0 * PERIOD)
+    assert sum(lands) * PERIOD == pytest.approx(gait_clock.WAITS, abs=2.0 * PERIOD)
 
 
 def test_the_delay_of_the_valve_is_a_lead() -> None:
-    rules, clock = settings(fractional.KIND, valve_delay=0.03), fractional.START._replace(fraction=0.5)
+    rules, clock = settings(fractional.KIND, valve_delay=0.03), gait_clock.START._replace(fraction=0.5)
     stance = phases.START._replace(phase=phases.MID_STANCE, stride_time=1.2)
     assert fractional.gait_time(rules, clock, stance).since_strike == pytest.approx(0.5 * 1.2 + 0.03)
 

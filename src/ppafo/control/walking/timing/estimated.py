@@ -12,14 +12,15 @@ The learnt stride is kept as a ring: its first knot is the next to come, its las
 from typing import Annotated, NamedTuple
 
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.timing import fractional
-from ppafo.control.walking.timing.fractional import (
+from ppafo.control.walking.timing.clock import (
+    ANCHOR_WEIGHT,
     DELAY_QUANTITIES,
     Delays,
-    FractionalClock,
+    GaitClock,
     next_clock,
     place_in_stride,
 )
+from ppafo.control.walking.timing.clock import START as CLOCK_START
 from ppafo.control.walking.timing.kind import GaitTime, TimingKind
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
@@ -85,7 +86,7 @@ class EstimatedClock(NamedTuple):
     Knots in the window, strides learnt from, and by how much estimates have moved the clock since the start [turns].
     """
 
-    clock: FractionalClock
+    clock: GaitClock
     stride: LearntStride
     window: Window
     next_knot: float
@@ -97,9 +98,9 @@ class EstimatedClock(NamedTuple):
 _NO_STRIDE = (0.0,) * KNOTS
 _NO_WINDOW = (0.0,) * WINDOW
 START = EstimatedClock(
-    clock=fractional.START,
+    clock=CLOCK_START,
     stride=LearntStride(_NO_STRIDE, _NO_STRIDE, _NO_STRIDE),
-    window=Window(_NO_WINDOW, _NO_WINDOW, _NO_WINDOW, _NO_WINDOW),
+    window=Window(angle=_NO_WINDOW, heel_force=_NO_WINDOW, toe_force=_NO_WINDOW, moved=_NO_WINDOW),
     next_knot=0.0,
     filled=0.0,
     learnt=0.0,
@@ -175,10 +176,10 @@ def turned(stride: LearntStride, measurement: GaitMeasurement, weight: float) ->
 def longer_window(window: Window, measurement: GaitMeasurement, moved: float) -> Window:
     """The window with the readings of a knot, without its oldest ones; ``moved`` [turns] by estimates until then."""
     return Window(
-        (*window.angle[1:], measurement.angle),
-        (*window.heel_force[1:], measurement.heel_force),
-        (*window.toe_force[1:], measurement.toe_force),
-        (*window.moved[1:], moved),
+        angle=(*window.angle[1:], measurement.angle),
+        heel_force=(*window.heel_force[1:], measurement.heel_force),
+        toe_force=(*window.toe_force[1:], measurement.toe_force),
+        moved=(*window.moved[1:], moved),
     )
 
 
@@ -201,7 +202,7 @@ def next_learnt(rules: EstimationRules, clock: EstimatedClock, before: PhaseStat
     A stride that is not good begins the learning anew, until it is done.
     """
     # In the stride before the time of a stride was known for the second time the clock may have waited.
-    ends = (before.strikes < phase.strikes) & (clock.clock.strides.count > 1.5)
+    ends = (before.strikes < phase.strikes) & (clock.clock.strides.counted > 1.5)
     time = clock.clock.strides.mean_time
     good = (abs(before.since_strike - time) < EVEN * time) & (phase.heel.loaded > 0.5)
     counted = (clock.learnt + 1.0 if good else 0.0) if ends else clock.learnt
@@ -209,7 +210,7 @@ def next_learnt(rules: EstimationRules, clock: EstimatedClock, before: PhaseStat
 
 
 def passed_knot(
-    rules: EstimationRules, clock: EstimatedClock, at: FractionalClock, learnt: float, measurement: GaitMeasurement
+    rules: EstimationRules, clock: EstimatedClock, at: GaitClock, learnt: float, measurement: GaitMeasurement
 ) -> EstimatedClock:
     """The clock where its fraction passes a knot: learning, or moved by a part of the estimated shift."""
     ready = is_learnt(rules, clock)
@@ -222,7 +223,7 @@ def passed_knot(
     moved = max(rules.estimate_weight * shift, -at.fraction)
     following = clock.next_knot + 1.0
     return EstimatedClock(
-        clock=FractionalClock(fraction=at.fraction + moved, event=at.event, come=at.come, strides=at.strides),
+        clock=GaitClock(fraction=at.fraction + moved, event=at.event, come=at.come, strides=at.strides),
         stride=stride,
         window=window,
         next_knot=following - KNOTS if following >= KNOTS else following,
@@ -270,7 +271,7 @@ KIND = TimingKind(
     source="Li, Becker, Shorter, Bretl, Hsiao-Wecksler, IEEE/ASME Trans Mechatronics 16 (2011) 835",
     quantities=(
         *DELAY_QUANTITIES,
-        fractional.ANCHOR_WEIGHT,
+        ANCHOR_WEIGHT,
         Quantity("learning_strides", "1", "good strides in a row from which the stride is learnt", 3.0, 1.0, 100.0),
         Quantity("relearning", "1", "weight of a later stride in the learnt one", 0.1, 0.0, 1.0),
         Quantity("angle_scale", "rad", "a difference of the angle that counts as one", 0.1, 1.0e-3, 10.0),

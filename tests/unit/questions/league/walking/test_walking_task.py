@@ -43,7 +43,7 @@ def test_a_timing_is_that_of_all_that_keep_time_and_an_entrant_may_have_its_own(
     task = walking_task(overrides=["timing.kind=fractional"])
     kinds = ("event_pid", "event_on_off", "off")
     clocks = [getattr(task.configuration(kind, "proportional").controller.initial, "clock", None) for kind in kinds]
-    assert [type(clock).__name__ for clock in clocks] == ["FractionalClock", "FractionalClock", "NoneType"]
+    assert [type(clock).__name__ for clock in clocks] == ["GaitClock", "GaitClock", "NoneType"]
     timed = {entrant.name: entrant.overrides for entrant in WALKING_ENTRANTS if entrant.overrides}
     assert timed["event_on_off-solenoid-estimated"] == ("timing.kind=estimated",)
     assert len(timed) == 4

@@ -1,0 +1,321 @@
+"""A clock of the stride: it runs at the pace of recent strides, and is anchored anew at each detected event.
+
+Heel strike, toes on the ground, heel off and toes off are each detected some known time after (or, where a force fades,
+before) they happen: the force has to pass its threshold, the sensor follows late, the change has to last, samples are
+taken. At each detected event the clock is anchored anew at the fraction at which that event has come in recent strides,
+plus its delay. So an event is known when the clock passes its fraction, before the sensors show it.
+
+The clock waits for an event that does not come: for the toes to come down, the heel or the toes to rise, the next
+strike. Who stands has no percent of gait. A stride whose heel and toes leave the ground late takes longer: the clock
+goes on at its pace. After a stride that was not even, as at starts, stops and stairs, nothing is predicted: events are
+known when they are detected.
+"""
+
+from typing import NamedTuple
+
+from ppafo.control.walking import phases
+from ppafo.control.walking.phases import PhaseRules, PhaseState
+from ppafo.control.walking.timing.kind import GaitTime
+from ppafo.model.declaration import Quantity
+
+WAITS = 0.05
+"""Fraction of the stride by which the clock runs past an event that was not detected, before it waits."""
+
+TOO_FAR = 0.15
+"""Fraction of the stride: an event further from where it came in recent strides than this does not move the clock."""
+
+EVEN = 0.1
+"""A stride that takes longer or shorter than recent ones by more than this fraction is odd: nothing is predicted."""
+
+FASTER = 0.3
+"""A stride is taken to be quicker or slower than recent ones by at most this fraction, by when the foot rises."""
+
+STRUCK = 0.0
+TOES_ON = 1.0
+HEEL_OFF = 2.0
+TOES_OFF = 3.0
+
+
+class Delays(NamedTuple):
+    """How fast the force grows or fades at each event [N/s], and lags of force sensor and valve [s]."""
+
+    heel_loading_rate: float
+    toe_loading_rate: float
+    heel_unloading_rate: float
+    toe_unloading_rate: float
+    sensor_lag: float
+    valve_delay: float
+
+
+class Events(NamedTuple):
+    """Something of each event of a stride: heel strike, toes on the ground, heel off, toes off."""
+
+    strike: float
+    toes_on: float
+    heel_off: float
+    toes_off: float
+
+
+class Strides(NamedTuple):
+    """The mean of recent stride times [s], how many count, the last [s], 1 where that was even, time of this one [s].
+
+    ``this_time`` is what the stride will take that has begun, by when its heel and its toes have left the ground.
+    """
+
+    mean_time: float
+    counted: float
+    last: float
+    even: float
+    this_time: float
+
+
+class GaitClock(NamedTuple):
+    """Fraction of the stride [turns], the last event that the clock has passed, and at which fraction each comes.
+
+    ``come`` is that of recent strides, 0 for an event that was not seen yet.
+    """
+
+    fraction: float
+    event: float
+    come: Events
+    strides: Strides
+
+
+NOT_KNOWN = Events(strike=0.0, toes_on=0.0, heel_off=0.0, toes_off=0.0)
+START = GaitClock(
+    fraction=0.0,
+    event=TOES_OFF,
+    come=NOT_KNOWN,
+    strides=Strides(mean_time=0.0, counted=0.0, last=0.0, even=0.0, this_time=0.0),
+)
+
+
+def detection_delays(delays: Delays, phase_rules: PhaseRules, period: float) -> Events:
+    """How long after each event it is detected [s]; below 0 where the force fades below its threshold before.
+
+    A first-order sensor follows a ramp late by its time constant; an event falls half a sample before its sample.
+    """
+    late = delays.sensor_lag + phase_rules.debounce + 0.5 * period
+    return Events(
+        strike=late + phase_rules.load_threshold / delays.heel_loading_rate,
+        toes_on=late + phase_rules.load_threshold / delays.toe_loading_rate,
+        heel_off=late - phase_rules.unload_threshold / delays.heel_unloading_rate,
+        toes_off=late - phase_rules.unload_threshold / delays.toe_unloading_rate,
+    )
+
+
+def seen_events(before: PhaseState, phase: PhaseState) -> Events:
+    """1 for each event that is detected at this sample, else 0; heel and toes only where they can be that event."""
+    enters = (before.phase == phases.SWING) & (phase.phase != phases.SWING)
+    toes_on = (before.toe.loaded < 0.5) & (phase.toe.loaded > 0.5) & (before.phase == phases.LANDING)
+    heel_off = (before.heel.loaded > 0.5) & (phase.heel.loaded < 0.5) & (phase.toe.loaded > 0.5)
+    leaves = (before.phase != phases.SWING) & (phase.phase == phases.SWING)
+    return Events(
+        strike=1.0 if enters else 0.0,
+        toes_on=1.0 if toes_on else 0.0,
+        heel_off=1.0 if heel_off else 0.0,
+        toes_off=1.0 if leaves else 0.0,
+    )
+
+
+def next_come(come: float, seen: float, found: float, weight: float) -> float:
+    """Fraction of the stride at which an event comes [turns], after it may have been seen at ``found``."""
+    # One stumble moves it by no more than a usual stride may.
+    missed = max(-TOO_FAR, min(TOO_FAR, found - come))
+    moved = come + weight * missed if come > 0.0 else found
+    return moved if (seen > 0.5) & (found > 0.0) & (found < 1.0) else come
+
+
+def anchored(fraction: float, seen: float, come: float, late: float, weight: float) -> float:
+    """Fraction [turns] after an event that comes at ``come`` may have been detected ``late`` [turns] after it."""
+    missed = come + late - fraction
+    usable = (seen > 0.5) & (come > 0.0) & (abs(missed) < TOO_FAR)
+    return fraction + weight * missed if usable else fraction
+
+
+def latest_fraction(phase: PhaseState, come: Events, predicts: bool) -> float:
+    """Fraction [turns] at which the clock waits for the event that the sensors have to show next.
+
+    It waits before a strike that it does not predict.
+    """
+    on_ground = come.toes_off if phase.heel.loaded < 0.5 else come.heel_off
+    on_ground = come.toes_on if phase.phase == phases.LANDING else on_ground
+    awaited = on_ground if on_ground > 0.0 else 1.0
+    strike = 1.0 + WAITS if predicts else 1.0 - WAITS
+    return strike if phase.phase == phases.SWING else awaited + WAITS
+
+
+def last_event(clock: GaitClock, fraction: float, come: Events, seen: Events, phase: PhaseState) -> float:
+    """The last event that has been passed; one whose fraction is not known is passed where it is detected."""
+    is_swing = phase.phase == phases.SWING
+    struck = (seen.strike > 0.5) | (is_swing & (clock.event == TOES_OFF) & (fraction >= 1.0))
+    expected = is_swing & (clock.event == STRUCK)
+    passed = clock.event if expected else event_of_stance(clock.event, fraction, come, seen, phase.toe.loaded)
+    return STRUCK if struck else passed
+
+
+def event_of_stance(event: float, fraction: float, come: Events, seen: Events, toe_loaded: float) -> float:
+    """The last event passed in a stance: one after the other."""
+    # A foot that comes down on its toes has them on the ground at once.
+    toes_on = (
+        (seen.toes_on > 0.5)
+        | ((come.toes_on <= 0.0) & (toe_loaded > 0.5))
+        | ((come.toes_on > 0.0) & (fraction >= come.toes_on))
+    )
+    heel_off = (seen.heel_off > 0.5) & (come.heel_off <= 0.0) | ((come.heel_off > 0.0) & (fraction >= come.heel_off))
+    toes_off = (seen.toes_off > 0.5) | ((come.toes_off > 0.0) & (fraction >= come.toes_off))
+    found = max(event, TOES_ON) if toes_on else event
+    found = max(found, HEEL_OFF) if heel_off else found
+    return TOES_OFF if toes_off else found
+
+
+def events_found(since_strike: float, stride_time: float, late: Events) -> Events:
+    """Fractions [turns] at which an event that is detected now has come; ``late`` [s] is the delay of each."""
+    now = since_strike + late.strike
+    return Events(
+        strike=0.0,
+        toes_on=(now - late.toes_on) / stride_time,
+        heel_off=(now - late.heel_off) / stride_time,
+        toes_off=(now - late.toes_off) / stride_time,
+    )
+
+
+def learnt_events(come: Events, seen: Events, found: Events, weight: float) -> Events:
+    """Fractions at which events come [turns], after a sample with those ``seen`` at fractions ``found``."""
+    return Events(
+        strike=0.0,
+        toes_on=next_come(come.toes_on, seen.toes_on, found.toes_on, weight),
+        heel_off=next_come(come.heel_off, seen.heel_off, found.heel_off, weight),
+        toes_off=next_come(come.toes_off, seen.toes_off, found.toes_off, weight),
+    )
+
+
+def chosen_events(some: Events, others: Events, takes_some: bool) -> Events:
+    """Some events or the others: nothing is learnt in fractions of a stride whose time is not known."""
+    return Events(
+        strike=0.0,
+        toes_on=some.toes_on if takes_some else others.toes_on,
+        heel_off=some.heel_off if takes_some else others.heel_off,
+        toes_off=some.toes_off if takes_some else others.toes_off,
+    )
+
+
+def next_strides(
+    strides: Strides, struck: bool, ends: bool, on_heel: bool, taken: float, first_time: float, weight: float
+) -> Strides:
+    """The mean of recent stride times after a sample at which a stride that has ``taken`` [s] may end.
+
+    The first strides count evenly, then a new one with its ``weight``. An odd one does not count, until a second one
+    is like it: the wearer walks at another pace. What begins with the toes, or does not end, is no even stride.
+    """
+    known = strides.mean_time if strides.counted > 0.5 else first_time
+    usual = ends & (taken > 0.5 * known) & (taken < 2.0 * known)
+    first = strides.counted < 0.5
+    near = abs(taken - known) < EVEN * known
+    repeats = abs(taken - strides.last) < EVEN * strides.last
+    share = max(weight, 1.0 / (strides.counted + 1.0))
+    moved = known + share * (taken - known) if near else 0.5 * (taken + strides.last)
+    moved = taken if first else moved
+    counts = usual & (first | near | repeats)
+    mean_time = moved if counts else known
+    even = counts & on_heel & (not first)
+    return Strides(
+        mean_time=mean_time,
+        counted=strides.counted + 1.0 if counts else strides.counted,
+        last=taken if ends else strides.last,
+        even=(1.0 if even else 0.0) if struck else strides.even,
+        this_time=mean_time if struck | (strides.this_time <= 0.0) else strides.this_time,
+    )
+
+
+def paced(strides: Strides, seen: Events, found: Events, come: Events, weight: float) -> Strides:
+    """What the stride that has begun will take, after its heel or its toes have left the ground early or late.
+
+    ``found`` are the fractions of the mean stride at which they did, ``come`` those of recent strides.
+    """
+    heel = (seen.heel_off > 0.5) & (come.heel_off > 0.0)
+    toes = (seen.toes_off > 0.5) & (come.toes_off > 0.0)
+    pace = found.heel_off / come.heel_off if heel else 1.0
+    pace = found.toes_off / come.toes_off if toes else pace
+    told = strides.mean_time * (1.0 + weight * (max(1.0 - FASTER, min(1.0 + FASTER, pace)) - 1.0))
+    return Strides(
+        mean_time=strides.mean_time,
+        counted=strides.counted,
+        last=strides.last,
+        even=strides.even,
+        this_time=told if heel | toes else strides.this_time,
+    )
+
+
+def anchored_fraction(
+    clock: GaitClock, seen: Events, late: Events, stride_time: float, weight: float, period: float
+) -> float:
+    """The fraction of the stride [turns] a ``period`` [s] later, moved by what was detected after the strike."""
+    come = clock.come
+    fraction = clock.fraction + period / stride_time
+    fraction = anchored(fraction, seen.toes_on, come.toes_on, late.toes_on / stride_time, weight)
+    fraction = anchored(fraction, seen.heel_off, come.heel_off, late.heel_off / stride_time, weight)
+    return anchored(fraction, seen.toes_off, come.toes_off, late.toes_off / stride_time, weight)
+
+
+def struck_fraction(fraction: float, target: float, weight: float) -> float:
+    """Fraction [turns] at a detected strike: moved towards ``target`` by a weight, all the way from far off."""
+    missed = target + 1.0 - fraction
+    return fraction + weight * missed - 1.0 if abs(missed) < TOO_FAR else target
+
+
+def next_clock(
+    delays: Delays,
+    phase_rules: PhaseRules,
+    clock: GaitClock,
+    before: PhaseState,
+    phase: PhaseState,
+    weight: float,
+    strike_weight: float,
+    period: float,
+) -> GaitClock:
+    """The clock after a sample; a detected strike moves it by ``strike_weight``, the events after it by ``weight``."""
+    late, seen = detection_delays(delays, phase_rules, period), seen_events(before, phase)
+    struck = seen.strike > 0.5
+    # The first strike ends no stride, and the second one begins the first whole one: a walk may begin in mid-stance.
+    ends = struck & (before.strikes > 1.5)
+    taken = before.since_strike + period
+    on_heel, usual = phase.heel.loaded > 0.5, phase_rules.stride_weight
+    strides = next_strides(clock.strides, struck, ends, on_heel, taken, phase.stride_time, usual)
+    found = events_found(phase.since_strike, strides.mean_time, late)
+    strides = paced(strides, seen, found, clock.come, weight)
+    stride, predicts = strides.this_time, strides.even > 0.5
+    learnt = learnt_events(clock.come, seen, found, max(usual, 1.0 / max(strides.counted, 1.0)))
+    come = chosen_events(learnt, clock.come, predicts | (strides.counted < 1.5) & (strides.counted > 0.5))
+    passed = anchored_fraction(clock, seen, late, stride, weight, period)
+    set_anew = struck_fraction(passed, late.strike / stride, strike_weight)
+    fraction = set_anew if struck else min(passed, latest_fraction(phase, come, predicts))
+    told = chosen_events(come, NOT_KNOWN, predicts)
+    event = last_event(clock, fraction, told, seen, phase)
+    return GaitClock(fraction=fraction, event=event, come=come, strides=strides)
+
+
+def place_in_stride(fraction: float, lead: float, phase: PhaseState) -> GaitTime:
+    """The time in the stride at a fraction of it [turns], a ``lead`` [s] ahead; the strike is expected, not awaited.
+
+    It is the fraction of the stride time that the phases go by, as a law makes it of this time again; 0 s at the start.
+    """
+    stride_time = phase.stride_time if phase.stride_time > 0.0 else 1.0
+    ahead = fraction + lead / stride_time
+    expected = (phase.phase == phases.SWING) & (ahead >= 1.0) & (fraction < 1.0 + WAITS)
+    time = (ahead - 1.0 if expected else ahead) * stride_time
+    return GaitTime(time, 1.0 if (phase.phase == phases.LANDING) | expected else 0.0)
+
+
+ANCHOR_WEIGHT = Quantity(
+    "anchor_weight", "1", "how far an event after the strike moves the clock, 1 wholly", 0.8, 0.0, 1.0
+)
+
+DELAY_QUANTITIES = (
+    Quantity("heel_loading_rate", "N/s", "how fast the heel is loaded after its strike", 5.6e3, 100.0, 1.0e6),
+    Quantity("toe_loading_rate", "N/s", "how fast the toes are loaded as they come down", 4.0e4, 100.0, 1.0e6),
+    Quantity("heel_unloading_rate", "N/s", "how fast the load of the heel fades before it rises", 1.3e3, 100.0, 1.0e6),
+    Quantity("toe_unloading_rate", "N/s", "how fast the load of the toes fades before they rise", 7.0e3, 100.0, 1.0e6),
+    Quantity("sensor_lag", "s", "how late the force sensors follow; from their bandwidth unless given", None, 0.0, 0.2),
+    Quantity("valve_delay", "s", "how late the valve follows; its dead time unless given", None, 0.0, 0.2),
+)
