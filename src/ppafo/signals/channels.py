@@ -42,6 +42,12 @@ CHANNELS: dict[str, ChannelKind] = {
     "controller_phase": ChannelKind(
         PLAIN_NUMBER, "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off", is_held=True
     ),
+    "gait_fraction": ChannelKind(
+        PLAIN_NUMBER, "fraction of the stride that the controller takes it to be, where it predicts"
+    ),
+    "gait_event": ChannelKind(
+        PLAIN_NUMBER, "last event that it knows of: 0 heel strike, 1 toes on, 2 heel off, 3 toes off", is_held=True
+    ),
     "safe_state": ChannelKind(
         PLAIN_NUMBER, "0 while the controller helps, 1 in a pause, 2 once it has stopped for good", is_held=True
     ),
