@@ -44,6 +44,12 @@ CHANNELS: dict[str, ChannelKind] = {
     "controller_phase": ChannelKind(
         PLAIN_NUMBER, "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off", is_held=True
     ),
+    "gait_fraction": ChannelKind(
+        PLAIN_NUMBER, "fraction of the stride that the controller takes it to be, where it predicts"
+    ),
+    "gait_event": ChannelKind(
+        PLAIN_NUMBER, "last event that it knows of: 0 heel strike, 1 toes on, 2 heel off, 3 toes off", is_held=True
+    ),
     "safe_state": ChannelKind(
         PLAIN_NUMBER,
         "0 while the controller helps, 1 lifts the foot only, 2 pauses, 3 has stopped for good",
