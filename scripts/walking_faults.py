@@ -61,6 +61,11 @@ def wrong(lag: float = 0.0, **values: float) -> Fault:
     return Fault(0.0, 0.0, 0.0, distorts=1.0, memory=np.exp(-PERIOD / lag) if lag else 0.0, **values)
 
 
+def late(samples: float) -> Fault:
+    """A sensor that is late by whole samples of 1 ms."""
+    return wrong(late_samples=samples)
+
+
 def force_kinds(sensor: str) -> Iterator[tuple[str, Kind]]:
     """Faults of a force sensor, by what fails."""
     faults = {
@@ -69,8 +74,8 @@ def force_kinds(sensor: str) -> Iterator[tuple[str, Kind]]:
         "offset -50 N": wrong(offset=-50.0), "offset -150 N": wrong(offset=-150.0), "gain 0.1": wrong(gain=0.1),
         "gain 0.4": wrong(gain=0.4), "gain 3": wrong(gain=3.0), "drift 50 N/s": wrong(drift=50.0),
         "drift -50 N/s": wrong(drift=-50.0), "lag 50 ms": wrong(lag=0.05), "lag 106 ms (1.5 Hz)": wrong(lag=0.106),
-        "lag 300 ms": wrong(lag=0.3), "50 ms late": wrong(delay=50.0), "100 ms late": wrong(delay=100.0),
-        "200 ms late": wrong(delay=200.0), "half of the samples lost": wrong(lost_fraction=0.5),
+        "lag 300 ms": wrong(lag=0.3), "50 ms late": late(50.0), "100 ms late": late(100.0),
+        "200 ms late": late(200.0), "half of the samples lost": wrong(lost_fraction=0.5),
         "99 % of the samples lost": wrong(lost_fraction=0.99), "crosstalk 0.3": wrong(crosstalk=0.3),
         "dead and back every 0.3 s": stuck(0.0, 0.3), "frozen and back every 0.7 s": frozen(0.7),
     }  # fmt: skip
@@ -86,7 +91,7 @@ def angle_kinds() -> Iterator[tuple[str, Kind]]:
         "offset 25 deg": wrong(offset=25.0 * DEGREE), "offset -25 deg": wrong(offset=-25.0 * DEGREE),
         "gain 0.7": wrong(gain=0.7), "gain 1.3": wrong(gain=1.3), "drift 5 deg/s": wrong(drift=5.0 * DEGREE),
         "drift -5 deg/s": wrong(drift=-5.0 * DEGREE), "lag 100 ms": wrong(lag=0.1),
-        "20 ms late": wrong(delay=20.0), "100 ms late": wrong(delay=100.0), "200 ms late": wrong(delay=200.0),
+        "20 ms late": late(20.0), "100 ms late": late(100.0), "200 ms late": late(200.0),
         "99 % of the samples lost": wrong(lost_fraction=0.99), "frozen and back every 0.3 s": frozen(0.3),
     }  # fmt: skip
     return ((f"angle: {what}", {"angle": fault}) for what, fault in faults.items())
@@ -100,8 +105,8 @@ def pressure_kinds(sensor: str) -> Iterator[tuple[str, Kind]]:
         "offset -5 psi": wrong(offset=-5.0 * PSI), "offset 20 psi": wrong(offset=20.0 * PSI),
         "gain 0.5": wrong(gain=0.5), "gain 1.5": wrong(gain=1.5), "drift 2 psi/s": wrong(drift=2.0 * PSI),
         "drift -2 psi/s": wrong(drift=-2.0 * PSI),
-        "lag 100 ms": wrong(lag=0.1), "20 ms late": wrong(delay=20.0), "50 ms late": wrong(delay=50.0),
-        "100 ms late": wrong(delay=100.0), "99 % of the samples lost": wrong(lost_fraction=0.99),
+        "lag 100 ms": wrong(lag=0.1), "20 ms late": late(20.0), "50 ms late": late(50.0),
+        "100 ms late": late(100.0), "99 % of the samples lost": wrong(lost_fraction=0.99),
         "crosstalk 0.3": wrong(crosstalk=0.3), "frozen and back every 0.3 s": frozen(0.3),
     }  # fmt: skip
     return ((f"{sensor.replace('_', ' ')}: {what}", {sensor: fault}) for what, fault in faults.items())
@@ -111,8 +116,8 @@ def pairs() -> dict[str, Kind]:
     """Two sensors at once."""
     swap, slow = wrong(crosstalk=1.0), wrong(lag=0.106)
     return {
-        "heel and toe 100 ms late": {"heel": wrong(delay=100.0), "toe": wrong(delay=100.0)},
-        "pressures 50 ms late": {"pressure_1": wrong(delay=50.0), "pressure_2": wrong(delay=50.0)},
+        "heel and toe 100 ms late": {"heel": late(100.0), "toe": late(100.0)},
+        "pressures 50 ms late": {"pressure_1": late(50.0), "pressure_2": late(50.0)},
         "heel and toe swapped": {"heel": swap, "toe": swap},
         "heel and toe with 1.5 Hz": {"heel": slow, "toe": slow},
         "heel and toe dead": {"heel": stuck(0.0), "toe": stuck(0.0)},
@@ -162,7 +167,7 @@ def run(name: str, faults: list[Kind], begins: Floats) -> Runs:
         for kind in faults
         for time in begins
     ]
-    first = replace(configuration, gait_sensors=sound._replace(heel_fault=wrong(delay=LATEST)._replace(time=1.0e8)))
+    first = replace(configuration, gait_sensors=sound._replace(heel_fault=late(LATEST)._replace(time=1.0e8)))
     plan = plan_walk(plan_of(first, (FIRST + 1.0 + AFTER) * stride))
     single = batch_of(plan)
     paths = [path for group, row in single.program.parameter_rows().items() for path in leaf_paths(row, group)]

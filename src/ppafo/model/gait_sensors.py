@@ -24,8 +24,8 @@ class Fault(NamedTuple):
 
     With ``distorts`` 1 it shows gain times what is there, plus an offset and a drift [1/s] in its own unit, with a
     fraction of the other sensor of its kind (``crosstalk``), a first-order lag (``memory``, what is left of its last
-    value after a sample) and a fraction of its samples lost, ``delay`` whole samples late. With a ``period`` [s] above
-    0 it is so in the first half of each period only.
+    value after a sample), a fraction of its samples lost, and ``late_samples`` whole samples late. With a ``period``
+    [s] above 0 it is so in the first half of each period only.
     """
 
     time: float
@@ -39,7 +39,7 @@ class Fault(NamedTuple):
     memory: float = 0.0
     lost_fraction: float = 0.0
     period: float = 0.0
-    delay: float = 0.0
+    late_samples: float = 0.0
 
 
 class GaitSensors(NamedTuple):
@@ -202,7 +202,7 @@ def measure_gait(
 
 def samples_late(fault: Fault, time: float, sample: int) -> int:
     """How many samples ago a reading was made that arrives at ``time`` [s], the time of ``sample``."""
-    late = int(fault.delay) if is_active(fault, time) else 0
+    late = int(fault.late_samples) if is_active(fault, time) else 0
     return min(late, sample)
 
 

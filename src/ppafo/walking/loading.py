@@ -281,7 +281,7 @@ def _fault(reading: Reading, sensor: str) -> Fault:
         memory=exponential(-_period(reading) / wrong["lag"]) if wrong["lag"] > 0.0 else 0.0,
         lost_fraction=wrong["lost_share"],
         period=period,
-        delay=float(round(wrong["delay"] / _period(reading))),
+        late_samples=float(round(wrong["delay"] / _period(reading))),
     )
 
 

@@ -92,7 +92,7 @@ def plan_walk(plan: WalkPlan) -> Run:
 
 def longest_delay(sensors: GaitSensors) -> float:
     """Most samples by which a fault makes a sensor late."""
-    return max(value.delay for value in sensors if isinstance(value, Fault))
+    return max(value.late_samples for value in sensors if isinstance(value, Fault))
 
 
 def walk_steps(plan: WalkPlan, plant: PlantParameters) -> Steps:

@@ -14,12 +14,12 @@ BEGINS, LATE = 3.2, 0.05
     ("time", "sample", "late"), [(1.9, 1900, 0), (2.0, 2000, 7), (2.4, 2400, 7), (2.6, 2600, 0), (3.1, 3100, 7)]
 )
 def test_a_delay_begins_with_the_fault_and_comes_and_goes_with_it(time: float, sample: int, late: int) -> None:
-    fault = Fault(2.0, 0.0, 0.0, distorts=1.0, delay=7.0, period=1.0)
+    fault = Fault(2.0, 0.0, 0.0, distorts=1.0, late_samples=7.0, period=1.0)
     assert samples_late(fault, time, sample) == late
 
 
 def test_nothing_is_older_than_the_walk() -> None:
-    assert samples_late(Fault(0.0, 0.0, 0.0, distorts=1.0, delay=100.0), 0.03, 30) == 30
+    assert samples_late(Fault(0.0, 0.0, 0.0, distorts=1.0, late_samples=100.0), 0.03, 30) == 30
 
 
 def test_a_late_heel_sensor_shows_the_next_strike_as_much_later() -> None:

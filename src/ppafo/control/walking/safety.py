@@ -79,7 +79,7 @@ START = SafetyState(
     ventings=0.0,
     finding=Finding(sign=NO_SIGN, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0),
     readings=NOTHING_READ,
-    stance=Stance(0.0, 0.0, 0.0, 0.0),
+    stance=Stance(heel_seen=0.0, toe_seen=0.0, together=0.0, apart=0.0),
     toe_strides=0.0,
     steady=0.0,
     valve_times=ValveTimes(0.0, 0.0, 0.0),
