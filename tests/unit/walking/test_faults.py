@@ -142,7 +142,8 @@ def test_both_chambers_then_lose_their_pressure_for_good_or_what_pushes_where_th
     assert due.sum(axis=0).min() * walks.time[1] > 0.2 * walks.stride, "there is something to see"
     limit = np.where(walks.lifted[row], LIFTED_PUSH, most)
     assert (walks.pressure[:, row] - limit)[due].max() <= 0.0
-    assert walks.lifted[row].any() <= what.startswith("heel sensor dead"), "a foot is lifted where the heel is missed"
+    missed = ("heel sensor dead", "heel sensor frozen")  # One that freezes in the air shows no load from then on.
+    assert walks.lifted[row].any() <= what.startswith(missed), "a foot is lifted where the heel is missed"
     assert walks.pressure[walks.time < walks.begins.min(), row].max() > 5.0 * most, "the device worked before"
 
 

@@ -49,6 +49,9 @@ GONE = 0.1
 QUICK_PERIOD = 0.005
 """Sample period [s] above which a force may be gone within a sample: toes leave the ground in some 0.1 s."""
 
+SQUEEZING_ANGLE = 2.09
+"""Ankle angle [rad] from which a foot may squeeze a full chamber 2 to any pressure: 30 deg in plantarflexion."""
+
 HALF = 0.5
 """A stride of less than this fraction of the stride time, or of more than its inverse, is not a good one."""
 
@@ -85,8 +88,10 @@ def range_sign(rules: SafetyRules, measurement: GaitMeasurement) -> float:
     force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
     force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
     angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
-    low, high = min(measurement.pressure_1, measurement.pressure_2), max(measurement.pressure_1, measurement.pressure_2)
-    pressure = (low < rules.lowest_pressure) | (high > rules.highest_pressure)
+    squeezed = measurement.angle > SQUEEZING_ANGLE
+    pressure = min(measurement.pressure_1, measurement.pressure_2) < rules.lowest_pressure
+    pressure = pressure | (measurement.pressure_1 > rules.highest_pressure)
+    pressure = pressure | ((measurement.pressure_2 > rules.highest_pressure) & (not squeezed))
     found = signs.PRESSURE_RANGE if pressure else NO_SIGN
     found = signs.ANGLE_RANGE if angle else found
     return signs.FORCE_RANGE if force else found

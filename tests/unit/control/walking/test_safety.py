@@ -72,6 +72,12 @@ def test_a_reading_out_of_range_stops_at_once(change: dict[str, float], sign: fl
     assert signs.level_of(sign) == signs.STOPPED
 
 
+def test_a_full_chamber_2_that_the_foot_squeezes_is_no_fault() -> None:
+    squeezed = GOOD._replace(pressure_2=2.1e6, angle=2.1)
+    assert found(squeezed) == signs.NO_SIGN
+    assert found(squeezed._replace(pressure_1=2.1e6)) == signs.PRESSURE_RANGE
+
+
 def test_every_sign_says_what_it_goes_by_and_those_of_faults_come_first() -> None:
     numbers = list(signs.SIGNS)
     assert numbers == [float(number) for number in range(1, len(numbers) + 1)]
