@@ -10,6 +10,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import SimulationError
 from ppafo.parameters import load_device
 from ppafo.parameters.chamber_volumes import PRINTED_VOLUMES, ChamberVolumes, readings
+from ppafo.questions.timing.solve import WEARERS, rms_of, timed_events, uneven_course
 from ppafo.walking.comparison import healthy_metrics
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
@@ -121,6 +122,17 @@ def recycling_work(values: Values) -> float:
     return recycling / plain
 
 
+def event_reduction(wearer: str) -> float:
+    """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
+    configuration = load_walk(PAIR, WEARERS[wearer])
+    course = uneven_course(2.0 / configuration.gait.stride_time)
+    errors = []
+    for timing in ("thresholds", "estimated"):
+        walked = replace(load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}")), course=course)
+        errors.append(rms_of([event.errors for event in timed_events(walked, MINUTES).values()]))
+    return 1.0 - errors[1] / errors[0]
+
+
 _OF_PRESSURE, _OF_CHAMBERS = {"pressure": "Pa_a"}, {"chambers": CHAMBERS}
 _OF_RECYCLING = _OF_CHAMBERS | {"holding_time": "s"}
 
@@ -150,5 +162,17 @@ COMPUTATIONS: dict[str, Computation] = {
         "1",
         _OF_RECYCLING,
         recycling_work,
+    ),
+    "healthy_event_reduction": Computation(
+        "error of event times less with state estimation than with thresholds, nondisabled wearer, uneven strides",
+        "1",
+        {},
+        lambda _: event_reduction("healthy"),
+    ),
+    "impaired_event_reduction": Computation(
+        "error of event times less with state estimation than with thresholds, drop foot, uneven strides",
+        "1",
+        {},
+        lambda _: event_reduction("impaired"),
     ),
 }
