@@ -15,6 +15,7 @@ from ppafo.cli.main import main
 from ppafo.progress import Report
 from ppafo.questions.reproduce import solve as study
 from ppafo.questions.reproduce.bench import bench_study
+from ppafo.questions.reproduce.solve import Reproduction
 from ppafo.storage import read_csv
 
 # Spelled out once more on purpose: other programs read these identifiers and this order.
@@ -151,7 +152,8 @@ def missed_claims(monkeypatch: pytest.MonkeyPatch) -> None:
         for claim in honest.claims
     )
 
-    def missing(overrides: Sequence[str], progress: Report) -> study.Reproduction:
+    def missing(overrides: Sequence[str], progress: Report, study: str) -> Reproduction:
+        assert study == "ppafo-2011"
         return dataclasses.replace(honest, claims=claims, overrides=tuple(overrides))
 
     monkeypatch.setattr(study, "reproduce", missing)

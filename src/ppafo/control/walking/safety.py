@@ -101,6 +101,9 @@ FALL_TIME = 0.03
 FALLS = 0.03
 """A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.1."""
 
+LATE = 1.3
+"""Times ``vent_time`` after which chamber 2 shows no pressure: from 90 psig it takes that time itself."""
+
 MINIMUM_OPENING = 0.1
 """Commands below this may lie within the overlap of a valve: they do not count as opening it."""
 
@@ -171,8 +174,8 @@ def valve_sign(
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
     left = holds_pressure(rules, measurement.pressure_1, slow_pressure_1)
-    left = left | (measurement.pressure_2 > rules.filled_pressure)
-    no_fall = stands & (valve_times.venting > rules.vent_time) & left
+    late = (valve_times.venting > LATE * rules.vent_time) & (measurement.pressure_2 > rules.filled_pressure)
+    no_fall = stands & ((valve_times.venting > rules.vent_time) & left | late)
     found = signs.NO_FALL if no_fall else NO_SIGN
     return signs.NO_RISE if no_rise_1 | no_rise_2 else found
 
