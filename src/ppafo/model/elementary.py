@@ -23,7 +23,12 @@ _TERMS_OF_SINE = 9
 
 
 def exponential(exponent: float) -> float:
-    """Exponential function [-] of a number [-], within 2e-16; beyond -709 and 709 that of these."""
+    """Exponential function [-] of a number [-], within 2e-16; beyond -709 and 709 that of these, NaN of NaN.
+
+    Below -708.39 the result is subnormal, and has fewer digits: it is within 5e-324, not within a share of itself.
+    """
+    if math.isnan(exponent):
+        return exponent
     inside = max(-_LARGEST_EXPONENT, min(exponent, _LARGEST_EXPONENT))
     doublings = int(inside / LOGARITHM_OF_2 + (0.5 if inside >= 0.0 else -0.5))
     rest = inside - doublings * _UPPER_PART
@@ -58,7 +63,10 @@ def logarithm(number: float) -> float:
 
 
 def power(base: float, exponent: float) -> float:
-    """A positive base [-] to an exponent [-]; its relative error is 3e-16 times (1 + the size of its logarithm)."""
+    """A positive base [-] to an exponent [-]; its relative error is 3e-16 times (1 + the size of its logarithm).
+
+    A subnormal result has fewer digits, as in ``exponential``; NaN stays NaN.
+    """
     return exponential(exponent * logarithm(base))
 
 

@@ -1,5 +1,7 @@
 """Exponential, logarithm, power, sine and cosine against numbers of forty digits."""
 
+import math
+
 import mpmath
 import numpy as np
 from hypothesis import given
@@ -48,3 +50,12 @@ def test_what_has_no_logarithm_ends_all_the_same() -> None:
     assert exponential(1e6) == exponential(709.0)
     assert exponential(0.0) == 1.0
     assert logarithm(1.0) == 0.0
+
+
+def test_what_is_no_number_stays_none() -> None:
+    assert all(math.isnan(found) for found in (exponential(math.nan), power(math.nan, 2.0), power(2.0, math.nan)))
+
+
+@given(st.floats(-709.0, -708.39))
+def test_a_subnormal_exponential_is_right_to_its_last_digit(exponent: float) -> None:
+    assert abs(mpmath.mpf(exponential(exponent)) - mpmath.exp(exponent)) <= 5e-324 + 3e-16 * mpmath.exp(exponent)

@@ -117,6 +117,46 @@ def test_the_delay_of_the_valve_is_a_lead() -> None:
     assert fractional.gait_time(rules, clock, stance).since_strike == pytest.approx(0.5 * 1.2 + 0.03)
 
 
+@pytest.mark.parametrize("even", [0.0, 1.0])
+def test_a_slow_valve_makes_no_strike_of_a_foot_that_hangs_after_an_odd_stride(even: float) -> None:
+    """At 0.95 the clock waits there; 60 ms ahead is beyond the strike."""
+    strides = gait_clock.START.strides._replace(even=even)
+    clock = gait_clock.START._replace(fraction=0.95, strides=strides)
+    found = gait_clock.place_in_stride(clock, 0.06, phases.START._replace(stride_time=1.1))
+    assert found.lands == even
+    assert (found.since_strike < 0.1) == (even > 0.5)
+
+
+@pytest.mark.parametrize("pace", [0.4, 0.5, 1.1, 2.4])
+@pytest.mark.parametrize("before", [0, 5])
+def test_the_second_stride_of_any_pace_sets_it_and_the_first_does_not(before: int, pace: float) -> None:
+    strides, found = gait_clock.START.strides, []
+    for taken in [1.1] * before + [pace, pace, pace]:
+        strides = gait_clock.next_strides(strides, True, True, True, taken, 1.1, 0.2)
+        found.append(strides.mean_time)
+    assert found[-3] == pytest.approx(1.1)
+    assert found[-2:] == pytest.approx([pace, pace])
+    assert strides.even == 1.0, "the third is like the two before"
+
+
+@pytest.mark.parametrize("kind", list(TIMINGS.values())[1:], ids=lambda timing: timing.name)
+def test_the_time_since_a_strike_is_never_below_0_when_strides_become_quicker(kind: TimingKind) -> None:
+    phase = np.concatenate([np.arange(0.5, 9.1, PERIOD), 9.1 + np.arange(0.0, 1.8, 1.1 * PERIOD)])
+    rules = settings(kind)
+    times = [kind.gait_time(rules, clock, phases.START._replace(stride_time=1.0)) for clock in followed(kind, phase)]
+    assert min(time.since_strike for time in times) >= 0.0
+
+
+def test_a_clock_that_a_strike_left_before_it_is_not_moved_where_nothing_is_estimated() -> None:
+    rules, fraction = settings(estimated.KIND), gait_clock.struck_fraction(0.9, 0.025, estimated.KEEPS)
+    assert fraction == pytest.approx(-0.075)
+    clock, at = estimated.START._replace(next_knot=29.0), gait_clock.START._replace(fraction=fraction)
+    measurement = GaitMeasurement(1.6, 1.0e5, 1.0e5, 0.0, 0.0, 0.0)
+    found = estimated.passed_knot(rules.estimation, clock, at, 0.0, measurement)
+    assert (found.clock.fraction, found.moved) == (fraction, 0.0)
+    assert estimated.gait_time(rules, found, phases.START._replace(phase=phases.LANDING)).since_strike == 0.0
+
+
 def learnt(shape: Floats) -> LearntStride:
     """A learnt stride from values (3, knots) of angle and forces."""
     return LearntStride(*(tuple(row.tolist()) for row in shape))

@@ -206,17 +206,16 @@ def next_strides(
     """The mean of recent stride times after a sample at which a stride that has ``taken`` [s] may end.
 
     The first strides count evenly, then a new one with its ``weight``. An odd one does not count, until a second one
-    is like it: the wearer walks at another pace. What begins with the toes, or does not end, is no even stride.
+    is like it, however long both are: the wearer walks at another pace. What begins with the toes, or does not end, is no even stride.
     """
     known = strides.mean_time if strides.counted > 0.5 else first_time
-    usual = ends & (taken > 0.5 * known) & (taken < 2.0 * known)
-    first = strides.counted < 0.5
+    first = (strides.counted < 0.5) & (taken > 0.5 * known) & (taken < 2.0 * known)
     near = abs(taken - known) < EVEN * known
     repeats = abs(taken - strides.last) < EVEN * strides.last
     share = max(weight, 1.0 / (strides.counted + 1.0))
     moved = known + share * (taken - known) if near else 0.5 * (taken + strides.last)
     moved = taken if first else moved
-    counts = usual & (first | near | repeats)
+    counts = ends & (first | near | repeats)
     mean_time = moved if counts else known
     even = counts & on_heel & (not first)
     return Strides(
@@ -295,15 +294,18 @@ def next_clock(
     return GaitClock(fraction=fraction, event=event, come=come, strides=strides)
 
 
-def place_in_stride(fraction: float, lead: float, phase: PhaseState) -> GaitTime:
-    """The time in the stride at a fraction of it [turns], a ``lead`` [s] ahead; the strike is expected, not awaited.
+def place_in_stride(clock: GaitClock, lead: float, phase: PhaseState) -> GaitTime:
+    """The time in the stride that a clock shows, a ``lead`` [s] ahead; the strike is expected, not awaited.
 
-    It is the fraction of the stride time that the phases go by, as a law makes it of this time again; 0 s at the start.
+    After an odd stride it is awaited, not expected. It is the fraction of the stride time that the phases go by, as a
+    law makes it of this time again; 0 s at the start, and where a detected strike is ahead of the clock.
     """
     stride_time = phase.stride_time if phase.stride_time > 0.0 else 1.0
-    ahead = fraction + lead / stride_time
-    expected = (phase.phase == phases.SWING) & (ahead >= 1.0) & (fraction < 1.0 + WAITS)
-    time = (ahead - 1.0 if expected else ahead) * stride_time
+    ahead = clock.fraction + lead / stride_time
+    comes = (phase.phase == phases.SWING) & (ahead >= 1.0) & (clock.fraction < 1.0 + WAITS)
+    expected = comes & (clock.strides.even > 0.5)
+    shown = ahead - 1.0 if expected else ahead
+    time = max(0.0, shown) * stride_time
     return GaitTime(time, 1.0 if (phase.phase == phases.LANDING) | expected else 0.0)
 
 

@@ -220,7 +220,8 @@ def passed_knot(
     together = knots_passed(at.fraction, clock.next_knot) < 1.0
     filled = clock.filled + 1.0 if together else 0.0
     shift = estimated_shift(stride, window, rules) - moved_since(window) if ready & (filled >= WINDOW) else 0.0
-    moved = max(rules.estimate_weight * shift, -at.fraction)
+    # No further back than the strike; a clock that a strike left before it stays there until it gets to it.
+    moved = max(rules.estimate_weight * shift, min(0.0, -at.fraction))
     following = clock.next_knot + 1.0
     return EstimatedClock(
         clock=GaitClock(fraction=at.fraction + moved, event=at.event, come=at.come, strides=at.strides),
@@ -262,7 +263,7 @@ def follow(
 
 def gait_time(rules: EstimatedRules, clock: EstimatedClock, phase: PhaseState) -> GaitTime:
     """The time since the heel strike [s], ahead by the delay of the valve."""
-    return place_in_stride(clock.clock.fraction, rules.delays.valve_delay, phase)
+    return place_in_stride(clock.clock, rules.delays.valve_delay, phase)
 
 
 KIND = TimingKind(

@@ -42,7 +42,7 @@ def follow(
 
 def gait_time(rules: FractionalRules, clock: GaitClock, phase: PhaseState) -> GaitTime:
     """The time since the heel strike [s], ahead by the delay of the valve."""
-    return place_in_stride(clock.fraction, rules.delays.valve_delay, phase)
+    return place_in_stride(clock, rules.delays.valve_delay, phase)
 
 
 KIND = TimingKind(
