@@ -11,6 +11,8 @@ enthalpy takes it along.
 from bisect import bisect_right
 from typing import NamedTuple
 
+from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.errors import SimulationError
 from ppafo.model.fluid_table import (
     Column,
     FluidTable,
@@ -166,8 +168,25 @@ def ice_rate(line: Isobar, enthalpy: float, flow: float, ice: float, step: float
     return max(flow * (line.enthalpies[0] - enthalpy) / DRY_ICE, -ice / step)
 
 
-def supply_now(table: FluidTable, line: Isobar, supply: ColdSupply, state: SupplyState, near: float) -> SupplyNow:
-    """What a supply offers in a state whose content is ``near`` a temperature [K]: pressure, flow and warmth."""
+def enthalpy_behind_seat(line: Isobar, enthalpy: float, ice: float, mass: float) -> float:
+    """Specific enthalpy [J/kg] behind a seat with dry ice [kg] of a mass of gas [kg] that comes with ``enthalpy``.
+
+    It is as cold as the ice while there is some, warmer as far as the gas has more than all of the ice takes.
+    """
+    if line.freezes < 0.5:
+        return enthalpy
+    if mass <= 0.0:
+        return line.enthalpies[0] if ice > 0.0 else max(enthalpy, line.enthalpies[0])
+    return max(enthalpy - ice * DRY_ICE / mass, line.enthalpies[0])
+
+
+def supply_now(
+    table: FluidTable, line: Isobar, supply: ColdSupply, state: SupplyState, near: float, mass: float
+) -> SupplyNow:
+    """What a supply offers in a state whose content is ``near`` a temperature [K]: pressure, flow and warmth.
+
+    ``mass`` [kg] is what the device draws in a step, the last one for the next, which dry ice cools while it lasts.
+    """
     content = _content(table, supply, state, near)
     regulator = supply.regulator
     highest = min(regulator.set_pressure, max(content.pressure - regulator.pressure_margin, 0.0))
@@ -178,9 +197,8 @@ def supply_now(table: FluidTable, line: Isobar, supply: ColdSupply, state: Suppl
         supply.heat_capacity_ratio,
         table.gas_constant,
     )
-    outlet = enthalpy_behind(line, supply.body, state.body_temperature, content.outflow_enthalpy)
-    if line.freezes > 0.5:
-        outlet = max(outlet, line.enthalpies[0])
+    arriving = enthalpy_behind(line, supply.body, state.body_temperature, content.outflow_enthalpy)
+    outlet = enthalpy_behind_seat(line, arriving, state.ice, mass)
     behind = enthalpy_behind(line, supply.hose, state.hose_temperature, outlet)
     return SupplyNow(
         content=content,
@@ -200,7 +218,16 @@ def advance_supply(
     mass: float,
     step: float,
 ) -> SupplyState:
-    """The state after a step [s] in which a mass [kg] left the bottle evenly, by Heun's rule, from its ``content``."""
+    """The state after a step [s] in which a mass [kg] left the bottle evenly, by Heun's rule, from its ``content``.
+
+    SimulationError where the bottle has no more than that: nobody can have drawn it.
+    """
+    if mass >= state.mass:
+        raise SimulationError(
+            f"{mass * GRAMS_PER_KILOGRAM:.3g} g of gas were drawn within {step:.3g} s from a bottle with "
+            f"{state.mass * GRAMS_PER_KILOGRAM:.3g} g: set bottle.coupling shorter, or bottle.least_torque higher, "
+            f"so that the walk ends before the bottle is bare"
+        )
     flow = mass / step
     first = supply_rates(line, supply, state, content, flow, step)
     guess = SupplyState._make(value + step * rate for value, rate in zip(state, first, strict=True))
@@ -220,8 +247,7 @@ def supply_rates(
     now = bottle_rates(content, bottle, flow, supply.wall, supply.room_temperature)
     arriving = enthalpy_behind(line, supply.body, state.body_temperature, content.outflow_enthalpy)
     growth = ice_rate(line, arriving, flow, state.ice, step)
-    leaving = flow * arriving + growth * DRY_ICE
-    outlet = leaving / flow if flow > 0.0 else arriving
+    outlet = enthalpy_behind_seat(line, arriving, state.ice, flow * step)
     behind = enthalpy_behind(line, supply.hose, state.hose_temperature, outlet)
     to_body = supply.body.room_heat_transfer * (supply.room_temperature - state.body_temperature)
     to_hose = supply.hose.room_heat_transfer * (supply.room_temperature - state.hose_temperature)

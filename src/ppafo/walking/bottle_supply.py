@@ -66,13 +66,16 @@ class BottleSupply:
             room_heat=0.0,
         )
 
-    def offers(self, state: SupplyState, near: float) -> SupplyNow:
-        """Return what the supply offers the device in a state whose content is ``near`` a temperature [K]."""
-        return supply_now(self.bottle.fluid.table, self.line, self.bottle.supply, state, near)
+    def offers(self, state: SupplyState, near: float, mass: float) -> SupplyNow:
+        """Return what the supply offers in a state whose content is ``near`` a temperature [K].
+
+        ``mass`` [kg] is what the device drew in the last coupling.
+        """
+        return supply_now(self.bottle.fluid.table, self.line, self.bottle.supply, state, near, mass)
 
     def offers_first(self) -> SupplyNow:
         """Return what the supply offers the device at the start."""
-        return self.offers(self.start(), self.temperature)
+        return self.offers(self.start(), self.temperature, 0.0)
 
     def device_at_start(self, device: Device) -> Device:
         """Return the device with gas of the temperature that the supply has at the start."""

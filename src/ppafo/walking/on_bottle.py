@@ -15,7 +15,7 @@ import numpy as np
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.engine.lanes import BatchResult, Floats, LaneBlock, load_program
 from ppafo.engine.rows import row_numbers
-from ppafo.engine.run import Run, batch_of
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.model.cold_gas import DRY_ICE, SupplyNow, SupplyState, advance_supply, open_share
 from ppafo.model.fluid_table import has_liquid
 from ppafo.model.plant import PlantParameters
@@ -23,8 +23,9 @@ from ppafo.model.source import bottle_content
 from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle_supply import BottleSupply
 
-EndKind = Literal["walk's end", "empty", "too cold", "frozen", "iced", "too little flow"]
+EndKind = Literal["walk's end", "empty", "too cold", "frozen", "iced", "too little flow", "diverged"]
 WALKED: EndKind = "walk's end"
+DIVERGED: EndKind = "diverged"
 
 _PARAMETERS = (
     "plant.gas_product",
@@ -137,27 +138,37 @@ def run_on_bottle(
     met = [(0.0, state, supply.offers_first())]
     lanes = _lanes_of(run, met[0][2])
     gauges = [1.0] * max(2, math.ceil(_STRIDES * stride_time / (every * run.step)))
-    ending, done = None, 0
+    ending, done, before = None, 0, float(batch.states[regulated, 0])
     while ending is None and done < count:
-        steps, before = min(every, count - done), float(block.states[regulated, 0])
+        steps = min(every, count - done)
         block.set_parameters(lanes.rows, lanes.offered(met[-1][2]))
         block.advance(steps)
         done += steps
         progress(done * run.step / 60.0, count * run.step / 60.0)
-        mass = float(block.states[regulated, 0]) - before
-        if not math.isfinite(mass):
+        ending = _divergence(block.states, states["result.failure_time"], state, done * run.step)
+        if ending is not None:
             break
+        mass, before = float(block.states[regulated, 0]) - before, float(block.states[regulated, 0])
         content = met[-1][2].content
         state = advance_supply(table, supply.line, supply.bottle.supply, state, content, mass, steps * run.step)
-        now = supply.offers(state, content.temperature)
+        now = supply.offers(state, content.temperature, mass)
         met.append((done * run.step, state, now))
         gauges = [*gauges[1:], lanes.gauge(float(block.states[line, 0]), now)]
         ending = _ending(supply, state, now, max(gauges), done * run.step)
     result = block.result()
     record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
     last = ending or SupplyEnding(WALKED, _at_the_end(state), done * run.step)
-    let_through = float(block.states[regulated, 0]) - float(batch.states[regulated, 0])
+    let_through = before - float(batch.states[regulated, 0])
     return BatchResult(result.states, record), _course(supply, met, let_through, last)
+
+
+def _divergence(states: Floats, failure: int, state: SupplyState, time: float) -> SupplyEnding | None:
+    """Return that a walk left what is possible by a time [s], None where it did not; ``state`` is the last before."""
+    failed = float(states[failure, 0])
+    if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
+        return None
+    message = f"the walk diverged, and {_grams(state.mass)} were left in the bottle before"
+    return SupplyEnding(DIVERGED, message, min(time, failed))
 
 
 @dataclass(frozen=True, slots=True)

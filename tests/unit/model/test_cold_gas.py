@@ -2,15 +2,18 @@
 
 import pytest
 
+from ppafo.errors import SimulationError
 from ppafo.model.cold_gas import (
     DRY_ICE,
     Isobar,
     Passage,
+    advance_supply,
     enthalpy_at,
     enthalpy_behind,
     heat_to_warm,
     ice_rate,
     isobar,
+    supply_now,
     supply_rates,
     temperature_at,
 )
@@ -85,6 +88,46 @@ def test_warm_gas_takes_off_no_more_ice_than_there_is(line: Isobar) -> None:
     warm = enthalpy_at(line, WARM)
     assert ice_rate(line, warm, 1e-3, 0.0, 0.1) == 0.0
     assert ice_rate(line, warm, 1.0, 1e-6, 0.1) == pytest.approx(-1e-5)
+
+
+@pytest.mark.parametrize("ice", [0.0, 1.0e-7, 25.0e-6, 1.0e-3])
+@pytest.mark.parametrize("body", [220.0, 280.0])
+def test_the_gas_that_is_offered_is_as_cold_as_the_balance_says(ice: float, body: float) -> None:
+    """The hose passes its gas on as it is, so what is delivered is what comes out of the regulator."""
+    supply = load_walk("solenoid-regulators", ["bottle.temperature=280 K"], bottle="paper-co2-9oz").bottle
+    assert supply is not None
+    line, model = isobar(TABLE, 400e3), supply.bottle.supply._replace(hose=Passage(1.0, 0.0, 0.0))
+    state, mass, step = supply.start()._replace(body_temperature=body, ice=ice), 0.4e-3, 0.5
+    now = supply_now(TABLE, line, model, state, 280.0, mass)
+    rates = supply_rates(line, model, state, now.content, mass / step, step)
+    assert now.outlet_temperature == pytest.approx(temperature_at(line, rates.delivered * step / mass), abs=1e-6)
+    warmest = supply_now(TABLE, line, model, state._replace(ice=0.0), 280.0, mass).outlet_temperature
+    assert now.outlet_temperature <= warmest
+    assert now.outlet_temperature < warmest - 5.0 or ice < 1e-6 or body < 280.0, "ice makes the gas of a warm body cold"
+
+
+def test_ice_takes_from_the_gas_what_it_loses() -> None:
+    supply = load_walk("solenoid-regulators", ["bottle.temperature=280 K"], bottle="paper-co2-9oz").bottle
+    assert supply is not None
+    state = supply.start()._replace(ice=25.0e-6)
+    content = bottle_content(TABLE, state.mass, supply.bottle.volume, 280.0)
+    model = supply.bottle.supply._replace(hose=Passage(1.0, 0.0, 0.0))
+    icy, bare = (
+        supply_rates(supply.line, model, state._replace(ice=ice), content, 1.0e-3, 0.5) for ice in (25e-6, 0.0)
+    )
+    assert icy.ice < 0.0 == bare.ice
+    assert icy.delivered == pytest.approx(bare.delivered + DRY_ICE * icy.ice, rel=1e-12)
+
+
+@pytest.mark.parametrize("share", [1.0, 1.3])
+def test_no_more_gas_is_drawn_than_the_bottle_has(share: float) -> None:
+    supply = load_walk("solenoid-regulators", ["bottle.fill=0.02"], bottle="paper-co2-9oz").bottle
+    assert supply is not None
+    state, content = supply.start(), supply.offers_first().content
+    with pytest.raises(SimulationError, match=r"5.1 g: set bottle\.coupling shorter"):
+        advance_supply(TABLE, supply.line, supply.bottle.supply, state, content, share * state.mass, 0.1)
+    after = advance_supply(TABLE, supply.line, supply.bottle.supply, state, content, 0.5 * state.mass, 0.1)
+    assert after.mass == pytest.approx(0.5 * state.mass)
 
 
 def test_a_bottle_file_without_regulator_and_hose_has_those_of_the_papers_bottle() -> None:

@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from ppafo.engine.lanes import BatchResult, Floats
+from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError
-from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking import load_walk, on_bottle, walk, walk_population
 from ppafo.walking.comparison import with_device_off
-from ppafo.walking.walk import WalkResult
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.walk import WalkResult, plan_of
 from tests.judge import bottle as independent
 
 WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
@@ -93,6 +96,44 @@ def test_the_walk_ends_with_its_supply_and_says_why_and_when(kind: str) -> None:
     reached = found.recording["line_pressure_1"][found.recording.time > end - 1.0].max() - 101325.0
     if kind not in ("walk's end", "frozen"):
         assert reached < 0.9 * 344.74e3 * 1.001, "less than 90 % of the torque in the last stride"
+
+
+class Breaking:
+    """Stands for the lanes: gas flows through the regulator evenly, until ``good`` advances are done."""
+
+    def __init__(self, wrong: str, good: int, rows: dict[str, int], states: Floats) -> None:
+        self.wrong, self.good, self.rows, self.states = wrong, good, rows, states.copy()
+
+    def set_parameters(self, rows: list[int], values: Floats) -> None:
+        assert len(rows) == len(values)
+
+    def advance(self, steps: int) -> None:
+        self.good -= 1
+        self.states[self.rows["line_state.regulated_mass"]] += 1.0e-5
+        if self.good < 0:
+            self.states[self.rows[self.wrong]] = 0.25 if self.wrong == "result.failure_time" else np.nan
+
+    def result(self) -> BatchResult:
+        return BatchResult(self.states, np.zeros((100_000, *self.states.shape)))
+
+
+@pytest.mark.parametrize("wrong", ["line_state.regulated_mass", "line_state.mass_1", "result.failure_time"])
+@pytest.mark.parametrize("good", [0, 2])
+def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
+    wrong: str, good: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen = load_walk(WALK, bottle=BOTTLE)
+    run = plan_walk(plan_of(chosen, 12.0))
+    rows = row_numbers(run.program.state_rows())
+    monkeypatch.setattr(on_bottle, "load_program", lambda program: None)
+    monkeypatch.setattr(on_bottle, "LaneBlock", lambda *given: Breaking(wrong, good, rows, given[-1]))
+    assert chosen.bottle is not None
+    _, course = on_bottle.run_on_bottle(run, chosen.bottle, 1.1, lambda done, total: None)
+    assert course.ending.kind == "diverged"
+    assert "diverged, and 255 g were left" in course.ending.message
+    assert course.ending.time == pytest.approx(min(0.25, 0.1 * (good + 1)) if "failure" in wrong else 0.1 * (good + 1))
+    assert course.regulated == pytest.approx(1.0e-5 * good)
+    assert course.balance.left_bottle == pytest.approx(course.regulated, abs=1e-12)
 
 
 def test_ice_narrows_the_seat_until_the_gas_lacks_no_more_than_it_is_given() -> None:

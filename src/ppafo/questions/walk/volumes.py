@@ -11,7 +11,7 @@ from ppafo.errors import DataError
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
 from ppafo.questions.endurance.draw import full_chambers, largest_flow, walk_gas
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
-from ppafo.walking.on_bottle import WALKED
+from ppafo.walking.on_bottle import DIVERGED, WALKED
 from ppafo.walking.walk import WalkResult, walk
 from ppafo.walking.walk_metrics import settled
 
@@ -125,7 +125,7 @@ def _lasts(one: VolumeReading) -> float | None:
     """Return how long the bottle lasts [s]: that of the walk where it ended it, else one that is followed alone."""
     supply = one.result.supply
     if supply is not None:
-        return supply.ending.time if supply.ending.kind != WALKED else None
+        return None if supply.ending.kind in (WALKED, DIVERGED) else supply.ending.time
     return None if one.life is None else one.life.discharge.walking_time
 
 
