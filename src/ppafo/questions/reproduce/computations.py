@@ -129,7 +129,7 @@ def event_reduction(wearer: str) -> float:
     errors = []
     for timing in ("thresholds", "estimated"):
         walked = replace(load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}")), course=course)
-        errors.append(rms_of([event.errors for event in timed_events(walked, MINUTES).values()]))
+        errors.append(rms_of([event.errors for event in timed_events(walked, 1.0).values()]))
     return 1.0 - errors[1] / errors[0]
 
 
