@@ -94,7 +94,7 @@ def rates(y: Column, angle: float, open_1: bool, open_2: bool, n: "Numbers", gas
     at_hose = between(gas.gas_temperatures, gas.gas_enthalpies, y[HOSE])
     arriving = enthalpy + n.body_share * (at_body - enthalpy)
     frost = gas.gas_enthalpies[0]
-    outlet = max(arriving, frost)
+    outlet = frost if y[ICE] > 0.0 else max(arriving, frost)
     warmth = between(gas.gas_enthalpies, gas.gas_temperatures, outlet + n.hose_share * (at_hose - outlet))
     product = n.constant * warmth
     line_1, line_2 = y[LINE_1] * product / n.line_1, y[LINE_2] * product / n.line_2

@@ -206,7 +206,8 @@ def next_strides(
     """The mean of recent stride times after a sample at which a stride that has ``taken`` [s] may end.
 
     The first strides count evenly, then a new one with its ``weight``. An odd one does not count, until a second one
-    is like it, however long both are: the wearer walks at another pace. What begins with the toes, or does not end, is no even stride.
+    is like it, however long both are: the wearer walks at another pace. What begins with the toes, or does not end, is
+    no even stride.
     """
     known = strides.mean_time if strides.counted > 0.5 else first_time
     first = (strides.counted < 0.5) & (taken > 0.5 * known) & (taken < 2.0 * known)
