@@ -59,13 +59,15 @@ def translated(composed: str, collector: SourceCollector) -> str:
 
 def c_source(module: Module, documents: Mapping[str, str], title: str) -> str:
     """A translation unit with all functions of a module; ``documents`` has the docstrings of rows and functions."""
-    writer = _Writer(documents, {item.name for item in module.functions})
+    # What returns nothing but empty rows is never called: an empty value is not written.
+    functions = [item for item in module.functions if item.returns is None or not is_empty(item.returns)]
+    writer = _Writer(documents, {item.name for item in functions})
     prelude = files("ppafo.translation").joinpath("prelude.h").read_text(encoding="utf-8")
-    for item in module.functions:
+    for item in functions:
         writer.function(item)
     # Written again now that all structs have their names, which no local name may hide.
     writer.outer |= {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
-    bodies = [writer.function(item) for item in module.functions]
+    bodies = [writer.function(item) for item in functions]
     return "\n".join([_comment(title), prelude, *writer.structs, *bodies])
 
 
