@@ -230,7 +230,7 @@ class _Body:
     def write_count(self, item: typed.Count, level: int) -> Iterator[str]:
         """A loop that counts; a name that lives beyond it gets the number from a counter of its own."""
         name = self.name(item.name)
-        is_own = id(item) in self.scopes.counted
+        is_own = id(item) in self.scopes.counted or item.name not in self.scopes.read
         counter = name if is_own else f"{name}_next"
         while not is_own and counter in {*map(self.name, self.kinds), *self.writer.outer}:
             counter += "_"

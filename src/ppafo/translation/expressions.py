@@ -126,7 +126,9 @@ class Expressions:
             array, at = self.term(node.value.value), self.literal(node.slice)
             if array.kind != "name" or not isinstance(array.type, Array) or at not in range(array.type.dimensions):
                 raise self.refused(node, f"'{ast.unparse(node)}' is no extent of an array")
-            return Term("number", INT, (), array.type.shape[at]) if array.type.shape else Term("extent", INT, (array,), at)
+            return (
+                Term("number", INT, (), array.type.shape[at]) if array.type.shape else Term("extent", INT, (array,), at)
+            )
         owner = self.term(node.value)
         if isinstance(owner.type, Array):
             return self.element(owner, owner.type, node)
@@ -245,6 +247,8 @@ class Expressions:
         kind = joined(yes.type, no.type)
         if kind is None:
             raise self.refused(node, "a choice between values of different forms")
+        if typed.mixes(yes.type, no.type):
+            raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
 
     def _of_call(self, node: ast.Call) -> Term:
@@ -307,7 +311,9 @@ class Expressions:
             return values[0]
         if own == "int":
             return values[0] if values[0].type == INT else Term("convert", INT, (values[0],))
-        kind = FLOAT if any(value.type == FLOAT for value in values) else INT
+        if len({value.type for value in values}) > 1:
+            raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
+        kind = values[0].type
         made, *others = [converted(value, kind) for value in values]
         if not others:
             return Term(own, kind, (made,))

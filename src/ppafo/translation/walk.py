@@ -114,7 +114,12 @@ class _FunctionWalk:
         self.read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
         self.made: set[str] = set()
         self.values = Expressions(
-            self.types, _counters(definition), module.rows, module.definitions, made=module.function, refused=module.refused
+            self.types,
+            _counters(definition),
+            module.rows,
+            module.definitions,
+            made=module.function,
+            refused=module.refused,
         )
         self.returns: Type | None = None
         self.has_widened = False
