@@ -15,7 +15,7 @@ from ppafo.engine.lane_source import INLINE, write_lanes
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.translation import typed
-from ppafo.translation.c_terms import CTerms, c_name
+from ppafo.translation.c_terms import CTerms, c_name, member_name
 from ppafo.translation.scopes import Scopes, scopes_of
 from ppafo.translation.typed import (
     Array,
@@ -59,9 +59,15 @@ def translated(composed: str, collector: SourceCollector) -> str:
 
 def c_source(module: Module, documents: Mapping[str, str], title: str) -> str:
     """A translation unit with all functions of a module; ``documents`` has the docstrings of rows and functions."""
-    writer = _Writer(documents)
+    # What returns nothing but empty rows is never called: an empty value is not written.
+    functions = [item for item in module.functions if item.returns is None or not is_empty(item.returns)]
+    writer = _Writer(documents, {item.name for item in functions})
     prelude = files("ppafo.translation").joinpath("prelude.h").read_text(encoding="utf-8")
-    bodies = [writer.function(item) for item in module.functions]
+    for item in functions:
+        writer.function(item)
+    # Written again now that all structs have their names, which no local name may hide.
+    writer.outer |= {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
+    bodies = [writer.function(item) for item in functions]
     return "\n".join([_comment(title), prelude, *writer.structs, *bodies])
 
 
@@ -75,12 +81,12 @@ def _comment(text: str, further: Iterable[str] = ()) -> str:
 
 @dataclass(slots=True)
 class _Writer:
-    """What has been written so far: structs by type, and the names that are taken."""
+    """What has been written so far: structs by type; ``outer`` are names of functions, and of structs in the end."""
 
     documents: Mapping[str, str]
+    outer: set[str]
     structs: list[str] = field(default_factory=list)
     names: dict[Type, str] = field(default_factory=dict)
-    taken: dict[str, int] = field(default_factory=dict)
     owner: str = ""
 
     def type_name(self, kind: Type) -> str:
@@ -90,10 +96,12 @@ class _Writer:
         if isinstance(kind, Array):
             return "ppafo_array"
         if kind not in self.names:
-            wanted = self.struct_name(kind)
-            self.taken[wanted] = self.taken.get(wanted, 0) + 1
-            number = self.taken[wanted]
-            self.names[kind] = wanted if number == 1 else f"{wanted}_{number}"
+            wanted = own = self.struct_name(kind)
+            number = 1
+            while {own, f"make_{own}"} & {*self.outer, *self.names.values()}:
+                number += 1
+                own = f"{wanted}_{number}"
+            self.names[kind] = own
             self.structs.append(self.struct(kind, self.names[kind]))
         return self.names[kind]
 
@@ -109,7 +117,7 @@ class _Writer:
     def members(self, kind: Type) -> list[tuple[str, Type]]:
         """Members of a struct that hold something, by their names in C."""
         if isinstance(kind, Row):
-            return [(c_name(name), inner) for name, inner in kind.fields if not is_empty(inner)]
+            return [(member_name(kind, name), inner) for name, inner in kind.fields if not is_empty(inner)]
         assert isinstance(kind, Items)
         return [(f"item_{place}", inner) for place, inner in enumerate(kind.types) if not is_empty(inner)]
 
@@ -119,23 +127,27 @@ class _Writer:
             inner, count = self.type_name(kind.types[0]), len(kind.types)
             members = [("", f"{inner} item[{count}]")]
             given = [f"{inner}{TIED}item_{place}" for place in range(count)]
-            fill = [f"made.item[{place}] = item_{place};" for place in range(count)]
+            made, fill = "made", [f"made.item[{place}] = item_{place};" for place in range(count)]
         else:
             members = [(own, f"{self.type_name(inner)}{TIED}{own}") for own, inner in self.members(kind)]
-            given = [declared for _, declared in members]
-            fill = [f"made.{own} = {own};" for own, _ in members]
-        said = _comment(self.documents.get(name, "")) if isinstance(kind, Row) else ""
+            types = {name, *(self.type_name(inner) for _, inner in self.members(kind))}
+            given_as = {own: c_name(own, [other for other, _ in members], types) for own, _ in members}
+            given = [f"{self.type_name(inner)}{TIED}{given_as[own]}" for own, inner in self.members(kind)]
+            made = c_name("made", given_as.values(), given_as.values())
+            fill = [f"{made}.{own} = {given_as[own]};" for own, _ in members]
+        said = _comment(self.documents.get(kind.name, "")) if isinstance(kind, Row) else ""
         declared = [f"    {text};".replace(TIED, " ") for _, text in members]
         head = _wrapped(f"PPAFO_INLINE {name} make_{name}({', '.join(given)})")
-        body = ["{", f"    {name} made;", *(f"    {line}" for line in fill), "    return made;", "}", ""]
+        body = ["{", f"    {name} {made};", *(f"    {line}" for line in fill), f"    return {made};", "}", ""]
         return "\n".join([*([said] if said else []), "typedef struct {", *declared, f"}} {name};", "", *head, *body])
 
     def function(self, item: Function) -> str:
         """One function with its comment."""
         self.owner = item.source
-        body = _Body(self, item, scopes_of(item)).text()
+        writer = _Body(self, item, scopes_of(item))
+        body = writer.text()
         returns = "void" if item.returns is None else self.type_name(item.returns)
-        given = ", ".join(f"{self.type_name(kind)}{TIED}{c_name(name)}" for name, kind in item.parameters)
+        given = ", ".join(f"{self.type_name(kind)}{TIED}{writer.name(name)}" for name, kind in item.parameters)
         linkage = "PPAFO_ENTRY void" if item.returns is None else f"PPAFO_INLINE {returns}"
         head = _wrapped(f"{linkage} {item.name}({given or 'void'})")
         bound = [f"Here {text}." for text in item.bound]
@@ -149,14 +161,18 @@ class _Body:
 
     def __init__(self, writer: _Writer, item: Function, scopes: Scopes) -> None:
         self.writer = writer
-        self.terms = CTerms(writer.type_name)
+        self.terms = CTerms(writer.type_name, self.name)
         self.item = item
         self.scopes = scopes
         self.kinds: dict[str, Type] = dict(item.parameters) | scopes.types
 
+    def name(self, name: str) -> str:
+        """A local name in C: no two of a function are the same, and none hides what the file has."""
+        return c_name(name, self.kinds, self.writer.outer)
+
     def text(self) -> list[str]:
         unused = [name for name, _ in self.item.parameters if name not in self.scopes.read]
-        return [*(f"    (void){c_name(name)};" for name in unused), *self.block(self.item.body, 1)]
+        return [*(f"    (void){self.name(name)};" for name in unused), *self.block(self.item.body, 1)]
 
     def block(self, body: tuple[Statement, ...], level: int) -> list[str]:
         """Some statements, with what must be declared before them."""
@@ -172,7 +188,7 @@ class _Body:
         kind = self.kinds[name]
         begin = {"bool": " = false", "int": " = 0", "float": " = 0.0"}
         value = begin[kind.name] if isinstance(kind, typed.Scalar) else ""
-        return f"{self.writer.type_name(kind)} {c_name(name)}{value}"
+        return f"{self.writer.type_name(kind)} {self.name(name)}{value}"
 
     def line(self, text: str, level: int) -> Iterator[str]:
         yield from _wrapped("    " * level + text, "    " * (level + 1))
@@ -182,12 +198,12 @@ class _Body:
             starts = self.scopes.first.get(id(item), "")
             declared = f"{starts}{self.writer.type_name(item.value.type)} " if starts else ""
             yield from self.line(
-                f"{declared.replace('let ', '')}{c_name(item.name)} = {self.terms.term(item.value)};", level
+                f"{declared.replace('let ', '')}{self.name(item.name)} = {self.terms.term(item.value)};", level
             )
 
     def write_reserve(self, item: typed.Reserve, level: int) -> Iterator[str]:
         extents = "".join(f"[{extent}]" for extent in item.type.shape)
-        yield from self.line(f"double {c_name(item.name)}{extents};", level)
+        yield from self.line(f"double {self.name(item.name)}{extents};", level)
 
     def write_store(self, item: typed.Store, level: int) -> Iterator[str]:
         yield from self.line(f"{self.terms.term(item.element)} = {self.terms.term(item.value)};", level)
@@ -213,10 +229,10 @@ class _Body:
 
     def write_count(self, item: typed.Count, level: int) -> Iterator[str]:
         """A loop that counts; a name that lives beyond it gets the number from a counter of its own."""
-        name = c_name(item.name)
-        is_own = id(item) in self.scopes.counted
+        name = self.name(item.name)
+        is_own = id(item) in self.scopes.counted or item.name not in self.scopes.read
         counter = name if is_own else f"{name}_next"
-        while not is_own and counter in self.kinds:
+        while not is_own and counter in {*map(self.name, self.kinds), *self.writer.outer}:
             counter += "_"
         sign, change = ("<", f"++{counter}") if item.step == 1 else (">", f"{counter} += {item.step}")
         sign = "<" if item.step > 0 else ">"

@@ -1,112 +1,28 @@
 """Typed terms as text of C."""
 
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from ppafo.translation.typed import BOOL, FLOAT, INT, Array, Items, Term, Type, is_empty
+from ppafo.translation.typed import BOOL, FLOAT, INT, Array, Items, Row, Term, Type, is_empty
 
 _RESERVED = frozenset(
-    {
-        *(
-            "auto",
-            "break",
-            "case",
-            "char",
-            "const",
-            "continue",
-            "default",
-            "do",
-            "double",
-            "else",
-            "enum",
-            "extern",
-        ),
-        *(
-            "float",
-            "for",
-            "goto",
-            "if",
-            "inline",
-            "int",
-            "long",
-            "register",
-            "restrict",
-            "return",
-            "short",
-            "signed",
-        ),
-        *(
-            "sizeof",
-            "static",
-            "struct",
-            "switch",
-            "typedef",
-            "union",
-            "unsigned",
-            "void",
-            "volatile",
-            "while",
-            "bool",
-        ),
-        *(
-            "true",
-            "false",
-            "and",
-            "and_eq",
-            "asm",
-            "bitand",
-            "bitor",
-            "catch",
-            "class",
-            "compl",
-            "constexpr",
-        ),
-        *(
-            "decltype",
-            "delete",
-            "explicit",
-            "export",
-            "friend",
-            "mutable",
-            "namespace",
-            "new",
-            "noexcept",
-            "not",
-        ),
-        *(
-            "not_eq",
-            "nullptr",
-            "operator",
-            "or",
-            "or_eq",
-            "private",
-            "protected",
-            "public",
-            "template",
-            "this",
-            "throw",
-        ),
-        *(
-            "try",
-            "typeid",
-            "typename",
-            "using",
-            "virtual",
-            "wchar_t",
-            "xor",
-            "xor_eq",
-            "unix",
-            "linux",
-            "gamma",
-            "main",
-        ),
-        *(
-            "fabs",
-            "sqrt",
-        ),
-    }
+    """
+    auto break case char const continue default do double else enum extern float for goto if inline int long register
+    restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false and
+    and_eq asm bitand bitor catch class compl concept consteval constexpr constinit const_cast co_await co_return co_yield
+    decltype delete dynamic_cast explicit export friend mutable namespace new noexcept not not_eq nullptr operator or or_eq
+    private protected public reinterpret_cast requires static_assert static_cast template this thread_local throw try typeid
+    typename typeof typeof_unqual using virtual wchar_t char8_t char16_t char32_t alignas alignof xor xor_eq unix linux i386
+    gamma main fabs sqrt advance int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t size_t intptr_t uintptr_t
+    NAN INFINITY HUGE_VAL HUGE_VALF HUGE_VALL DECIMAL_DIG NULL math_errhandling
+    """.split()
 )
+_MACRO = re.compile(
+    r"(_[A-Z_]|(PPAFO|ppafo|DBL|FLT|LDBL|FP|MATH|M|INT|UINT|INTMAX|UINTMAX|SIZE|PTRDIFF|WCHAR|WINT|SIG|INT\d+|UINT\d+)_)"
+)
+"""How names begin that headers or compilers keep for themselves."""
 _WORDS = {"and": "&&", "or": "||"}
 _LEVELS = {"or": 2, "and": 3, **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 5), "+": 8, "-": 8, "*": 9, "/": 9}
 _CHOICE, _SIGN, _ATOM = 1, 10, 11
@@ -119,16 +35,25 @@ _HELPERS = {
 }
 
 
-def c_name(name: str) -> str:
-    """A name of Python as C can have it."""
-    return f"{name}_" if name in _RESERVED else name
+def c_name(name: str, others: Collection[str] = (), outer: Collection[str] = ()) -> str:
+    """A name of Python as C can have it: not one of C's, of the ``others`` beside it, or of the file around it."""
+    found = name
+    while found in _RESERVED or _MACRO.match(found) or found in outer or (found != name and found in others):
+        found = f"v{found}" if _MACRO.match(found) else f"{found}_"
+    return found
+
+
+def member_name(kind: Row, name: str) -> str:
+    """The member of a struct for a field of a row."""
+    return c_name(name, [own for own, _ in kind.fields])
 
 
 @dataclass(frozen=True, slots=True)
 class CTerms:
-    """Writes terms; ``type_name`` gives the name of a type in C."""
+    """Writes terms; ``type_name`` gives the name of a type in C, ``name`` that of a local name."""
 
     type_name: Callable[[Type], str]
+    name: Callable[[str], str]
 
     def term(self, item: Term, least: int = 0) -> str:
         """A term as text, in brackets where what is around it binds more than ``least``."""
@@ -169,8 +94,7 @@ class CTerms:
         if item.type == BOOL:
             return ("true" if value else "false"), _ATOM
         if item.type == INT:
-            is_wide = abs(value) > 2**31 - 1
-            return (f"INT64_C({value})" if is_wide else str(value)), _ATOM if value >= 0 else _SIGN
+            return (f"INT64_C({value})" if value >= 0 else f"-INT64_C({-value})"), _ATOM if value >= 0 else _SIGN
         if math.isnan(value):
             return "(double)NAN", _SIGN
         if math.isinf(value):
@@ -178,10 +102,12 @@ class CTerms:
         return repr(float(value)), _ATOM if math.copysign(1.0, value) > 0.0 else _SIGN
 
     def _of_name(self, item: Term) -> tuple[str, int]:
-        return c_name(item.detail), _ATOM
+        return self.name(item.detail), _ATOM
 
     def _of_field(self, item: Term) -> tuple[str, int]:
-        return f"{self.term(item.parts[0], _ATOM)}.{c_name(item.detail)}", _ATOM
+        kind = item.parts[0].type
+        assert isinstance(kind, Row)
+        return f"{self.term(item.parts[0], _ATOM)}.{member_name(kind, item.detail)}", _ATOM
 
     def _of_item(self, item: Term) -> tuple[str, int]:
         owner = self.term(item.parts[0], _ATOM)
@@ -193,7 +119,7 @@ class CTerms:
     def _of_element(self, item: Term) -> tuple[str, int]:
         owner, *places = item.parts
         assert isinstance(owner.type, Array)
-        name = c_name(owner.detail)
+        name = self.name(owner.detail)
         if owner.type.shape:
             return name + "".join(f"[{self.term(place)}]" for place in places), _ATOM
         index = self.term(places[0], 9 if len(places) > 1 else 0)
@@ -202,7 +128,7 @@ class CTerms:
         return f"{name}.values[{index}]", _ATOM
 
     def _of_extent(self, item: Term) -> tuple[str, int]:
-        return f"{c_name(item.parts[0].detail)}.extent[{item.detail}]", _ATOM
+        return f"{self.name(item.parts[0].detail)}.extent[{item.detail}]", _ATOM
 
     def _of_build(self, item: Term) -> tuple[str, int]:
         name = self.type_name(item.type)
@@ -220,7 +146,7 @@ class CTerms:
         if given.type == FLOAT:
             return f"ppafo_whole_part({self.term(given)})", _ATOM
         if given.type == BOOL:
-            one, none = ("1.0", "0.0") if item.type == FLOAT else ("1", "0")
+            one, none = ("1.0", "0.0") if item.type == FLOAT else ("INT64_C(1)", "INT64_C(0)")
             return f"{self.term(given, _CHOICE + 1)} ? {one} : {none}", _CHOICE
         return f"(double){self.term(given, _SIGN)}", _SIGN
 

@@ -2,7 +2,7 @@
 
 import ast
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,17 +33,20 @@ SIGN_OF: dict[type[ast.AST], str] = {
     **{ast.And: "and", ast.Or: "or"},
 }
 CONSTANTS = {"inf": math.inf, "nan": math.nan, "pi": math.pi}
+EXACT = 2**53
+"""Up to here a float holds every whole number."""
 WHOLE_ONLY = frozenset({"&", "|", "^", ">>"})
 
 
 @dataclass(frozen=True, slots=True)
 class Expressions:
-    """Expressions of one function: its names with their types, the rows and functions of the module.
+    """Expressions of one function: its names with their types, those that only count up from 0, rows and functions.
 
     ``made`` gives a function for types of its parameters, ``refused`` the error for a place.
     """
 
     types: Mapping[str, Type]
+    counters: Collection[str]
     rows: Mapping[str, Sequence[str]]
     definitions: Mapping[str, ast.FunctionDef]
     made: Callable[[str, tuple[Type, ...]], Function]
@@ -74,6 +77,8 @@ class Expressions:
 
     def condition(self, node: ast.expr) -> Term:
         """Whether an expression is true."""
+        if isinstance(node, ast.BoolOp):
+            return _linked(node, [self.condition(item) for item in node.values])
         found = self.scalar(node)
         return (
             found
@@ -85,7 +90,14 @@ class Expressions:
         """A part of a tuple, whose bounds are literal."""
         if not isinstance(node, ast.Slice) or node.step is not None:
             raise self.refused(node, f"'{ast.unparse(node)}' is no part of a tuple")
-        return slice(*(None if item is None else ast.literal_eval(item) for item in (node.lower, node.upper)))
+        return slice(*(None if item is None else self.literal(item) for item in (node.lower, node.upper)))
+
+    def literal(self, node: ast.expr) -> int:
+        """A whole number that is written out."""
+        number = _literal(self.whole(node))
+        if number is None:
+            raise self.refused(node, f"'{ast.unparse(node)}' must be a number that is written out")
+        return number
 
     def _of_constant(self, node: ast.Constant) -> Term:
         kinds: dict[type, Type] = {bool: BOOL, int: INT, float: FLOAT}
@@ -111,29 +123,76 @@ class Expressions:
 
     def _of_subscript(self, node: ast.Subscript) -> Term:
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
-            assert isinstance(node.value.value, ast.Name)
-            return Term("extent", INT, (self._of_name(node.value.value),), ast.literal_eval(node.slice))
+            array, at = self.term(node.value.value), self.literal(node.slice)
+            if array.kind != "name" or not isinstance(array.type, Array) or at not in range(array.type.dimensions):
+                raise self.refused(node, f"'{ast.unparse(node)}' is no extent of an array")
+            return (
+                Term("number", INT, (), array.type.shape[at]) if array.type.shape else Term("extent", INT, (array,), at)
+            )
         owner = self.term(node.value)
         if isinstance(owner.type, Array):
-            places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-            return Term("element", FLOAT, (owner, *(self.whole(place) for place in places)))
+            return self.element(owner, owner.type, node)
         if not isinstance(owner.type, Items | Row):
             raise self.refused(node, f"'{ast.unparse(node.value)}' has no items")
-        count = len(owner.type.types) if isinstance(owner.type, Items) else len(owner.type.fields)
+        count = count_of(owner.type)
         if isinstance(node.slice, ast.Slice):
             parts = tuple(typed.item_of(owner, place) for place in range(count)[self.part(node.slice)])
             return Term("build", Items(tuple(part.type for part in parts)), parts)
         place = self.whole(node.slice)
-        number = -place.parts[0].detail if place.kind == "negative" else place.detail
-        if place.kind in ("number", "negative"):
+        number = _literal(place)
+        if number is not None:
+            if not -count <= number < count:
+                raise self.refused(node, f"'{ast.unparse(node)}' is beyond the {count} items")
             return typed.item_of(owner, range(count)[number])
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
             raise self.refused(node, f"'{ast.unparse(node)}' takes an item of a tuple of several types by a variable")
-        return Term("item", owner.type.types[0], (owner, place))
+        return Term("item", owner.type.types[0], (owner, self.from_start(place, Term("number", INT, (), count))))
+
+    def element(self, owner: Term, kind: Array, node: ast.Subscript) -> Term:
+        """An element of an array, which has all its places."""
+        places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        extents = kind.shape or (None,) * kind.dimensions
+        if len(places) != len(extents):
+            raise self.refused(node, f"'{ast.unparse(node)}' does not have {len(extents)} places")
+        given = []
+        for at, (place, extent) in enumerate(zip(places, extents, strict=True)):
+            count = Term("extent", INT, (owner,), at) if extent is None else Term("number", INT, (), extent)
+            given.append(self.from_start(self.whole(place), count))
+        return Term("element", FLOAT, (owner, *given))
+
+    def from_start(self, place: Term, count: Term) -> Term:
+        """A place counted from the start, where Python counts a negative one from the end."""
+        if self.is_from_zero(place):
+            return place
+        is_negative = Term("<", BOOL, (place, Term("number", INT, (), 0)))
+        return Term("choice", INT, (is_negative, Term("+", INT, (place, count)), place))
+
+    def is_from_zero(self, item: Term) -> bool:
+        """True for a whole number that cannot be negative."""
+        if item.kind in ("number", "%", "//", ">>", "&") and item.type == INT:
+            known = item if item.kind == "number" else item.parts[1]
+            is_literal = (_literal(known) or 0) > 0 or (item.kind == "number" and _literal(known) == 0)
+            return is_literal and (item.kind in ("number", "%", "&") or self.is_from_zero(item.parts[0]))
+        if item.kind == "name":
+            return item.detail in self.counters
+        if item.kind in ("+", "*", "min"):
+            return all(map(self.is_from_zero, item.parts))
+        if item.kind == "choice":
+            return all(map(self.is_from_zero, item.parts[1:]))
+        return item.kind == "extent" or (item.kind == "convert" and item.parts[0].type == BOOL)
 
     def _of_tuple(self, node: ast.Tuple) -> Term:
-        parts = tuple(self.term(item) for item in node.elts)
+        parts = tuple(part for item in node.elts for part in self.items(item))
         return Term("build", Items(tuple(part.type for part in parts)), parts)
+
+    def items(self, node: ast.expr) -> list[Term]:
+        """What an item of a tuple that is written out stands for: itself, or with a star all that it holds."""
+        if not isinstance(node, ast.Starred):
+            return [self.term(node)]
+        whole = self.term(node.value)
+        if not isinstance(whole.type, Items | Row):
+            raise self.refused(node, f"'{ast.unparse(node)}' is no tuple")
+        return [typed.item_of(whole, place) for place in range(count_of(whole.type))]
 
     def _of_unaryop(self, node: ast.UnaryOp) -> Term:
         if isinstance(node.op, ast.Not):
@@ -149,15 +208,16 @@ class Expressions:
         is_whole = left.type == right.type == INT
         if not sign or (not is_whole and sign in WHOLE_ONLY | {"//", "%"}):
             raise self.refused(node, f"'{ast.unparse(node)}' needs a library function")
+        if sign == ">>" and _literal(right) not in range(64):
+            raise self.refused(node, f"'{ast.unparse(node)}' shifts by what is not written out as 0 to 63")
         kind = INT if is_whole and sign != "/" else FLOAT
         return Term(sign, kind, (converted(left, kind), converted(right, kind)))
 
     def _of_boolop(self, node: ast.BoolOp) -> Term:
-        parts = [self.condition(item) for item in node.values]
-        made = parts[0]
-        for part in parts[1:]:
-            made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
-        return made
+        parts = [self.term(item) for item in node.values]
+        if any(part.type != BOOL for part in parts):
+            raise self.refused(node, f"the value of '{ast.unparse(node)}', which is no truth value in Python")
+        return _linked(node, parts)
 
     def _of_compare(self, node: ast.Compare) -> Term:
         values = [self.scalar(item, INT) for item in (node.left, *node.comparators)]
@@ -166,16 +226,29 @@ class Expressions:
             kind = joined(left.type, right.type)
             if type(sign) not in SIGN_OF or kind is None:
                 raise self.refused(node, f"'{ast.unparse(node)}'")
+            if kind == FLOAT and not all(map(self.is_exact, (left, right))):
+                raise self.refused(node, f"'{ast.unparse(node)}' compares a whole number with a float")
             one = Term(SIGN_OF[type(sign)], BOOL, (converted(left, kind), converted(right, kind)))
             made = one if made is None else Term("and", BOOL, (made, one))
         assert made is not None
         return made
+
+    def is_exact(self, item: Term) -> bool:
+        """True for what a float holds exactly: a float, a truth value, a small literal, a counter."""
+        number = _literal(item)
+        if item.type == FLOAT or number is not None:
+            return number is None or abs(number) <= EXACT
+        return (item.kind == "convert" and item.parts[0].type == BOOL) or (
+            item.kind == "name" and item.detail in self.counters
+        )
 
     def _of_ifexp(self, node: ast.IfExp) -> Term:
         test, yes, no = self.condition(node.test), self.term(node.body), self.term(node.orelse)
         kind = joined(yes.type, no.type)
         if kind is None:
             raise self.refused(node, "a choice between values of different forms")
+        if typed.mixes(yes.type, no.type):
+            raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
 
     def _of_call(self, node: ast.Call) -> Term:
@@ -224,9 +297,13 @@ class Expressions:
         least = FLOAT if own in ("sqrt", "float") else INT
         if own not in FUNCTIONS | {"float", "int", "bool", "len"} or node.keywords:
             raise self.refused(node, f"'{name}' is a function of a library")
+        if len(node.args) < 1 or (own in ("min", "max")) != (len(node.args) > 1):
+            raise self.refused(node, f"'{ast.unparse(node)}' with {len(node.args)} arguments")
         if own == "len":
             kind = self.term(node.args[0]).type
-            return Term("number", INT, (), len(kind.types if isinstance(kind, Items) else getattr(kind, "fields", ())))
+            if not isinstance(kind, Items | Row):
+                raise self.refused(node, f"'{ast.unparse(node.args[0])}' has no items")
+            return Term("number", INT, (), count_of(kind))
         if own == "bool":
             return self.condition(node.args[0])
         values = [self.scalar(item, least) for item in node.args]
@@ -234,10 +311,31 @@ class Expressions:
             return values[0]
         if own == "int":
             return values[0] if values[0].type == INT else Term("convert", INT, (values[0],))
-        kind = FLOAT if any(value.type == FLOAT for value in values) else INT
+        if len({value.type for value in values}) > 1:
+            raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
+        kind = values[0].type
         made, *others = [converted(value, kind) for value in values]
         if not others:
             return Term(own, kind, (made,))
         for other in others:
             made = Term(own, kind, (made, other))
         return made
+
+
+def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
+    """Truth values with ``and`` or ``or`` between them."""
+    made = parts[0]
+    for part in parts[1:]:
+        made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
+    return made
+
+
+def count_of(kind: Items | Row) -> int:
+    """Items of a tuple, or fields of a row."""
+    return len(kind.types) if isinstance(kind, Items) else len(kind.fields)
+
+
+def _literal(item: Term) -> int | None:
+    """The whole number that a term writes out; None for any other term."""
+    sign, item = (-1, item.parts[0]) if item.kind == "negative" else (1, item)
+    return sign * int(item.detail) if item.kind == "number" and item.type == INT else None

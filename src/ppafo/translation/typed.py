@@ -197,6 +197,17 @@ def joined(one: Type, other: Type) -> Type | None:
     return None
 
 
+def mixes(one: Type, other: Type) -> bool:
+    """True where one has a whole number or truth value in the place of a float: -0 and large ones would differ."""
+    if isinstance(one, Scalar) and isinstance(other, Scalar):
+        return one != other and FLOAT in (one, other)
+    if isinstance(one, Row) and isinstance(other, Row):
+        return any(mixes(inner, outer) for (_, inner), (_, outer) in zip(one.fields, other.fields, strict=True))
+    if isinstance(one, Items) and isinstance(other, Items):
+        return any(mixes(*pair) for pair in zip(one.types, other.types, strict=True))
+    return False
+
+
 def converted(term: Term, kind: Type) -> Term:
     """The value of a term as another type that holds it."""
     if term.type == kind:

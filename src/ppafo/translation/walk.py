@@ -26,6 +26,7 @@ from ppafo.translation.typed import (
     Items,
     Module,
     Row,
+    Scalar,
     Statement,
     Term,
     Type,
@@ -69,7 +70,8 @@ class _ModuleWalk:
     rows: dict[str, list[str]] = field(default_factory=dict)
     definitions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     done: dict[tuple[str, tuple[Type, ...]], Function] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
+    open: set[tuple[str, tuple[Type, ...]]] = field(default_factory=set)
+    names: set[str] = field(default_factory=set)
     module: Module = field(default_factory=Module)
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
@@ -77,9 +79,14 @@ class _ModuleWalk:
         key = name, types
         if key not in self.done:
             definition = self.definitions[name]
-            self.counts[name] = self.counts.get(name, 0) + 1
-            number = self.counts[name]
-            own = name if number == 1 else f"{name}_{number}"
+            if key in self.open:
+                raise self.refused(definition, f"'{name}' calls itself")
+            self.open.add(key)
+            number, own = 1, name
+            while own in self.names or (number > 1 and (own in self.definitions or own in self.rows)):
+                number += 1
+                own = f"{name}_{number}"
+            self.names.add(own)
             self.done[key] = _FunctionWalk(self, definition).walked(own, types)
             self.module.functions.append(self.done[key])
         return self.done[key]
@@ -101,9 +108,18 @@ class _FunctionWalk:
         self.module = module
         self.definition = definition
         self.types: dict[str, Type] = {}
-        self.names = {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)}
+        nodes = list(ast.walk(definition))
+        self.names = {node.id for node in nodes if isinstance(node, ast.Name)}
+        self.names |= {node.arg for node in nodes if isinstance(node, ast.arg)}
+        self.read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+        self.made: set[str] = set()
         self.values = Expressions(
-            self.types, module.rows, module.definitions, made=module.function, refused=module.refused
+            self.types,
+            _counters(definition),
+            module.rows,
+            module.definitions,
+            made=module.function,
+            refused=module.refused,
         )
         self.returns: Type | None = None
         self.has_widened = False
@@ -115,11 +131,12 @@ class _FunctionWalk:
         given = self.definition.args
         names = [item.arg for item in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
         self.types.update(zip(names, types, strict=True))
-        for _ in range(10):
+        # Types only grow, so this ends.
+        self.has_widened = True
+        while self.has_widened:
             self.has_widened, self.flags = False, 0
+            self.made.clear()
             body = self.block(self.definition.body)
-            if not self.has_widened:
-                break
         for parameter, kind in zip(names, types, strict=True):
             if self.types[parameter] != kind:
                 problem = f"'{parameter}' is given as one type and becomes another; give the second a name of its own"
@@ -164,6 +181,8 @@ class _FunctionWalk:
         kind = value.type if self.returns is None else joined(self.returns, value.type)
         if kind is None:
             raise self.refused(node, "a function that returns values of different forms")
+        if self.returns is not None and typed.mixes(self.returns, value.type):
+            raise self.refused(node, "a function that returns a whole number in one place and a float in another")
         self.has_widened |= self.returns is not None and kind != self.returns
         self.returns = kind
         return [typed.Return(converted(value, kind))]
@@ -183,8 +202,12 @@ class _FunctionWalk:
         if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "range"):
             return self.loop_over_items(name, node)
         bounds = [self.values.whole(item) for item in call.args]
+        if not 1 <= len(bounds) <= 3 or call.keywords:
+            raise self.refused(node, f"'{ast.unparse(call)}'")
         start, stop = (Term("number", INT, (), 0), bounds[0]) if len(bounds) == 1 else bounds[:2]
-        step = ast.literal_eval(call.args[2]) if len(bounds) == 3 else 1
+        step = self.values.literal(call.args[2]) if len(bounds) == 3 else 1
+        if step == 0:
+            raise self.refused(node, f"'{ast.unparse(call)}' goes nowhere")
         self.note_type(name, INT, node)
         before: list[Statement] = []
         if stop.reads & {name, *_changed(node.body)}:
@@ -243,7 +266,10 @@ class _FunctionWalk:
         if isinstance(target, ast.Name):
             return [self.assign(target.id, value, node)]
         if isinstance(target, ast.Subscript):
-            return [typed.Store(self.values.term(target), converted(value, FLOAT))]
+            element = self.values.term(target)
+            if element.kind != "element" or not isinstance(value.type, Scalar):
+                raise self.refused(node, f"'{ast.unparse(target)}' on the left")
+            return [typed.Store(element, converted(value, FLOAT))]
         if not isinstance(target, ast.Tuple):
             raise self.refused(node, f"'{ast.unparse(target)}' on the left")
         return self.assign_items(target, value, node)
@@ -261,8 +287,9 @@ class _FunctionWalk:
 
     def fresh(self, wanted: str, kind: Type) -> str:
         """A name that the text does not have, for values of one form."""
-        while wanted in self.names or joined(self.types.get(wanted, kind), kind) is None:
+        while wanted in self.names or wanted in self.made or joined(self.types.get(wanted, kind), kind) is None:
             wanted += "_"
+        self.made.add(wanted)
         return wanted
 
     def note_type(self, name: str, kind: Type, node: ast.AST) -> None:
@@ -271,6 +298,8 @@ class _FunctionWalk:
         found = joined(before, kind)
         if found is None:
             raise self.refused(node, f"'{name}' holds values of different forms")
+        if typed.mixes(before, kind):
+            raise self.refused(node, f"'{name}' holds a whole number in one place and a float in another")
         self.has_widened |= found != before
         self.types[name] = found
 
@@ -284,12 +313,12 @@ class _FunctionWalk:
         before: list[Statement] = []
         read = {item.id for item in ast.walk(node.value) if isinstance(item, ast.Name)}
         if value.kind != "build" or read & set(names):
-            whole = self.fresh("_and_".join(name for name in names if name != "_"), kind)
+            whole = self.fresh("_and_".join(name for name in names if name != "_") or "items", kind)
             before = [self.assign(whole, value, node)]
             value = Term("name", self.types[whole], (), whole)
         return [
             *before,
-            *(self.assign(name, typed.item_of(value, at), node) for at, name in enumerate(names) if name != "_"),
+            *(self.assign(name, typed.item_of(value, at), node) for at, name in enumerate(names) if name in self.read),
         ]
 
 
@@ -302,3 +331,23 @@ def _changed(body: Sequence[ast.stmt]) -> set[str]:
     """Names that some statements give values."""
     nodes = (node for statement in body for node in ast.walk(statement))
     return {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+
+
+def _counters(definition: ast.FunctionDef) -> set[str]:
+    """Names that hold nothing but the numbers of loops that count up from 0 or more."""
+    loops = [node for node in ast.walk(definition) if isinstance(node, ast.For) and _counts_up(node)]
+    names = [node.target.id for node in loops if isinstance(node.target, ast.Name)]
+    given = [item.arg for item in ast.walk(definition) if isinstance(item, ast.arg)]
+    stored = [
+        node.id for node in ast.walk(definition) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    ]
+    return {name for name in names if names.count(name) == stored.count(name) and name not in given}
+
+
+def _counts_up(node: ast.For) -> bool:
+    """True for a loop over ``range`` whose start and step are written out and not negative."""
+    if not isinstance(node.iter, ast.Call) or ast.unparse(node.iter.func) != "range":
+        return False
+    bounds = node.iter.args
+    literals = [bounds[0], *bounds[2:]] if len(bounds) > 1 else []
+    return all(isinstance(item, ast.Constant) for item in literals)

@@ -17,6 +17,9 @@ from ppafo.errors import ProgramError
 from ppafo.translation.c99 import c_source, program_source
 from ppafo.translation.native import build, run_native
 from ppafo.translation.walk import walk_module
+from ppafo.walking.loading import load_walk
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.walk import plan_of
 from scripts.bits import digest, drawn_batch, failures, plain_batch
 from tests.composed_programs import drawn_programs
 
@@ -92,7 +95,7 @@ def loops(first: float, last: float) -> tuple[float, float, float]:
     number = 0
     while True:
         number += 1
-        if number * number > last:
+        if float(number * number) > last:
             break
     pair = swapped(Pair(found, float(number)), 2.0)
     return float(total), pair.signed, pair.double
@@ -112,6 +115,108 @@ def test_c_has_the_bits_of_python(function: Callable[..., Any], tmp_path: Path) 
     assert found.T.tobytes() == np.array(expected).tobytes()
 
 
+class Made(NamedTuple):
+    """Fields with names that C, or what is written around them, has too."""
+
+    made: float
+    double: float
+    double_: float
+
+
+def twice(value: float) -> float:
+    """Called with a whole number and with another, so that there are two of it."""
+    return value + value
+
+
+def twice_2(value: float) -> float:
+    """Has the name that the second of those might get."""
+    return 3.0 * value
+
+
+BILLIONS = 2_000_000_000
+
+
+def names_of_c(left: float, right: float) -> tuple[float, float, float, float]:
+    """Names that C, C++ or a header has, beside those that they might get instead."""
+    int64_t, NAN, static_assert, char16_t = left, right, 2.0, 3.0  # noqa: N806
+    double, double_, dynamic_cast, thread_local, alignas = left, 10.0 * right, 5.0, 6.0, 7.0
+    row = Made(left, right, 3.0)
+    row = row if left > 0.0 else Made(right, left, row.double_)
+    held = twice(int(left)) + twice(right) + twice_2(left)
+    total = int64_t + NAN + static_assert * char16_t + dynamic_cast + thread_local + alignas
+    return total, double + double_, row.made + 10.0 * row.double + 100.0 * row.double_, held
+
+
+def whole_and_places(left: float, right: float) -> tuple[float, float, float, float]:
+    """Whole numbers beyond 32 bits, and places that may be negative."""
+    wide = 2147483647 + (left > 0.0)
+    items = (left, right, 5.0)
+    place = 0 if left > 0.0 else 1
+    items = (*items[1:], left + 1.0)
+    _ = left
+    _, last = right, left
+    return float(BILLIONS + BILLIONS + wide), items[place - 1], items[-place], _ + 10.0 * last
+
+
+def loops_in_loops(left: float, right: float) -> tuple[float, float, float]:
+    """Ends of nested loops that change under way, with one name."""
+    outer, inner, total, other = int(left), int(right), 0.0, 0.0
+    for i in range(outer):
+        outer -= 1
+        total += i
+        for _ in range(2):
+            for i in range(inner):  # noqa: PLW2901
+                inner -= 1
+                total += 100.0
+    for j in range(int(left)):
+        for j in range(int(right)):  # noqa: B007, PLW2901
+            other += 1.0
+    return total, other, float(inner)
+
+
+def late_types(left: float) -> float:
+    """A chain of names, each of the type of the next, of which the last becomes a whole number."""
+    a = False
+    b = False
+    c = False
+    d = False
+    e = False
+    f = False
+    g = False
+    h = False
+    i = False
+    j = False
+    k = False
+    l = False  # noqa: E741
+    for turn in range(20):
+        a = b
+        b = c
+        c = d
+        d = e
+        e = f
+        f = g
+        g = h
+        h = i
+        i = j
+        j = k
+        k = l
+        l = turn + int(left)  # noqa: E741
+    return float(a)
+
+
+def all_of_them(left: float, right: float) -> tuple[float, ...]:
+    """The results of the four, in one tuple."""
+    loops_and_types = (*loops_in_loops(left, right), late_types(left))
+    return (*names_of_c(left, right), *whole_and_places(left, right), *loops_and_types)
+
+
+@needs_gcc
+def test_c_has_the_bits_of_python_where_its_own_names_numbers_and_places_are_others(tmp_path: Path) -> None:
+    columns = np.array([(3.0, 7.0), (0.0, 0.0), (-0.0, 1.0), (1.0, -2.0), (2.0, 5.0)]).T
+    found = in_c(all_of_them, "x[0, lane], x[1, lane]", 12, columns, tmp_path)
+    assert found.T.tobytes() == np.array([all_of_them(*column) for column in columns.T.tolist()]).tobytes()
+
+
 def exponential(value: float) -> float:
     """Needs a library."""
     return math.exp(value)
@@ -129,24 +234,124 @@ def two_forms(value: float) -> float:
     return held[0]
 
 
+def value_of_or(value: float) -> float:
+    """In Python one of the two, in C whether one is not zero."""
+    return value or 3.0
+
+
+def value_of_and(value: float) -> float:
+    """The same of ``and``."""
+    return 1.0 if value else (value and 3.0)
+
+
+def counted_and_float(value: float) -> float:
+    """A loop's own name that is a float elsewhere."""
+    i = 0.5 * value
+    for i in range(3):  # noqa: B007, PLW2901
+        value += 1.0
+    return i
+
+
+def whole_and_float(value: float) -> float:
+    """0 has no sign, 0.0 has one."""
+    number = int(value)
+    number = value if value > 3.0 else float(-number)
+    return number
+
+
+def choice_of_types(value: float) -> float:
+    """The same in one line."""
+    return -(0 if value > 3.0 else value)
+
+
+def larger_of_types(value: float) -> float:
+    """The same in a function."""
+    return -max(0, value)
+
+
+def returns_of_types(value: float) -> float:
+    """The same in what a function returns."""
+    if value > 3.0:
+        return value
+    return 0
+
+
+def shift_by_name(value: float) -> float:
+    """C leaves shifts by 64 and more undefined."""
+    return float(5 >> int(value))
+
+
+def compared_types(value: float) -> float:
+    """Python compares exactly, C rounds the whole number first."""
+    return 1.0 if int(value) == value else 0.0
+
+
+def large_compared(value: float) -> float:
+    """The same of a number that no float is."""
+    return 1.0 if value > 9007199254740993 else 0.0
+
+
+def step_by_name(value: float) -> float:
+    """A step that is not written out."""
+    step = 2
+    for turn in range(0, 10, step):
+        value += turn
+    return value
+
+
+def beyond(value: float) -> float:
+    """An item that is not there."""
+    return (value, value)[2]
+
+
+def no_length(value: float) -> float:
+    """Numbers have no length."""
+    return float(len(value))  # type: ignore[arg-type]
+
+
+def without_end(value: float) -> float:
+    """Calls itself."""
+    return without_end(value)
+
+
+TYPES = "a whole number in one place and a float in another"
+
+
 @pytest.mark.parametrize(
-    ("function", "said"),
+    ("function", "line", "said"),
     [
-        (exponential, "'math.exp' is a function of a library"),
-        (remainder, "needs a library function"),
-        (two_forms, "'held' holds values of different forms"),
+        (exponential, 2, "'math.exp' is a function of a library"),
+        (remainder, 2, "needs a library function"),
+        (two_forms, 3, "'held' holds values of different forms"),
+        (value_of_or, 2, "the value of 'value or 3.0'"),
+        (value_of_and, 2, "the value of 'value and 3.0'"),
+        (counted_and_float, 3, f"'i' holds {TYPES}"),
+        (whole_and_float, 3, f"'number' holds {TYPES}"),
+        (choice_of_types, 2, "a choice between a whole number and a float"),
+        (larger_of_types, 2, "a choice between a whole number and a float"),
+        (returns_of_types, 4, f"returns {TYPES}"),
+        (shift_by_name, 2, "shifts by what is not written out"),
+        (compared_types, 2, "compares a whole number with a float"),
+        (large_compared, 2, "compares a whole number with a float"),
+        (step_by_name, 3, "'step' must be a number that is written out"),
+        (beyond, 2, "is beyond the 2 items"),
+        (no_length, 2, "'value' has no items"),
+        (without_end, 0, "calls itself"),
     ],
 )
-def test_what_is_outside_the_subset_is_refused_with_file_and_line(function: Callable[..., Any], said: str) -> None:
-    last = function.__code__.co_firstlineno + (3 if function is two_forms else 2)
-    with pytest.raises(ProgramError, match=rf"test_c99\.py:{last}: .*{said}"):
+def test_what_c_would_compute_otherwise_is_refused_with_file_and_line(
+    function: Callable[..., Any], line: int, said: str
+) -> None:
+    line += function.__code__.co_firstlineno
+    with pytest.raises(ProgramError, match=rf"test_c99\.py:{line}: .*{said}"):
         walk_module(module_of(function, "x[0, lane]", 1))
 
 
 @needs_gcc
 @pytest.mark.parametrize("language", ["-std=c99", "-xc++"])
 def test_programs_compile_without_a_warning(language: str, tmp_path: Path) -> None:
-    for number, program in enumerate(drawn_programs(3)):
+    walk = plan_walk(plan_of(load_walk("solenoid", ["timing.kind=estimated"]), 4.0)).program
+    for number, program in enumerate([*drawn_programs(3), walk]):
         written = tmp_path / f"{number}.c"
         written.write_text(program_source(program), encoding="utf-8")
         done = subprocess.run(["gcc", language, *WARNINGS, str(written)], capture_output=True, text=True, check=False)
