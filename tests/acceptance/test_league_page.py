@@ -80,7 +80,7 @@ def test_errors_toes_and_gas_of_the_walking_table_are_those_of_a_walk() -> None:
     assert set(shown) == {entrant.name for entrant in WALKING_ENTRANTS}
     task = walking_task()
     for entrant in WALKING_ENTRANTS:
-        found = walk_measures(task, task.configuration(entrant.kind, entrant.valve))
+        found = walk_measures(task, task.configuration(entrant.kind, entrant.valve, entrant.overrides))
         error, at_lag, toes, gas = (float(shown[entrant.name][column]) for column in (0, 3, 4, 5))
         assert found["torque_error"] == pytest.approx(error, abs=6e-4), entrant.name
         assert found["lagged_error"] == pytest.approx(at_lag, abs=6e-4), entrant.name

@@ -29,7 +29,7 @@ FORMATS: dict[str, tuple[Callable[[str], Any], Traversable]] = {
     "design": (load_design, PACKAGE / "questions" / "design" / "library"),
     "size": (load_sizing, PACKAGE / "questions" / "size" / "library"),
     "walk": (load_walk, PACKAGE / "walking" / "configurations"),
-    "bottle": (load_bottle, PACKAGE / "questions" / "endurance" / "bottles"),
+    "bottle": (load_bottle, PACKAGE / "parameters" / "bottles" / "files"),
     "parts": (load_catalogue, PACKAGE / "parameters" / "parts" / "catalogues"),
     "rig": (load_preset, PACKAGE / "rig" / "presets"),
     "gait": (load_gait, PACKAGE / "gait" / "normative"),

@@ -52,6 +52,7 @@ def league() -> League:
         torque_lag=0.024,
         lagged_error=0.25,
         toe_height=0.004,
+        event_error=0.0169,
         slap_rate=-6.0,
         push_off_work=1.25,
         gas=6.5e-4,
@@ -68,9 +69,10 @@ def league() -> League:
 def test_a_row_has_a_cell_for_every_heading_and_the_distances_to_the_bound(league: League) -> None:
     row, off = row_texts(league_table(league))
     assert len(row) == len(off) == len(league_table(league).head)
-    assert row[2:9] == ["0.500", "0.400", "0.024", "0.250", "4", "-344", "1.25"]
-    assert row[9:] == ["0.650", "0.450", "7", "inf", "33"]
-    assert off[9:] == ["0.000", "-", "0", "-", "-"]
+    assert row[2:7] == ["0.500", "0.400", "0.024", "0.250", "0.0169"]
+    assert row[7:10] == ["4", "-344", "1.25"]
+    assert row[10:] == ["0.650", "0.450", "7", "inf", "33"]
+    assert off[10:] == ["0.000", "-", "0", "-", "-"]
 
 
 def test_the_notes_say_task_bound_draws_and_what_went_wrong(league: League) -> None:
@@ -120,6 +122,6 @@ def test_the_figure_has_a_mark_for_each_and_the_bound_as_a_line(league: League) 
 def test_without_a_bound_its_columns_are_empty_and_the_reason_is_said(league: League) -> None:
     without = dataclasses.replace(league, bounds={}, without_bound="the lower bound needs CasADi")
     row = row_texts(league_table(without))[0]
-    assert (row[3], row[10]) == ("-", "-")
+    assert (row[3], row[11]) == ("-", "-")
     assert "no lower bound: the lower bound needs CasADi" in text_of(without.answer())
     assert without.plot().axes
