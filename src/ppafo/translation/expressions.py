@@ -311,6 +311,10 @@ class Expressions:
             return values[0]
         if own == "int":
             return values[0] if values[0].type == INT else Term("convert", INT, (values[0],))
+        return self.joined_by(own, values, node)
+
+    def joined_by(self, own: str, values: list[Term], node: ast.Call) -> Term:
+        """The size or root of one number, or the smallest or largest of several of one type."""
         if len({value.type for value in values}) > 1:
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         kind = values[0].type
