@@ -22,6 +22,7 @@ from ppafo.translation.typed import (
     Term,
     Type,
     converted,
+    count_of,
     is_empty,
     joined,
 )
@@ -332,11 +333,6 @@ def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
     for part in parts[1:]:
         made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
     return made
-
-
-def count_of(kind: Items | Row) -> int:
-    """Items of a tuple, or fields of a row."""
-    return len(kind.types) if isinstance(kind, Items) else len(kind.fields)
 
 
 def _literal(item: Term) -> int | None:
