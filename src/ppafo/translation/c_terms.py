@@ -8,16 +8,19 @@ from dataclasses import dataclass
 from ppafo.translation.typed import BOOL, FLOAT, INT, Array, Items, Row, Term, Type, is_empty
 
 _RESERVED = frozenset(
-    """
-    auto break case char const continue default do double else enum extern float for goto if inline int long register
-    restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false and
-    and_eq asm bitand bitor catch class compl concept consteval constexpr constinit const_cast co_await co_return co_yield
-    decltype delete dynamic_cast explicit export friend mutable namespace new noexcept not not_eq nullptr operator or or_eq
-    private protected public reinterpret_cast requires static_assert static_cast template this thread_local throw try typeid
-    typename typeof typeof_unqual using virtual wchar_t char8_t char16_t char32_t alignas alignof xor xor_eq unix linux i386
-    gamma main fabs sqrt advance int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t size_t intptr_t uintptr_t
-    NAN INFINITY HUGE_VAL HUGE_VALF HUGE_VALL DECIMAL_DIG NULL math_errhandling
-    """.split()
+    word
+    for line in (
+        "auto break case char const continue default do double else enum extern float for goto if inline int long",
+        "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile",
+        "while bool true false and and_eq asm bitand bitor catch class compl concept consteval constexpr constinit",
+        "const_cast co_await co_return co_yield decltype delete dynamic_cast explicit export friend mutable",
+        "namespace new noexcept not not_eq nullptr operator or or_eq private protected public reinterpret_cast",
+        "requires static_assert static_cast template this thread_local throw try typeid typename typeof",
+        "typeof_unqual using virtual wchar_t char8_t char16_t char32_t alignas alignof xor xor_eq unix linux i386",
+        "gamma main fabs sqrt advance int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t size_t",
+        "intptr_t uintptr_t NAN INFINITY HUGE_VAL HUGE_VALF HUGE_VALL DECIMAL_DIG NULL math_errhandling",
+    )
+    for word in line.split()
 )
 _MACRO = re.compile(
     r"(_[A-Z_]|(PPAFO|ppafo|DBL|FLT|LDBL|FP|MATH|M|INT|UINT|INTMAX|UINTMAX|SIZE|PTRDIFF|WCHAR|WINT|SIG|INT\d+|UINT\d+)_)"

@@ -22,6 +22,7 @@ from ppafo.translation.typed import (
     Term,
     Type,
     converted,
+    count_of,
     is_empty,
     joined,
 )
@@ -311,6 +312,10 @@ class Expressions:
             return values[0]
         if own == "int":
             return values[0] if values[0].type == INT else Term("convert", INT, (values[0],))
+        return self.joined_by(own, values, node)
+
+    def joined_by(self, own: str, values: list[Term], node: ast.Call) -> Term:
+        """The size or root of one number, or the smallest or largest of several of one type."""
         if len({value.type for value in values}) > 1:
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         kind = values[0].type
@@ -328,11 +333,6 @@ def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
     for part in parts[1:]:
         made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
     return made
-
-
-def count_of(kind: Items | Row) -> int:
-    """Items of a tuple, or fields of a row."""
-    return len(kind.types) if isinstance(kind, Items) else len(kind.fields)
 
 
 def _literal(item: Term) -> int | None:

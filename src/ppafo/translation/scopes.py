@@ -1,5 +1,6 @@
 """Which assignments of a function are needed, and where its names are declared: as far in and as late as can be."""
 
+import ast
 from dataclasses import dataclass, field, replace
 
 from ppafo.translation import typed
@@ -179,3 +180,23 @@ def _terms(statement: Statement) -> list[Term]:
     if isinstance(statement, typed.Count):
         return [statement.start, statement.stop]
     return [statement.test] if isinstance(statement, typed.If | typed.While) else []
+
+
+def counters(definition: ast.FunctionDef) -> set[str]:
+    """Names that hold nothing but the numbers of loops that count up from 0 or more."""
+    loops = [node for node in ast.walk(definition) if isinstance(node, ast.For) and _counts_up(node)]
+    names = [node.target.id for node in loops if isinstance(node.target, ast.Name)]
+    given = [item.arg for item in ast.walk(definition) if isinstance(item, ast.arg)]
+    stored = [
+        node.id for node in ast.walk(definition) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    ]
+    return {name for name in names if names.count(name) == stored.count(name) and name not in given}
+
+
+def _counts_up(node: ast.For) -> bool:
+    """True for a loop over ``range`` whose start and step are written out and not negative."""
+    if not isinstance(node.iter, ast.Call) or ast.unparse(node.iter.func) != "range":
+        return False
+    bounds = node.iter.args
+    literals = [bounds[0], *bounds[2:]] if len(bounds) > 1 else []
+    return all(isinstance(item, ast.Constant) for item in literals)

@@ -180,6 +180,11 @@ def is_empty(kind: Type) -> bool:
     return isinstance(kind, Handed)
 
 
+def count_of(kind: Items | Row) -> int:
+    """Items of a tuple, or fields of a row."""
+    return len(kind.types) if isinstance(kind, Items) else len(kind.fields)
+
+
 def joined(one: Type, other: Type) -> Type | None:
     """The type that holds both, as where two branches meet; None where there is none."""
     if one == other:

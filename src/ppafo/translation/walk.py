@@ -15,7 +15,7 @@ from ppafo.engine.plain_python import refusal
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
 from ppafo.translation.expressions import Expressions
-from ppafo.translation.scopes import needed
+from ppafo.translation.scopes import counters, needed
 from ppafo.translation.typed import (
     BOOL,
     FLOAT,
@@ -115,7 +115,7 @@ class _FunctionWalk:
         self.made: set[str] = set()
         self.values = Expressions(
             self.types,
-            _counters(definition),
+            counters(definition),
             module.rows,
             module.definitions,
             made=module.function,
@@ -331,23 +331,3 @@ def _changed(body: Sequence[ast.stmt]) -> set[str]:
     """Names that some statements give values."""
     nodes = (node for statement in body for node in ast.walk(statement))
     return {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
-
-
-def _counters(definition: ast.FunctionDef) -> set[str]:
-    """Names that hold nothing but the numbers of loops that count up from 0 or more."""
-    loops = [node for node in ast.walk(definition) if isinstance(node, ast.For) and _counts_up(node)]
-    names = [node.target.id for node in loops if isinstance(node.target, ast.Name)]
-    given = [item.arg for item in ast.walk(definition) if isinstance(item, ast.arg)]
-    stored = [
-        node.id for node in ast.walk(definition) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-    ]
-    return {name for name in names if names.count(name) == stored.count(name) and name not in given}
-
-
-def _counts_up(node: ast.For) -> bool:
-    """True for a loop over ``range`` whose start and step are written out and not negative."""
-    if not isinstance(node.iter, ast.Call) or ast.unparse(node.iter.func) != "range":
-        return False
-    bounds = node.iter.args
-    literals = [bounds[0], *bounds[2:]] if len(bounds) > 1 else []
-    return all(isinstance(item, ast.Constant) for item in literals)

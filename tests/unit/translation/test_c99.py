@@ -165,7 +165,7 @@ def loops_in_loops(left: float, right: float) -> tuple[float, float, float]:
         outer -= 1
         total += i
         for _ in range(2):
-            for i in range(inner):  # noqa: PLW2901
+            for i in range(inner):  # noqa: B007, PLW2901
                 inner -= 1
                 total += 100.0
     for j in range(int(left)):
@@ -247,7 +247,7 @@ def value_of_and(value: float) -> float:
 def counted_and_float(value: float) -> float:
     """A loop's own name that is a float elsewhere."""
     i = 0.5 * value
-    for i in range(3):  # noqa: B007, PLW2901
+    for i in range(3):  # noqa: B007
         value += 1.0
     return i
 
@@ -256,7 +256,7 @@ def whole_and_float(value: float) -> float:
     """0 has no sign, 0.0 has one."""
     number = int(value)
     number = value if value > 3.0 else float(-number)
-    return number
+    return number  # noqa: RET504
 
 
 def choice_of_types(value: float) -> float:
@@ -301,7 +301,7 @@ def step_by_name(value: float) -> float:
 
 def beyond(value: float) -> float:
     """An item that is not there."""
-    return (value, value)[2]
+    return (value, value)[2]  # noqa: PLE0643
 
 
 def no_length(value: float) -> float:
