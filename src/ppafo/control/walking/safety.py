@@ -58,7 +58,7 @@ class SafetyState(NamedTuple):
     """Level of ``signs``; good strides in a row; how often help got less, and the last; what the signs remember.
 
     ``toe_strides`` are strides in a row on the toes alone, and ``steady`` is 1 where the last stride took about the
-    stride time. ``slow_pressure_1`` [Pa] is above a reading that falls.
+    stride time. ``slow_pressure_1`` and ``_2`` [Pa] are above a reading that falls.
     """
 
     level: float
@@ -71,6 +71,7 @@ class SafetyState(NamedTuple):
     steady: float
     valve_times: ValveTimes
     slow_pressure_1: float
+    slow_pressure_2: float
 
 
 START = SafetyState(
@@ -84,6 +85,7 @@ START = SafetyState(
     steady=0.0,
     valve_times=ValveTimes(0.0, 0.0, 0.0),
     slow_pressure_1=0.0,
+    slow_pressure_2=0.0,
 )
 
 LIFT_STRIDES = 1.0
@@ -96,7 +98,7 @@ STEADY = 0.1
 """A stride that is longer or shorter than the stride time by less than this fraction of it is a usual one."""
 
 FALL_TIME = 0.03
-"""Time constant [s] of the slow pressure of chamber 1, which tells whether its reading falls."""
+"""Time constant [s] of the slow pressures, which tell whether a reading falls."""
 
 FALLS = 0.03
 """A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.1."""
@@ -161,6 +163,7 @@ def valve_sign(
     rules: SafetyRules,
     valve_times: ValveTimes,
     slow_pressure_1: float,
+    slow_pressure_2: float,
     phase: PhaseState,
     measurement: GaitMeasurement,
 ) -> float:
@@ -174,6 +177,7 @@ def valve_sign(
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
     left = holds_pressure(rules, measurement.pressure_1, slow_pressure_1)
+    left = left | holds_pressure(rules, measurement.pressure_2, slow_pressure_2)
     late = (valve_times.venting > LATE * rules.vent_time) & (measurement.pressure_2 > rules.filled_pressure)
     no_fall = stands & ((valve_times.venting > rules.vent_time) & left | late)
     found = signs.NO_FALL if no_fall else NO_SIGN
@@ -226,13 +230,14 @@ def monitor(
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
     steady = (1.0 if usual else 0.0) if enters else state.steady
     slow_pressure_1 = next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period)
+    slow_pressure_2 = next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period)
     sign = signs.TOE_STRIDES if toe_strides > rules.most_toe_strides else NO_SIGN
     sign = first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if steady > 0.5 else sign
     sign = first_sign(gait_sign(rules, before, phase, stance), sign)
     sign = first_sign(readings.still_sign(rules, seen, before, phase), sign)
     sign = first_sign(readings.gone_sign(rules, state.readings, measurement, period), sign)
     sign = first_sign(readings.range_sign(rules, measurement), sign)
-    sign = first_sign(valve_sign(rules, state.valve_times, slow_pressure_1, phase, measurement), sign)
+    sign = first_sign(valve_sign(rules, state.valve_times, slow_pressure_1, slow_pressure_2, phase, measurement), sign)
     good_strides = next_good_strides(state, before, phase, sign)
     level = max(level_after(rules, state, good_strides, stance.together), signs.level_of(sign))
     vents = level > state.level
@@ -247,6 +252,7 @@ def monitor(
         steady=steady,
         valve_times=state.valve_times,
         slow_pressure_1=slow_pressure_1,
+        slow_pressure_2=slow_pressure_2,
     )
 
 
@@ -294,4 +300,5 @@ def safe_command(state: SafetyState, phase: float, command: float, period: float
         steady=state.steady,
         valve_times=valve_times,
         slow_pressure_1=state.slow_pressure_1,
+        slow_pressure_2=state.slow_pressure_2,
     )
