@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from ppafo.control.walking import off
+from ppafo.errors import SimulationError
 from ppafo.metrics import Metric
 from ppafo.model.leg import passive_torque
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.gait_series import landing_phase
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import Progress, WalkResult, silent, walk
+from ppafo.walking.walk import SHORTEST_STRIDES, Progress, WalkResult, silent, walk
 from ppafo.walking.walk_metrics import healthy_positive_work, healthy_toe_height, lowest_toes
 
 Say = Callable[[str], None]
@@ -35,12 +36,27 @@ class Comparison:
 def compare_walks(
     configuration: Configuration, minutes: float | None = None, progress: Progress = silent
 ) -> Comparison:
-    """Walk ``minutes`` [min], or a whole course, with the device and with it off; ScenarioError for bad input."""
+    """Walk ``minutes`` [min], or a whole course, with the device and with it off.
+
+    ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
+    """
     worn = walk(configuration, minutes, progress=progress)
+    _check_ending(worn)
     # As long as the bottle lasted, where there is one.
     as_long = minutes if worn.supply is None else float(worn.recording.time[-1]) / 60.0
     bare = walk(with_device_off(configuration), as_long, progress=progress)
     return Comparison(worn, bare, healthy_metrics(configuration))
+
+
+def _check_ending(worn: WalkResult) -> None:
+    """Refuse a walk that its bottle ended within the first strides."""
+    shortest = SHORTEST_STRIDES * worn.configuration.gait.stride_time
+    if worn.supply is not None and worn.supply.ending.time < shortest:
+        ending = worn.supply.ending
+        raise SimulationError(
+            f"{worn.configuration.name} on its bottle: {ending.message}, after {ending.time:.3g} s: fewer than "
+            f"{SHORTEST_STRIDES} strides; take a fuller, larger or warmer bottle"
+        )
 
 
 def with_device_off(configuration: Configuration) -> Configuration:

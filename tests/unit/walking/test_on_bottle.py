@@ -1,13 +1,15 @@
 """A walk on its bottle: what closes, an independent simulator, the coupling, what ends it, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.rows import row_numbers
-from ppafo.errors import ParameterError, ScenarioError
+from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.walking import load_walk, on_bottle, walk, walk_population
-from ppafo.walking.comparison import with_device_off
+from ppafo.walking.comparison import compare_walks, with_device_off
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import WalkResult, plan_of
 from tests.judge import bottle as independent
@@ -174,3 +176,14 @@ def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:
     with pytest.raises(ScenarioError, match=r"gas_model\.kind.*not with a bottle"):
         load_walk(WALK, [*changes, "gas_model.wall_area_per_volume=100 1/m"], bottle=BOTTLE)
     assert with_device_off(configuration).bottle is None
+
+
+def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_time(
+    small: WalkResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert small.supply is not None
+    ending = small.supply.ending._replace(time=3.1, message="the bottle is empty")
+    ended = replace(small, supply=replace(small.supply, ending=ending))
+    monkeypatch.setattr("ppafo.walking.comparison.walk", lambda *_, **__: ended)
+    with pytest.raises(SimulationError, match=r"the bottle is empty, after 3\.1 s: fewer than 5 strides"):
+        compare_walks(small.configuration)
