@@ -145,6 +145,13 @@ def walk(
     return replace(_walk_result(chosen, recording, record, starts, status), supply=supply)
 
 
+def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
+    """Return the integral of a channel over the ankle angle, in its unit times rad, mean of the strides with help."""
+    turned = np.diff(result.recording["angle"])
+    done = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
+    return float(np.diff(done[result.starts])[settled(result.helped)].mean())
+
+
 def walk_duration(configuration: Configuration, minutes: float | None = None) -> float:
     """Length of a walk [s], that of its course or a minute unless given; ScenarioError if too short or too long."""
     course = course_of_walk(configuration)

@@ -14,8 +14,7 @@ from ppafo.questions.timing.solve import WEARERS, rms_of, timed_events, uneven_c
 from ppafo.walking.comparison import healthy_metrics
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
-from ppafo.walking.walk import WalkResult, walk
-from ppafo.walking.walk_metrics import settled
+from ppafo.walking.walk import WalkResult, integral_of_a_stride, walk
 
 CHAMBERS = "chambers"
 """Stands for the unit of an argument that names a reading of the chambers' volumes."""
@@ -77,9 +76,7 @@ def _healthy_peak_moment(configuration: Configuration) -> float:
 
 def _work_of_a_stride(result: WalkResult) -> float:
     """Return the net work [J] of the actuator torque on the ankle, mean over the strides with help."""
-    torque, angle = result.recording["torque"], result.recording["angle"]
-    done = np.concatenate([[0.0], np.cumsum(0.5 * (torque[1:] + torque[:-1]) * np.diff(angle))])
-    return float(np.diff(done[result.starts])[settled(result.helped)].mean())
+    return integral_of_a_stride(result, result.recording["torque"])
 
 
 def held_torque(values: Values) -> float:

@@ -169,24 +169,7 @@ def _data(timing: Timing) -> dict[str, Any]:
             }
             for wearer in WEARERS
         },
-        "ways": [
-            {
-                "wearer": item.wearer,
-                "way": item.way,
-                "timing": item.timing,
-                "rms": None if np.isnan(item.rms) else item.rms,
-                "events": {
-                    name: {
-                        "rms": None if np.isnan(found.rms) else found.rms,
-                        "known": int(found.errors.size),
-                        "missed": found.missed,
-                        "false": found.false,
-                    }
-                    for name, found in item.events.items()
-                },
-            }
-            for item in timing.ways
-        ],
+        "ways": [_way_data(item) for item in timing.ways],
         "slap": [
             {
                 "change": item.change,
@@ -200,3 +183,26 @@ def _data(timing: Timing) -> dict[str, Any]:
         ],
         "versions": {"ppafo": __version__},
     }
+
+
+def _way_data(way: TimedWay) -> dict[str, Any]:
+    return {
+        "wearer": way.wearer,
+        "way": way.way,
+        "timing": way.timing,
+        "rms": _number(way.rms),
+        "events": {
+            name: {
+                "rms": _number(found.rms),
+                "known": int(found.errors.size),
+                "missed": found.missed,
+                "false": found.false,
+            }
+            for name, found in way.events.items()
+        },
+    }
+
+
+def _number(value: float) -> float | None:
+    """Return a number as JSON has it: None where there is none."""
+    return None if np.isnan(value) else value

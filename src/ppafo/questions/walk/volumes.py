@@ -4,16 +4,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from ppafo.answers import Column, Section, Table
 from ppafo.errors import DataError
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
 from ppafo.questions.endurance.draw import full_chambers, largest_flow, walk_gas
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
 from ppafo.walking.on_bottle import DIVERGED, WALKED
-from ppafo.walking.walk import WalkResult, walk
-from ppafo.walking.walk_metrics import settled
+from ppafo.walking.walk import WalkResult, integral_of_a_stride, walk
 
 LONGEST = 1.0
 """Minutes that are walked at most with other chambers: a walk repeats itself, but for a course and on a bottle."""
@@ -78,10 +75,8 @@ def walks_by_volume(
 
 
 def _read(chambers: ChamberVolumes, result: WalkResult, life: Endurance | None) -> VolumeReading:
-    recording, helped = result.recording, settled(result.helped)
-    difference, angle = recording["pressure_1"] - recording["pressure_2"], recording["angle"]
-    done = np.concatenate([[0.0], np.cumsum(0.5 * (difference[1:] + difference[:-1]) * np.diff(angle))])
-    turned = float(np.diff(done[result.starts])[helped].mean())
+    recording = result.recording
+    turned = integral_of_a_stride(result, recording["pressure_1"] - recording["pressure_2"])
     torque_constant = result.configuration.device.actuator.torque_constant
     return VolumeReading(
         chambers=chambers,
