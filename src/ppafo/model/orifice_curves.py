@@ -23,7 +23,7 @@ A curve that is best by relative least squares crosses the exact function of hel
 
 def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
     """Fitted curve [-] of equations (6), (7) for a gas; within 3e-7 of the exact function below ``linear_ratio``."""
-    coefficients = over_runs(_isentropic_coefficients, heat_capacity_ratio)
+    coefficients = over_runs(_remembered_coefficients, heat_capacity_ratio)
     return _curve(critical_pressure_ratio(heat_capacity_ratio), linear_ratio, coefficients)
 
 
@@ -34,7 +34,7 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
     """
     scale = 1.0 / (1.0 - critical_ratio)
     factor = root(scale)
-    unscaled = _iso6358_coefficients()
+    unscaled = _remembered_iso6358_coefficients()
     coefficients = unscaled
     for place in range(TERMS):
         coefficients = _with_item(coefficients, place, unscaled[place] * factor)
@@ -42,7 +42,6 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
     return _curve(critical_ratio, linear_ratio, coefficients)
 
 
-@lru_cache(maxsize=4096)
 def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
     """Coefficients of a gas, through the exact function of equation (7) at places below the critical pressure ratio."""
     k = heat_capacity_ratio
@@ -56,13 +55,18 @@ def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
     return _polynomial_through(gaps, values)
 
 
-@lru_cache(maxsize=1)
+_remembered_coefficients = lru_cache(maxsize=4096)(_isentropic_coefficients)
+
+
 def _iso6358_coefficients() -> Terms:
     """Coefficients for a critical ratio of 0, where the function is the root of (1 - r)(1 + r)."""
     values = PLACES
     for place in range(TERMS):
         values = _with_item(values, place, math.sqrt(2.0 - PLACES[place]))
     return _polynomial_through(PLACES, values)
+
+
+_remembered_iso6358_coefficients = lru_cache(maxsize=1)(_iso6358_coefficients)
 
 
 def area_conductance(

@@ -9,7 +9,7 @@ from importlib.resources import files
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
-from ppafo.exports.c_library.program import COUNTS, ExportedProgram, c_text
+from ppafo.exports.c_library.program import COUNTS, ExportedProgram, Further, c_text
 from ppafo.model.declaration import Quantity
 from ppafo.version import __version__
 
@@ -42,23 +42,30 @@ _FILES = {
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """Something that can be chosen before a run: its name in C, what it is, and what the scenario has."""
+    """Something that can be chosen before a run: its name in C and in ppafo, what it is, and what the scenario has."""
 
     name: str
+    path: str
     quantity: Quantity
     value: float
 
 
 @dataclass(frozen=True, slots=True)
 class Library:
-    """What is to be written: ``preparation`` has the lines of C from settings to the numbers of a run."""
+    """What is to be written.
+
+    ``further`` adds the function that makes the numbers of a run from the settings, ``preparation`` has the lines of C
+    around it, ``other_program`` conditions in C under which another program would be needed. ``words`` fill the page.
+    """
 
     title: str
     description: str
     program: ExportedProgram
     settings: tuple[Setting, ...]
     preparation: tuple[str, ...]
-    further: Mapping[str, str]
+    other_program: tuple[str, ...]
+    words: Mapping[str, str]
+    further: Further | None = None
 
 
 def c_identifier(name: str) -> str:
@@ -73,9 +80,10 @@ def library_files(library: Library) -> dict[str, bytes]:
     words = _words(library, name)
     texts = {target.format(name=name): _filled(source, words) for source, target in _FILES.items()}
     texts["LICENSE"] = _filled("LICENSE", {})
-    head = f'#include "{name}.h"\n\n#include <string.h>\n\n#define PPAFO_ENTRY static\n'
+    head = f'#include "{name}.h"\n\n#include <string.h>\n\n#if !defined(PPAFO_ENTRY)\n#define PPAFO_ENTRY static\n#endif\n'
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
-    texts[f"{name}.c"] = f"{head}{c_text(program, title)}\n{_filled('interface.c', words)}"
+    functions = c_text(program, title, [item.name for item in library.settings], library.further)
+    texts[f"{name}.c"] = f"{head}{functions}\n{_filled('interface.c', words)}"
     return {file: text.encode() for file, text in sorted(texts.items())}
 
 
@@ -108,12 +116,14 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
         "prepare": "\n".join(f"    {line}" for line in library.preparation),
         "defaults": "\n".join(f"    settings->{item.name} = {item.value!r};" for item in library.settings),
+        "setting_count": str(len(library.settings)),
+        "other_program": "".join(f"\n        || {item}" for item in library.other_program),
         "ranges": "\n".join(_range(item) for item in library.settings),
         "read_outputs": "\n".join(
             f"    outputs->{item} = values[{place}];" for place, item in enumerate(program.outputs)
         ),
         "read_metrics": "\n".join(
-            f"    given->{kind.name} = found[{place}];" for place, kind in enumerate(program.metrics)
+            f"    given->{kind.name} = found[METRIC_{kind.name.upper()}];" for kind in program.metrics
         ),
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),
@@ -124,7 +134,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
             for kind in program.metrics
         ),
         "example": f"{library.settings[0].name} = {library.settings[0].value!r};",
-        **library.further,
+        **library.words,
     }
 
 

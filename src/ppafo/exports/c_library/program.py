@@ -1,7 +1,7 @@
 """The composed module of an exported scenario: its lane loop for one run, its metrics, and the way from settings there."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ppafo.engine.lane_meters import TRACED
@@ -17,8 +17,13 @@ from ppafo.translation.c99 import c_source, documents_of
 from ppafo.translation.one_run import one_run_collector
 from ppafo.translation.walk import walk_module
 
-COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay")
-"""Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays."""
+COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
+"""Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.
+
+The last one is 1 where the error decides about the parts of a step, else 0.
+"""
+Further = Callable[[SourceCollector], str]
+"""Writes a further composed function, once it has gathered what that calls."""
 METRICS_ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], int64, float64[::1])")'
 
 
@@ -61,20 +66,30 @@ def places_of(groups: Mapping[str, type]) -> dict[str, str]:
     return {path: f"AT_{re.sub(r'[^A-Za-z0-9]+', '_', path).strip('_').upper()}" for path in paths}
 
 
-def c_text(item: ExportedProgram, title: str) -> str:
-    """All functions of an exported program in C."""
+def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: Further | None = None) -> str:
+    """All functions of an exported program in C; ``further`` may add one that takes ``settings``, which are named."""
     collector = one_run_collector(INLINE)
-    metrics = metrics_entry(item, collector)
-    composed = f"{write_lanes(item.program, collector, lanes=1)}\n\n{metrics}\n"
+    entries = [metrics_entry(item, collector), *([] if further is None else [further(collector)])]
+    composed = "\n\n".join([write_lanes(item.program, collector, lanes=1), *entries, ""])
     state, parameter = list(item.state_places.values()), list(item.parameter_places.values())
     stepping = [f"AT_STEP_{name.removeprefix('AT_')}" for name in places_of(item.program.step_rows()).values()]
     own = ["AT_PART_LENGTH", "AT_PART_BEFORE", "AT_PART_REMAINING", "AT_PART_ERROR"]
     alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
-    places = {"x": [*state, *parameter, *stepping, *own], "states": state, "first": state, "parameters": alone}
+    places = {
+        "x": [*state, *parameter, *stepping, *own],
+        "states": state,
+        "first": state,
+        "parameters": alone,
+        "counts": [f"COUNT_{name.upper()}" for name in COUNTS],
+        "settings": [f"SETTING_{name.upper()}" for name in settings],
+        "found": [f"METRIC_{kind.name.upper()}" for kind in item.metrics],
+    }
     counted = [
         _enumeration("Places of all numbers of a run: states, parameters, and what a step hands on.", places["x"]),
         _enumeration("Places of the parameters alone.", alone),
-        _enumeration("Places of the numbers of the steps.", [f"COUNT_{name.upper()}" for name in COUNTS]),
+        _enumeration("Places of the numbers of the steps.", places["counts"]),
+        _enumeration("Places of the settings.", places["settings"]),
+        _enumeration("Places of the metrics.", places["found"]),
     ]
     documents = documents_of(collector) | {"Readings": Readings.__doc__ or ""}
     return "\n".join([*counted, c_source(walk_module(composed), documents, title, places)])

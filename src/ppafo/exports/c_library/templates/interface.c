@@ -3,7 +3,14 @@
 #define NEVER_FAILED @never@
 #define SAME_MOMENT @same_moment@
 
-enum { OUTPUTS = @output_count@, STATES = @state_count@, PARAMETERS = @parameter_count@, METRICS = @metric_count@ };
+enum {
+    SETTINGS = @setting_count@,
+    OUTPUTS = @output_count@,
+    STATES = @state_count@,
+    PARAMETERS = @parameter_count@,
+    METRICS = @metric_count@,
+    COUNTS = @count_count@
+};
 
 struct @name@_run {
     double parameters[PARAMETERS];
@@ -28,7 +35,7 @@ struct @name@_run {
 typedef struct {
     double parameters[PARAMETERS];
     double states[STATES];
-    double counts[@count_count@];
+    double counts[COUNTS];
 } prepared_run;
 
 static ppafo_array array_of(double *values, int64_t first, int64_t second, int64_t third)
@@ -43,7 +50,15 @@ static ppafo_array array_of(double *values, int64_t first, int64_t second, int64
 
 static void prepare_run(const @name@_settings *settings, prepared_run *prepared)
 {
+    memset(prepared, 0, sizeof(*prepared));
 @prepare@
+}
+
+/* True where Python would run other functions for these settings than there are here. */
+static bool is_other_program(const @name@_settings *settings, const prepared_run *prepared)
+{
+    (void)settings;
+    return prepared->counts[COUNT_INTERVAL] < 1.0 || prepared->counts[COUNT_STEPS] > 1.0e9@other_program@;
 }
 
 static int64_t values_of_history(int64_t signal_delay, int64_t command_delay)
@@ -69,6 +84,9 @@ size_t @name@_size(const @name@_settings *settings)
         return 0;
     }
     prepare_run(settings, &prepared);
+    if (is_other_program(settings, &prepared)) {
+        return 0;
+    }
     return sizeof(@name@_run) + sizeof(double) * (size_t)values_of_history((int64_t)prepared.counts[COUNT_SIGNAL_DELAY],
         (int64_t)prepared.counts[COUNT_COMMAND_DELAY]);
 }
@@ -83,6 +101,9 @@ size_t @name@_size(const @name@_settings *settings)
         return @NAME@_BAD_SETTING;
     }
     prepare_run(settings, &prepared);
+    if (is_other_program(settings, &prepared)) {
+        return @NAME@_OTHER_PROGRAM;
+    }
     memset(run, 0, sizeof(*run));
     memcpy(run->parameters, prepared.parameters, sizeof(run->parameters));
     memcpy(run->states, prepared.states, sizeof(run->states));

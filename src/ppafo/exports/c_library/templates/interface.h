@@ -28,7 +28,8 @@ typedef enum {
     @NAME@_FINISHED,       /* there is no further sample; the metrics are those of the whole run */
     @NAME@_FAILED,         /* the run left what is possible: try a smaller step, check inertia, volumes and areas */
     @NAME@_TOO_MANY_PARTS, /* as before: a step was cut into 100,000 parts and was still not done */
-    @NAME@_BAD_SETTING     /* @name@_bad_setting says which */
+    @NAME@_BAD_SETTING,    /* @name@_bad_setting says which */
+    @NAME@_OTHER_PROGRAM   /* the settings need functions that are not here, see README.md: export them from ppafo */
 } @name@_status;
 
 /* What can be chosen before a run begins. */
@@ -56,7 +57,7 @@ void @name@_defaults(@name@_settings *settings);
 /* The name of the first setting that is out of range, a null pointer where all are good. */
 const char *@name@_bad_setting(const @name@_settings *settings);
 
-/* Bytes of a run; it depends on delays. 0 for a bad setting. */
+/* Bytes of a run; it depends on delays. 0 for settings with which no run can begin. */
 size_t @name@_size(const @name@_settings *settings);
 
 /* Begin a run. */

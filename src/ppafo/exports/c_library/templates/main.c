@@ -18,6 +18,10 @@ int main(void)
         fprintf(stderr, "%s is out of range\n", @name@_bad_setting(&settings));
         return 2;
     }
+    if (@name@_size(&settings) == 0) {
+        fprintf(stderr, "these settings need another program, see README.md\n");
+        return 2;
+    }
     run = (@name@_run *)malloc(@name@_size(&settings));
     if (run == NULL) {
         fprintf(stderr, "no memory\n");
