@@ -4,7 +4,14 @@ import argparse
 import shlex
 from pathlib import Path
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, check_output, print_result, write_files
+from ppafo.cli.output import (
+    EXIT_GOOD,
+    add_json_argument,
+    add_override_argument,
+    check_output,
+    print_result,
+    write_files,
+)
 
 _C = "write a scenario as a library in C: header, source, example, make files"
 

@@ -52,7 +52,9 @@ def program_source(program: Program) -> str:
 
 def translated(composed: str, collector: SourceCollector) -> str:
     """The same of a composed module that ``collector`` gathered."""
-    return c_source(walk_module(composed), documents_of(collector), "Generated from the functions of ppafo. Not to be edited.")
+    return c_source(
+        walk_module(composed), documents_of(collector), "Generated from the functions of ppafo. Not to be edited."
+    )
 
 
 def documents_of(collector: SourceCollector) -> dict[str, str]:

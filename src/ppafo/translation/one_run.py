@@ -1,7 +1,7 @@
 """Functions that Python applies to columns of runs, as functions of one run, which is what the subset has.
 
-What prepares and judges runs takes settings by their names as text, and numbers that may be columns (``model.columns``).
-For one run a name is a field, no number is a column, and a function over runs is called as it is.
+What prepares and judges runs takes settings by their names as text, and numbers that may be columns of
+``model.columns``. For one run a name is a field, no number is a column, and a function over runs is called as it is.
 """
 
 import ast

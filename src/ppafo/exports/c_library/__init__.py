@@ -1,15 +1,18 @@
 """A scenario as a library in C99, with an example and make files."""
 
+import itertools
 from collections.abc import Sequence
 
 from ppafo.engine.program import Program
 from ppafo.engine.run import batch_of
 from ppafo.exports.c_library.files import Library, library_files
-from ppafo.exports.c_library.preparation import Preparation, settings_of
-from ppafo.exports.c_library.program import exported
+from ppafo.exports.c_library.preparation import Preparation, relations_of, settings_of
+from ppafo.exports.c_library.program import ExportedProgram, exported
+from ppafo.metrics.catalog import METRICS
 from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters.device import Orifice, SonicOrifice
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import PrescribedMotion, Scenario
 
 _ARRAYS = {
     "given": "SETTINGS",
@@ -36,18 +39,56 @@ def scenario_library(scenario: Scenario) -> Library:
         description=" ".join(scenario.description.split()),
         program=program,
         settings=settings,
+        relations=relations_of(scenario),
         preparation=("double given[SETTINGS];", *given, f"prepare({arrays});"),
         other_program=_other_program(scenario, program.program),
-        words={},
+        words=_words(scenario, program),
         further=lambda collector: Preparation(scenario, program.program, collector).text(),
     )
+
+
+def _words(scenario: Scenario, program: ExportedProgram) -> dict[str, str]:
+    """What the page of the library says of this scenario."""
+    supply, motion = scenario.device.supply, scenario.motion
+    moves = f"prescribed, `{motion.profile.kind}`" if isinstance(motion, PrescribedMotion) else "free"
+    forms = {
+        "valve": scenario.device.valve.orifice,
+        "leak": scenario.device.actuator.leak,
+    }
+    lines = "with lines behind the regulators" if scenario.supply_lines else "constant supply pressures"
+    fixed = [
+        f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.control.kind}`",
+        f"the reference, `{scenario.reference.kind}`, and the motion, {moves}",
+        *(f"the form of the {name}, `{_form(orifice)}`" for name, orifice in forms.items()),
+        f"the gas, `{'isothermal' if scenario.thermal is None else 'thermal'}`; {lines}, which "
+        f"{'take' if supply.relieving else 'do not take'} gas back from a chamber above them",
+    ]
+    zero = [f"`valve_{name}`" for name in _choosing(scenario) if not scenario.device.valve.settings[name] > 0.0]
+    flawless = [] if any(scenario.sensors.flaws) else ["all of `sensors_` but the seed"]
+    parts = "" if program.program.is_adaptive or not program.program.is_held else _WHOLE_STEPS
+    left_out = [kind.name for kind in METRICS.values() if kind.traced]
+    return {
+        "fixed": "\n".join(f"- {item};" for item in fixed),
+        "at_zero": f"here 0 are {', '.join([*zero, *flawless]) or 'none'}",
+        "parts": parts,
+        "left_out": ", ".join(f"`{name}`" for name in left_out),
+    }
+
+
+_WHOLE_STEPS = """
+
+This vane is held, and its chambers are slow enough for whole steps. Settings that make them faster (a wider valve, less
+volume) need a shorter `run_step`, else they give the status below too."""
+
+
+def _form(orifice: Orifice | SonicOrifice) -> str:
+    return "sonic_conductance, critical_ratio" if isinstance(orifice, SonicOrifice) else "area, discharge_coefficient"
 
 
 def _other_program(scenario: Scenario, program: Program) -> tuple[str, ...]:
     """Conditions in C under which the settings ask for another program than this one."""
     given = scenario.device.valve.settings
-    names = [item.name for item in VALVES[scenario.device.valve.kind].quantities]
-    found = [_differs([f"valve_{name}"], given[name] > 0.0) for name in names]
+    found = [_differs([f"valve_{name}"], given[name] > 0.0) for name in _choosing(scenario)]
     flaws = ["angle_noise", "pressure_noise", "angle_resolution", "pressure_resolution"]
     bandwidths = ["angle_bandwidth", "pressure_bandwidth"]
     found += [
@@ -59,6 +100,21 @@ def _other_program(scenario: Scenario, program: Program) -> tuple[str, ...]:
     found.append(f"(prepared->counts[COUNT_NEEDS_PARTS] != 0.0) != {_truth(program.is_adaptive)}")
     found.append(f"({interval} != (double)(int64_t){interval}) != {_truth(program.samples_inside)}")
     return tuple(found)
+
+
+def _choosing(scenario: Scenario) -> list[str]:
+    """Settings of the valve that choose its functions by being 0 or not."""
+    kind = VALVES[scenario.device.valve.kind]
+    names = [item.name for item in kind.quantities]
+    chosen = {}
+    for pattern in itertools.product((0.0, 0.01), repeat=len(names)):
+        model = kind.choose(dict(zip(names, pattern, strict=True)))
+        chosen[pattern] = model, model.command_delay(dict(zip(names, pattern, strict=True))) > 0.0
+    return [
+        name
+        for place, name in enumerate(names)
+        if any(chosen[pattern] != chosen[*pattern[:place], 0.0, *pattern[place + 1 :]] for pattern in chosen)
+    ]
 
 
 def _differs(names: Sequence[str], is_above: bool) -> str:

@@ -1,8 +1,10 @@
 """The files of an exported library: header, source, example, make files, licence and a page on how to use it."""
 
+import math
 import re
+import sys
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -30,6 +32,8 @@ OUTPUTS = {
     "leaked_mass": ("kg", "gas past the vane so far"),
 }
 """Unit and meaning of what can be read at each sample."""
+UNITS = {"Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
+_SIGNS = {"below": "<", "at most": "<=", "at least": ">="}
 _MARK = re.compile(r"@(\w+)@")
 _FILES = {
     "interface.h": "{name}.h",
@@ -51,6 +55,16 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True)
+class Relation:
+    """A setting that must be ``below``, ``at most`` or ``at least`` another, but for ``tolerance`` in its unit."""
+
+    name: str
+    relation: str
+    other: str
+    tolerance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Library:
     """What is to be written.
 
@@ -62,6 +76,7 @@ class Library:
     description: str
     program: ExportedProgram
     settings: tuple[Setting, ...]
+    relations: tuple[Relation, ...]
     preparation: tuple[str, ...]
     other_program: tuple[str, ...]
     words: Mapping[str, str]
@@ -80,7 +95,9 @@ def library_files(library: Library) -> dict[str, bytes]:
     words = _words(library, name)
     texts = {target.format(name=name): _filled(source, words) for source, target in _FILES.items()}
     texts["LICENSE"] = _filled("LICENSE", {})
-    head = f'#include "{name}.h"\n\n#include <string.h>\n\n#if !defined(PPAFO_ENTRY)\n#define PPAFO_ENTRY static\n#endif\n'
+    head = (
+        f'#include "{name}.h"\n\n#include <string.h>\n\n#if !defined(PPAFO_ENTRY)\n#define PPAFO_ENTRY static\n#endif\n'
+    )
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
     functions = c_text(program, title, [item.name for item in library.settings], library.further)
     texts[f"{name}.c"] = f"{head}{functions}\n{_filled('interface.c', words)}"
@@ -111,14 +128,14 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "count_count": str(len(COUNTS)),
         "output_count": str(len(program.outputs)),
         "metric_count": str(len(program.metrics)),
-        "settings": _members((item.name, item.quantity.unit, item.quantity.summary) for item in library.settings),
+        "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),
         "outputs": _members((("time", "s", "since the start"), *((item, *OUTPUTS[item]) for item in program.outputs))),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
         "prepare": "\n".join(f"    {line}" for line in library.preparation),
         "defaults": "\n".join(f"    settings->{item.name} = {item.value!r};" for item in library.settings),
         "setting_count": str(len(library.settings)),
         "other_program": "".join(f"\n        || {item}" for item in library.other_program),
-        "ranges": "\n".join(_range(item) for item in library.settings),
+        "ranges": "\n".join([*map(_range, library.settings), *map(_related, library.relations)]),
         "read_outputs": "\n".join(
             f"    outputs->{item} = values[{place}];" for place, item in enumerate(program.outputs)
         ),
@@ -127,10 +144,9 @@ def _words(library: Library, name: str) -> dict[str, str]:
         ),
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),
-        "csv_values": ",\n".join(f"            outputs.{item}" for item in outputs).replace("            ", " " * 15),
+        "csv_values": ",\n".join(f"            outputs.{item}" for item in outputs),
         "print_metrics": "\n".join(
-            f'        printf("# {kind.name} = %.17g {kind.unit}: {kind.summary.replace("%", "%%")}\\n", '
-            f"metrics.{kind.name});"
+            f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", "{kind.summary}");'
             for kind in program.metrics
         ),
         "example": f"{library.settings[0].name} = {library.settings[0].value!r};",
@@ -142,20 +158,36 @@ def _members(items: Iterable[tuple[str, str, str]]) -> str:
     """Members of a struct, each with its unit and meaning."""
     lines = []
     for name, unit, said in items:
-        comment = f"{unit or '-'}: {said}".replace("*/", "* /").rstrip(": ")
+        comment = f"{UNITS.get(unit, unit) or '-'}: {said}".replace("*/", "* /")
         lines.append(f"    double {name}; /* {comment} */")
     return "\n".join(lines)
+
+
+def _said(quantity: Quantity) -> str:
+    """What a setting is, and its range."""
+    low, high = (limit if abs(limit) < math.inf else None for limit in (quantity.minimum, quantity.maximum))
+    above = "" if low is None else f"{'from' if quantity.minimum_allowed else 'above'} {low:g}"
+    below = "" if high is None else f"up to {high:g}"
+    limits = " ".join(filter(None, (above, below)))
+    return f"{quantity.summary or quantity.name}{'; ' if limits else ''}{limits}"
+
+
+def _refused(holds: str, name: str) -> str:
+    """Lines of C that name a setting unless something holds, which it does not for what is no number."""
+    return f'    if (!({holds})) {{\n        return "{name}";\n    }}'
+
+
+def _related(item: Relation) -> str:
+    """Lines of C that refuse a setting that contradicts another."""
+    slack = f" {'-' if item.relation == 'at least' else '+'} {item.tolerance!r}" if item.tolerance else ""
+    holds = f"settings->{item.name} {_SIGNS[item.relation]} settings->{item.other}{slack}"
+    return _refused(holds, item.name)
 
 
 def _range(item: Setting) -> str:
     """Lines of C that refuse a value that the declaration does not allow, or that is no number."""
     quantity, value = item.quantity, f"settings->{item.name}"
     sign = ">=" if quantity.minimum_allowed else ">"
-    low = f"{value} {sign} {quantity.minimum!r}" if quantity.minimum > -1e308 else f"{value} > -1.0e308"
-    high = f"{value} <= {quantity.maximum!r}" if quantity.maximum < 1e308 else f"{value} < 1.0e308"
-    return f'    if (!({low} && {high})) {{\n        return "{item.name}";\n    }}'
-
-
-def assigned(places: Sequence[tuple[str, str]]) -> tuple[str, ...]:
-    """Lines of C that give each place what is behind it."""
-    return tuple(f"{place} = {value};" for place, value in places)
+    low = max(quantity.minimum, -sys.float_info.max)
+    high = min(quantity.maximum, sys.float_info.max)
+    return _refused(f"{value} {sign} {low!r} && {value} <= {high!r}", item.name)

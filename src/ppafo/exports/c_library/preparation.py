@@ -1,6 +1,7 @@
-"""From the settings of a scenario to the numbers of a run, as one composed function that calls those of the planning."""
+"""From the settings of a scenario to the numbers of a run: one composed function, which calls those of the planning."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
@@ -11,16 +12,18 @@ from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, initial_masses, sensors_at_start, whole_and_rest
 from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.source_text import SourceCollector
-from ppafo.exports.c_library.files import Setting, c_identifier
+from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters.building import consistency
 from ppafo.parameters.declaration import SECTIONS
 from ppafo.parameters.device import SonicOrifice
 from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
+from ppafo.simulation.motion import TOLERANCE
 from ppafo.simulation.numbers import HELD_ANGLE, TIMES, declared_numbers, number_at, other_form
 from ppafo.simulation.preparation import (
     is_slow_held,
@@ -34,6 +37,12 @@ from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.simulation.supply_line import LINES, SECTION
 
 ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], float64[::1])")'
+_SAID = {
+    "run.step": "longest step of the engine",
+    "run.output_interval": "time from one sample to the next",
+    "controller.period": "time between two decisions of the controller",
+}
+"""What some settings are where no file stands around them."""
 _LEVEL_OF_HELD = "motion.profile.level"
 _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply")
 
@@ -47,8 +56,32 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
         "controller.period": scenario.control.period,
     }
     return tuple(
-        Setting(c_identifier(path), path, item, times[path] if path in TIMES else number_at(scenario, path))
+        Setting(
+            c_identifier(path),
+            path,
+            replace(item, summary=_SAID.get(path, item.summary)),
+            times[path] if path in TIMES else number_at(scenario, path),
+        )
         for path, item in _declared(scenario).items()
+    )
+
+
+def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
+    """Settings that contradict each other, as they would in a file."""
+    rules: list[tuple[str, str, str, float]] = [
+        *((path, relation, other, 0.0) for path, relation, other, _ in consistency(scenario.device)),
+        ("run.step", "at most", "run.duration", 0.0),
+        ("run.step", "at most", "run.output_interval", TOLERANCE * scenario.time_step),
+        ("run.output_interval", "at most", "run.duration", 0.0),
+        ("sensors.delay", "at most", "run.duration", 0.0),
+    ]
+    if HELD_ANGLE in _declared(scenario):
+        rules.append((HELD_ANGLE, "at least", "actuator.angle_min", TOLERANCE))
+        rules.append((HELD_ANGLE, "at most", "actuator.angle_max", TOLERANCE))
+    if scenario.supply_lines is not None:
+        rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure", 0.0))
+    return tuple(
+        Relation(c_identifier(path), relation, c_identifier(other), slack) for path, relation, other, slack in rules
     )
 
 
@@ -90,8 +123,8 @@ class Preparation:
             "needs_parts": "1.0 if needs_parts else 0.0",
         }
         body += [f"counts[{place}] = {counted[name]}" for place, name in enumerate(COUNTS)]
-        rows = [f"{name} = namedtuple({name!r}, {fields!r})" for name, fields in self.rows.items()]
-        return "\n".join([*rows, ENTRY, "def prepare(settings, parameters, states, counts):", *indent(body)])
+        own = [f"{name} = namedtuple({name!r}, {fields!r})" for name, fields in self.rows.items()]
+        return "\n".join([*own, ENTRY, "def prepare(settings, parameters, states, counts):", *indent(body)])
 
     def initial_rows(self) -> dict[str, type]:
         """State rows that a run begins with; those of meters begin with the first sample."""
@@ -172,7 +205,9 @@ class Preparation:
             yield f"thermal = {add(thermal_gas)}({self.row('Walls', walls)}, gas)"
         if scenario.supply_lines is not None:
             of_lines = [
-                c_identifier(f"{SECTION}.{line}.{name}") for line in LINES for name in ("droop", "largest_flow", "volume")
+                c_identifier(f"{SECTION}.{line}.{name}")
+                for line in LINES
+                for name in ("droop", "largest_flow", "volume")
             ]
             yield f"lines = {add(SupplyLines)}({', '.join(of_lines)}, {scenario.supply_lines.relieving!r})"
 

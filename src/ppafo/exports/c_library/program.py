@@ -1,4 +1,4 @@
-"""The composed module of an exported scenario: its lane loop for one run, its metrics, and the way from settings there."""
+"""The composed module of an exported scenario: its lane loop for one run, its metrics, the way from settings there."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -107,21 +107,20 @@ def metrics_entry(item: ExportedProgram, collector: SourceCollector) -> str:
     kind, make = (ThermalTotals, thermal_totals) if program.is_thermal else (Totals, totals)
     further = ", plant, thermal" if program.is_thermal else ""
     parameters = program.parameter_rows()
-    lines = [f"{name} = {_loaded(program, name, parameters, 'parameters', collector)}" for name in ("plant", "thermal")]
+    lines = [f"{name} = {_loaded(name, parameters, 'parameters', collector)}" for name in ("plant", "thermal")]
     add = collector.add
     for array in ("first", "states"):
-        state = _loaded(program, "state", groups, array, collector)
-        masses = f", {_loaded(program, 'masses', groups, array, collector)}" if program.is_thermal else ""
+        state = _loaded("state", groups, array, collector)
+        masses = f", {_loaded('masses', groups, array, collector)}" if program.is_thermal else ""
         lines.append(f"{array}_total = {add(make)}({state}{masses}{further})")
     gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind._fields)
     meters = ", ".join(
-        f"{name}={_loaded(program, group, groups, 'states', collector)}"
+        f"{name}={_loaded(group, groups, 'states', collector)}"
         for name, group in zip(names, program.meter_groups, strict=True)
     )
-    course = _loaded(program, "course", groups, "states", collector)
+    course = _loaded("course", groups, "states", collector)
     lines += [
-        f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples, gains"
-        f"={add(kind)}({gains}))",
+        f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples, gains={add(kind)}({gains}))",
         *(f"found[{place}] = {add(metric.read)}(readings)" for place, metric in enumerate(item.metrics)),
     ]
     rows = [
@@ -131,9 +130,7 @@ def metrics_entry(item: ExportedProgram, collector: SourceCollector) -> str:
     return "\n".join([*rows, METRICS_ENTRY, "def metrics(first, states, parameters, samples, found):", *indent(lines)])
 
 
-def _loaded(
-    program: Program, group: str, groups: Mapping[str, type], array: str, collector: SourceCollector
-) -> str:
+def _loaded(group: str, groups: Mapping[str, type], array: str, collector: SourceCollector) -> str:
     """The NamedTuple of a group of rows, from an array of all of them."""
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
     cells = {path: f"{array}[{place}]" for place, path in enumerate(paths)}

@@ -26,10 +26,10 @@ extern "C" {
 typedef enum {
     @NAME@_GOING_ON,       /* a sample can be read */
     @NAME@_FINISHED,       /* there is no further sample; the metrics are those of the whole run */
-    @NAME@_FAILED,         /* the run left what is possible: try a smaller step, check inertia, volumes and areas */
+    @NAME@_FAILED,         /* left what is possible: try a smaller step; check inertia, volumes and areas */
     @NAME@_TOO_MANY_PARTS, /* as before: a step was cut into 100,000 parts and was still not done */
     @NAME@_BAD_SETTING,    /* @name@_bad_setting says which */
-    @NAME@_OTHER_PROGRAM   /* the settings need functions that are not here, see README.md: export them from ppafo */
+    @NAME@_OTHER_PROGRAM   /* the settings need functions that are not here, see README.md */
 } @name@_status;
 
 /* What can be chosen before a run begins. */
@@ -47,14 +47,15 @@ typedef struct {
 @metrics@
 } @name@_metrics;
 
-/* A run under way: memory of the caller, of the size that @name@_size tells, aligned as for a double. It has no pointer
- * in it and nothing outside it changes, so that runs do not know of each other, and a copy goes on as the first would. */
+/* A run under way: memory of the caller, aligned as for a double, of the size that @name@_size tells.
+ * It has no pointer in it and nothing outside it changes: runs do not know of each other, and a copy goes on as the
+ * first would. */
 typedef struct @name@_run @name@_run;
 
 /* The settings of the scenario. */
 void @name@_defaults(@name@_settings *settings);
 
-/* The name of the first setting that is out of range, a null pointer where all are good. */
+/* The name of the first setting that is out of range or contradicts another; a null pointer where all are good. */
 const char *@name@_bad_setting(const @name@_settings *settings);
 
 /* Bytes of a run; it depends on delays. 0 for settings with which no run can begin. */

@@ -4,6 +4,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+static void print_metric(const char *name, double value, const char *unit, const char *summary)
+{
+    if (value == value) {
+        printf("# %s = %.17g %s: %s\n", name, value, unit, summary);
+    } else {
+        printf("# %s: none here: %s\n", name, summary);
+    }
+}
+
 int main(void)
 {
     @name@_settings settings;
