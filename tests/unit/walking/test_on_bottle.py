@@ -31,6 +31,17 @@ def test_mass_and_energy_close(small: WalkResult) -> None:
     assert balance.given_up + balance.ice + balance.room == pytest.approx(balance.delivered, rel=1e-12)
 
 
+def test_a_bottle_of_a_gram_ends_empty_and_its_gas_stays_what_a_gas_can_be() -> None:
+    found = walk(WALK, 0.1, ["bottle.gas_mass=1 g", "bottle.volume=1.5 cm^3"], bottle=BOTTLE)
+    assert found.supply is not None
+    values = found.supply.values
+    assert found.supply.ending.kind == "empty"
+    assert np.all(np.diff(values["bottle_mass"]) <= 0.0)
+    assert values["bottle_temperature"].max() <= 298.0 + 1e-9, "nothing is warmer than the room"
+    assert values["bottle_pressure"].max() == values["bottle_pressure"][0]
+    assert np.diff(values["bottle_mass"]).min() > -0.06e-3, "no more than a share leaves between two meetings"
+
+
 def test_what_leaves_the_bottle_is_in_the_lines_or_went_into_the_device(small: WalkResult) -> None:
     recording, configuration = small.recording, small.configuration
     lines = configuration.supply_lines
@@ -144,6 +155,10 @@ def test_ice_narrows_the_seat_until_the_gas_lacks_no_more_than_it_is_given() -> 
     opened = found.supply.values["seat_open"]
     assert opened[0] == 1.0
     assert opened.min() < 0.05
+    balance = found.supply.balance
+    assert balance.iced > 4.0e-5
+    assert balance.left_bottle == pytest.approx(balance.regulated + balance.iced, rel=1e-12)
+    assert balance.given_up + balance.ice + balance.room == pytest.approx(balance.delivered, rel=1e-12)
     assert np.diff(found.recording["regulated_mass"])[-500:].sum() < 0.1 * found.recording["regulated_mass"][-1]
 
 
