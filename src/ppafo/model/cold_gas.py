@@ -252,20 +252,28 @@ def advance_supply(
 
 def parts_of(table: FluidTable, line: Isobar, supply: ColdSupply, least: float, flow: float, step: float) -> int:
     """Into how many parts a step [s] goes with at least a mass [kg] in the bottle, so that no temperature swings up."""
-    return max(1, math.ceil(step * fastest_rate(table, line, supply, least, flow) / LARGEST_CHANGE))
+    return max(1, math.ceil(step * max(following_rates(table, line, supply, least, flow).values()) / LARGEST_CHANGE))
 
 
-def fastest_rate(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float) -> float:
-    """The fastest rate [1/s] at which content, wall, regulator or hose follow what is around them.
+def following_rates(
+    table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float
+) -> dict[str, float]:
+    """The rates [1/s], by name, at which content, wall, regulator and hose follow what is around them, at most.
 
     ``mass`` [kg] is the gas in the bottle, ``flow`` [kg/s] that through the regulator.
     """
-    wall, body, hose = supply.wall, supply.body, supply.hose
-    content = wall.content_heat_transfer / (_LEAST_HEAT_CAPACITY * table.gas_constant * mass)
-    walls = (wall.content_heat_transfer + wall.room_heat_transfer) / wall.wall_heat_capacity
-    capacity = (line.enthalpies[-1] - line.enthalpies[0]) / (line.temperatures[-1] - line.temperatures[0])
-    passages = ((part.room_heat_transfer + flow * part.effectiveness * capacity) / part.heat_capacity for part in (body, hose))
-    return max(content, walls, *passages)
+    wall, temperatures = supply.wall, line.temperatures
+    capacity = (line.enthalpies[-1] - line.enthalpies[0]) / (temperatures[-1] - temperatures[0])
+    parts = {"regulator": supply.body, "hose": supply.hose}
+    passages = {
+        name: (part.room_heat_transfer + flow * part.effectiveness * capacity) / part.heat_capacity
+        for name, part in parts.items()
+    }
+    return {
+        "content": wall.content_heat_transfer / (_LEAST_HEAT_CAPACITY * table.gas_constant * mass),
+        "wall": (wall.content_heat_transfer + wall.room_heat_transfer) / wall.wall_heat_capacity,
+        **passages,
+    }
 
 
 def _heun(

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, make_schema, optional, read_model, table
-from ppafo.documents.toml_text import TomlKind
+from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity
@@ -178,6 +178,7 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
     part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
+    _check_name(name_or_path)
     parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
     found = _warming() | _given(parsed)
     if part is not None:
@@ -186,6 +187,17 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     for override in overrides:
         found = _override(found, override)
     return _build(parsed, found, file)
+
+
+def _check_name(name_or_path: str | Path) -> None:
+    """Refuse a name that neither a bottle nor a part has, with the nearest of both."""
+    name, path = label(str(name_or_path)), Path(name_or_path)
+    known = (*FILE.names(), *bottle_parts())
+    if name in known or path.suffix == ".toml" or "/" in name:
+        return
+    raise ParameterError(
+        f"there is no bottle '{name}'{nearest_name(name, known)}; available: {', '.join(known)}, or give a .toml file"
+    )
 
 
 def _given(parsed: Any) -> dict[str, Entry]:
