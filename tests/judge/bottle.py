@@ -108,7 +108,7 @@ def rates(y: Column, angle: float, open_1: bool, open_2: bool, n: "Numbers", gas
     into_1 = port(n.valve, inside_1, line_1 if open_1 else n.room_pressure, warmth, n.constant, n.k)
     into_2 = port(n.valve, inside_2, line_2 if open_2 else n.room_pressure, warmth, n.constant, n.k)
     leak = port(n.leak, inside_1, inside_2, warmth, n.constant, n.k)
-    # Of what comes from the bottle a part stays as ice: growth * (frost - SUBLIMATION) + through * frost is its enthalpy.
+    # What comes from the bottle has the enthalpy growth * (frost - SUBLIMATION) + through * frost: ice, and gas.
     freezes = y[ICE] > 0.0 or arriving < frost
     growth = through * (frost - arriving) / (SUBLIMATION + arriving - frost) if freezes else 0.0
     drawn = through + growth

@@ -41,7 +41,7 @@ LARGEST_CHANGE = 0.2
 """Share of a difference of temperature that a step of Heun's rule may even out; above 2 it would swing up."""
 
 _LEAST_HEAT_CAPACITY = 2.5
-"""Heat capacity of any gas at constant volume over its gas constant [-], at least: no molecule has less but noble ones."""
+"""Heat capacity of air, nitrogen or CO2 at constant volume over the gas constant [-], at least."""
 
 _HALVINGS = 60
 _FIRST_SECANT, _SAME_TEMPERATURE, _MAXIMUM_SECANTS = 1.0e-3, 1.0e-9, 12
@@ -178,7 +178,7 @@ def ice_rate(line: Isobar, enthalpy: float, flow: float, ice: float, step: float
 
 
 def enthalpy_behind_seat(line: Isobar, enthalpy: float, ice: float, mass: float) -> float:
-    """Specific enthalpy [J/kg] of a mass of gas [kg] behind a seat with dry ice [kg], to which it comes with ``enthalpy``.
+    """Specific enthalpy [J/kg] of a mass of gas [kg] behind a seat with dry ice [kg]; it comes with ``enthalpy``.
 
     It is as cold as the ice while there is some, warmer as far as the gas has more than all of the ice takes. The ice
     that goes is part of the mass.
@@ -228,11 +228,11 @@ def advance_supply(
     mass: float,
     step: float,
 ) -> SupplyState:
-    """The state after a step [s] in which a mass [kg] went on behind the seat evenly, by Heun's rule, from its ``content``.
+    """The state after a step [s] in which a mass [kg] went on behind the seat evenly, by Heun's rule.
 
-    The step is cut where little gas, or a part of little heat capacity, follows faster than that rule does.
-
-    SimulationError where the bottle has no more than that: nobody can have drawn it.
+    ``content`` is that of the bottle before it. The step is cut where little gas, or a part of little heat capacity,
+    follows faster than that rule does. SimulationError where the bottle has no more than that: nobody can have drawn
+    it.
     """
     if mass >= state.mass:
         raise SimulationError(
@@ -255,9 +255,7 @@ def parts_of(table: FluidTable, line: Isobar, supply: ColdSupply, least: float, 
     return max(1, math.ceil(step * max(following_rates(table, line, supply, least, flow).values()) / LARGEST_CHANGE))
 
 
-def following_rates(
-    table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float
-) -> dict[str, float]:
+def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float) -> dict[str, float]:
     """The rates [1/s], by name, at which content, wall, regulator and hose follow what is around them, at most.
 
     ``mass`` [kg] is the gas in the bottle, ``flow`` [kg/s] that through the regulator.

@@ -2,7 +2,8 @@
 
 Chambers and lines move within milliseconds, bottle, regulator and hose within seconds. So the lanes run for a tenth of
 a second with what the supply offers at its beginning, and the supply follows with the gas that the regulator let
-through in it; they meet more often where little is left. Nothing is compiled for it: what a supply offers are parameters of any program with lines.
+through in it; they meet more often where little is left. Nothing is compiled for it: what a supply offers are
+parameters of any program with lines.
 """
 
 import math
@@ -161,7 +162,10 @@ def run_on_bottle(
         state = advance_supply(table, supply.line, supply.bottle.supply, state, content, mass, steps * run.step)
         now = supply.offers(state, content.temperature, mass)
         met.append((done * run.step, state, now))
-        gauges = [*(old for old in gauges if old[0] > done - window), (done, lanes.gauge(float(block.states[line, 0]), now))]
+        gauges = [
+            *(old for old in gauges if old[0] > done - window),
+            (done, lanes.gauge(float(block.states[line, 0]), now)),
+        ]
         ending = _ending(supply, state, now, max(gauge for _, gauge in gauges), done * run.step)
     result = block.result()
     record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]

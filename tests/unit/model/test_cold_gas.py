@@ -126,7 +126,7 @@ def test_ice_takes_from_the_gas_what_it_loses() -> None:
 
 
 QUICK = {
-    "hose": ["bottle.hose.heat_capacity=0.02 J/K"],
+    "hose": ["bottle.hose.heat_capacity=0.03 J/K"],
     "wall": ["bottle.wall_heat_capacity=0.01 J/K"],
     "content": ["bottle.gas_mass=1 g", "bottle.volume=1.5 cm^3"],
 }

@@ -190,10 +190,14 @@ def test_a_mistake_is_named_in_one_line(override: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("path", "value"), [("gait", "falisse2019-subject1"), ("course", "stairs"), ("bottle", BOTTLE)])
+@pytest.mark.parametrize(
+    ("path", "value"), [("gait", "falisse2019-subject1"), ("course", "stairs"), ("bottle", BOTTLE)]
+)
 def test_what_is_named_twice_is_refused(path: str, value: str) -> None:
     own = "bottle.name=other" if path == "bottle" else f"{path}=other"
-    with pytest.raises(ScenarioError, match=f"override '{own}': the {path} is given as '{value}' already; give it once"):
+    with pytest.raises(
+        ScenarioError, match=f"override '{own}': the {path} is given as '{value}' already; give it once"
+    ):
         load_walk(WALK, [own], **{path: value})
 
 

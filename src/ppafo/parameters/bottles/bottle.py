@@ -56,12 +56,22 @@ REGULATOR = (
         minimum_allowed=False,
     ),
 )
+
+
+def _passed(part: str, short: str) -> tuple[Quantity, ...]:
+    """Declare what a part that the gas passes has, in the order of ``Passage``."""
+    warms = f"share of the way to the {short}'s temperature that the gas warms"
+    return (
+        Quantity("heat_capacity", "J/K", f"heat capacity of the {part}", minimum=1e-3, maximum=1e6),
+        Quantity("effectiveness", "", warms, minimum=0.0, maximum=1.0),
+        Quantity(
+            "room_heat_transfer", "W/K", f"heat conductance from the room to the {short}", minimum=0.0, maximum=1e6
+        ),
+    )
+
+
 BODY = (
-    Quantity("heat_capacity", "J/K", "heat capacity of the regulator's body", minimum=1e-3, maximum=1e6),
-    Quantity(
-        "effectiveness", "", "share of the way to the body's temperature that the gas warms", minimum=0.0, maximum=1.0
-    ),
-    Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the regulator", minimum=0.0, maximum=1e6),
+    *_passed("regulator's body", "regulator"),
     Quantity(
         "ice_capacity",
         "kg",
@@ -71,13 +81,7 @@ BODY = (
         minimum_allowed=False,
     ),
 )
-HOSE = (
-    Quantity("heat_capacity", "J/K", "heat capacity of the hose to the device", minimum=1e-3, maximum=1e6),
-    Quantity(
-        "effectiveness", "", "share of the way to the hose's temperature that the gas warms", minimum=0.0, maximum=1.0
-    ),
-    Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the hose", minimum=0.0, maximum=1e6),
-)
+HOSE = _passed("hose to the device", "hose")
 ROOM = (Quantity("temperature", "K", "temperature of the room, and initially of bottle and gas"),)
 
 SECTIONS: dict[str, tuple[Quantity, ...]] = {

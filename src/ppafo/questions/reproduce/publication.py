@@ -28,7 +28,9 @@ class ClaimEntry(BaseModel):
 
     id: str = Field(pattern=_IDENTIFIER, description="name of the claim, unique in the file")
     statement: Text = Field(description="what is claimed, one sentence")
-    published: float | None = Field(None, allow_inf_nan=False, description="published number in 'unit'; left out where only words are")
+    published: float | None = Field(
+        None, allow_inf_nan=False, description="published number in 'unit'; left out where only words are"
+    )
     unit: str = Field("", description="unit of the published and of our number")
     words: str = Field("", description="what is published where it is no number, or the range of it")
     where: Text = Field(description="where it was read")
