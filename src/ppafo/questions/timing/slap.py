@@ -1,9 +1,9 @@
 """What the slap of the foot comes from: valves, chambers, pressure and timing, in all combinations, from one state.
 
 The foot comes down within a tenth of a second after the heel strike. How fast depends first of all on how far it has to
-fall, which the swing before decides. So a walk is stopped at a heel strike, the foot gets the angle and the rate, and the
-chambers get the pressures, that the device as it is has there, and the walk goes on: controller and valves keep what
-they have learnt and where they stand. What then differs is the fall alone.
+fall, which the swing before decides. So a walk is stopped at a heel strike, the foot gets the angle and the rate, and
+the chambers get the pressures, that the device as it is has there, and the walk goes on: controller and valves keep
+what they have learnt and where they stand. What then differs is the fall alone.
 """
 
 import itertools
@@ -65,9 +65,10 @@ class Strike:
 
 @dataclass(frozen=True, slots=True)
 class Falls:
-    """How a foot comes down, mean over strikes: rate [rad/s] from the ``imposed`` state and as it ``walked``, nan for none.
+    """How a foot comes down: rate [rad/s] from the ``imposed`` state and as it ``walked``, means over strikes.
 
-    ``drop`` [rad] is how far it is tilted up at the strike as it walked, and ``strikes`` are its states there.
+    Both are nan where a foot does not come down after its heel. ``drop`` [rad] is how far it is tilted up at the
+    strike as it walked, and ``strikes`` are its states there.
     """
 
     imposed: float
@@ -86,7 +87,7 @@ class SlapWalk:
 
 @dataclass(frozen=True, slots=True)
 class SlapShare:
-    """What one factor takes off the slap [rad/s]: alone, on average over all orders (Shapley), and as the last of all."""
+    """What one factor takes off the slap [rad/s]: alone, on average over all orders (Shapley), and as the last."""
 
     factor: str
     alone: float
@@ -155,16 +156,18 @@ def slap_study(file: str, overrides: Sequence[str], gait: str | Path | None, pro
     """
     chosen = [sub for size in range(len(FACTORS) + 1) for sub in itertools.combinations(FACTORS, size)]
     base = _with((), file, overrides, gait)
-    strikes = _falls(base, ()).strikes
+    strikes = falls_of(base, ()).strikes
     walks = []
     for number, factors in enumerate(chosen):
         progress(Progress("slap, factors", number, len(chosen), noun="combinations"))
-        walks.append(SlapWalk(tuple(one.name for one in factors), _falls(_with(factors, file, overrides, gait), strikes)))
+        walks.append(
+            SlapWalk(tuple(one.name for one in factors), falls_of(_with(factors, file, overrides, gait), strikes))
+        )
     slaps = {frozenset(one.factors): one.falls.imposed for one in walks}
     if not np.isfinite(list(slaps.values())).all():
         return None
     # Without the device its chambers hold nothing: the foot has the state, the chambers their own.
-    bare = _falls(with_device_off(base), [replace(strike, pressures=()) for strike in strikes])
+    bare = falls_of(with_device_off(base), [replace(strike, pressures=()) for strike in strikes])
     return SlapStudy(bare, tuple(walks), shares_of(slaps, [one.name for one in FACTORS]))
 
 
@@ -195,17 +198,19 @@ def _with(factors: Sequence[Factor], file: str, overrides: Sequence[str], gait: 
     return replace(configuration, device=device)
 
 
-def _falls(configuration: Configuration, strikes: Sequence[Strike]) -> Falls:
-    """Walk, and let one lane after the other go on from a state of ``strikes`` at its strike; the last lane just walks."""
+def falls_of(configuration: Configuration, strikes: Sequence[Strike]) -> Falls:
+    """Walk, and at each strike let another lane go on from its state in ``strikes``; the last lane just walks."""
     stride = configuration.gait.stride_time
     plan = plan_of(configuration, (FIRST_STRIKE + STRIKES) * stride)
     run = plan_walk(replace(plan, record_interval=stride))
     batch = batch_of(run)
     width = STRIKES + 1
-    many = (np.repeat(values, width, axis=1) for values in (batch.parameters, batch.states))
-    block = LaneBlock(load_program(batch.program), batch.clock, *many)
+    parameters, states = (np.repeat(values, width, axis=1) for values in (batch.parameters, batch.states))
+    block = LaneBlock(load_program(batch.program), batch.clock, parameters, states)
     rows = row_numbers(batch.program.state_rows())
-    done, own, imposed, walked, drops = 0, [], [], [], []
+    own: list[Strike] = []
+    imposed, walked, drops = [], [], []
+    done, reach = 0, round(REACH * stride / run.step)
     for lane in range(STRIKES):
         before = round((FIRST_STRIKE + lane) * stride / run.step) - 2
         block.advance(before - done)
@@ -215,7 +220,6 @@ def _falls(configuration: Configuration, strikes: Sequence[Strike]) -> Falls:
         if strikes:
             _impose(run, block.states[:, lane], rows, strikes[lane])
         landings = block.states[rows["walk.landings"]].copy()
-        reach = round(REACH * stride / run.step)
         block.advance(reach)
         done += reach
         slaps = np.where(block.states[rows["walk.landings"]] > landings, block.states[rows["walk.slap_rate"]], np.nan)
@@ -223,7 +227,7 @@ def _falls(configuration: Configuration, strikes: Sequence[Strike]) -> Falls:
         walked.append(float(slaps[STRIKES]))
     if (block.states[rows["result.failure_time"]] < NEVER_FAILED).any():
         raise SimulationError(f"{configuration.name} diverged as its foot came down; {REMEDY}")
-    return Falls(*(float(np.mean(values)) for values in (imposed, walked, drops)), tuple(own))
+    return Falls(float(np.mean(imposed)), float(np.mean(walked)), float(np.mean(drops)), tuple(own))
 
 
 def _to_strike(block: LaneBlock, strides: int) -> int:
