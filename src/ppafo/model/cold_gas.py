@@ -19,6 +19,7 @@ from ppafo.model.fluid_table import (
     FluidTable,
     densest_gas,
     fluid_pressure,
+    gas_density,
     gas_specific_energy,
     has_liquid,
 )
@@ -43,7 +44,6 @@ LARGEST_CHANGE = 0.2
 _LEAST_HEAT_CAPACITY = 2.5
 """Heat capacity of air, nitrogen or CO2 at constant volume over the gas constant [-], at least."""
 
-_HALVINGS = 60
 _FIRST_SECANT, _SAME_TEMPERATURE, _MAXIMUM_SECANTS = 1.0e-3, 1.0e-9, 12
 
 
@@ -123,15 +123,9 @@ def isobar(table: FluidTable, pressure: float) -> Isobar:
 
 
 def gas_enthalpy(table: FluidTable, temperature: float, pressure: float) -> float:
-    """Specific enthalpy [J/kg] of gas at a temperature [K] and a pressure [Pa], by halving for its density."""
-    low, high = 0.0, densest_gas(table, temperature)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if fluid_pressure(table, temperature, middle) < pressure:
-            low = middle
-        else:
-            high = middle
-    return gas_specific_energy(table, temperature, high) + pressure / high
+    """Specific enthalpy [J/kg] of gas at a temperature [K] and a pressure [Pa]."""
+    density = gas_density(table, temperature, pressure)
+    return gas_specific_energy(table, temperature, density) + pressure / density
 
 
 def enthalpy_at(line: Isobar, temperature: float) -> float:
@@ -250,9 +244,9 @@ def advance_supply(
     return after._replace(mass=state.mass - mass - (after.ice - state.ice))
 
 
-def parts_of(table: FluidTable, line: Isobar, supply: ColdSupply, least: float, flow: float, step: float) -> int:
+def parts_of(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float, step: float) -> int:
     """Into how many parts a step [s] goes with at least a mass [kg] in the bottle, so that no temperature swings up."""
-    return max(1, math.ceil(step * max(following_rates(table, line, supply, least, flow).values()) / LARGEST_CHANGE))
+    return max(1, math.ceil(step * max(following_rates(table, line, supply, mass, flow).values()) / LARGEST_CHANGE))
 
 
 def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float) -> dict[str, float]:

@@ -15,7 +15,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity
-from ppafo.model.fluid_table import densest_gas, fluid_pressure, has_liquid, liquid_density
+from ppafo.model.fluid_table import densest_gas, fluid_pressure, gas_density, has_liquid, liquid_density
 from ppafo.model.gas import SPECIES
 from ppafo.model.source import BottleWall, Regulator, bottle_content, pressure_reserve
 from ppafo.parameters.bottles.fluids import Fluid, load_fluid
@@ -27,7 +27,6 @@ from ppafo.units import format_quantity, split_quantity, to_si
 PAPER_BOTTLE = "paper-co2-9oz"
 
 FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") / "files", ParameterError)
-_HALVINGS = 80
 
 BOTTLE = (
     Quantity("volume", "m^3", "internal volume of the bottle", minimum=1e-6, maximum=1.0),
@@ -310,19 +309,7 @@ def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float
             if has_liquid(fluid.table)
             else f"{file}: bottle.fill_pressure: the table of {fluid.name} ends at {most:.4g} Pa at {temperature:g} K"
         )
-    return values["bottle.volume"] * gas_density(fluid, temperature, pressure)
-
-
-def gas_density(fluid: Fluid, temperature: float, pressure: float) -> float:
-    """Return the density [kg/m^3] of gas at a temperature [K] and an absolute pressure [Pa], by halving."""
-    low, high = 0.0, densest_gas(fluid.table, temperature)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if fluid_pressure(fluid.table, temperature, middle) < pressure:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+    return values["bottle.volume"] * gas_density(fluid.table, temperature, pressure)
 
 
 def _check_temperature(path: str, temperature: float, fluid: Fluid, file: str) -> None:
