@@ -55,8 +55,8 @@ class Endurance(Solved):
     without_reuse: Discharge | None
     steps_when_warm: float
     is_of_course: bool = False
-    is_whole: bool = True
     others: Mapping[str, "Endurance"] = field(default_factory=dict)
+    is_whole: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,9 @@ _HEAD = (
     Column("push, heel loaded (N m)"),
     Column("pause or stop at (s)"),
 )
-_WHOLE = "whole course"
+_WHOLE, _PART = "whole course", "as far as walked"
+_SAME_TIME = 0.05
+"""Time [s] by which a recording may end before its course: its samples."""
 _COURSE = (
     "The course over time. Grey: every other segment. 'Without' is the same course with the same device and both "
     "chambers vented."
@@ -86,8 +88,9 @@ def _whole(comparison: Comparison) -> tuple[str | None, ...]:
     worn, bare = comparison.with_device, comparison.without_device
     numbers = {name: item.value for name, item in worn.metrics.items()}
     toes = bare.metrics.get("course_lowest_toes")
+    is_whole = numbers["course_time"] >= numbers["course_planned_time"] - _SAME_TIME
     return (
-        _WHOLE,
+        _WHOLE if is_whole else _PART,
         "0.0",
         f"{numbers['course_time']:.1f}",
         f"{numbers['course_strides']:.0f}",
