@@ -125,6 +125,15 @@ def _safe_time(recording: Recording, own: NDArray[np.bool_]) -> float | None:
     return float(recording.time[begins[0]]) if begins.size else None
 
 
+_SAME_TIME = 0.05
+"""Time [s] by which a recording may end before its course: its samples."""
+
+
+def is_whole_course(walked: float, planned: float) -> bool:
+    """True where a course of a planned time [s] was walked to its end, after a time [s] by its recording."""
+    return walked >= planned - _SAME_TIME
+
+
 def course_metrics(
     planned: PlannedCourse, segments: Sequence[SegmentResult], recording: Recording, steady: int
 ) -> dict[str, Metric]:

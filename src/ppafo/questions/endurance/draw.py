@@ -18,6 +18,7 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.owned_folder import read_json
 from ppafo.storage.recordings import read_recording
 from ppafo.walking import WalkResult
+from ppafo.walking.course_segments import is_whole_course
 from ppafo.walking.strides import SETTLING
 
 PEAK_WINDOW = 0.1
@@ -34,9 +35,6 @@ _COURSE_KEYS = ("course_gas", "gas_of_course", "course_time")
 """Metric of the gas of a step, and what the readings of the chambers call that gas and the time of a step."""
 
 _CHANNELS = ("angle", "pressure_1", "pressure_2", "supplied_mass")
-_SAME_TIME = 0.05
-"""Time [s] by which a recording may end before its course: its samples."""
-
 _LEAST = 1.0e-12
 """Gas [kg] by which a walk that takes none may come out below 0: rounding of its totals."""
 
@@ -158,7 +156,7 @@ class WalkGas:
     @property
     def is_whole(self) -> bool:
         """True unless the walk ended before its course did."""
-        return not self.course or self.stride_time >= self.course_time - _SAME_TIME
+        return not self.course or is_whole_course(self.stride_time, self.course_time)
 
 
 @dataclass(frozen=True, slots=True)

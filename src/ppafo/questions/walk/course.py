@@ -10,7 +10,7 @@ from ppafo.errors import DataError
 from ppafo.gait.scaling import speed_range
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.course_segments import SegmentResult
+from ppafo.walking.course_segments import SegmentResult, is_whole_course
 from ppafo.walking.figures.course import course_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 
@@ -28,8 +28,6 @@ _HEAD = (
     Column("pause or stop at (s)"),
 )
 _WHOLE, _PART = "whole course", "as far as walked"
-_SAME_TIME = 0.05
-"""Time [s] by which a recording may end before its course: its samples."""
 _COURSE = (
     "The course over time. Grey: every other segment. 'Without' is the same course with the same device and both "
     "chambers vented."
@@ -88,7 +86,7 @@ def _whole(comparison: Comparison) -> tuple[str | None, ...]:
     worn, bare = comparison.with_device, comparison.without_device
     numbers = {name: item.value for name, item in worn.metrics.items()}
     toes = bare.metrics.get("course_lowest_toes")
-    is_whole = numbers["course_time"] >= numbers["course_planned_time"] - _SAME_TIME
+    is_whole = is_whole_course(numbers["course_time"], numbers["course_planned_time"])
     return (
         _WHOLE if is_whole else _PART,
         "0.0",
