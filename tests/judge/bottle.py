@@ -108,8 +108,11 @@ def rates(y: Column, angle: float, open_1: bool, open_2: bool, n: "Numbers", gas
     into_1 = port(n.valve, inside_1, line_1 if open_1 else n.room_pressure, warmth, n.constant, n.k)
     into_2 = port(n.valve, inside_2, line_2 if open_2 else n.room_pressure, warmth, n.constant, n.k)
     leak = port(n.leak, inside_1, inside_2, warmth, n.constant, n.k)
-    growth = through * (frost - arriving) / SUBLIMATION if y[ICE] > 0.0 or arriving < frost else 0.0
-    leaving = arriving + growth * SUBLIMATION / through if through > 0.0 else arriving
+    # What comes from the bottle has the enthalpy growth * (frost - SUBLIMATION) + through * frost: ice, and gas.
+    freezes = y[ICE] > 0.0 or arriving < frost
+    growth = through * (frost - arriving) / (SUBLIMATION + arriving - frost) if freezes else 0.0
+    drawn = through + growth
+    leaving = frost if freezes else arriving
     behind = leaving + n.hose_share * (at_hose - leaving)
     to_content = n.content_heat * (y[WALL] - boiling)
     per_kelvin = (
@@ -119,10 +122,10 @@ def rates(y: Column, angle: float, open_1: bool, open_2: bool, n: "Numbers", gas
         content(gas, boiling, y[BOTTLE_MASS] * 1.0001, n.volume) - content(gas, boiling, y[BOTTLE_MASS], n.volume)
     ) / (0.0001 * y[BOTTLE_MASS])
     slope = [
-        (to_content - through * enthalpy + through * per_mass) / per_kelvin,
-        -through,
+        (to_content - drawn * enthalpy + drawn * per_mass) / per_kelvin,
+        -drawn,
         (n.wall_heat * (n.room - y[WALL]) - to_content) / n.wall_capacity,
-        (n.body_heat * (n.room - y[BODY]) - through * (arriving - enthalpy)) / n.body_capacity,
+        (n.body_heat * (n.room - y[BODY]) - drawn * (arriving - enthalpy)) / n.body_capacity,
         (n.hose_heat * (n.room - y[HOSE]) - through * (behind - leaving)) / n.hose_capacity,
         growth,
         through - second - (into_1 if open_1 else 0.0),

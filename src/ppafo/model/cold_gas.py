@@ -8,6 +8,7 @@ flow does (with its power 0.8, Dittus and Boelter). Dry ice stays in the seat an
 enthalpy takes it along.
 """
 
+import math
 from bisect import bisect_right
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from ppafo.model.fluid_table import (
     FluidTable,
     densest_gas,
     fluid_pressure,
+    gas_density,
     gas_specific_energy,
     has_liquid,
 )
@@ -36,7 +38,12 @@ from ppafo.model.source import (
 DRY_ICE = 5.55e5
 """Heat that turns dry ice into vapour at the triple point [J/kg]: 350 of evaporation (tables), 205 of melting (CRC)."""
 
-_HALVINGS = 60
+LARGEST_CHANGE = 0.2
+"""Share of a difference of temperature that a step of Heun's rule may even out; above 2 it would swing up."""
+
+_LEAST_HEAT_CAPACITY = 2.5
+"""Heat capacity of air, nitrogen or CO2 at constant volume over the gas constant [-], at least."""
+
 _FIRST_SECANT, _SAME_TEMPERATURE, _MAXIMUM_SECANTS = 1.0e-3, 1.0e-9, 12
 
 
@@ -116,15 +123,9 @@ def isobar(table: FluidTable, pressure: float) -> Isobar:
 
 
 def gas_enthalpy(table: FluidTable, temperature: float, pressure: float) -> float:
-    """Specific enthalpy [J/kg] of gas at a temperature [K] and a pressure [Pa], by halving for its density."""
-    low, high = 0.0, densest_gas(table, temperature)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if fluid_pressure(table, temperature, middle) < pressure:
-            low = middle
-        else:
-            high = middle
-    return gas_specific_energy(table, temperature, high) + pressure / high
+    """Specific enthalpy [J/kg] of gas at a temperature [K] and a pressure [Pa]."""
+    density = gas_density(table, temperature, pressure)
+    return gas_specific_energy(table, temperature, density) + pressure / density
 
 
 def enthalpy_at(line: Isobar, temperature: float) -> float:
@@ -159,25 +160,28 @@ def open_share(supply: ColdSupply, ice: float) -> float:
 
 
 def ice_rate(line: Isobar, enthalpy: float, flow: float, ice: float, step: float) -> float:
-    """Growth of the dry ice in the seat [kg/s] under a flow [kg/s] of an enthalpy [J/kg]; no more goes than is there.
+    """Growth of the dry ice in the seat [kg/s] while gas comes with an enthalpy [J/kg]; no more goes than is there.
 
-    What the gas lacks at the temperature where ice forms is taken from it as ice, and what it has beyond takes ice off.
+    What the gas lacks at the temperature where ice forms is taken from it as ice, and what it has beyond takes ice off:
+    ``flow`` [kg/s] goes on behind the seat, and flow plus growth comes from the bottle.
     """
     if line.freezes < 0.5:
         return 0.0
-    return max(flow * (line.enthalpies[0] - enthalpy) / DRY_ICE, -ice / step)
+    lacking = (line.enthalpies[0] - enthalpy) / DRY_ICE
+    return max(flow * lacking / (1.0 - lacking), -ice / step)
 
 
 def enthalpy_behind_seat(line: Isobar, enthalpy: float, ice: float, mass: float) -> float:
-    """Specific enthalpy [J/kg] behind a seat with dry ice [kg] of a mass of gas [kg] that comes with ``enthalpy``.
+    """Specific enthalpy [J/kg] of a mass of gas [kg] behind a seat with dry ice [kg]; it comes with ``enthalpy``.
 
-    It is as cold as the ice while there is some, warmer as far as the gas has more than all of the ice takes.
+    It is as cold as the ice while there is some, warmer as far as the gas has more than all of the ice takes. The ice
+    that goes is part of the mass.
     """
     if line.freezes < 0.5:
         return enthalpy
     if mass <= 0.0:
         return line.enthalpies[0] if ice > 0.0 else max(enthalpy, line.enthalpies[0])
-    return max(enthalpy - ice * DRY_ICE / mass, line.enthalpies[0])
+    return max(enthalpy - (ice / mass) * (DRY_ICE + enthalpy - line.enthalpies[0]), line.enthalpies[0])
 
 
 def supply_now(
@@ -218,9 +222,11 @@ def advance_supply(
     mass: float,
     step: float,
 ) -> SupplyState:
-    """The state after a step [s] in which a mass [kg] left the bottle evenly, by Heun's rule, from its ``content``.
+    """The state after a step [s] in which a mass [kg] went on behind the seat evenly, by Heun's rule.
 
-    SimulationError where the bottle has no more than that: nobody can have drawn it.
+    ``content`` is that of the bottle before it. The step is cut where little gas, or a part of little heat capacity,
+    follows faster than that rule does. SimulationError where the bottle has no more than that: nobody can have drawn
+    it.
     """
     if mass >= state.mass:
         raise SimulationError(
@@ -228,25 +234,67 @@ def advance_supply(
             f"{state.mass * GRAMS_PER_KILOGRAM:.3g} g: set bottle.coupling shorter, or bottle.least_torque higher, "
             f"so that the walk ends before the bottle is bare"
         )
-    flow = mass / step
+    parts = parts_of(table, line, supply, state.mass - mass, mass / step, step)
+    after = state
+    for part in range(parts):
+        near = content if part == 0 else _content(table, supply, after, content.temperature)
+        after = _heun(table, line, supply, after, near, mass / step, step / parts)
+        content = near
+    # The mass itself, so that what left the bottle came through the regulator or is ice, to the last digit.
+    return after._replace(mass=state.mass - mass - (after.ice - state.ice))
+
+
+def parts_of(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float, step: float) -> int:
+    """Into how many parts a step [s] goes with at least a mass [kg] in the bottle, so that no temperature swings up."""
+    return max(1, math.ceil(step * max(following_rates(table, line, supply, mass, flow).values()) / LARGEST_CHANGE))
+
+
+def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float) -> dict[str, float]:
+    """The rates [1/s], by name, at which content, wall, regulator and hose follow what is around them, at most.
+
+    ``mass`` [kg] is the gas in the bottle, ``flow`` [kg/s] that through the regulator.
+    """
+    wall, temperatures = supply.wall, line.temperatures
+    capacity = (line.enthalpies[-1] - line.enthalpies[0]) / (temperatures[-1] - temperatures[0])
+    parts = {"regulator": supply.body, "hose": supply.hose}
+    passages = {
+        name: (part.room_heat_transfer + flow * part.effectiveness * capacity) / part.heat_capacity
+        for name, part in parts.items()
+    }
+    return {
+        "content": wall.content_heat_transfer / (_LEAST_HEAT_CAPACITY * table.gas_constant * mass),
+        "wall": (wall.content_heat_transfer + wall.room_heat_transfer) / wall.wall_heat_capacity,
+        **passages,
+    }
+
+
+def _heun(
+    table: FluidTable,
+    line: Isobar,
+    supply: ColdSupply,
+    state: SupplyState,
+    content: BottleContent,
+    flow: float,
+    step: float,
+) -> SupplyState:
+    """The state a step [s] later under a flow [kg/s], from its ``content``."""
     first = supply_rates(line, supply, state, content, flow, step)
     guess = SupplyState._make(value + step * rate for value, rate in zip(state, first, strict=True))
     then = _content(table, supply, guess, content.temperature)
     second = supply_rates(line, supply, guess, then, flow, step)
     rates = zip(state, first, second, strict=True)
-    after = SupplyState._make(value + 0.5 * step * (one + other) for value, one, other in rates)
-    # The mass itself, so that what left the bottle is what came through the regulator, to the last digit.
-    return after._replace(mass=state.mass - mass)
+    return SupplyState._make(value + 0.5 * step * (one + other) for value, one, other in rates)
 
 
 def supply_rates(
     line: Isobar, supply: ColdSupply, state: SupplyState, content: BottleContent, flow: float, step: float
 ) -> SupplyState:
-    """Time derivatives of a state under a flow [kg/s], as a state; ``step`` [s] is how long they are to hold."""
-    bottle = BottleState(state.mass, state.energy, state.wall_temperature)
-    now = bottle_rates(content, bottle, flow, supply.wall, supply.room_temperature)
+    """Time derivatives of a state under a flow [kg/s] behind the seat, as a state, to hold for a ``step`` [s]."""
     arriving = enthalpy_behind(line, supply.body, state.body_temperature, content.outflow_enthalpy)
     growth = ice_rate(line, arriving, flow, state.ice, step)
+    leaving = flow + growth
+    bottle = BottleState(state.mass, state.energy, state.wall_temperature)
+    now = bottle_rates(content, bottle, leaving, supply.wall, supply.room_temperature)
     outlet = enthalpy_behind_seat(line, arriving, state.ice, flow * step)
     behind = enthalpy_behind(line, supply.hose, state.hose_temperature, outlet)
     to_body = supply.body.room_heat_transfer * (supply.room_temperature - state.body_temperature)
@@ -255,7 +303,7 @@ def supply_rates(
         mass=now.mass_rate,
         energy=now.content_energy_rate,
         wall_temperature=now.wall_temperature_rate,
-        body_temperature=(to_body - flow * (arriving - content.outflow_enthalpy)) / supply.body.heat_capacity,
+        body_temperature=(to_body - leaving * (arriving - content.outflow_enthalpy)) / supply.body.heat_capacity,
         hose_temperature=(to_hose - flow * (behind - outlet)) / supply.hose.heat_capacity,
         ice=growth,
         outflow=now.outflow_power,

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 Column = tuple[float, ...]
 
+_HALVINGS = 80
+
 
 class FluidTable(NamedTuple):
     """Nodes of a fluid: ``temperatures`` [K], ``fractions`` of the densest gas [-] from 0 to 1, and values at them.
@@ -53,6 +55,18 @@ def fluid_pressure(table: FluidTable, temperature: float, density: float) -> flo
     held = min(density, densest_gas(table, temperature))
     factor = _across(table.factors, table, temperature, density)
     return factor * held * table.gas_constant * temperature
+
+
+def gas_density(table: FluidTable, temperature: float, pressure: float) -> float:
+    """Density [kg/m^3] of gas at a temperature [K] and an absolute pressure [Pa], by halving; at most the densest."""
+    low, high = 0.0, densest_gas(table, temperature)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if fluid_pressure(table, temperature, middle) < pressure:
+            low = middle
+        else:
+            high = middle
+    return high
 
 
 def gas_specific_energy(table: FluidTable, temperature: float, density: float) -> float:

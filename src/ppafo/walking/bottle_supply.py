@@ -7,7 +7,7 @@ from typing import Any
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError
-from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, isobar, supply_now
+from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, following_rates, isobar, supply_now
 from ppafo.model.declaration import Quantity
 from ppafo.model.fluid_table import densest_gas, has_liquid, liquid_density
 from ppafo.model.regulator import SupplyLines
@@ -25,15 +25,26 @@ FILL = Quantity("fill", "1", "gas in the bottle over that of a full one", 1.0, 0
 TEMPERATURE = Quantity("temperature", "K", "temperature of bottle, regulator and hose at the start", None, 200.0, 400.0)
 LEAST_TORQUE = Quantity("least_torque", "1", "torque that ends the walk, over that at the set pressure", 0.9, 0.0, 1.0)
 COUPLING = Quantity("coupling", "s", "how often bottle and device tell each other", 0.1, 1.0e-3, 1.0)
+_SET_PRESSURE = "regulator.set_pressure"
 OVERRIDES = {path if path.startswith(f"{SECTION}.") else f"{SECTION}.{path}": path for path in PATHS}
 """What an override may set of the bottle's own file, ``bottle.volume`` and ``bottle.regulator.area``, by its path."""
 
 NUMBERS = (FILL, TEMPERATURE, LEAST_TORQUE, COUPLING)
 
+_FOLLOWS = {
+    "content": f"set {SECTION}.gas_mass higher, or {SECTION}.content_heat_transfer lower",
+    "wall": f"set {SECTION}.wall_heat_capacity higher",
+    "regulator": f"set {SECTION}.regulator.heat_capacity higher",
+    "hose": f"set {SECTION}.hose.heat_capacity higher",
+}
+"""What makes a part of the supply follow more slowly."""
+
 _OWN = tuple(f"{LINES}.plantarflexion.{name}" for name in ("droop", "largest_flow"))
 """What the bottle's own regulator says instead."""
 
 _SAME_GAS = 1.0e-2
+_FASTEST = 1.0e3
+"""Rate [1/s] up to which a walk follows what warms and cools: within a millisecond, the step of the lanes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +126,14 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
         return None
     if not isinstance(section.get("name"), str):
         raise ScenarioError(f"{reading.file}: '{NAME}' is missing: the name of a bottle, or the path of its file")
+    own = section.get("overrides", ())
+    if any(text.partition("=")[0].strip() == _SET_PRESSURE for text in own):
+        raise ScenarioError(
+            f"{reading.file}: {SECTION}.{_SET_PRESSURE}: in a walk the bottle's regulator is set to supply.pressure; "
+            f"set that"
+        )
     try:
-        bottle = load_bottle(_place(section["name"], folder), section.get("overrides", ()))
+        bottle = load_bottle(_place(section["name"], folder), own)
     except ParameterError as error:
         raise ParameterError(f"{reading.file}: [{SECTION}]: {error}") from error
     bottle = replace(bottle, regulator=bottle.regulator._replace(set_pressure=device.supply.pressure))
@@ -166,6 +183,7 @@ def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
     for path in _OWN:
         if value_at(reading.document, path) is not None:
             raise reading.refusal(path, f"the bottle's regulator has its own: set {SECTION}.regulator.droop or .area")
+    _check_rates(reading, supply)
     pressure = supply.offers_first().content.pressure
     if pressure < regulator.set_pressure + regulator.pressure_margin:
         has = quantity_text(pressure, "Pa_a", device.supply.atmospheric_pressure)
@@ -173,3 +191,16 @@ def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
             regulator.set_pressure + regulator.pressure_margin, "Pa_a", device.supply.atmospheric_pressure
         )
         raise reading.refusal(NAME, f"has {has} at the start, and its regulator needs {needs}")
+
+
+def _check_rates(reading: Reading, supply: BottleSupply) -> None:
+    """Refuse a bottle of so little gas, or parts of so little heat capacity, that they follow within no time."""
+    flow = supply.offers_first().largest_flow
+    rates = following_rates(supply.bottle.fluid.table, supply.line, supply.bottle.supply, supply.mass, flow)
+    fastest = max(rates, key=rates.__getitem__)
+    if rates[fastest] > _FASTEST:
+        raise reading.refusal(
+            NAME,
+            f"the temperature of its {fastest} follows within {1.0e3 / rates[fastest]:.3g} ms, and a walk follows what "
+            f"takes {1.0e3 / _FASTEST:g} ms or more: {_FOLLOWS[fastest]}",
+        )

@@ -125,11 +125,23 @@ def _safe_time(recording: Recording, own: NDArray[np.bool_]) -> float | None:
     return float(recording.time[begins[0]]) if begins.size else None
 
 
-def course_metrics(segments: Sequence[SegmentResult], recording: Recording, steady: int) -> dict[str, Metric]:
-    """Numbers of a whole course by name, SI units."""
+_SAME_TIME = 0.05
+"""Time [s] by which a recording may end before its course: its samples."""
+
+
+def is_whole_course(walked: float, planned: float) -> bool:
+    """True where a course of a planned time [s] was walked to its end, after a time [s] by its recording."""
+    return walked >= planned - _SAME_TIME
+
+
+def course_metrics(
+    planned: PlannedCourse, segments: Sequence[SegmentResult], recording: Recording, steady: int
+) -> dict[str, Metric]:
+    """Numbers of a whole course by name, SI units, or of what was walked of it."""
     toes = [segment.lowest_toes for segment in segments if segment.lowest_toes is not None]
     found = {
-        "course_time": Metric(float(recording.time[-1]), "s", "length of the course"),
+        "course_time": Metric(float(recording.time[-1]), "s", "length of the course, as far as it was walked"),
+        "course_planned_time": Metric(float(planned.duration), "s", "length of the whole course"),
         "steady_strides": Metric(float(steady), "-", "whole strides at an even speed on level ground"),
         "course_strides": Metric(float(sum(item.strides for item in segments)), "-", "strides of the course"),
         "course_gas": Metric(float(recording["supplied_mass"][-1]), "kg", "gas taken from the supply on the course"),

@@ -2,7 +2,7 @@
 
 import copy
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -87,6 +87,7 @@ def load_walk(
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
+    _check_given_once(given, {"gait": gait, "course": course, bottle_supply.NAME: bottle}, file)
     document = _apply_overrides(FILE.parse(FILE.read(name_or_path), file), given, file)
     if bottle is not None:
         document.setdefault(bottle_supply.SECTION, {})["name"] = str(bottle)
@@ -128,6 +129,18 @@ def load_walk(
     check_walk(configuration, reading)
     course_of_walk(configuration)
     return configuration
+
+
+def _check_given_once(overrides: tuple[str, ...], others: Mapping[str, object], file: str) -> None:
+    """Refuse an override beside another word for the same value; ``others`` by path, None where nothing was said."""
+    for override in overrides:
+        path, text = split_override(override)
+        other = others.get(path)
+        if other is not None:
+            raise ScenarioError(
+                f"{file}: override '{path}={text}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
+                "already; give it once"
+            )
 
 
 def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file: str) -> dict[str, Any]:

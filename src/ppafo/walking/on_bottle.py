@@ -2,7 +2,8 @@
 
 Chambers and lines move within milliseconds, bottle, regulator and hose within seconds. So the lanes run for a tenth of
 a second with what the supply offers at its beginning, and the supply follows with the gas that the regulator let
-through in it. Nothing is compiled for it: what a supply offers are parameters of any program with lines.
+through in it; they meet more often where little is left. Nothing is compiled for it: what a supply offers are
+parameters of any program with lines.
 """
 
 import math
@@ -39,6 +40,10 @@ _PARAMETERS = (
 _STRIDES = 2.0
 """Strides in which the line must once come near the set pressure."""
 
+_LARGEST_DRAW = 0.05
+"""Share of the gas in the bottle that may leave between two meetings: what it offers stays until the next one."""
+
+_LEAST_FLOW = 1.0e-12
 _ABOVE_FREEZING = 0.02
 _OPEN = 0.999
 UNITS = {
@@ -65,14 +70,16 @@ class SupplyEnding(NamedTuple):
 
 
 class SupplyBalance(NamedTuple):
-    """What must close: gas out of the bottle and through its regulator [kg], and energy of all parts [J].
+    """What must close: gas out of the bottle, through its regulator and as ice in it [kg], and energy of all parts [J].
 
-    ``given_up`` is what content, wall, regulator and hose lost, ``ice`` what the dry ice in the seat lacks, ``room``
-    the heat of the room, ``delivered`` the enthalpy of the gas behind the hose: given_up + ice + room = delivered.
+    left_bottle = regulated + iced. ``given_up`` is what content, wall, regulator and hose lost, ``ice`` the enthalpy
+    that the dry ice in the seat lacks, ``room`` the heat of the room, ``delivered`` the enthalpy of the gas behind the
+    hose: given_up + ice + room = delivered.
     """
 
     left_bottle: float
     regulated: float
+    iced: float
     given_up: float
     ice: float
     room: float
@@ -114,8 +121,9 @@ class SupplyCourse:
         return SupplyBalance(
             left_bottle=first.mass - last.mass,
             regulated=self.regulated,
+            iced=last.ice,
             given_up=sum(parts),
-            ice=DRY_ICE * last.ice,
+            ice=(DRY_ICE - self.supply.line.enthalpies[0]) * last.ice,
             room=last.room_heat,
             delivered=last.delivered,
         )
@@ -137,10 +145,11 @@ def run_on_bottle(
     state, table = supply.start(), supply.bottle.fluid.table
     met = [(0.0, state, supply.offers_first())]
     lanes = _lanes_of(run, met[0][2])
-    gauges = [1.0] * max(2, math.ceil(_STRIDES * stride_time / (every * run.step)))
+    window = max(2, math.ceil(_STRIDES * stride_time / (every * run.step))) * every
+    gauges = [(0, 1.0)]
     ending, done, before = None, 0, float(batch.states[regulated, 0])
     while ending is None and done < count:
-        steps = min(every, count - done)
+        steps = min(_steps_to_meet(met[-1], run.step, every), count - done)
         block.set_parameters(lanes.rows, lanes.offered(met[-1][2]))
         block.advance(steps)
         done += steps
@@ -153,13 +162,22 @@ def run_on_bottle(
         state = advance_supply(table, supply.line, supply.bottle.supply, state, content, mass, steps * run.step)
         now = supply.offers(state, content.temperature, mass)
         met.append((done * run.step, state, now))
-        gauges = [*gauges[1:], lanes.gauge(float(block.states[line, 0]), now)]
-        ending = _ending(supply, state, now, max(gauges), done * run.step)
+        gauges = [
+            *(old for old in gauges if old[0] > done - window),
+            (done, lanes.gauge(float(block.states[line, 0]), now)),
+        ]
+        ending = _ending(supply, state, now, max(gauge for _, gauge in gauges), done * run.step)
     result = block.result()
     record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
     last = ending or SupplyEnding(WALKED, _at_the_end(state), done * run.step)
     let_through = before - float(batch.states[regulated, 0])
     return BatchResult(result.states, record), _course(supply, met, let_through, last)
+
+
+def _steps_to_meet(last: tuple[float, SupplyState, SupplyNow], step: float, every: int) -> int:
+    """Return how many steps [of ``step`` s] the lanes go until they meet the supply again, at most ``every``."""
+    _, state, now = last
+    return max(1, min(every, int(_LARGEST_DRAW * state.mass / (max(now.largest_flow, _LEAST_FLOW) * step))))
 
 
 def _divergence(states: Floats, failure: int, state: SupplyState, time: float) -> SupplyEnding | None:

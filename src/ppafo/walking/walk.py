@@ -228,7 +228,7 @@ def _walk_result(
     segments: tuple[SegmentResult, ...] = ()
     if planned is not None:
         segments = segment_results(configuration, planned, recording, strides["push_off_work"], starts)
-        metrics |= course_metrics(segments, recording, int((helped & steady).sum()))
+        metrics |= course_metrics(planned, segments, recording, int((helped & steady).sum()))
     return WalkResult(
         configuration, recording, strides, averages, metrics, status, starts, helped, apart, events, segments
     )

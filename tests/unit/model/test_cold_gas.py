@@ -78,7 +78,10 @@ def test_temperature_and_enthalpy_are_inverse(line: Isobar) -> None:
 def test_ice_forms_only_behind_an_outlet_below_the_triple_point_of_518_kpa(line: Isobar) -> None:
     wet = bottle_content(TABLE, 0.255, 375e-6, 298.0).outflow_enthalpy
     above = isobar(TABLE, 600e3)
-    assert ice_rate(line, wet, 1e-3, 0.0, 0.1) == pytest.approx(1e-3 * (line.enthalpies[0] - wet) / DRY_ICE)
+    growth = ice_rate(line, wet, 1e-3, 0.0, 0.1)
+    split = 1e-3 * line.enthalpies[0] + growth * (line.enthalpies[0] - DRY_ICE)
+    assert growth > 0.0
+    assert (1e-3 + growth) * wet == pytest.approx(split, rel=1e-12), "what comes is gas that goes on, and ice"
     assert ice_rate(above, wet, 1e-3, 0.0, 0.1) == 0.0
     assert above.temperatures[0] == pytest.approx(coolprop("T", "P", 600e3, "Q", 1), abs=1.0)
     assert isobar(load_fluid("air").table, PRESSURE).freezes == 0.0
@@ -116,7 +119,33 @@ def test_ice_takes_from_the_gas_what_it_loses() -> None:
         supply_rates(supply.line, model, state._replace(ice=ice), content, 1.0e-3, 0.5) for ice in (25e-6, 0.0)
     )
     assert icy.ice < 0.0 == bare.ice
-    assert icy.delivered == pytest.approx(bare.delivered + DRY_ICE * icy.ice, rel=1e-12)
+    arriving = bare.delivered / 1.0e-3
+    taken = (supply.line.enthalpies[0] - DRY_ICE) * -icy.ice
+    assert icy.delivered == pytest.approx((1.0e-3 + icy.ice) * arriving + taken, rel=1e-12)
+    assert -icy.mass == pytest.approx(1.0e-3 + icy.ice, rel=1e-12), "the ice that goes is part of the flow"
+
+
+QUICK = {
+    "hose": ["bottle.hose.heat_capacity=0.03 J/K"],
+    "wall": ["bottle.wall_heat_capacity=0.01 J/K"],
+    "content": ["bottle.gas_mass=1 g", "bottle.volume=1.5 cm^3"],
+}
+
+
+@pytest.mark.parametrize("part", QUICK)
+def test_a_part_that_follows_fast_ends_between_its_neighbours(part: str) -> None:
+    """Heat that flows from warm to cold makes nothing warmer than the warmest; a step that is too long would."""
+    supply = load_walk("solenoid-regulators", QUICK[part], bottle="paper-co2-9oz").bottle
+    assert supply is not None
+    table, model = supply.bottle.fluid.table, supply.bottle.supply
+    state, near = supply.start(), supply.temperature
+    for _ in range(15):
+        state = advance_supply(table, supply.line, model, state, supply.offers(state, near, 0.0).content, 6.0e-5, 0.1)
+        now = supply.offers(state, near, 6.0e-5)
+        near = now.content.temperature
+        assert 216.0 < near < 298.0 + 1e-9
+        assert near - 1e-9 < state.wall_temperature < 298.0 + 1e-9
+        assert now.outlet_temperature - 1e-9 < state.hose_temperature < 298.0 + 1e-9
 
 
 @pytest.mark.parametrize("share", [1.0, 1.3])

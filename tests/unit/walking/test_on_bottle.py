@@ -1,6 +1,7 @@
 """A walk on its bottle: what closes, an independent simulator, the coupling, what ends it, and what is refused."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,8 +9,11 @@ import pytest
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
+from ppafo.questions.league.walking.task import walking_task
+from ppafo.questions.timing.solve import event_timing
 from ppafo.walking import load_walk, on_bottle, walk, walk_population
 from ppafo.walking.comparison import compare_walks, with_device_off
+from ppafo.walking.loading import FILE
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import WalkResult, plan_of
 from tests.judge import bottle as independent
@@ -29,6 +33,17 @@ def test_mass_and_energy_close(small: WalkResult) -> None:
     assert balance.left_bottle == pytest.approx(balance.regulated, rel=1e-12)
     assert balance.regulated > 4.0e-3
     assert balance.given_up + balance.ice + balance.room == pytest.approx(balance.delivered, rel=1e-12)
+
+
+def test_a_bottle_of_a_gram_ends_empty_and_its_gas_stays_what_a_gas_can_be() -> None:
+    found = walk(WALK, 0.1, ["bottle.gas_mass=1 g", "bottle.volume=1.5 cm^3"], bottle=BOTTLE)
+    assert found.supply is not None
+    values = found.supply.values
+    assert found.supply.ending.kind == "empty"
+    assert np.all(np.diff(values["bottle_mass"]) <= 0.0)
+    assert values["bottle_temperature"].max() <= 298.0 + 1e-9, "nothing is warmer than the room"
+    assert values["bottle_pressure"].max() == values["bottle_pressure"][0]
+    assert np.diff(values["bottle_mass"]).min() > -0.06e-3, "no more than a share leaves between two meetings"
 
 
 def test_what_leaves_the_bottle_is_in_the_lines_or_went_into_the_device(small: WalkResult) -> None:
@@ -144,6 +159,10 @@ def test_ice_narrows_the_seat_until_the_gas_lacks_no_more_than_it_is_given() -> 
     opened = found.supply.values["seat_open"]
     assert opened[0] == 1.0
     assert opened.min() < 0.05
+    balance = found.supply.balance
+    assert balance.iced > 4.0e-5
+    assert balance.left_bottle == pytest.approx(balance.regulated + balance.iced, rel=1e-12)
+    assert balance.given_up + balance.ice + balance.room == pytest.approx(balance.delivered, rel=1e-12)
     assert np.diff(found.recording["regulated_mass"])[-500:].sum() < 0.1 * found.recording["regulated_mass"][-1]
 
 
@@ -158,6 +177,9 @@ MISTAKES = {
     "supply.relieving=true": "no gas goes back into a bottle",
     "supply_line.plantarflexion.droop=3 Pa s/kg": "the bottle's regulator has its own",
     "bottle.regulator.pressure_margin=8 MPa_d": "its regulator needs",
+    "bottle.regulator.set_pressure=30 psi_g": "the bottle's regulator is set to supply.pressure; set that",
+    "bottle.hose.heat_capacity=0.001 J/K": r"its hose follows within 0\.0\d+ ms, and a walk follows what takes 1 ms",
+    "bottle.wall_heat_capacity=0.001 J/K": r"its wall .*set bottle\.wall_heat_capacity higher",
 }
 
 
@@ -166,6 +188,28 @@ def test_a_mistake_is_named_in_one_line(override: str) -> None:
     with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[override]) as caught:
         load_walk(WALK, ["bottle.name=paper-co2-9oz", override])
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"), [("gait", "falisse2019-subject1"), ("course", "stairs"), ("bottle", BOTTLE)]
+)
+def test_what_is_named_twice_is_refused(path: str, value: str) -> None:
+    own = "bottle.name=other" if path == "bottle" else f"{path}=other"
+    with pytest.raises(
+        ScenarioError, match=f"override '{own}': the {path} is given as '{value}' already; give it once"
+    ):
+        load_walk(WALK, [own], **{path: value})
+
+
+def test_who_times_events_or_compares_controllers_has_no_bottle(tmp_path: Path) -> None:
+    """Both would have walked at the pressure of the first moment, and said nothing."""
+    file = tmp_path / "carried.toml"
+    shipped = Path(str(FILE.shipped)) / f"{WALK}.toml"
+    file.write_text(shipped.read_text(encoding="utf-8") + f'\n[bottle]\nname = "{BOTTLE}"\n', encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"carried\.toml: bottle: events are timed at one supply pressure"):
+        event_timing(file)
+    with pytest.raises(ScenarioError, match=r"carried\.toml: bottle: a league compares strides at one supply pressure"):
+        walking_task(file)
 
 
 def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:

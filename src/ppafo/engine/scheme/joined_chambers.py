@@ -1,7 +1,7 @@
 """Chambers that a valve joins with each other: the leak between them is as wide as that valve stands open."""
 
 from ppafo.model.orifice import FlowCurve
-from ppafo.model.plant import PlantParameters
+from ppafo.model.plant import PlantParameters, plant_with
 
 
 def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantParameters:
@@ -12,31 +12,8 @@ def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantP
     joining = opening * plant.valve_conductance
     conductance = plant.leak_conductance + joining
     share = joining / max(conductance, 1.0e-30)
-    valve, leak = plant.valve_curve, plant.leak_curve
-    return PlantParameters(
-        gas_product=plant.gas_product,
-        torque_constant=plant.torque_constant,
-        volume_per_angle=plant.volume_per_angle,
-        angle_min=plant.angle_min,
-        angle_max=plant.angle_max,
-        dead_volume_1=plant.dead_volume_1,
-        dead_volume_2=plant.dead_volume_2,
-        restitution=plant.restitution,
-        static_torque=plant.static_torque,
-        dynamic_torque=plant.dynamic_torque,
-        viscous_damping=plant.viscous_damping,
-        inertia=plant.inertia,
-        gravity_torque=plant.gravity_torque,
-        external_torque=plant.external_torque,
-        supply_pressure=plant.supply_pressure,
-        dorsiflexion_pressure=plant.dorsiflexion_pressure,
-        atmospheric_pressure=plant.atmospheric_pressure,
-        valve_conductance=plant.valve_conductance,
-        leak_conductance=conductance,
-        valve_curve=valve,
-        leak_curve=mean_curve(leak, valve, share),
-        relieving=plant.relieving,
-    )
+    curve = mean_curve(plant.leak_curve, plant.valve_curve, share)
+    return plant_with(plant, plant.supply_pressure, plant.dorsiflexion_pressure, conductance, curve)
 
 
 def mean_curve(first: FlowCurve, second: FlowCurve, share: float) -> FlowCurve:

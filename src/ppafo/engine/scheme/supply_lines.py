@@ -29,6 +29,7 @@ from ppafo.model.plant import (
     ThermalState,
     chamber_pressures,
     chamber_volumes,
+    plant_with,
 )
 from ppafo.model.ports import PortFlowSlopes
 from ppafo.model.regulator import LineState, LineStep, SupplyLines, line_pressures, step_lines
@@ -46,30 +47,7 @@ class FedGas(NamedTuple):
 def plant_at_line_pressures(plant: PlantParameters, lines: SupplyLines, state: LineState) -> PlantParameters:
     """The plant with the pressures of its lines in place of those that the regulators are set to."""
     pressure_1, pressure_2 = line_pressures(lines, plant.gas_product, state)
-    return PlantParameters(
-        gas_product=plant.gas_product,
-        torque_constant=plant.torque_constant,
-        volume_per_angle=plant.volume_per_angle,
-        angle_min=plant.angle_min,
-        angle_max=plant.angle_max,
-        dead_volume_1=plant.dead_volume_1,
-        dead_volume_2=plant.dead_volume_2,
-        restitution=plant.restitution,
-        static_torque=plant.static_torque,
-        dynamic_torque=plant.dynamic_torque,
-        viscous_damping=plant.viscous_damping,
-        inertia=plant.inertia,
-        gravity_torque=plant.gravity_torque,
-        external_torque=plant.external_torque,
-        supply_pressure=pressure_1,
-        dorsiflexion_pressure=pressure_2,
-        atmospheric_pressure=plant.atmospheric_pressure,
-        valve_conductance=plant.valve_conductance,
-        leak_conductance=plant.leak_conductance,
-        valve_curve=plant.valve_curve,
-        leak_curve=plant.leak_curve,
-        relieving=plant.relieving,
-    )
+    return plant_with(plant, pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
 
 
 def lines_after(

@@ -11,11 +11,11 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, make_schema, optional, read_model, table
-from ppafo.documents.toml_text import TomlKind
+from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity
-from ppafo.model.fluid_table import densest_gas, fluid_pressure, has_liquid, liquid_density
+from ppafo.model.fluid_table import densest_gas, fluid_pressure, gas_density, has_liquid, liquid_density
 from ppafo.model.gas import SPECIES
 from ppafo.model.source import BottleWall, Regulator, bottle_content, pressure_reserve
 from ppafo.parameters.bottles.fluids import Fluid, load_fluid
@@ -27,7 +27,6 @@ from ppafo.units import format_quantity, split_quantity, to_si
 PAPER_BOTTLE = "paper-co2-9oz"
 
 FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") / "files", ParameterError)
-_HALVINGS = 80
 
 BOTTLE = (
     Quantity("volume", "m^3", "internal volume of the bottle", minimum=1e-6, maximum=1.0),
@@ -56,12 +55,22 @@ REGULATOR = (
         minimum_allowed=False,
     ),
 )
+
+
+def _passed(part: str, short: str) -> tuple[Quantity, ...]:
+    """Declare what a part that the gas passes has, in the order of ``Passage``."""
+    warms = f"share of the way to the {short}'s temperature that the gas warms"
+    return (
+        Quantity("heat_capacity", "J/K", f"heat capacity of the {part}", minimum=1e-3, maximum=1e6),
+        Quantity("effectiveness", "", warms, minimum=0.0, maximum=1.0),
+        Quantity(
+            "room_heat_transfer", "W/K", f"heat conductance from the room to the {short}", minimum=0.0, maximum=1e6
+        ),
+    )
+
+
 BODY = (
-    Quantity("heat_capacity", "J/K", "heat capacity of the regulator's body", minimum=1e-3, maximum=1e6),
-    Quantity(
-        "effectiveness", "", "share of the way to the body's temperature that the gas warms", minimum=0.0, maximum=1.0
-    ),
-    Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the regulator", minimum=0.0, maximum=1e6),
+    *_passed("regulator's body", "regulator"),
     Quantity(
         "ice_capacity",
         "kg",
@@ -71,13 +80,7 @@ BODY = (
         minimum_allowed=False,
     ),
 )
-HOSE = (
-    Quantity("heat_capacity", "J/K", "heat capacity of the hose to the device", minimum=1e-3, maximum=1e6),
-    Quantity(
-        "effectiveness", "", "share of the way to the hose's temperature that the gas warms", minimum=0.0, maximum=1.0
-    ),
-    Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the hose", minimum=0.0, maximum=1e6),
-)
+HOSE = _passed("hose to the device", "hose")
 ROOM = (Quantity("temperature", "K", "temperature of the room, and initially of bottle and gas"),)
 
 SECTIONS: dict[str, tuple[Quantity, ...]] = {
@@ -178,6 +181,7 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
     part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
+    _check_name(name_or_path)
     parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
     found = _warming() | _given(parsed)
     if part is not None:
@@ -186,6 +190,17 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     for override in overrides:
         found = _override(found, override)
     return _build(parsed, found, file)
+
+
+def _check_name(name_or_path: str | Path) -> None:
+    """Refuse a name that neither a bottle nor a part has, with the nearest of both."""
+    name, path = label(str(name_or_path)), Path(name_or_path)
+    known = (*FILE.names(), *bottle_parts())
+    if name in known or path.suffix == ".toml" or "/" in name:
+        return
+    raise ParameterError(
+        f"there is no bottle '{name}'{nearest_name(name, known)}; available: {', '.join(known)}, or give a .toml file"
+    )
 
 
 def _given(parsed: Any) -> dict[str, Entry]:
@@ -294,19 +309,7 @@ def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float
             if has_liquid(fluid.table)
             else f"{file}: bottle.fill_pressure: the table of {fluid.name} ends at {most:.4g} Pa at {temperature:g} K"
         )
-    return values["bottle.volume"] * gas_density(fluid, temperature, pressure)
-
-
-def gas_density(fluid: Fluid, temperature: float, pressure: float) -> float:
-    """Return the density [kg/m^3] of gas at a temperature [K] and an absolute pressure [Pa], by halving."""
-    low, high = 0.0, densest_gas(fluid.table, temperature)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if fluid_pressure(fluid.table, temperature, middle) < pressure:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+    return values["bottle.volume"] * gas_density(fluid.table, temperature, pressure)
 
 
 def _check_temperature(path: str, temperature: float, fluid: Fluid, file: str) -> None:

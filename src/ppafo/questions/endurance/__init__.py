@@ -20,7 +20,7 @@ QUESTION = Question(
         Argument(
             ("--step-time",),
             "step_time",
-            "time of one step; default: '1.1 s', the whole recording, or one stride of a walk",
+            "time of one step; default: '1.1 s', the whole recording, one stride of a walk, or its whole course",
             metavar="TIME",
             type=quantity("s"),
         ),

@@ -32,9 +32,9 @@ _USE = (Column("gas use"), Column("gas per step", "gas mass", ".3g"))
 _REUSED = (
     Column("gas saved", "gas mass", ".3g"),
     Column("walking with reuse", "duration"),
-    Column("steps with reuse", form=".0f"),
+    Column("steps with reuse"),
 )
-_COURSE = (Column("walking", "duration"), Column("steps", form=".0f"))
+_COURSE = (Column("walking", "duration"), Column("steps"))
 
 
 def answer_of(found: Endurance | Endurances) -> Answer:
@@ -82,11 +82,12 @@ def _answer_of_several(several: Endurances) -> Answer:
 
 def _cells(one: Endurance) -> tuple[str | float, ...]:
     course = one.discharge
-    last = (course.walking_time, course.steps)
+    last = (course.walking_time, steps_text(course.steps))
     if one.reuse is None or one.without_reuse is None:
         return one.draw.mass_per_step, *last, course.ending.kind
     saved, before = one.reuse.balance.returned_mass, one.without_reuse
-    return one.draw.mass_per_step + saved, before.walking_time, before.steps, saved, *last, course.ending.kind
+    first = (one.draw.mass_per_step + saved, before.walking_time, steps_text(before.steps))
+    return *first, saved, *last, course.ending.kind
 
 
 def _facts(found: Endurance) -> list[tuple[str, str]]:
@@ -96,8 +97,8 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
     flows = [quantity_text(flow, "mass flow") for flow in (draw.mean_flow, draw.peak_flow)]
     rows = [
         ("run time", f"{_minutes(course.walking_time)} of walking, {_minutes(course.total_time)} in total"),
-        ("steps", f"{course.steps:.0f}"),
-        ("steps without cooling", f"{found.steps_when_warm:.0f} (a bottle that stays at room temperature)"),
+        ("steps", steps_text(course.steps)),
+        ("steps without cooling", f"{steps_text(found.steps_when_warm)} (a bottle that stays at room temperature)"),
         ("ended", course.ending.message),
         ("gas", f"{_gas(draw.mass_per_step)} a step, {flows[0]}, largest {flows[1]}"),
         ("heat that it lacks", _lacking_heat(found)),
@@ -120,7 +121,7 @@ def _other_facts(found: Endurance) -> list[tuple[str, str]]:
             f"with {name}",
             f"{_gas(other.draw.mass_per_step + _saved(other))} a step, "
             f"{f'{_gas(_saved(other))} of it saved, ' if other.reuse else ''}"
-            f"{_minutes(other.discharge.walking_time)} of walking, {other.discharge.steps:.0f} steps"
+            f"{_minutes(other.discharge.walking_time)} of walking, {steps_text(other.discharge.steps)} steps"
             f"{', without reuse' if found.reuse and not other.reuse else ''}",
         )
         for name, other in found.others.items()
@@ -138,7 +139,7 @@ def _reuse_facts(found: Endurance, reused: Reuse, without: Discharge) -> list[tu
     return [
         ("exhaust reused", f"{saved}; the exhaust holds {_gas(balance.exhausted_mass)}"),
         ("chambers", _chambers(reused)),
-        ("without reuse", f"{_minutes(without.walking_time)} of walking, {without.steps:.0f} steps"),
+        ("without reuse", f"{_minutes(without.walking_time)} of walking, {steps_text(without.steps)} steps"),
     ]
 
 
@@ -252,6 +253,11 @@ def _bottle_data(found: Endurance) -> dict[str, Any]:
         "volume": bottle.volume,
         "values": {path: entry.model_dump() for path, entry in bottle.entries.items()},
     }
+
+
+def steps_text(steps: float) -> str:
+    """Return a number of steps as it is shown: a decimal of few, such as of courses, whole ones of many."""
+    return f"{steps:.1f}" if steps < 99.5 else f"{steps:.0f}"
 
 
 def _minutes(seconds: float) -> str:

@@ -18,6 +18,7 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.owned_folder import read_json
 from ppafo.storage.recordings import read_recording
 from ppafo.walking import WalkResult
+from ppafo.walking.course_segments import is_whole_course
 from ppafo.walking.strides import SETTLING
 
 PEAK_WINDOW = 0.1
@@ -140,7 +141,7 @@ class WalkGas:
 
     ``gas_per_stride`` is that of the strides with help, 0 where the walk took none. ``others`` is the gas use of the
     same walk with other readings of the paper's chambers, by their names. A walk on a ``course``, "" without one, is
-    repeated as a whole: gas and time are then those of the course.
+    repeated as a whole: gas and time are then those of the course, which takes ``course_time`` [s].
     """
 
     name: str
@@ -150,6 +151,12 @@ class WalkGas:
     actuator: Actuator
     others: Mapping[str, "OtherGas"] = field(default_factory=dict)
     course: str = ""
+    course_time: float = 0.0
+
+    @property
+    def is_whole(self) -> bool:
+        """True unless the walk ended before its course did."""
+        return not self.course or is_whole_course(self.stride_time, self.course_time)
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +190,7 @@ def walk_gas(result: WalkResult) -> WalkGas:
         configuration.gait.stride_time if course is None else result.recording.duration,
         Actuator(**{name: getattr(actuator, name) for name in Actuator.__slots__}),
         course="" if course is None else course.name,
+        course_time=0.0 if course is None else result.metrics["course_planned_time"].value,
     )
 
 
@@ -217,7 +225,8 @@ def read_walk_gas(folder: Path) -> WalkGas:
         _number(document, time, path, 0.0),
         actuator,
         _others(document, actuator, path, keys[1:]),
-        "" if course is None else str(_table({"course": course}, "course", path).get("name", "")),
+        "" if course is None else str(_table({"course": course}, "course", path).get("name", "course")),
+        0.0 if course is None else _number(document, "metrics.course_planned_time.value", path, 0.0),
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ppafo.answers import Solved
-from ppafo.errors import ParameterError
+from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.questions.endurance.discharge import Discharge, discharge
 from ppafo.questions.endurance.draw import (
@@ -43,8 +43,8 @@ class Endurance(Solved):
 
     ``discharge`` is the requested course; ``without_reuse`` the same without reuse, where there is one.
     ``steps_when_warm`` is the number of steps that a bottle which stays at room temperature gives: what cooling costs.
-    ``is_of_course`` is true where a step is a whole course. ``others`` is the same for a walk or a run with
-    other readings of the paper's chambers, by their names.
+    ``is_of_course`` is true where a step is a course, ``is_whole`` unless the walk ended before it did. ``others`` is
+    the same for a walk or a run with other readings of the paper's chambers, by their names.
     """
 
     bottle: Bottle
@@ -56,6 +56,7 @@ class Endurance(Solved):
     steps_when_warm: float
     is_of_course: bool = False
     others: Mapping[str, "Endurance"] = field(default_factory=dict)
+    is_whole: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +123,9 @@ def endurance_of_walk_gas(gas: WalkGas, bottle: Bottle, schedule: Schedule, reus
     changes, draw = tuple(reuse), draw_of_walk(gas)
     plan = parse_reuse(changes, bottle, full_chambers(gas)) if changes else None
     others = {name: _other(bottle, other, schedule, changes) for name, other in gas.others.items()}
-    return replace(follow_bottle(bottle, draw, schedule, plan), others=others, is_of_course=bool(gas.course))
+    return replace(
+        follow_bottle(bottle, draw, schedule, plan), others=others, is_of_course=bool(gas.course), is_whole=gas.is_whole
+    )
 
 
 def _other(bottle: Bottle, other: OtherGas, schedule: Schedule, changes: tuple[str, ...]) -> Endurance:
@@ -164,8 +167,14 @@ def _endurance_of_use(
     if isinstance(use, str | Path) and is_walk_folder(Path(use)):
         gas = read_walk_gas(Path(use))
     if gas is not None:
+        step = f"its whole course '{gas.course}'" if gas.course else "one stride of its walk"
         if step_time is not None:
-            raise ParameterError(f"--step-time: a step of {_name(use)} is one stride of its walk; omit --step-time")
+            raise ParameterError(f"--step-time: a step of {_name(use)} is {step}; omit --step-time")
+        if not gas.is_whole:
+            raise DataError(
+                f"{_name(use)}: the walk ended after {gas.stride_time:.4g} s of the {gas.course_time:.4g} s of course "
+                f"'{gas.course}', so it cannot be repeated as a whole; walk the whole course, without a bottle"
+            )
         return endurance_of_walk_gas(gas, bottle, schedule, reuse)
     recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
     draw = draw_of_recording(recording, step_time)

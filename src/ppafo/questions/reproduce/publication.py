@@ -1,5 +1,6 @@
 """A publication as a file of claims: what it states, where, what is assumed, and how our number is computed."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -27,15 +28,17 @@ class ClaimEntry(BaseModel):
 
     id: str = Field(pattern=_IDENTIFIER, description="name of the claim, unique in the file")
     statement: Text = Field(description="what is claimed, one sentence")
-    published: float | None = Field(None, description="published number in 'unit'; left out where only words are")
+    published: float | None = Field(
+        None, allow_inf_nan=False, description="published number in 'unit'; left out where only words are"
+    )
     unit: str = Field("", description="unit of the published and of our number")
     words: str = Field("", description="what is published where it is no number, or the range of it")
     where: Text = Field(description="where it was read")
     source: str = Field("", description="publication, where it is not that of the file")
     computation: str = Field("", description="name of a computation: " + ", ".join(COMPUTATIONS))
     arguments: dict[str, str] = Field(default_factory=dict, description="arguments of the computation, with units")
-    at_least: float | None = Field(None, description="lowest value that agrees, in 'unit'")
-    at_most: float | None = Field(None, description="highest value that agrees, in 'unit'")
+    at_least: float | None = Field(None, allow_inf_nan=False, description="lowest value that agrees, in 'unit'")
+    at_most: float | None = Field(None, allow_inf_nan=False, description="highest value that agrees, in 'unit'")
     assumed: Texts = Field((), description="what our number rests on beside what is published")
     note: str = Field("", description="why the verdict is what it is")
     not_testable: str = Field("", description="why nothing is computed, in place of a computation")
@@ -107,14 +110,28 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
         hint = nearest_name(entry.computation, COMPUTATIONS)
         known = ", ".join(COMPUTATIONS)
         raise ScenarioError(f"{place}.computation: there is no '{entry.computation}'{hint}; available: {known}")
-    if entry.at_least is None and entry.at_most is None:
-        raise ScenarioError(f"{place}: give at_least or at_most, or both: what agrees with the claim")
+    _check_range(entry, place)
     computation = COMPUTATIONS[entry.computation]
     try:
         from_si(1.0, entry.unit, computation.unit)
     except UnitError as error:
         raise ScenarioError(f"{place}.unit: {error}") from error
     return PublishedClaim(entry, computation, _arguments(entry, computation, place), source)
+
+
+def _check_range(entry: ClaimEntry, place: str) -> None:
+    """Refuse a range that is none, and one in which the published number itself would not agree."""
+    if entry.at_least is None and entry.at_most is None:
+        raise ScenarioError(f"{place}: give at_least or at_most, or both: what agrees with the claim")
+    low = -math.inf if entry.at_least is None else entry.at_least
+    high = math.inf if entry.at_most is None else entry.at_most
+    if low > high:
+        raise ScenarioError(f"{place}: at_least = {low:g} lies above at_most = {high:g}: no number agrees")
+    if entry.published is not None and not low <= entry.published <= high:
+        name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
+        raise ScenarioError(
+            f"{place}: published = {entry.published:g} does not agree with itself, {name} = {limit:g}; widen the range"
+        )
 
 
 def _arguments(entry: ClaimEntry, computation: Computation, place: str) -> dict[str, str | float]:
@@ -139,6 +156,10 @@ def _argument(text: str, unit: str, place: str) -> str | float:
             raise ScenarioError(f"{place}: there are no chambers '{text}'{hint}; available: {known}")
         return text
     try:
-        return parse_quantity(text, unit)
+        value = parse_quantity(text, unit)
     except UnitError as error:
         raise ScenarioError(f"{place}: {error}") from error
+    # An absolute pressure and a time: neither lies below 0.
+    if not 0.0 <= value < math.inf:
+        raise ScenarioError(f"{place} = '{text}': must be at least 0 {unit} and finite")
+    return value

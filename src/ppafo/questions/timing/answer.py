@@ -1,5 +1,6 @@
 """The answer about timing: errors of events by wearer, way and timing, and what the slap comes from."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import quantity_text
 from ppafo.control.walking.catalog import TIMINGS
 from ppafo.questions.timing.figure import timing_figure
+from ppafo.questions.timing.slap import FACTORS, Falls, SlapStudy
 from ppafo.questions.timing.solve import STEADY, WEARERS, TimedWay, Timing
 from ppafo.version import __version__
 from ppafo.walking.event_times import EVENTS
@@ -33,14 +35,22 @@ _POOLED = (
     Column("less", "fraction", ".0f"),
     Column("published", "fraction", ".0f"),
 )
-_SLAP = (
-    Column("changed"),
-    Column("slap", "angular velocity", "z.0f"),
-    Column("less slap", "angular velocity", "z.0f"),
+_FALL = (
+    Column("foot"),
     Column("falls through", "angle", ".1f"),
-    Column("toes", "length", "z.0f"),
-    Column("work", "energy", "z.2f"),
-    Column("gas", "gas mass", ".3f"),
+    Column("slap", "angular velocity", "z.0f"),
+)
+_SHARES = (
+    Column("changed"),
+    Column("alone", "angular velocity", "+.0f"),
+    Column("mean over all orders", "angular velocity", "+.0f"),
+    Column("after the others", "angular velocity", "+.0f"),
+)
+_COMBINED = (
+    *(Column(name) for name in ("valves", "volume", "pressure", "timing")),
+    Column("slap", "angular velocity", "z.0f"),
+    Column("as it walks", "angular velocity", "z.0f"),
+    Column("falls then through", "angle", ".1f"),
 )
 
 
@@ -62,11 +72,7 @@ def answer_of(timing: Timing) -> Answer:
                 paragraphs=(_METHOD,),
                 table=Table(_HEAD, tuple(_row(item) for item in timing.ways), left=3),
             ),
-            Section(
-                "What the slap of the foot comes from",
-                paragraphs=(_SLAP_METHOD,),
-                table=Table(_SLAP, _slap_rows(timing)),
-            ),
+            *_slap_sections(timing.slap),
         ),
         data=_data(timing),
     )
@@ -79,12 +85,52 @@ _METHOD = (
     "that it knew nothing of within a quarter of a stride, 'false' those that it took for one. 'steady' repeats one "
     "stride, 'uneven' draws stride times that vary by 2.5 %; the others are the courses that come with the package."
 )
-_SLAP_METHOD = (
-    "'Slap' is the rate of the foot as it comes down on its sole, below 0 with the toes falling; 'less slap' is what "
-    "the change takes off the slap of the device as it is; 'falls through' is how far the foot is tilted up at the "
-    "heel strike. With each change the swing angle is the one at which it falls nearly as far as before, because "
-    "a foot that is held higher comes down faster. Without the device the toes hang low."
+_FALL_METHOD = (
+    "'Slap' is the rate of the foot as it comes down on its sole, below 0 with the toes falling. A device that lifts "
+    "the foot makes it fall further. The second row is the foot from the angle and the rate that it has with the "
+    "device at its strike, with vented chambers: from the first row to it is what the fall makes, from there to the "
+    "third what the device's torque takes off."
 )
+_SHARES_METHOD = (
+    "What each change takes off the slap, above 0 for less: the foot falls from one state, that of the device as it is "
+    "at its heel strikes, with the same pressures in the chambers; controller and valves stay their own. Every "
+    "combination is tried. 'Alone' is with nothing else changed, 'mean over all orders' (Shapley) adds up to that of "
+    "all together, 'after the others' is with all else changed."
+)
+_NO_SLAP = "Some strides do not begin on the heel: there is no fall to tell what it comes from."
+
+
+def _slap_sections(slap: SlapStudy | None) -> tuple[Section, ...]:
+    """Return what the slap comes from: fall and torque, the shares of four factors, all combinations."""
+    title = "What the slap of the foot comes from"
+    if slap is None:
+        return (Section(title, paragraphs=(_NO_SLAP,)),)
+    device = slap.as_it_is
+    falls: tuple[tuple[str | float, ...], ...] = (
+        ("without the device", slap.device_off.drop, slap.device_off.walked),
+        ("as the device lifts it, vented", device.drop, slap.device_off.imposed),
+        ("with the device", device.drop, device.imposed),
+    )
+    shares = tuple((one.factor, one.alone, one.share, one.last) for one in slap.shares)
+    together = slap.walks[-1].falls.imposed - device.imposed
+    combined = tuple(
+        (
+            *("yes" if factor.name in one.factors else "-" for factor in FACTORS),
+            one.falls.imposed,
+            one.falls.walked,
+            one.falls.drop,
+        )
+        for one in slap.walks
+    )
+    return (
+        Section(title, paragraphs=(_FALL_METHOD,), table=Table(_FALL, falls)),
+        Section(
+            "What valves, volume, pressure and timing contribute",
+            paragraphs=(_SHARES_METHOD,),
+            table=Table(_SHARES, (*shares, ("all together", None, together, None)), marked=(len(shares),)),
+        ),
+        Section("Every combination", table=Table(_COMBINED, combined, left=len(FACTORS)), is_detail=True),
+    )
 
 
 def _sentence(timing: Timing, wearer: str) -> str:
@@ -135,22 +181,6 @@ def _row(item: TimedWay) -> tuple[str | float | None, ...]:
     )
 
 
-def _slap_rows(timing: Timing) -> tuple[tuple[str | float, ...], ...]:
-    as_it_is = timing.slap[1].slap_rate
-    return tuple(
-        (
-            item.change,
-            item.slap_rate,
-            item.slap_rate - as_it_is,
-            item.drop,
-            item.lowest_toes,
-            item.push_off_work,
-            item.gas,
-        )
-        for item in timing.slap
-    )
-
-
 def _data(timing: Timing) -> dict[str, Any]:
     return {
         "format": "ppafo timing",
@@ -170,19 +200,23 @@ def _data(timing: Timing) -> dict[str, Any]:
             for wearer in WEARERS
         },
         "ways": [_way_data(item) for item in timing.ways],
-        "slap": [
-            {
-                "change": item.change,
-                "slap_rate": item.slap_rate,
-                "drop": item.drop,
-                "lowest_toes": item.lowest_toes,
-                "push_off_work": item.push_off_work,
-                "gas": item.gas,
-            }
-            for item in timing.slap
-        ],
+        "slap": None if timing.slap is None else _slap_data(timing.slap),
         "versions": {"ppafo": __version__},
     }
+
+
+def _slap_data(slap: SlapStudy) -> dict[str, Any]:
+    """Return falls, shares and combinations in SI; rates are those of the foot, below 0 with the toes falling."""
+    return {
+        "device_off": _fall_data(slap.device_off),
+        "walks": [{"factors": list(one.factors), **_fall_data(one.falls)} for one in slap.walks],
+        "shares": [asdict(one) for one in slap.shares],
+    }
+
+
+def _fall_data(falls: Falls) -> dict[str, float | None]:
+    names = ("imposed", "walked", "drop")
+    return {name: _number(getattr(falls, name)) for name in names}
 
 
 def _way_data(way: TimedWay) -> dict[str, Any]:

@@ -1,46 +1,112 @@
-"""What the slap of the foot comes from: one thing of the device or its control changed at a time, and all of them."""
+"""What the slap of the foot comes from: valves, chambers, pressure and timing, in all combinations, from one state.
 
-from collections.abc import Callable, Sequence
+The foot comes down within a tenth of a second after the heel strike. How fast depends first of all on how far it has to
+fall, which the swing before decides. So a walk is stopped at a heel strike, the foot gets the angle and the rate, and
+the chambers get the pressures, that the device as it is has there, and the walk goes on: controller and valves keep
+what they have learnt and where they stand. What then differs is the fall alone.
+"""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import factorial
 from pathlib import Path
 
 import numpy as np
 
+from ppafo.engine.lanes import Floats, LaneBlock, load_program
+from ppafo.engine.rows import row_numbers
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.engine.scheme.ankle_torque import foot_direction
 from ppafo.errors import SimulationError
+from ppafo.model.chambers import chamber_mass
+from ppafo.model.contact import foot_angle
+from ppafo.model.plant import chamber_pressures, chamber_volumes
 from ppafo.parameters.device import Device, Orifice
 from ppafo.progress import Progress, Report
 from ppafo.walking.comparison import with_device_off
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
-from ppafo.walking.walk import walk
-from ppafo.walking.walk_metrics import settled
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.walk import REMEDY, plan_of
 
-MINUTES = 0.3
 LARGER = 4.0
 """Valves of so many times the area, chambers of one so manieth of the volume: about as far as virtual work allows."""
 
 HIGHER = 20.0 * 6894.757293168361
 """Rise of both supply pressures [Pa]: 20 psi."""
 
-LEAD = "30 ms"
-TIMED = ("timing.kind=fractional",)
-EARLY = (*TIMED, f"timing.valve_delay={LEAD}")
+FIRST_STRIKE, STRIKES = 8, 12
+"""Heel strikes that are looked at: by the first of them strides are learnt."""
+
+REACH = 0.3
+"""Fraction of a stride within which a foot that strikes with its heel has come down."""
+
+AS_IT_IS = "timing.kind=thresholds"
 
 
 @dataclass(frozen=True, slots=True)
-class SlapSource:
-    """A walk with one change: rate of the foot as it comes down [rad/s], and what it falls from and costs.
+class Factor:
+    """One thing that may contribute: its name, and the walk with it from the overrides and the device without."""
 
-    ``drop`` [rad] is how far the foot is tilted up at the heel strike above where it lies flat; ``lowest_toes`` [m] in
-    mid-swing, ``gas`` [kg] and ``push_off_work`` [J] a stride.
+    name: str
+    overrides: tuple[str, ...]
+    device: Callable[[Device], Device]
+
+
+@dataclass(frozen=True, slots=True)
+class Strike:
+    """The leg at a heel strike: angle [rad] and rate [rad/s] of the ankle, and both chambers [Pa], () for their own."""
+
+    angle: float
+    rate: float
+    pressures: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Falls:
+    """How a foot comes down: rate [rad/s] from the ``imposed`` state and as it ``walked``, means over strikes.
+
+    Both are nan where a foot does not come down after its heel. ``drop`` [rad] is how far it is tilted up at the
+    strike as it walked, and ``strikes`` are its states there.
     """
 
-    change: str
-    slap_rate: float
+    imposed: float
+    walked: float
     drop: float
-    lowest_toes: float
-    gas: float
-    push_off_work: float
+    strikes: tuple[Strike, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SlapWalk:
+    """A combination of factors and how the foot comes down with it."""
+
+    factors: tuple[str, ...]
+    falls: Falls
+
+
+@dataclass(frozen=True, slots=True)
+class SlapShare:
+    """What one factor takes off the slap [rad/s]: alone, on average over all orders (Shapley), and as the last."""
+
+    factor: str
+    alone: float
+    share: float
+    last: float
+
+
+@dataclass(frozen=True, slots=True)
+class SlapStudy:
+    """What the slap comes from: the device off, the combinations from none to all factors, and their shares."""
+
+    device_off: Falls
+    walks: tuple[SlapWalk, ...]
+    shares: tuple[SlapShare, ...]
+
+    @property
+    def as_it_is(self) -> Falls:
+        """The fall with the device and the timing as they are."""
+        return self.walks[0].falls
 
 
 def larger_valves(device: Device) -> Device:
@@ -75,74 +141,130 @@ def same_device(device: Device) -> Device:
     return device
 
 
-def all_together(device: Device) -> Device:
-    """The device with larger valves, smaller chambers and more pressure."""
-    return higher_pressure(smaller_chambers(larger_valves(device)))
-
-
-LOW, HIGH, TRIES = 1.45, 1.95, 8
-"""Swing angles [rad] between which the foot is made to fall as far as with the device as it is, in so many walks."""
-
-Change = tuple[str, Sequence[str], Callable[[Device], Device]]
-
-CHANGES: tuple[Change, ...] = (
-    ("as it is", (), same_device),
-    (f"valves {LARGER:g} times as large", (), larger_valves),
-    (f"chambers of 1/{LARGER:g} the volume", (), smaller_chambers),
-    ("20 psi more pressure", (), higher_pressure),
-    ("time in the stride known (fractional)", TIMED, same_device),
-    (f"the same, valves switched {LEAD} ahead", EARLY, same_device),
-    ("device and timing together", EARLY, all_together),
+FACTORS = (
+    Factor(f"valves {LARGER:g} times as large", (), larger_valves),
+    Factor(f"chambers of 1/{LARGER:g} the volume", (), smaller_chambers),
+    Factor("20 psi more pressure", (), higher_pressure),
+    Factor("time in the stride known", ("timing.kind=fractional",), same_device),
 )
 
 
-def slap_sources(
-    file: str, overrides: Sequence[str], gait: str | Path | None, progress: Report
-) -> tuple[SlapSource, ...]:
-    """Walk with the device off, as it is, and with each change; SimulationError where a walk diverges."""
-    found: list[SlapSource] = []
-    for number, (change, own, device) in enumerate(CHANGES):
-        progress(Progress(f"slap, {change}", number, len(CHANGES) + 1))
-        configuration = load_walk(file, (*overrides, *own), gait)
-        changed = replace(configuration, device=device(configuration.device))
-        found.append(_fallen_as_far(change, changed, found[0].drop) if found else _walked(change, changed))
-    progress(Progress("slap, device off", len(CHANGES), len(CHANGES) + 1))
-    return (_walked("device off", with_device_off(load_walk(file, overrides, gait))), *found)
+def slap_study(file: str, overrides: Sequence[str], gait: str | Path | None, progress: Report) -> SlapStudy | None:
+    """Let the foot fall from one state with every combination of factors; None where it does not strike with its heel.
 
-
-def _fallen_as_far(change: str, configuration: Configuration, drop: float) -> SlapSource:
-    """Walk with the swing angle at which the foot falls as far [rad] as with the device as it is, or nearly so.
-
-    Else a change that lifts the foot higher would seem to make the slap.
+    SimulationError where a walk diverges.
     """
-    tried: list[SlapSource] = []
-    low, high = LOW, HIGH
-    for _ in range(TRIES):
-        angle = 0.5 * (low + high)
-        found = _walked(change, replace(configuration, settings={**configuration.settings, "swing_angle": angle}))
-        tried.append(found)
-        low, high = (angle, high) if found.drop > drop else (low, angle)
-    return min(tried, key=lambda item: abs(item.drop - drop))
+    chosen = [sub for size in range(len(FACTORS) + 1) for sub in itertools.combinations(FACTORS, size)]
+    base = _with((), file, overrides, gait)
+    strikes = falls_of(base, ()).strikes
+    walks = []
+    for number, factors in enumerate(chosen):
+        progress(Progress("slap, factors", number, len(chosen), noun="combinations"))
+        walks.append(
+            SlapWalk(tuple(one.name for one in factors), falls_of(_with(factors, file, overrides, gait), strikes))
+        )
+    slaps = {frozenset(one.factors): one.falls.imposed for one in walks}
+    if not np.isfinite(list(slaps.values())).all():
+        return None
+    # Without the device its chambers hold nothing: the foot has the state, the chambers their own.
+    bare = falls_of(with_device_off(base), [replace(strike, pressures=()) for strike in strikes])
+    return SlapStudy(bare, tuple(walks), shares_of(slaps, [one.name for one in FACTORS]))
 
 
-def _walked(change: str, configuration: Configuration) -> SlapSource:
-    result = walk(configuration, MINUTES)
-    if not result.status.is_completed:
-        raise SimulationError(f"{configuration.name}, {change}: {result.status.message}")
-    recording = result.recording
-    helped = np.flatnonzero(settled(result.helped))
-    tilt = recording["shank_angle"] - recording["angle"]
-    strikes = result.starts[:-1][helped]
-    flat = [
-        float(tilt[a:b][recording["contact"][a:b] == 2.0][0])
-        for a, b in zip(strikes, result.starts[1:][helped], strict=True)
-    ]
-    metrics = result.metrics
-    return SlapSource(
-        change=change,
-        slap_rate=metrics["slap_rate"].value,
-        drop=float(np.mean(tilt[strikes] - np.array(flat))),
-        lowest_toes=metrics["lowest_toes"].value,
-        gas=metrics["gas"].value,
-        push_off_work=metrics["push_off_work"].value,
+def shares_of(values: Mapping[frozenset[str], float], names: Sequence[str]) -> tuple[SlapShare, ...]:
+    """What each of some names adds to the value of a set of them: alone, on average over all orders, and last.
+
+    The averages (Shapley 1953) add up to the value of all less that of none.
+    """
+    count, everything = len(names), frozenset(names)
+    found = []
+    for name in names:
+        others = [item for item in names if item != name]
+        sets = [frozenset(sub) for size in range(count) for sub in itertools.combinations(others, size)]
+        weights = [factorial(len(sub)) * factorial(count - len(sub) - 1) / factorial(count) for sub in sets]
+        gains = [values[sub | {name}] - values[sub] for sub in sets]
+        share = sum(weight * gain for weight, gain in zip(weights, gains, strict=True))
+        last = values[everything] - values[everything - {name}]
+        found.append(SlapShare(name, gains[0], share, last))
+    return tuple(found)
+
+
+def _with(factors: Sequence[Factor], file: str, overrides: Sequence[str], gait: str | Path | None) -> Configuration:
+    timing = tuple(text for factor in factors for text in factor.overrides)
+    configuration = load_walk(file, (*overrides, AS_IT_IS, *timing), gait)
+    device = configuration.device
+    for factor in factors:
+        device = factor.device(device)
+    return replace(configuration, device=device)
+
+
+def falls_of(configuration: Configuration, strikes: Sequence[Strike]) -> Falls:
+    """Walk, and at each strike let another lane go on from its state in ``strikes``; the last lane just walks."""
+    stride = configuration.gait.stride_time
+    plan = plan_of(configuration, (FIRST_STRIKE + STRIKES) * stride)
+    run = plan_walk(replace(plan, record_interval=stride))
+    batch = batch_of(run)
+    width = STRIKES + 1
+    parameters, states = (np.repeat(values, width, axis=1) for values in (batch.parameters, batch.states))
+    block = LaneBlock(load_program(batch.program), batch.clock, parameters, states)
+    rows = row_numbers(batch.program.state_rows())
+    own: list[Strike] = []
+    imposed, walked, drops = [], [], []
+    done, reach = 0, round(REACH * stride / run.step)
+    for lane in range(STRIKES):
+        before = round((FIRST_STRIKE + lane) * stride / run.step) - 2
+        block.advance(before - done)
+        done = before + _to_strike(block, rows["walk.strides"])
+        own.append(_state(run, block.states[:, STRIKES], rows))
+        drops.append(_tilt(run, block.states[:, STRIKES], rows))
+        if strikes:
+            _impose(run, block.states[:, lane], rows, strikes[lane])
+        landings = block.states[rows["walk.landings"]].copy()
+        block.advance(reach)
+        done += reach
+        slaps = np.where(block.states[rows["walk.landings"]] > landings, block.states[rows["walk.slap_rate"]], np.nan)
+        imposed.append(float(slaps[lane]))
+        walked.append(float(slaps[STRIKES]))
+    if (block.states[rows["result.failure_time"]] < NEVER_FAILED).any():
+        raise SimulationError(f"{configuration.name} diverged as its foot came down; {REMEDY}")
+    return Falls(float(np.mean(imposed)), float(np.mean(walked)), float(np.mean(drops)), tuple(own))
+
+
+def _to_strike(block: LaneBlock, strides: int) -> int:
+    """Go on to the heel strike, which is some steps ahead; the number of steps."""
+    before = float(block.states[strides, 0])
+    steps = 0
+    while float(block.states[strides, 0]) == before:
+        block.advance(1)
+        steps += 1
+    return steps
+
+
+def _tilt(run: Run, column: Floats, rows: Mapping[str, int]) -> float:
+    """How far the foot is tilted up [rad] above where it lies flat."""
+    assert run.walk is not None
+    foot = foot_angle(float(column[rows["walk.now.shank"]]), float(column[rows["state.angle"]]))
+    return foot - run.walk.timing.ground_angle
+
+
+def _state(run: Run, column: Floats, rows: Mapping[str, int]) -> Strike:
+    angle, rate, *masses = (
+        float(column[rows[f"state.{name}"]]) for name in ("angle", "angular_velocity", "mass_1", "mass_2")
     )
+    return Strike(angle, rate, chamber_pressures(run.plant, angle, *masses))
+
+
+def _impose(run: Run, column: Floats, rows: Mapping[str, int], strike: Strike) -> None:
+    """Give the leg of one lane, and the gas in its chambers, another state."""
+    foot = foot_direction(float(column[rows["walk.now.shank"]]), strike.angle)
+    pressures = strike.pressures or _state(run, column, rows).pressures
+    volumes = chamber_volumes(run.plant, strike.angle)
+    column[rows["state.angle"]], column[rows["state.angular_velocity"]] = strike.angle, strike.rate
+    column[rows["walk.foot.sine"]], column[rows["walk.foot.cosine"]] = foot.sine, foot.cosine
+    for chamber, pressure, volume in zip("12", pressures, volumes, strict=True):
+        mass = chamber_mass(pressure, volume, run.plant.gas_product)
+        # Gas with an energy balance keeps its temperature: its true mass goes with what it counts.
+        true = rows.get(f"masses.mass_{chamber}")
+        if true is not None:
+            column[true] *= mass / column[rows[f"state.mass_{chamber}"]]
+        column[rows[f"state.mass_{chamber}"]] = mass

@@ -13,7 +13,7 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.timing.slap import SlapSource, slap_sources
+from ppafo.questions.timing.slap import SlapStudy, slap_study
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course import Segment, WalkingCourse, list_courses, load_course
 from ppafo.walking.event_times import EVENTS, EventErrors, event_errors, known_events, true_events, within
@@ -59,7 +59,7 @@ class Timing(Solved):
     overrides: tuple[str, ...]
     minutes: float
     ways: tuple[TimedWay, ...]
-    slap: tuple[SlapSource, ...]
+    slap: SlapStudy | None
 
     def pooled(self, wearer: str, timing: str, ways: Sequence[str] | None = None) -> float:
         """Root mean square [s] of all errors of a wearer with a timing, on some ways or on all."""
@@ -109,7 +109,7 @@ def event_timing(
                 walk = load_walk(configuration, (*overrides, *own, f"timing.kind={timing}"), gait)
                 walk = replace(walk, course=course)
                 found.append(TimedWay(wearer, way, timing, timed_events(walk, length)))
-    slap = slap_sources(str(configuration), tuple(overrides), gait, tell)
+    slap = slap_study(str(configuration), (*overrides, *WEARERS["impaired"]), gait, tell)
     return Timing(str(configuration), tuple(overrides), length, tuple(found), slap)
 
 
@@ -117,6 +117,8 @@ def ways_of(configuration: Configuration) -> dict[str, WalkingCourse | None]:
     """The ways to walk: steadily, unevenly, and the courses that come with the package."""
     if configuration.course is not None:
         raise ScenarioError(f"{configuration.file}: course: events are timed on courses of their own; leave it away")
+    if configuration.bottle is not None:
+        raise ScenarioError(f"{configuration.file}: bottle: events are timed at one supply pressure; leave it away")
     cadence = 2.0 / configuration.gait.stride_time
     return {STEADY: None, UNEVEN: uneven_course(cadence)} | {name: load_course(name) for name in list_courses()}
 

@@ -54,7 +54,8 @@ _ROWS = (
 
 _EXPLAINED = (
     "'Without' is the same wearer with the same device and both chambers vented. 'Healthy' is the gait itself. The "
-    "first strides, in which the controller learns the stride time, are left out. The device is on one leg, so a "
+    "first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "
+    "when the walk ends. The device is on one leg, so a "
     "stride is one step of that leg. A stride in which the controller paused or had stopped is not in 'with' but in "
     "'vented', where there is one."
 )
@@ -223,8 +224,8 @@ def _bottle(life: Endurance | None) -> str:
 
 
 def _steps(life: Endurance) -> str:
-    steps = life.discharge.steps
-    return f"{steps:.1f} times this course" if life.is_of_course else f"{steps:.0f} strides of this leg"
+    steps, walked = life.discharge.steps, "" if life.is_whole else "what was walked of "
+    return f"{steps:.1f} times {walked}this course" if life.is_of_course else f"{steps:.0f} strides of this leg"
 
 
 def _bottle_data(life: Endurance | None) -> dict[str, Any] | None:

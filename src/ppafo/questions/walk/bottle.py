@@ -55,7 +55,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     rows = [
         ("bottle", f"{bottle.title}, with {_gas(supply.supply.mass)} at {_warmth(supply.supply.temperature)}"),
         ("what ended it", supply.ending.message),
-        ("when", f"{quantity_text(supply.ending.time, 'duration')}, after {worn.starts.size} strides"),
+        ("when", f"{quantity_text(supply.ending.time, 'duration')}, after {worn.helped.size} strides"),
         ("gas used", f"{_gas(supply.balance.left_bottle)}, left {_gas(float(values['bottle_mass'][-1]))}{liquid}"),
         ("bottle at the end", f"{_warmth(float(values['bottle_temperature'][-1]))}, {_pressure(supply)}"),
         ("coldest gas behind the regulator", _warmth(float(values["outlet_temperature"].min()))),

@@ -10,7 +10,7 @@ from ppafo.errors import DataError
 from ppafo.gait.scaling import speed_range
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.course_segments import SegmentResult
+from ppafo.walking.course_segments import SegmentResult, is_whole_course
 from ppafo.walking.figures.course import course_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 
@@ -27,7 +27,7 @@ _HEAD = (
     Column("push, heel loaded (N m)"),
     Column("pause or stop at (s)"),
 )
-_WHOLE = "whole course"
+_WHOLE, _PART = "whole course", "as far as walked"
 _COURSE = (
     "The course over time. Grey: every other segment. 'Without' is the same course with the same device and both "
     "chambers vented."
@@ -86,8 +86,9 @@ def _whole(comparison: Comparison) -> tuple[str | None, ...]:
     worn, bare = comparison.with_device, comparison.without_device
     numbers = {name: item.value for name, item in worn.metrics.items()}
     toes = bare.metrics.get("course_lowest_toes")
+    is_whole = is_whole_course(numbers["course_time"], numbers["course_planned_time"])
     return (
-        _WHOLE,
+        _WHOLE if is_whole else _PART,
         "0.0",
         f"{numbers['course_time']:.1f}",
         f"{numbers['course_strides']:.0f}",

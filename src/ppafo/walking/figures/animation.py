@@ -52,7 +52,7 @@ class _Scene:
         ghost.place(self.legs.healthy, index, offset)
         worn.place(self.legs.worn, index, offset)
         worn.colour(DRAGS if drags(self.legs, index) else self.colour)
-        parts = (ghost.shank, ghost.foot, worn.shank, worn.foot, worn.joint)
+        parts = (ghost.shank, worn.shank, worn.foot, ghost.foot, worn.joint)
         return [self.ticks, *parts]
 
 

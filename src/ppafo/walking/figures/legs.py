@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
 
-GHOST = "#b9b9b9"
+GHOST = "#5a5a5a"
+"""The healthy foot: dark enough to be seen on a coloured one, in front of which it is drawn."""
 DRAGS = "#a4001d"
 DRAG_LIMIT = -0.01
 """Toes below the ground by more than this [m] are shown as dragging; hip and knee could give less."""
@@ -98,7 +99,7 @@ def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False)
     """Add the lines of one leg to an axes, of a line width [points]; ``place`` puts them somewhere."""
     from matplotlib.patches import Polygon
 
-    order = 2.0 if is_ghost else 3.0
+    order, foot_order = (2.0, 3.2) if is_ghost else (3.0, 3.0)
     (shank,) = axes.plot([], [], color=colour, linewidth=width, zorder=order, solid_capstyle="round")
     foot = Polygon(
         np.zeros((3, 2)),
@@ -106,11 +107,11 @@ def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False)
         edgecolor=colour,
         linewidth=0.6 * width,
         joinstyle="round",
-        zorder=order,
+        zorder=foot_order,
     )
     axes.add_patch(foot)
     size = 0.0 if is_ghost else 1.6 * width
-    (joint,) = axes.plot([], [], "o", color="white", markeredgecolor=colour, markersize=size, zorder=order + 0.5)
+    (joint,) = axes.plot([], [], "o", color="white", markeredgecolor=colour, markersize=size, zorder=3.5)
     return LegArtists(shank, foot, joint)
 
 
@@ -155,14 +156,14 @@ def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
     for index in range(turns.size):
         middle = _SLOT * (index + 0.47)
         offset = legs.healthy.ankle[index, 0] - middle
-        leg_artists(axes, GHOST, 1.8, is_ghost=True).place(legs.healthy, index, offset)
+        leg_artists(axes, GHOST, 1.5, is_ghost=True).place(legs.healthy, index, offset)
         leg_artists(axes, colour, 3.0).place(legs.worn, index, offset)
         if drags(legs, index):
             toe = legs.worn.toe[index] - (offset, 0.0)
             axes.plot(toe[0], toe[1], "x", color=DRAGS, markersize=9, markeredgewidth=2.2, zorder=5)
         percent = f"{100.0 * (turns[index] % 1.0):.0f} %"
         axes.text(middle, -0.135, percent, ha="center", va="top", fontsize=8.5, color=GREY)
-    axes.text(0.3, 0.66, label, ha="left", va="top", color=colour, fontsize=10.5)
+    axes.text(0.0, 0.66, label, ha="left", va="top", color=colour, fontsize=10.5)
     axes.set_xlim(0.0, _SLOT * turns.size)
     axes.set_ylim(-0.22, 0.68)
     axes.set_aspect("equal", adjustable="box")

@@ -212,6 +212,29 @@ def test_what_does_not_belong_to_a_walk_is_refused(
     assert words in capsys.readouterr().err
 
 
+def on_course(walk: WalkGas, planned: float, path: Path) -> Path:
+    """The folder of a walk on a course that takes a ``planned`` time [s], of which as much is walked as is recorded."""
+    folder = folder_of(walk, path)
+    document = json.loads((folder / "walk.json").read_text())
+    document["configuration"]["course"] = {"name": "corridor"}
+    times = {"course_time": walk.recording.duration, "course_planned_time": planned, "course_gas": 3.0e-3}
+    document["metrics"] |= {name: {"value": value} for name, value in times.items()}
+    (folder / "walk.json").write_text(json.dumps(document))
+    return folder
+
+
+def test_a_course_that_was_cut_short_is_not_taken_for_a_whole_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole, cut = (on_course(pulses(5.0), planned, tmp_path / f"{planned}") for planned in (5.0, 45.9))
+    assert main(["endurance", str(whole), "--longest", "39 s"]) == 0
+    assert re.search(r"steps +7\.8\n", capsys.readouterr().out), "7.8 courses are not 8"
+    assert main(["endurance", str(cut)]) == 2
+    assert "ended after 5 s of the 45.9 s of course 'corridor'" in capsys.readouterr().err
+    assert main(["endurance", str(whole), "--step-time", "1 s"]) == 2
+    assert "is its whole course 'corridor'; omit --step-time" in capsys.readouterr().err
+
+
 def test_several_recordings_have_one_folder_and_none_comes_twice(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -89,6 +89,8 @@ def walking_task(
     told = _with_profile(file, [*desired, *own], gait)
     if judged.course is not None:
         raise ScenarioError(f"{file}: course: a league compares equal strides; leave the course away")
+    if judged.bottle is not None:
+        raise ScenarioError(f"{file}: bottle: a league compares strides at one supply pressure; leave the bottle away")
     profile, told_profile = (
         TorqueProfile(**{name: walk.settings[name] for name in TorqueProfile._fields}) for walk in (judged, told)
     )
