@@ -1,6 +1,7 @@
 """Which assignments of a function are needed, and where its names are declared: as far in and as late as can be."""
 
 import ast
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from ppafo.translation import typed
@@ -182,14 +183,12 @@ def _terms(statement: Statement) -> list[Term]:
     return [statement.test] if isinstance(statement, typed.If | typed.While) else []
 
 
-def counters(definition: ast.FunctionDef) -> set[str]:
-    """Names that hold nothing but the numbers of loops that count up from 0 or more."""
-    loops = [node for node in ast.walk(definition) if isinstance(node, ast.For) and _counts_up(node)]
+def counters(nodes: Sequence[ast.AST]) -> set[str]:
+    """Names that hold nothing but the numbers of loops that count up from 0 or more, of all nodes of a definition."""
+    loops = [node for node in nodes if isinstance(node, ast.For) and _counts_up(node)]
     names = [node.target.id for node in loops if isinstance(node.target, ast.Name)]
-    given = [item.arg for item in ast.walk(definition) if isinstance(item, ast.arg)]
-    stored = [
-        node.id for node in ast.walk(definition) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-    ]
+    given = [item.arg for item in nodes if isinstance(item, ast.arg)]
+    stored = [node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
     return {name for name in names if names.count(name) == stored.count(name) and name not in given}
 
 

@@ -6,7 +6,7 @@ type, so that it is bound here. What is outside the subset is refused with the f
 
 import ast
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -72,6 +72,7 @@ class _ModuleWalk:
     done: dict[tuple[str, tuple[Type, ...]], Function] = field(default_factory=dict)
     open: set[tuple[str, tuple[Type, ...]]] = field(default_factory=set)
     names: set[str] = field(default_factory=set)
+    found: dict[str, "_Names"] = field(default_factory=dict)
     module: Module = field(default_factory=Module)
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
@@ -101,6 +102,24 @@ class _ModuleWalk:
         return refusal(found.file, found.line, problem)
 
 
+@dataclass(frozen=True, slots=True)
+class _Names:
+    """Names of a definition: all of them, those that are read, those that only count; looked for once."""
+
+    every: frozenset[str]
+    read: frozenset[str]
+    counters: frozenset[str]
+
+    @classmethod
+    def of(cls, definition: ast.FunctionDef) -> "_Names":
+        """The names of a definition."""
+        nodes = list(ast.walk(definition))
+        named = [node for node in nodes if isinstance(node, ast.Name)]
+        every = {node.id for node in named} | {node.arg for node in nodes if isinstance(node, ast.arg)}
+        read = {node.id for node in named if isinstance(node.ctx, ast.Load)}
+        return cls(frozenset(every), frozenset(read), frozenset(counters(nodes)))
+
+
 class _FunctionWalk:
     """One function for one choice of types; gone through again where a name turns out to hold a wider type."""
 
@@ -108,14 +127,14 @@ class _FunctionWalk:
         self.module = module
         self.definition = definition
         self.types: dict[str, Type] = {}
-        nodes = list(ast.walk(definition))
-        self.names = {node.id for node in nodes if isinstance(node, ast.Name)}
-        self.names |= {node.arg for node in nodes if isinstance(node, ast.arg)}
-        self.read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+        if definition.name not in module.found:
+            module.found[definition.name] = _Names.of(definition)
+        found = module.found[definition.name]
+        self.names, self.read = found.every, found.read
         self.made: set[str] = set()
         self.values = Expressions(
             self.types,
-            counters(definition),
+            found.counters,
             module.rows,
             module.definitions,
             made=module.function,
@@ -311,8 +330,7 @@ class _FunctionWalk:
         if len(names) != len(target.elts) or length != len(names):
             raise self.refused(node, f"'{ast.unparse(target)}' does not fit what is on the right")
         before: list[Statement] = []
-        read = {item.id for item in ast.walk(node.value) if isinstance(item, ast.Name)}
-        if value.kind != "build" or read & set(names):
+        if value.kind != "build" or value.reads & set(names):
             whole = self.fresh("_and_".join(name for name in names if name != "_") or "items", kind)
             before = [self.assign(whole, value, node)]
             value = Term("name", self.types[whole], (), whole)
@@ -327,7 +345,19 @@ def _is_empty_array(node: ast.Call) -> bool:
     return isinstance(node.func, ast.Attribute) and node.func.attr == "empty"
 
 
-def _changed(body: Sequence[ast.stmt]) -> set[str]:
+def _changed(body: Iterable[ast.stmt]) -> set[str]:
     """Names that some statements give values."""
-    nodes = (node for statement in body for node in ast.walk(statement))
-    return {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    found: set[str] = set()
+    for statement in body:
+        if isinstance(statement, ast.Assign):
+            found.update(item.id for target in statement.targets for item in _parts(target) if isinstance(item, ast.Name))
+        elif isinstance(statement, ast.AugAssign | ast.For):
+            found.update(item.id for item in _parts(statement.target) if isinstance(item, ast.Name))
+        if isinstance(statement, ast.If | ast.For | ast.While):
+            found |= _changed(statement.body) | _changed(statement.orelse)
+    return found
+
+
+def _parts(target: ast.expr) -> list[ast.expr]:
+    """What is on the left of an assignment, one by one."""
+    return target.elts if isinstance(target, ast.Tuple) else [target]
