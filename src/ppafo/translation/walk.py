@@ -350,7 +350,9 @@ def _changed(body: Iterable[ast.stmt]) -> set[str]:
     found: set[str] = set()
     for statement in body:
         if isinstance(statement, ast.Assign):
-            found.update(item.id for target in statement.targets for item in _parts(target) if isinstance(item, ast.Name))
+            found.update(
+                item.id for target in statement.targets for item in _parts(target) if isinstance(item, ast.Name)
+            )
         elif isinstance(statement, ast.AugAssign | ast.For):
             found.update(item.id for item in _parts(statement.target) if isinstance(item, ast.Name))
         if isinstance(statement, ast.If | ast.For | ast.While):

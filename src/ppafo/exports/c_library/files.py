@@ -11,7 +11,7 @@ from importlib.resources import files
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
-from ppafo.exports.c_library.program import COUNTS, ExportedProgram, Further, c_text
+from ppafo.exports.c_library.program import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further, c_text
 from ppafo.model.declaration import Quantity
 from ppafo.version import __version__
 
@@ -122,6 +122,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "version": __version__,
         "never": repr(NEVER_FAILED),
         "same_moment": repr(SAME_MOMENT),
+        "advance": f"(run->needs_parts == 1 ? {IN_PARTS} : {WHOLE})" if program.chooses_parts else WHOLE,
         "signal_rows": str(SIGNAL_ROWS),
         "state_count": str(len(states)),
         "parameter_count": str(len(parameters)),
