@@ -32,7 +32,14 @@ OUTPUTS = {
     "leaked_mass": ("kg", "gas past the vane so far"),
 }
 """Unit and meaning of what can be read at each sample."""
-ONE_LANE = "/* Loops over lanes have one turn here. */\n#define PPAFO_SIDE_BY_SIDE\n"
+_ALONE = """#if !defined(PPAFO_ENTRY)
+#define PPAFO_ENTRY static
+#endif
+/* Loops over lanes have one turn here. */
+#define PPAFO_SIDE_BY_SIDE
+
+"""
+"""What the functions are told that stand in the file of a library."""
 UNITS = {"Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
 _SIGNS = {"below": "<", "at most": "<=", "at least": ">="}
 _MARK = re.compile(r"@(\w+)@")
@@ -96,7 +103,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     words = _words(library, name)
     texts = {target.format(name=name): _filled(source, words) for source, target in _FILES.items()}
     texts["LICENSE"] = _filled("LICENSE", {})
-    head = f'#include "{name}.h"\n\n#include <string.h>\n\n#if !defined(PPAFO_ENTRY)\n#define PPAFO_ENTRY static\n#endif\n{ONE_LANE}'
+    head = f'#include "{name}.h"\n\n#include <string.h>\n\n{_ALONE}'
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
     functions = c_text(program, title, [item.name for item in library.settings], library.further)
     texts[f"{name}.c"] = f"{head}{functions}\n{_filled('interface.c', words)}"
