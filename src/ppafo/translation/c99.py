@@ -68,17 +68,19 @@ def c_source(
     """A translation unit with all functions of a module.
 
     ``documents`` has the docstrings of rows and functions; ``places`` has names for the first places of some arrays,
-    which the file around it defines.
+    which the file around it defines, ``x`` for those of all functions, ``advance.x`` for that of one.
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
     functions = [item for item in module.functions if item.returns is None or not is_empty(item.returns)]
     writer = _Writer(documents, {item.name for item in functions}, places or {})
     prelude = files("ppafo.translation").joinpath("prelude.h").read_text(encoding="utf-8")
-    for item in functions:
-        writer.function(item)
-    # Written again now that all structs have their names, which no local name may hide.
-    writer.outer |= {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
     bodies = [writer.function(item) for item in functions]
+    # Now all structs have their names, which no local name may hide: what has one is written again.
+    structs = {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
+    writer.outer |= structs
+    for place, item in enumerate(functions):
+        if writer.locals[item.name] & structs:
+            bodies[place] = writer.function(item)
     return "\n".join([_comment(title), prelude, *writer.structs, *bodies])
 
 
@@ -99,7 +101,16 @@ class _Writer:
     places: Mapping[str, Sequence[str]]
     structs: list[str] = field(default_factory=list)
     names: dict[Type, str] = field(default_factory=dict)
+    locals: dict[str, set[str]] = field(default_factory=dict)
     owner: str = ""
+
+    def places_in(self, function: str) -> Mapping[str, Sequence[str]]:
+        """Names for the first places of the arrays of a function."""
+        own = f"{function}."
+        return {
+            **self.places,
+            **{key.removeprefix(own): names for key, names in self.places.items() if key.startswith(own)},
+        }
 
     def type_name(self, kind: Type) -> str:
         """Name of a type in C; a struct is written where it is met first."""
@@ -158,6 +169,7 @@ class _Writer:
         self.owner = item.source
         writer = _Body(self, item, scopes_of(item))
         body = writer.text()
+        self.locals[item.name] = writer.used
         returns = "void" if item.returns is None else self.type_name(item.returns)
         given = ", ".join(f"{self.type_name(kind)}{TIED}{writer.name(name)}" for name, kind in item.parameters)
         linkage = "PPAFO_ENTRY void" if item.returns is None else f"PPAFO_INLINE {returns}"
@@ -173,14 +185,19 @@ class _Body:
 
     def __init__(self, writer: _Writer, item: Function, scopes: Scopes) -> None:
         self.writer = writer
-        self.terms = CTerms(writer.type_name, self.name, writer.places)
+        self.terms = CTerms(writer.type_name, self.name, writer.places_in(item.source))
         self.item = item
         self.scopes = scopes
         self.kinds: dict[str, Type] = dict(item.parameters) | scopes.types
+        self.written: dict[str, str] = {}
+        self.used: set[str] = set()
 
     def name(self, name: str) -> str:
         """A local name in C: no two of a function are the same, and none hides what the file has."""
-        return c_name(name, self.kinds, self.writer.outer)
+        if name not in self.written:
+            self.written[name] = c_name(name, self.kinds, self.writer.outer)
+            self.used.add(self.written[name])
+        return self.written[name]
 
     def text(self) -> list[str]:
         unused = [name for name, _ in self.item.parameters if name not in self.scopes.read]
@@ -246,6 +263,7 @@ class _Body:
         counter = name if is_own else f"{name}_next"
         while not is_own and counter in {*map(self.name, self.kinds), *self.writer.outer}:
             counter += "_"
+        self.used.add(counter)
         sign, change = ("<", f"++{counter}") if item.step == 1 else (">", f"{counter} += {item.step}")
         sign = "<" if item.step > 0 else ">"
         start, stop = self.terms.term(item.start), self.terms.term(item.stop, 6)

@@ -15,7 +15,7 @@ from ppafo.engine.plain_python import refusal
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
 from ppafo.translation.expressions import Expressions
-from ppafo.translation.scopes import counters, needed
+from ppafo.translation.scopes import Names, changed, needed
 from ppafo.translation.typed import (
     BOOL,
     FLOAT,
@@ -72,6 +72,7 @@ class _ModuleWalk:
     done: dict[tuple[str, tuple[Type, ...]], Function] = field(default_factory=dict)
     open: set[tuple[str, tuple[Type, ...]]] = field(default_factory=set)
     names: set[str] = field(default_factory=set)
+    found: dict[str, Names] = field(default_factory=dict)
     module: Module = field(default_factory=Module)
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
@@ -108,14 +109,14 @@ class _FunctionWalk:
         self.module = module
         self.definition = definition
         self.types: dict[str, Type] = {}
-        nodes = list(ast.walk(definition))
-        self.names = {node.id for node in nodes if isinstance(node, ast.Name)}
-        self.names |= {node.arg for node in nodes if isinstance(node, ast.arg)}
-        self.read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+        if definition.name not in module.found:
+            module.found[definition.name] = Names.of(definition)
+        found = module.found[definition.name]
+        self.names, self.read = found.every, found.read
         self.made: set[str] = set()
         self.values = Expressions(
             self.types,
-            counters(definition),
+            found.counters,
             module.rows,
             module.definitions,
             made=module.function,
@@ -210,7 +211,7 @@ class _FunctionWalk:
             raise self.refused(node, f"'{ast.unparse(call)}' goes nowhere")
         self.note_type(name, INT, node)
         before: list[Statement] = []
-        if stop.reads & {name, *_changed(node.body)}:
+        if stop.reads & {name, *changed(node.body)}:
             # Python asks for the end of a range once.
             end = self.fresh(f"{name}_stop", INT)
             before, stop = [self.assign(end, stop, node)], Term("name", INT, (), end)
@@ -222,7 +223,7 @@ class _FunctionWalk:
         owner = self.values.term(whole)
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
             raise self.refused(node, f"'{ast.unparse(node.iter)}' is no tuple of one type")
-        if owner.reads & {name, *_changed(node.body)}:
+        if owner.reads & {name, *changed(node.body)}:
             raise self.refused(node, f"a loop over '{ast.unparse(node.iter)}' that changes it")
         places = range(len(owner.type.types))
         if isinstance(node.iter, ast.Subscript):
@@ -311,8 +312,7 @@ class _FunctionWalk:
         if len(names) != len(target.elts) or length != len(names):
             raise self.refused(node, f"'{ast.unparse(target)}' does not fit what is on the right")
         before: list[Statement] = []
-        read = {item.id for item in ast.walk(node.value) if isinstance(item, ast.Name)}
-        if value.kind != "build" or read & set(names):
+        if value.kind != "build" or value.reads & set(names):
             whole = self.fresh("_and_".join(name for name in names if name != "_") or "items", kind)
             before = [self.assign(whole, value, node)]
             value = Term("name", self.types[whole], (), whole)
@@ -325,9 +325,3 @@ class _FunctionWalk:
 def _is_empty_array(node: ast.Call) -> bool:
     """True for ``np.empty(...)``."""
     return isinstance(node.func, ast.Attribute) and node.func.attr == "empty"
-
-
-def _changed(body: Sequence[ast.stmt]) -> set[str]:
-    """Names that some statements give values."""
-    nodes = (node for statement in body for node in ast.walk(statement))
-    return {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
