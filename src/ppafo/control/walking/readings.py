@@ -77,17 +77,17 @@ QUICK_PERIOD = 0.005
 SQUEEZING_ANGLE = 2.09
 """Ankle angle [rad] from which a foot may squeeze a full chamber 2 to any pressure: 30 deg in plantarflexion."""
 
-TURNED_UP = 0.035
-"""Angle [rad] by which a foot has turned up when a strike is seen that is in doubt: 2 deg, which takes some 40 ms."""
+TURNED_UP = 0.052
+"""Angle [rad] by which a foot has turned up when a strike is seen that is in doubt: 3 deg, 1 more than of any wearer."""
 
-SETTLES = 0.026
-"""Angle [rad], 1.5 deg: a foot that turns down by more lands now, one that turns up by more is flat."""
+TURNS_DOWN, IS_FLAT = 0.01, 0.026
+"""Angles [rad]: a foot that turns down by more lands now, one that turns up by more until the toes load is flat."""
 
 LATE_STRIDES = 1.5
 """More strides in a row than this are late: the last step of a walk may be flat too."""
 
-RISES, LASTS = 1.4e4, 4.0e-3
-"""Pressure [Pa], above two steps of a converter of 1 psi, and time [s] of a rise that is not noise."""
+RISES, LASTS = 1.2e4, 3.0e-3
+"""Pressure [Pa], more than one step of a converter of 1 psi, and time [s], of a rise that is not noise."""
 
 COMPRESSES = 0.02
 """Angle in plantarflexion [rad] from which the ankle compresses chamber 2 by enough to raise its pressure."""
@@ -192,12 +192,12 @@ def next_landing(
     strikes = (before.phase == SWING) & (phase.phase == LANDING)
     turned_up = max(last.highest, readings.slow_angle) - angle > TURNED_UP
     in_doubt = (angle if turned_up & (steady > 0.5) else 0.0) if strikes else last.in_doubt
-    is_late = (before.phase == LANDING) & (last.in_doubt - angle > SETTLES)
+    is_late = (before.phase == LANDING) & (last.in_doubt - angle > IS_FLAT)
     flat = lifts(before.phase) & (phase.phase == MID_STANCE)
     return Landing(
         lowest=angle if lower else last.lowest,
         highest=angle if lower else highest,
-        in_doubt=0.0 if angle > in_doubt + SETTLES else in_doubt,
+        in_doubt=0.0 if angle > in_doubt + TURNS_DOWN else in_doubt,
         late=(last.late + 1.0 if is_late else 0.0) if flat else last.late,
     )
 
