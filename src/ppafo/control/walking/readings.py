@@ -77,8 +77,8 @@ QUICK_PERIOD = 0.005
 SQUEEZING_ANGLE = 2.09
 """Ankle angle [rad] from which a foot may squeeze a full chamber 2 to any pressure: 30 deg in plantarflexion."""
 
-TURNED_UP = 0.052
-"""Angle [rad] by which a foot has turned up when a strike is seen that is in doubt: 3 deg, 1 more than of any wearer."""
+TURNED_UP = 0.07
+"""Angle [rad] by which a foot has turned up when a strike is seen that is in doubt: 4 deg; of some wearers it is 3."""
 
 TURNS_DOWN, IS_FLAT = 0.01, 0.026
 """Angles [rad]: a foot that turns down by more lands now, one that turns up by more until the toes load is flat."""
@@ -88,6 +88,9 @@ LATE_STRIDES = 1.5
 
 RISES, LASTS = 1.2e4, 3.0e-3
 """Pressure [Pa], more than one step of a converter of 1 psi, and time [s], of a rise that is not noise."""
+
+SHOWN = 0.1
+"""Time [s] after ``follow_time`` in which a vented chamber is watched: a foot that then moves pumps gas about."""
 
 COMPRESSES = 0.02
 """Angle in plantarflexion [rad] from which the ankle compresses chamber 2 by enough to raise its pressure."""
@@ -221,7 +224,8 @@ def next_emptying(
     """
     pressure, angle = measurement.pressure_2, measurement.angle
     lower = (vented <= rules.follow_time) | (pressure < last.lowest)
-    rises = (pressure > last.lowest + RISES) & (angle < min(last.angle + COMPRESSES, SQUEEZING_ANGLE))
+    rises = (pressure > max(last.lowest + RISES, rules.filled_pressure)) & (vented < rules.follow_time + SHOWN)
+    rises = rises & (angle < min(last.angle + COMPRESSES, SQUEEZING_ANGLE))
     return Emptying(
         lowest=pressure if lower else last.lowest,
         angle=angle if lower else last.angle,

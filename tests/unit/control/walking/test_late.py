@@ -52,7 +52,7 @@ def test_forces_in_time_are_no_sign(late: float) -> None:
     assert {state.level for state in states} == {signs.HELPS}
 
 
-@pytest.mark.parametrize("late", [0.08, 0.1, 0.15, 0.2])
+@pytest.mark.parametrize("late", [0.1, 0.15, 0.2])
 def test_who_is_flat_before_the_heel_is_seen_is_lifted_and_not_pushed_after_two_strides(late: float) -> None:
     states = watched([0.0] * BEGINS + [late] * 5)
     levels = np.array([state.level for state in states])
@@ -110,6 +110,14 @@ def test_a_vented_chamber_whose_pressure_rises_stops(late: float, command: float
 @pytest.mark.parametrize("noise", [0.0, 2.0e3])
 def test_a_pressure_in_time_falls_with_noise_too(late: float, noise: float) -> None:
     assert emptied(late, noise=noise).level == signs.HELPS
+
+
+def test_a_foot_that_moves_long_after_pumps_gas_into_a_vented_chamber() -> None:
+    state, low, high = emptied(0.0), 0.95e5, 1.4e5
+    for shown in (low, *(high,) * 9):
+        seen = GaitMeasurement(1.5, 1.02e5, shown, 0.0, 0.0, 0.0)
+        state = safety.monitor(RULES, state, IN_THE_AIR, IN_THE_AIR, seen, PERIOD)
+    assert state.level == signs.HELPS
 
 
 def test_an_ankle_that_compresses_the_chamber_may_raise_its_pressure() -> None:
