@@ -86,7 +86,7 @@ TURNS_DOWN, IS_FLAT = 0.01, 0.026
 LATE_STRIDES = 1.5
 """More strides in a row than this are late: the last step of a walk may be flat too."""
 
-RISES, LASTS = 1.2e4, 3.0e-3
+RISES, LASTS = 1.2e4, 2.5e-3
 """Pressure [Pa], more than one step of a converter of 1 psi, and time [s], of a rise that is not noise."""
 
 SHOWN = 0.1
