@@ -116,6 +116,8 @@ def pairs() -> dict[str, Kind]:
     """Two sensors at once."""
     swap, slow = wrong(crosstalk=1.0), wrong(lag=0.106)
     return {
+        "heel and toe 50 ms late": {"heel": late(50.0), "toe": late(50.0)},
+        "heel and toe 200 ms late": {"heel": late(200.0), "toe": late(200.0)},
         "heel and toe 100 ms late": {"heel": late(100.0), "toe": late(100.0)},
         "pressures 50 ms late": {"pressure_1": late(50.0), "pressure_2": late(50.0)},
         "heel and toe swapped": {"heel": swap, "toe": swap},

@@ -110,7 +110,7 @@ def load_walk(
         gait=walked,
         wearer=read_wearer(reading, walked, is_named),
         controller=kind,
-        settings=reading.section("controller", law.quantities) | _timing_settings(reading, device, gait_sensors),
+        settings=_controller_settings(reading, law, device) | _timing_settings(reading, device, gait_sensors),
         sensors=_sensors(reading),
         gait_sensors=gait_sensors,
         period=_period(reading),
@@ -172,6 +172,24 @@ def _timed(law: ControllerKind, reading: Reading) -> ControllerKind:
         return with_timing(law, TIMINGS[_timing_kind(dict(reading.document))])
     except ScenarioError as error:
         raise ScenarioError(f"{reading.file}: {error}") from error
+
+
+def _controller_settings(reading: Reading, law: ControllerKind, device: Device) -> dict[str, float]:
+    """Return the settings of the controller [SI]; the lags of valve and pressure sensors add to ``follow_time``."""
+    valve = device.valve.settings
+    lag = walking_valve(device.valve).command_delay(valve)
+    lag += valve.get("closing_delay", 0.0) + valve.get("switching_interval", 0.0)
+    if valve.get("spool_frequency", 0.0) > 0.0:
+        lag += 2.0 * valve["spool_damping_ratio"] / (_TURN * valve["spool_frequency"])
+    if valve.get("slew_limit", 0.0) > 0.0:
+        lag += 1.0 / valve["slew_limit"]
+    if value_at(reading.document, f"sensors.{PRESSURE_BANDWIDTH.name}") is not None:
+        lag += 1.0 / (_TURN * reading.number(f"sensors.{PRESSURE_BANDWIDTH.name}", PRESSURE_BANDWIDTH))
+    known = (
+        replace(item, default=(item.default or 0.0) + lag) if item.name == "follow_time" else item
+        for item in law.quantities
+    )
+    return reading.section("controller", tuple(known))
 
 
 def _timing_settings(reading: Reading, device: Device, sensors: GaitSensors) -> dict[str, float]:

@@ -33,3 +33,11 @@ def test_a_late_heel_sensor_shows_the_next_strike_as_much_later() -> None:
         # The heel is on the ground when the fault begins: the first strike after it is that of the next stride.
         strikes.append(float(times[times > BEGINS + 0.3][0]))
     assert strikes[1] - strikes[0] == pytest.approx(LATE - 0.001, abs=0.0051)
+
+
+def test_what_is_known_of_valve_and_sensors_may_delay_a_pressure() -> None:
+    given = ["valve.delay=2 ms", "valve.spool_frequency=20 Hz", "sensors.pressure_bandwidth=50 Hz"]
+    lags = 2.0e-3 + 2.0 * 0.7 / (2.0 * np.pi * 20.0) + 1.0 / (2.0 * np.pi * 50.0)
+    ideal, slow = load_walk("proportional"), load_walk("proportional", given)
+    assert slow.settings["follow_time"] - ideal.settings["follow_time"] == pytest.approx(lags)
+    assert load_walk("proportional", [*given, "controller.follow_time=9 ms"]).settings["follow_time"] == 9.0e-3

@@ -40,6 +40,14 @@ SAFETY_QUANTITIES = (
     Quantity("largest_drop", "N", "no force as large as this is gone within a sample", 300.0, 10.0, 1.0e5),
     Quantity("lowest_flat_angle", "rad", "no ankle has less while the foot must stand flat", 1.22, -10.0, 10.0),
     Quantity("highest_flat_angle", "rad", "no ankle has more while the foot must stand flat", 1.92, -10.0, 10.0),
+    Quantity(
+        "follow_time",
+        "s",
+        "a pressure follows the valve within this, and the lags of valve and sensor",
+        8.0e-3,
+        0.0,
+        1.0,
+    ),
 )
 
 HOLD_QUANTITIES = (

@@ -1,4 +1,7 @@
-"""Signs in the readings of forces and angle as such: out of range, gone at once, or the same while others move.
+"""Signs in the readings as such: out of range, gone at once, the same while others move, or late.
+
+Where forces come late the ankle tells. A foot on its heel turns down until it is flat, and up from then on: one that
+has turned up before the heel is seen, and does so until the toes are, was on the ground long before.
 
 Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
 """
@@ -6,7 +9,7 @@ Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep
 from typing import NamedTuple
 
 from ppafo.control.walking import signs
-from ppafo.control.walking.phases import MID_STANCE, SWING, PhaseState, lifts
+from ppafo.control.walking.phases import LANDING, MID_STANCE, SWING, PhaseState, lifts
 from ppafo.control.walking.signs import NO_SIGN, SafetyRules
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -25,6 +28,28 @@ class LastReadings(NamedTuple):
     slow_angle: float
 
 
+class Landing(NamedTuple):
+    """Lowest ankle angle of this swing and the highest since [rad], that of a strike in doubt, late ones in a row.
+
+    The angle of a strike is 0 where the foot lands in time.
+    """
+
+    lowest: float
+    highest: float
+    in_doubt: float
+    late: float
+
+
+class Emptying(NamedTuple):
+    """Lowest pressure of chamber 2 since it was joined to the atmosphere [Pa], angle then [rad], how long above [s]."""
+
+    lowest: float
+    angle: float
+    rising: float
+
+
+AIRBORNE = Landing(lowest=0.0, highest=0.0, in_doubt=0.0, late=0.0)
+NOT_EMPTYING = Emptying(lowest=0.0, angle=0.0, rising=0.0)
 NOTHING_READ = LastReadings(
     heel_force=0.0,
     toe_force=0.0,
@@ -51,6 +76,30 @@ QUICK_PERIOD = 0.005
 
 SQUEEZING_ANGLE = 2.09
 """Ankle angle [rad] from which a foot may squeeze a full chamber 2 to any pressure: 30 deg in plantarflexion."""
+
+TURNED_UP = 0.07
+"""Angle [rad] by which a foot has turned up when a strike is seen that is in doubt: 4 deg; of some wearers it is 3."""
+
+TURNS_DOWN, IS_FLAT = 0.01, 0.026
+"""Angles [rad]: a foot that turns down by more lands now, one that turns up by more until the toes load is flat."""
+
+LATE_STRIDES = 1.5
+"""More strides in a row than this are late: the last step of a walk may be flat too."""
+
+RISES, LASTS = 1.2e4, 2.5e-3
+"""Pressure [Pa], more than one step of a converter of 1 psi, and time [s], of a rise that is not noise."""
+
+SHOWN = 0.1
+"""Time [s] after ``follow_time`` in which a vented chamber is watched: a foot that then moves pumps gas about."""
+
+COMPRESSES = 0.02
+"""Angle in plantarflexion [rad] from which the ankle compresses chamber 2 by enough to raise its pressure."""
+
+FALL_TIME = 0.03
+"""Time constant [s] of the slow pressures, which tell whether a reading falls."""
+
+FALLS = 0.03
+"""A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.1."""
 
 HALF = 0.5
 """A stride of less than this fraction of the stride time, or of more than its inverse, is not a good one."""
@@ -131,3 +180,54 @@ def still_sign(rules: SafetyRules, readings: LastReadings, before: PhaseState, p
     found = signs.FROZEN_ANGLE if angle & whole & (readings.angle_unchanged > before.since_strike) else found
     found = signs.FROZEN_TOE if toe & (phase.heel.loaded != before.heel.loaded) else found
     return signs.FROZEN_HEEL if heel & (phase.toe.loaded != before.toe.loaded) else found
+
+
+def next_landing(
+    last: Landing, readings: LastReadings, before: PhaseState, phase: PhaseState, steady: float
+) -> Landing:
+    """The landing after a sample; a strike is in doubt where the foot has turned up already, in a ``steady`` walk (1).
+
+    A foot that is lifted turns up in the air too, but down again on its heel.
+    """
+    angle, swings = readings.angle, phase.phase == SWING
+    lower = swings & ((before.phase != SWING) | (angle < last.lowest))
+    highest = max(last.highest, angle) if swings else last.highest
+    strikes = (before.phase == SWING) & (phase.phase == LANDING)
+    turned_up = max(last.highest, readings.slow_angle) - angle > TURNED_UP
+    in_doubt = (angle if turned_up & (steady > 0.5) else 0.0) if strikes else last.in_doubt
+    is_late = (before.phase == LANDING) & (last.in_doubt - angle > IS_FLAT)
+    flat = lifts(before.phase) & (phase.phase == MID_STANCE)
+    return Landing(
+        lowest=angle if lower else last.lowest,
+        highest=angle if lower else highest,
+        in_doubt=0.0 if angle > in_doubt + TURNS_DOWN else in_doubt,
+        late=(last.late + 1.0 if is_late else 0.0) if flat else last.late,
+    )
+
+
+def next_slow_pressure(last: float, pressure: float, period: float) -> float:
+    """Slow pressure [Pa] after a sample, taken every ``period`` [s]."""
+    return last + (pressure - last) * period / (period + FALL_TIME)
+
+
+def holds_pressure(rules: SafetyRules, pressure: float, slow: float) -> bool:
+    """True where a vented chamber shows a pressure [Pa] that does not fall."""
+    return (pressure > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
+
+
+def next_emptying(
+    rules: SafetyRules, last: Emptying, vented: float, measurement: GaitMeasurement, period: float
+) -> Emptying:
+    """Chamber 2 after a sample of ``period`` [s], joined to the atmosphere for ``vented`` [s].
+
+    It has no source then, and only the ankle could compress it: a pressure that rises shows what was before.
+    """
+    pressure, angle = measurement.pressure_2, measurement.angle
+    lower = (vented <= rules.follow_time) | (pressure < last.lowest)
+    rises = (pressure > max(last.lowest + RISES, rules.filled_pressure)) & (vented < rules.follow_time + SHOWN)
+    rises = rises & (angle < min(last.angle + COMPRESSES, SQUEEZING_ANGLE))
+    return Emptying(
+        lowest=pressure if lower else last.lowest,
+        angle=angle if lower else last.angle,
+        rising=last.rising + period if rises & (not lower) else 0.0,
+    )

@@ -17,7 +17,17 @@ from typing import NamedTuple
 
 from ppafo.control.walking import readings, signs
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState
-from ppafo.control.walking.readings import HALF, NOTHING_READ, LastReadings
+from ppafo.control.walking.readings import (
+    AIRBORNE,
+    HALF,
+    LASTS,
+    LATE_STRIDES,
+    NOT_EMPTYING,
+    NOTHING_READ,
+    Emptying,
+    Landing,
+    LastReadings,
+)
 from ppafo.control.walking.signs import HELPS, LIFTS, NO_SIGN, PAUSED, STOPPED, SafetyRules
 from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.gait_sensors import GaitMeasurement
@@ -66,10 +76,12 @@ class SafetyState(NamedTuple):
     ventings: float
     finding: Finding
     readings: LastReadings
+    landing: Landing
     stance: Stance
     toe_strides: float
     steady: float
     valve_times: ValveTimes
+    emptying: Emptying
     slow_pressure_1: float
     slow_pressure_2: float
 
@@ -80,10 +92,12 @@ START = SafetyState(
     ventings=0.0,
     finding=Finding(sign=NO_SIGN, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0),
     readings=NOTHING_READ,
+    landing=AIRBORNE,
     stance=Stance(heel_seen=0.0, toe_seen=0.0, together=0.0, apart=0.0),
     toe_strides=0.0,
     steady=0.0,
     valve_times=ValveTimes(0.0, 0.0, 0.0),
+    emptying=NOT_EMPTYING,
     slow_pressure_1=0.0,
     slow_pressure_2=0.0,
 )
@@ -96,12 +110,6 @@ STANDS_UP = 0.5
 
 STEADY = 0.1
 """A stride that is longer or shorter than the stride time by less than this fraction of it is a usual one."""
-
-FALL_TIME = 0.03
-"""Time constant [s] of the slow pressures, which tell whether a reading falls."""
-
-FALLS = 0.03
-"""A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.1."""
 
 LATE = 1.3
 """Times ``vent_time`` after which chamber 2 shows no pressure: from 90 psig it takes that time itself."""
@@ -149,38 +157,22 @@ def steady_sign(rules: SafetyRules, before: PhaseState, phase: PhaseState, angle
     return signs.NOT_FLAT if flat & (phase.toe.loaded < 0.5) else found
 
 
-def next_slow_pressure(last: float, pressure: float, period: float) -> float:
-    """Slow pressure [Pa] after a sample, taken every ``period`` [s]."""
-    return last + (pressure - last) * period / (period + FALL_TIME)
-
-
-def holds_pressure(rules: SafetyRules, pressure: float, slow: float) -> bool:
-    """True where a vented chamber shows a pressure [Pa] that does not fall."""
-    return (pressure > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
-
-
-def valve_sign(
-    rules: SafetyRules,
-    valve_times: ValveTimes,
-    slow_pressure_1: float,
-    slow_pressure_2: float,
-    phase: PhaseState,
-    measurement: GaitMeasurement,
-) -> float:
+def valve_sign(rules: SafetyRules, now: SafetyState, phase: PhaseState, measurement: GaitMeasurement) -> float:
     """The sign of a pressure that is not what the valve was told long enough.
 
     A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat. There
     the ankle compresses chamber 1, which may vent for longer than ``vent_time`` through a narrow valve, but does vent.
-    Chamber 2 grows then: a pressure that is still seen in it comes late.
+    Chamber 2 grows then: a pressure that is still seen in it comes late. So does one that rises once it is vented.
     """
+    valve_times = now.valve_times
     no_rise_1 = (valve_times.filling_1 > rules.fill_time) & (measurement.pressure_1 < rules.filled_pressure)
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
-    left = holds_pressure(rules, measurement.pressure_1, slow_pressure_1)
-    left = left | holds_pressure(rules, measurement.pressure_2, slow_pressure_2)
+    left = readings.holds_pressure(rules, measurement.pressure_1, now.slow_pressure_1)
+    left = left | readings.holds_pressure(rules, measurement.pressure_2, now.slow_pressure_2)
     late = (valve_times.venting > LATE * rules.vent_time) & (measurement.pressure_2 > rules.filled_pressure)
     no_fall = stands & ((valve_times.venting > rules.vent_time) & left | late)
-    found = signs.NO_FALL if no_fall else NO_SIGN
+    found = signs.NO_FALL if no_fall | (now.emptying.rising > LASTS) else NO_SIGN
     return signs.NO_RISE if no_rise_1 | no_rise_2 else found
 
 
@@ -213,6 +205,58 @@ def level_after(rules: SafetyRules, state: SafetyState, good_strides: float, tog
     return HELPS if resumes | (resting & (together > STANDS_UP)) else lifted
 
 
+def remembered(
+    rules: SafetyRules,
+    state: SafetyState,
+    before: PhaseState,
+    phase: PhaseState,
+    measurement: GaitMeasurement,
+    period: float,
+) -> SafetyState:
+    """The state with what the signs remember of a sample of ``period`` [s]; the level is as it was."""
+    seen = readings.next_readings(state.readings, measurement, period)
+    enters = (before.phase == SWING) & (phase.phase != SWING)
+    on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
+    usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
+    steady = (1.0 if usual else 0.0) if enters else state.steady
+    vented = state.valve_times.filling_1 + state.valve_times.venting
+    return SafetyState(
+        level=state.level,
+        good_strides=state.good_strides,
+        ventings=state.ventings,
+        finding=state.finding,
+        readings=seen,
+        landing=readings.next_landing(state.landing, seen, before, phase, steady),
+        stance=next_stance(state.stance, before, phase, period),
+        toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
+        steady=steady,
+        valve_times=state.valve_times,
+        emptying=readings.next_emptying(rules, state.emptying, vented, measurement, period),
+        slow_pressure_1=readings.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
+        slow_pressure_2=readings.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
+    )
+
+
+def found_sign(
+    rules: SafetyRules,
+    last: LastReadings,
+    now: SafetyState,
+    before: PhaseState,
+    phase: PhaseState,
+    measurement: GaitMeasurement,
+    period: float,
+) -> float:
+    """The sign of a sample that comes first in ``signs``; ``last`` are the readings before it, ``now`` remembers it."""
+    sign = signs.LATE_FORCES if now.landing.late > LATE_STRIDES else NO_SIGN
+    sign = signs.TOE_STRIDES if now.toe_strides > rules.most_toe_strides else sign
+    sign = first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if now.steady > 0.5 else sign
+    sign = first_sign(gait_sign(rules, before, phase, now.stance), sign)
+    sign = first_sign(readings.still_sign(rules, now.readings, before, phase), sign)
+    sign = first_sign(readings.gone_sign(rules, last, measurement, period), sign)
+    sign = first_sign(readings.range_sign(rules, measurement), sign)
+    return first_sign(valve_sign(rules, now, phase, measurement), sign)
+
+
 def monitor(
     rules: SafetyRules,
     state: SafetyState,
@@ -222,37 +266,25 @@ def monitor(
     period: float,
 ) -> SafetyState:
     """The state after a sample of ``period`` [s]; ``before`` and ``phase`` are the phases before and after it."""
-    seen = readings.next_readings(state.readings, measurement, period)
-    stance = next_stance(state.stance, before, phase, period)
-    enters = (before.phase == SWING) & (phase.phase != SWING)
-    on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
-    toe_strides = (state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides
-    usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
-    steady = (1.0 if usual else 0.0) if enters else state.steady
-    slow_pressure_1 = next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period)
-    slow_pressure_2 = next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period)
-    sign = signs.TOE_STRIDES if toe_strides > rules.most_toe_strides else NO_SIGN
-    sign = first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if steady > 0.5 else sign
-    sign = first_sign(gait_sign(rules, before, phase, stance), sign)
-    sign = first_sign(readings.still_sign(rules, seen, before, phase), sign)
-    sign = first_sign(readings.gone_sign(rules, state.readings, measurement, period), sign)
-    sign = first_sign(readings.range_sign(rules, measurement), sign)
-    sign = first_sign(valve_sign(rules, state.valve_times, slow_pressure_1, slow_pressure_2, phase, measurement), sign)
+    now = remembered(rules, state, before, phase, measurement, period)
+    sign = found_sign(rules, state.readings, now, before, phase, measurement, period)
     good_strides = next_good_strides(state, before, phase, sign)
-    level = max(level_after(rules, state, good_strides, stance.together), signs.level_of(sign))
+    level = max(level_after(rules, state, good_strides, now.stance.together), signs.level_of(sign))
     vents = level > state.level
     return SafetyState(
         level=level,
         good_strides=good_strides,
         ventings=state.ventings + (1.0 if vents else 0.0),
         finding=later_finding(vents, sign, measurement, state.finding),
-        readings=seen,
-        stance=stance,
-        toe_strides=toe_strides,
-        steady=steady,
-        valve_times=state.valve_times,
-        slow_pressure_1=slow_pressure_1,
-        slow_pressure_2=slow_pressure_2,
+        readings=now.readings,
+        landing=now.landing,
+        stance=now.stance,
+        toe_strides=now.toe_strides,
+        steady=now.steady,
+        valve_times=now.valve_times,
+        emptying=now.emptying,
+        slow_pressure_1=now.slow_pressure_1,
+        slow_pressure_2=now.slow_pressure_2,
     )
 
 
@@ -295,10 +327,12 @@ def safe_command(state: SafetyState, phase: float, command: float, period: float
         ventings=state.ventings,
         finding=state.finding,
         readings=state.readings,
+        landing=state.landing,
         stance=state.stance,
         toe_strides=state.toe_strides,
         steady=state.steady,
         valve_times=valve_times,
+        emptying=state.emptying,
         slow_pressure_1=state.slow_pressure_1,
         slow_pressure_2=state.slow_pressure_2,
     )

@@ -34,6 +34,7 @@ FLAT_ANGLE = 17.0
 SHORT_SWING = 18.0
 NO_HEEL = 19.0
 TOE_STRIDES = 20.0
+LATE_FORCES = 21.0
 
 FORCES = ("heel_force", "toe_force")
 PRESSURES = ("pressure_1", "pressure_2")
@@ -66,6 +67,7 @@ class SafetyRules(NamedTuple):
     largest_drop: float
     lowest_flat_angle: float
     highest_flat_angle: float
+    follow_time: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +96,7 @@ SIGNS: dict[float, Sign] = {
         "no_fall",
         "a vented chamber that shows a pressure which does not fall",
         PRESSURES,
-        ("filled_pressure", "vent_time"),
+        ("filled_pressure", "vent_time", "follow_time"),
     ),
     FROZEN_HEEL: Sign("frozen_heel", "a heel force that stays the same while the toes move", FORCES, ("frozen_time",)),
     FROZEN_TOE: Sign("frozen_toe", "a toe force that stays the same while the heel moves", FORCES, ("frozen_time",)),
@@ -128,6 +130,9 @@ SIGNS: dict[float, Sign] = {
         "no_heel", "a foot that must stand flat and does not load the heel", FORCES, ("flat_from", "flat_to")
     ),
     TOE_STRIDES: Sign("toe_strides", "strides on the toes alone, one after the other", FORCES, ("most_toe_strides",)),
+    LATE_FORCES: Sign(
+        "late_forces", "two strides in which the ankle shows the foot flat before the forces do", (*FORCES, "angle"), ()
+    ),
 }
 """Every sign by its number: those up to ``FORCE_GONE`` stop, from ``NO_HEEL`` on the foot is lifted only."""
 
