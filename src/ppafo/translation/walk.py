@@ -40,17 +40,30 @@ _ARRAY = re.compile(r"float64\[(.*?)\]|int64|float64")
 
 def walk_module(source: str) -> Module:
     """All functions of a composed module that its entries need. ProgramError for what is outside the subset."""
+    walk = _read(source)
+    for name, node in walk.definitions.items():
+        types = _entry_types(node)
+        if types is not None:
+            walk.function(name, types)
+    return walk.module
+
+
+def walk_function(source: str, name: str, types: tuple[Type, ...]) -> Module:
+    """One function of a composed module for some types of its parameters, and what it calls; it comes last."""
+    walk = _read(source)
+    walk.function(name, types)
+    return walk.module
+
+
+def _read(source: str) -> "_ModuleWalk":
+    """Rows and functions of a composed module, before any is walked."""
     walk = _ModuleWalk(source.split("\n"))
     for node in ast.parse(source).body:
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and isinstance(node.targets[0], ast.Name):
             walk.rows[node.targets[0].id] = ast.literal_eval(node.value.args[1])
         elif isinstance(node, ast.FunctionDef):
             walk.definitions[node.name] = node
-    for name, node in walk.definitions.items():
-        types = _entry_types(node)
-        if types is not None:
-            walk.function(name, types)
-    return walk.module
+    return walk
 
 
 def _entry_types(node: ast.FunctionDef) -> tuple[Type, ...] | None:
