@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-from ppafo.engine.rows import is_number, members
 from ppafo.engine.composed_names import is_row
+from ppafo.engine.rows import is_number, members
 from ppafo.engine.source_text import SourceCollector, emitted_name
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
@@ -26,6 +26,14 @@ Compare = Callable[[str, Any, Any, str], Any]
 """From a sign, two values and where they are compared: the expression of it, or a truth value where it is decided."""
 Around = Mapping[str, Callable[..., Any]]
 
+
+def _quotient(left: Any, right: Any) -> Any:
+    """A quotient as the lanes have it: infinite, or no number, over 0."""
+    if isinstance(left, int | float) and isinstance(right, int | float) and right == 0:
+        return math.nan if left == 0 or math.isnan(left) else math.copysign(math.inf, left) * math.copysign(1.0, right)
+    return left / right
+
+
 _COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
     **{"==": operator.eq, "!=": operator.ne},
@@ -33,6 +41,7 @@ _COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
 _ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
     **{"+": operator.add, "-": operator.sub, "*": operator.mul, "//": operator.floordiv, "%": operator.mod},
     **{"&": operator.and_, "|": operator.or_, "^": operator.xor, ">>": operator.rshift},
+    "/": _quotient,
 }
 _WHOLE_ONLY = frozenset({"//", "%", "&", "|", "^", ">>"})
 _WORDS = CTerms(lambda _: "", lambda name: name)
@@ -117,7 +126,7 @@ def _type_of(item: Any, collector: SourceCollector) -> Type:
 @lru_cache(maxsize=256)
 def _row_class(name: str, fields: tuple[str, ...]) -> Any:
     """A class of rows whose fields hold expressions."""
-    return namedtuple(name, fields)  # type: ignore[misc]  # noqa: PYI024
+    return namedtuple(name, fields)  # type: ignore[misc]
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,51 +186,73 @@ class _Call:
         """The value of a term."""
         if term.kind == "name":
             return names.get(term.detail)
-        if term.kind == "number":
-            return term.detail
-        if term.kind == "call":
-            given = [self.value(part, names) for part in term.parts]
-            return self.home.result(self.home.functions[term.detail], given)
         parts = [self.value(part, names) for part in term.parts]
-        if term.kind == "build":
-            if isinstance(term.type, Row):
-                return _row_class(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
-            return tuple(parts)
-        if term.kind == "field":
-            return getattr(parts[0], term.detail)
-        if term.kind == "item":
-            return parts[0][parts[1] if len(parts) > 1 else term.detail]
-        return self.number(term, parts)
+        writer: Callable[..., Any] | None = getattr(self, f"_of_{term.kind}", None)
+        if writer is not None:
+            return writer(term, *parts)
+        if term.kind in _COMPARISONS:
+            return self.compared(term.kind, parts[0], parts[1], _WORDS.term(term))
+        if term.kind in ("min", "max"):
+            return self.extreme(term, *parts)
+        if term.kind in ("and", "or"):
+            return _linked(term.kind, *parts)
+        if term.kind not in _ARITHMETIC:
+            raise self.refused(f"'{term.kind}' of the lane loop")
+        if term.kind in _WHOLE_ONLY and not all(isinstance(part, int) for part in parts):
+            raise self.refused(f"'{_WORDS.term(term)}' of whole numbers")
+        return _ARITHMETIC[term.kind](*parts)
 
-    def number(self, term: Term, parts: list[Any]) -> Any:
-        """The value of a term that is one number, from those that it is made of."""
+    def _of_number(self, term: Term) -> Any:
+        return term.detail
+
+    def _of_call(self, term: Term, *given: Any) -> Any:
+        return self.home.result(self.home.functions[term.detail], list(given))
+
+    def _of_build(self, term: Term, *parts: Any) -> Any:
+        if not isinstance(term.type, Row):
+            return parts
+        return _row_class(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
+
+    def _of_field(self, term: Term, owner: Any) -> Any:
+        return getattr(owner, term.detail)
+
+    def _of_item(self, term: Term, owner: Any, place: int | None = None) -> Any:
+        return owner[term.detail if place is None else place]
+
+    def _of_choice(self, _term: Term, test: Any, yes: Any, no: Any) -> Any:
+        return self.chosen(test, yes, no)
+
+    def _of_negative(self, _term: Term, given: Any) -> Any:
+        return -given
+
+    def _of_not(self, _term: Term, given: Any) -> Any:
         import casadi
 
-        kind = term.kind
-        if kind == "choice":
-            test, yes, no = parts
-            return self.chosen(test, yes, no)
-        if kind == "convert":
-            return self.converted(term, parts[0])
-        if kind == "negative":
-            return -parts[0]
-        if kind == "not":
-            return not parts[0] if isinstance(parts[0], bool) else casadi.logic_not(parts[0])
-        if kind in ("and", "or"):
-            return _linked(kind, *parts)
-        if kind in _COMPARISONS:
-            return self.compared(kind, parts[0], parts[1], _WORDS.term(term))
-        if kind == "sqrt":
-            return casadi.sqrt(parts[0]) if isinstance(parts[0], casadi.SX) else _root(parts[0])
-        if kind in ("min", "max", "abs"):
-            return self.extreme(term, parts)
-        if kind in _WHOLE_ONLY and not all(isinstance(part, int) for part in parts):
-            raise self.refused(f"'{_WORDS.term(term)}' of whole numbers")
-        if kind == "/":
-            return _quotient(*parts)
-        if kind in _ARITHMETIC:
-            return _ARITHMETIC[kind](*parts)
-        raise self.refused(f"'{kind}' of the lane loop")
+        return not given if isinstance(given, bool) else casadi.logic_not(given)
+
+    def _of_sqrt(self, _term: Term, given: Any) -> Any:
+        import casadi
+
+        if isinstance(given, casadi.SX):
+            return casadi.sqrt(given)
+        return math.sqrt(given) if given >= 0.0 else math.nan
+
+    def _of_abs(self, term: Term, given: Any) -> Any:
+        import casadi
+
+        is_negative = self.compared("<", given, 0.0, _WORDS.term(term))
+        if isinstance(is_negative, bool):
+            return -given if is_negative else given
+        return casadi.fabs(given)
+
+    def _of_convert(self, term: Term, given: Any) -> Any:
+        import casadi
+
+        if term.type == INT and isinstance(given, casadi.SX):
+            raise self.refused("the whole part of a number")
+        if isinstance(given, casadi.SX):
+            return given
+        return int(given) if term.type == INT else float(given)
 
     def compared(self, sign: str, left: Any, right: Any, words: str) -> Any:
         """A comparison: a truth value where both numbers are known or it is decided, else an expression."""
@@ -229,19 +260,14 @@ class _Call:
             return bool(_COMPARISONS[sign](left, right))
         return self.home.compare(sign, left, right, f"{self.function.source}: {words}")
 
-    def extreme(self, term: Term, parts: list[Any]) -> Any:
-        """The size of a number, the smaller or the larger of two; Python keeps the first of equal ones."""
+    def extreme(self, term: Term, first: Any, second: Any) -> Any:
+        """The smaller or the larger of two numbers; Python keeps the first of equal ones."""
         import casadi
 
         words = f"{term.kind}({', '.join(_WORDS.term(part) for part in term.parts)})"
-        first, second = parts if len(parts) == 2 else (parts[0], 0.0)
-        sign = {"min": "<", "max": ">", "abs": "<"}[term.kind]
-        left, right = (first, second) if term.kind == "abs" else (second, first)
-        is_other = self.compared(sign, left, right, words)
-        if isinstance(is_other, bool):
-            return (-first if term.kind == "abs" else second) if is_other else first
-        if term.kind == "abs":
-            return casadi.fabs(first)
+        is_second = self.compared("<" if term.kind == "min" else ">", second, first, words)
+        if isinstance(is_second, bool):
+            return second if is_second else first
         return (casadi.fmin if term.kind == "min" else casadi.fmax)(first, second)
 
     def chosen(self, test: Any, yes: Any, no: Any) -> Any:
@@ -255,19 +281,9 @@ class _Call:
             return type(yes)(*parts) if hasattr(yes, "_fields") else tuple(parts)
         if isinstance(yes, int | float) and isinstance(no, int | float) and yes == no:
             return yes
-        if isinstance(yes, bool) or (isinstance(yes, int) and not isinstance(yes, bool)):
-            raise self.refused("a whole number that depends on a comparison")
+        if isinstance(yes, int):
+            raise self.refused("a whole number or truth value that depends on a comparison")
         return casadi.if_else(test, yes, no)
-
-    def converted(self, term: Term, given: Any) -> Any:
-        """A number as another type."""
-        import casadi
-
-        if term.type == INT:
-            if isinstance(given, casadi.SX):
-                raise self.refused("the whole part of a number")
-            return int(given)
-        return given if isinstance(given, casadi.SX) else float(given)
 
 
 def _returns(item: Statement) -> bool:
@@ -287,14 +303,3 @@ def _linked(word: str, left: Any, right: Any) -> Any:
         if isinstance(one, bool):
             return (other if one else False) if word == "and" else (True if one else other)
     return (casadi.logic_and if word == "and" else casadi.logic_or)(left, right)
-
-
-def _quotient(left: Any, right: Any) -> Any:
-    """A quotient as the lanes have it: infinite, or no number, over 0."""
-    if isinstance(left, int | float) and isinstance(right, int | float) and right == 0:
-        return math.nan if left == 0 or math.isnan(left) else math.copysign(math.inf, left) * math.copysign(1.0, right)
-    return left / right
-
-
-def _root(value: float) -> float:
-    return math.sqrt(value) if value >= 0.0 else math.nan
