@@ -126,7 +126,7 @@ def _type_of(item: Any, collector: SourceCollector) -> Type:
 @lru_cache(maxsize=256)
 def _row_class(name: str, fields: tuple[str, ...]) -> Any:
     """A class of rows whose fields hold expressions."""
-    return namedtuple(name, fields)  # type: ignore[misc]
+    return namedtuple(name, fields)
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,14 +261,19 @@ class _Call:
         return self.home.compare(sign, left, right, f"{self.function.source}: {words}")
 
     def extreme(self, term: Term, first: Any, second: Any) -> Any:
-        """The smaller or the larger of two numbers; Python keeps the first of equal ones."""
+        """The smaller or the larger of two numbers.
+
+        Of equal ones these are the second and the first, as if the first were a little larger: only so have the ratio
+        and the sign of two equal pressures, which ``>=`` tells apart, derivatives of one side.
+        """
         import casadi
 
         words = f"{term.kind}({', '.join(_WORDS.term(part) for part in term.parts)})"
-        is_second = self.compared("<" if term.kind == "min" else ">", second, first, words)
+        is_second = self.compared("<=" if term.kind == "min" else ">", second, first, words)
         if isinstance(is_second, bool):
             return second if is_second else first
-        return (casadi.fmin if term.kind == "min" else casadi.fmax)(first, second)
+        # Not by CasADi's own functions, whose derivative at equal numbers is the mean of both sides.
+        return casadi.if_else(is_second, second, first)
 
     def chosen(self, test: Any, yes: Any, no: Any) -> Any:
         """One of two values, of all numbers in them where they are rows."""
