@@ -61,6 +61,7 @@ class Symbolic:
     """
 
     functions: Mapping[str, Function]
+    places: Mapping[str, str]
     name: str
     is_given: tuple[bool, ...]
     around: Around = field(default_factory=dict)
@@ -94,21 +95,27 @@ def symbolic(
     These are ``float``, classes of NamedTuples, or functions that are handed over. ProgramError, with file and line,
     for what is outside the subset.
     """
-    functions, name, is_given = _walked(function, given)
     before = {emitted_name(item): wrapper for item, wrapper in (around or {}).items()}
-    return Symbolic(functions, name, is_given, before, compare)
+    return Symbolic(*_walked(function, given), before, compare)
 
 
 @lru_cache(maxsize=32)
 def _walked(
     function: Callable[..., Any], given: tuple[type | Callable[..., Any], ...]
-) -> tuple[Mapping[str, Function], str, tuple[bool, ...]]:
-    """All functions of the module that a function is composed into, its name, which of its parameters hold numbers."""
+) -> tuple[Mapping[str, Function], Mapping[str, str], str, tuple[bool, ...]]:
+    """All functions of the module that a function is composed into, where each was written, and its own name.
+
+    Then which of its parameters hold numbers.
+    """
     collector = SourceCollector("@function")
     name = collector.add(function)
     types = tuple(_type_of(item, collector) for item in given)
     module = walk_function(collector.text(), name, types)
-    return {item.name: item for item in module.functions}, name, tuple(not is_empty(item) for item in types)
+    places = {
+        own: f"{item.__module__.removeprefix('ppafo.')}.{item.__qualname__}" for own, item in collector.owners.items()
+    }
+    functions = {item.name: item for item in module.functions}
+    return functions, places, name, tuple(not is_empty(item) for item in types)
 
 
 def _type_of(item: Any, collector: SourceCollector) -> Type:
@@ -137,7 +144,7 @@ class _Call:
     function: Function
 
     def refused(self, problem: str) -> ProgramError:
-        return ProgramError(f"{self.function.source}: {problem}, which has no expression")
+        return ProgramError(f"{self.home.places[self.function.source]}: {problem}, which has no expression")
 
     def block(self, body: tuple[Statement, ...], names: dict[str, Any]) -> Any:
         """What some statements return, None where they return nothing; ``names`` are changed."""
@@ -240,7 +247,7 @@ class _Call:
     def _of_abs(self, term: Term, given: Any) -> Any:
         import casadi
 
-        is_negative = self.compared("<", given, 0.0, _WORDS.term(term))
+        is_negative = self.compared("<", given, 0.0, f"{_WORDS.term(term.parts[0])} < 0.0")
         if isinstance(is_negative, bool):
             return -given if is_negative else given
         return casadi.fabs(given)
@@ -258,7 +265,7 @@ class _Call:
         """A comparison: a truth value where both numbers are known or it is decided, else an expression."""
         if isinstance(left, int | float) and isinstance(right, int | float):
             return bool(_COMPARISONS[sign](left, right))
-        return self.home.compare(sign, left, right, f"{self.function.source}: {words}")
+        return self.home.compare(sign, left, right, f"{self.home.places[self.function.source]}: {_in_python(words)}")
 
     def extreme(self, term: Term, first: Any, second: Any) -> Any:
         """The smaller or the larger of two numbers.
@@ -268,8 +275,9 @@ class _Call:
         """
         import casadi
 
-        words = f"{term.kind}({', '.join(_WORDS.term(part) for part in term.parts)})"
-        is_second = self.compared("<=" if term.kind == "min" else ">", second, first, words)
+        sign = "<=" if term.kind == "min" else ">"
+        one, other = (_WORDS.term(part) for part in term.parts)
+        is_second = self.compared(sign, second, first, f"{other} {sign} {one}")
         if isinstance(is_second, bool):
             return second if is_second else first
         # Not by CasADi's own functions, whose derivative at equal numbers is the mean of both sides.
@@ -289,6 +297,13 @@ class _Call:
         if isinstance(yes, int):
             raise self.refused("a whole number or truth value that depends on a comparison")
         return casadi.if_else(test, yes, no)
+
+
+def _in_python(words: str) -> str:
+    """A term of C as Python has it."""
+    for own, name in (("ppafo_smaller", "min"), ("ppafo_larger", "max"), ("fabs", "abs"), ("&&", "and"), ("||", "or")):
+        words = words.replace(own, name)
+    return words
 
 
 def _returns(item: Statement) -> bool:

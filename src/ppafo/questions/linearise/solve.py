@@ -13,8 +13,9 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
 from ppafo.model.orifice import FlowCurve
+from ppafo.model.plant import Openings
 from ppafo.questions.linearise import EQUILIBRIUM
-from ppafo.questions.linearise.plant import UNITS, answers_to_command, plant_of
+from ppafo.questions.linearise.plant import UNITS, Plant, answers_to_command, plant_of
 from ppafo.questions.linearise.point import Point, equilibrium, openings_at, point_at
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -144,10 +145,10 @@ def _check(scenario: Scenario, run: Run) -> None:
 
 
 class _Sides:
-    """Decides every comparison at a point, and keeps those that lie on an edge."""
+    """Decides every comparison at a point, one of them on its ``other_side``, and keeps those that lie on an edge."""
 
-    def __init__(self, values: Mapping[str, float]) -> None:
-        self._values = values
+    def __init__(self, values: Mapping[str, float], other_side: str = "") -> None:
+        self._values, self._other_side = values, other_side
         self.edges: dict[str, Edge] = {}
 
     def __call__(self, sign: str, left: Any, right: Any, place: str) -> bool:
@@ -156,7 +157,7 @@ class _Sides:
         is_true = tests.get(sign, (one == other) == (sign == "=="))
         if sign in tests and abs(one - other) <= ON_THE_EDGE * max(abs(one), abs(other)):
             self.edges[place] = Edge(place, is_true)
-        return is_true
+        return is_true != (place == self._other_side)
 
     def _value(self, item: Any) -> float:
         import casadi
@@ -169,21 +170,21 @@ class _Sides:
 
 def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     """The linear model at a point, from the smooth piece that the point lies on."""
-    import casadi
-
     values = dict(point.values)
     sides = _Sides(values)
     plant = plant_of(run, point.way, sides)
-    states, inputs = list(plant.states), list(plant.inputs)
-    x, u = (casadi.vertcat(*(plant.symbols[name] for name in names)) for names in (states, inputs))
-    rates, outputs = casadi.vertcat(*plant.rates.values()), casadi.vertcat(*plant.outputs.values())
-    wanted = [casadi.jacobian(item, by) for item in (rates, outputs) for by in (x, u)]
-    a, b, c, d, found, shown = (np.array(item) for item in plant.function([*wanted, rates, outputs])(values))
+    matrices = _matrices(plant, values)
+    edges = []
+    for place, edge in sides.edges.items():
+        others = _matrices(plant_of(run, point.way, _Sides(values, place)), values)
+        if any(_differs(one, other) for one, other in zip(matrices[:4], others[:4], strict=True)):
+            edges.append(edge)
+    a, b, c, d, found, shown = matrices
     return LinearModel(
         scenario=scenario,
         time=point.time,
-        states=tuple(Variable(name, UNITS[name], values[name]) for name in states),
-        inputs=tuple(Variable(name, UNITS[name], values[name]) for name in inputs),
+        states=tuple(Variable(name, UNITS[name], values[name]) for name in plant.states),
+        inputs=tuple(Variable(name, UNITS[name], values[name]) for name in plant.inputs),
         outputs=tuple(
             Variable(name, UNITS[name], float(value))
             for name, value in zip(plant.outputs, shown.ravel().tolist(), strict=True)
@@ -194,9 +195,24 @@ def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         d=d,
         rates=found.ravel(),
         sides=sides_of(run, point),
-        edges=tuple(sides.edges.values()),
+        edges=tuple(edges),
         delays=Delays(run.command_delay, run.signal_delay, run.period),
     )
+
+
+def _matrices(plant: Plant, values: Mapping[str, float]) -> list[Floats]:
+    """A, B, C and D of a plant at some values; then its rates and outputs there, as columns."""
+    import casadi
+
+    x, u = (casadi.vertcat(*(plant.symbols[name] for name in names)) for names in (plant.states, plant.inputs))
+    rates, outputs = casadi.vertcat(*plant.rates.values()), casadi.vertcat(*plant.outputs.values())
+    wanted = [casadi.jacobian(item, by) for item in (rates, outputs) for by in (x, u)]
+    return [np.array(item) for item in plant.function([*wanted, rates, outputs])(values)]
+
+
+def _differs(one: Floats, other: Floats) -> bool:
+    """True for two matrices that are not the same to rounding, or of different states."""
+    return one.shape != other.shape or not np.allclose(one, other, rtol=ON_THE_EDGE, atol=0.0, equal_nan=True)
 
 
 def sides_of(run: Run, point: Point) -> dict[str, str]:
@@ -216,7 +232,16 @@ def sides_of(run: Run, point: Point) -> dict[str, str]:
     if point.way == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
         vane = "held by a stop" if is_at_stop else "sticks: friction holds it"
-    return {"ankle": vane, **said}
+    return {"valve": _valve(openings, at["command"]), "ankle": vane, **said}
+
+
+def _valve(openings: Openings, command: float) -> str:
+    """What the valve does at a command [-]."""
+    size = max(openings)
+    if size == 0.0:
+        return "closed"
+    full = "; fully open, so that no command opens it further: its column is 0" if abs(command) >= 1.0 else ""
+    return f"feeds chamber {1 if openings.source_1 > 0.0 else 2}, open by {size:.4g}{full}"
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:
