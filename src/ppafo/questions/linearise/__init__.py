@@ -14,7 +14,7 @@ def point(text: str) -> float | str:
     try:
         return quantity("s")(text)
     except argparse.ArgumentTypeError as error:
-        raise argparse.ArgumentTypeError(f"{error}; or 'equilibrium'") from error
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a time such as '1.5 s', or 'equilibrium'") from error
 
 
 QUESTION = Question(

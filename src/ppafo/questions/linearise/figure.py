@@ -22,6 +22,8 @@ _SHOWN = (-5, -1)
 
 def frequency_figure(model: LinearModel) -> "Figure":
     """Return the response of the torque to the command: size and phase, and the phase with what is left out."""
+    from matplotlib.ticker import MultipleLocator
+
     poles = np.abs(model.poles) / (2.0 * np.pi)
     lowest = min(float(np.min(poles[poles > 0.0], initial=1.0)), 1.0)
     frequencies = np.geomspace(_DECADES[0] * lowest, _FASTEST, _POINTS)
@@ -44,6 +46,7 @@ def frequency_figure(model: LinearModel) -> "Figure":
         )
         angle.set_ylim(max(-360.0, float(np.min(phase)) - 90.0), float(np.max(phase)) + 20.0)
         angle.set_ylabel("phase (deg)")
+        angle.yaxis.set_major_locator(MultipleLocator(45.0))
         angle.set_xlabel("frequency (Hz)")
         angle.legend(loc="lower left")
         mark_kind(figure, "simulated")
