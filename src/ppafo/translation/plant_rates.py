@@ -102,7 +102,14 @@ def gas_rates(
     flows = symbolic(gas_flows, PlantParameters, Openings, float, float, around=around, compare=compare)
     found = flows(plant, openings, *pressures)
     slopes = _pressure_rates(plant, angle, rate, pressures, (found.mass_1, found.mass_2))
-    return PlantRates(*slopes, 0.0, 0.0, found.supplied, found.vented)
+    return PlantRates(
+        pressure_1=slopes[0],
+        pressure_2=slopes[1],
+        temperature_1=0.0,
+        temperature_2=0.0,
+        supplied=found.supplied,
+        vented=found.vented,
+    )
 
 
 def thermal_gas_rates(
@@ -123,13 +130,25 @@ def thermal_gas_rates(
     )
     types = (PlantParameters, ThermalParameters, Openings, PlantState, ThermalState, float, float)
     flows = symbolic(thermal_gas_flows, *types, compare=compare)
-    state = PlantState(angle, rate, content_1, content_2, 0.0, 0.0, 0.0)
-    found = flows(plant, thermal, openings, state, ThermalState(mass_1, mass_2, 0.0, 0.0, 0.0, 0.0), *pressures)
+    state = PlantState(
+        angle=angle,
+        angular_velocity=rate,
+        mass_1=content_1,
+        mass_2=content_2,
+        supplied_mass=0.0,
+        vented_mass=0.0,
+        leaked_mass=0.0,
+    )
+    masses = ThermalState(
+        mass_1=mass_1, mass_2=mass_2, supplied_content=0.0, vented_content=0.0, heat_content=0.0, gas_work=0.0
+    )
+    found = flows(plant, thermal, openings, state, masses, *pressures)
     # The contents hold the work of the moving wall already: only the volumes are left of equation (3).
     slopes = _pressure_rates(plant, angle, rate, pressures, (found.content_1, found.content_2))
     # A temperature is that of the walls times content over mass.
     return PlantRates(
-        *slopes,
+        pressure_1=slopes[0],
+        pressure_2=slopes[1],
         temperature_1=temperatures[0] * (found.content_1 / content_1 - found.mass_1 / mass_1),
         temperature_2=temperatures[1] * (found.content_2 / content_2 - found.mass_2 / mass_2),
         supplied=found.supplied,

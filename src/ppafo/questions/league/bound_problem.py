@@ -53,7 +53,8 @@ def mean_openings(run: Run, ways: Sequence[float], shares: Sequence[Any]) -> Ope
         changes = [opening[place] - rest for opening in found]
         moved = [share * change for share, change in zip(shares, changes, strict=True) if change != 0.0]
         means.append(sum(moved[1:], rest + moved[0]) if moved else rest)
-    return Openings(*means)
+    source_1, vent_1, source_2, vent_2 = means
+    return Openings(source_1=source_1, vent_1=vent_1, source_2=source_2, vent_2=vent_2)
 
 
 def smooth_flow_function(flow_function: Callable[..., Any], ratio: Any, curve: FlowCurve) -> Any:

@@ -12,10 +12,12 @@ import pytest
 
 import ppafo
 from ppafo.answers.text import text_of
+from ppafo.cli.main import main
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
+from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.proportional import openings_of, spool_acceleration
 from ppafo.questions.linearise.solve import LinearModel, linearise
 from ppafo.questions.linearise.steps import steps_of
@@ -183,14 +185,37 @@ def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
         (TASK, "equilibrium", (), "no equilibrium at 6 N m.*with the valve fully open the actuator comes to 5 N m"),
         (TASK, "Equilibrium", (), "neither a time nor 'equilibrium'"),
         ("torque-task-solenoid", 1.0, (), "valve 'solenoid' is on or off"),
-        ("torque-task-slow-valve", "equilibrium", ("device.valve=solenoid",), "."),
     ):
         with pytest.raises(ppafo.PpafoError, match=line) as refused:
             linearise(scenario, at, overrides)
         assert "\n" not in str(refused.value)
-    lines = ["supply_line.plantarflexion.volume=20 cm^3"]
-    with pytest.raises(ScenarioError):
-        linearise(TASK, 1.0, lines)
+    fed = replace(ppafo.load_scenario(TASK), supply_lines=SupplyLines(1e9, 1e-2, 1e-5, 1e9, 1e-2, 1e-5, 0.0))
+    with pytest.raises(ScenarioError, match="constant supplies; omit"):
+        linearise(fed, 1.0)
+
+
+def test_the_command_ends_with_2_and_one_line_for_what_has_no_linear_model(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, line in (
+        (["torque-task-solenoid", "--at", "1 s"], "on or off"),
+        ([TASK, "--at", "soon"], "--at 'soon': must be a time such as '1.5 s', or 'equilibrium'"),
+    ):
+        try:
+            code = main(["linearise", *words])
+        except SystemExit as ended:
+            code = int(str(ended.code))
+        said = capsys.readouterr().err
+        assert code == 2
+        assert line in said
+        assert said.count("\n") == 1
+
+
+def test_an_energy_balance_slows_what_isothermal_gas_does_at_once() -> None:
+    """With walls that take all heat at once the warm model has the poles of the isothermal one, and two fast ones."""
+    cold = linearise(TASK, overrides=HOLD)
+    walls = ("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=1e6 W/(m^2 K)", WARM[2])
+    warm = linearise(TASK, overrides=(*HOLD, *walls))
+    assert warm.poles[:2] == pytest.approx(cold.poles, rel=1e-3)
+    assert abs(warm.poles[2]) > 1e3 * abs(cold.poles[1])
 
 
 def test_the_folder_has_names_units_and_matrices(steady: LinearModel, tmp_path: Path) -> None:
