@@ -56,21 +56,18 @@ def both_sides(sign: str, left: Any, right: Any, _where: str) -> Any:
 class Symbolic:
     """A function of the model that takes CasADi symbols in the place of floats; call it as the function itself.
 
-    What is handed over as a function is left out of the call. ``around`` has functions by the name of those of the
-    model that they stand before: each is called with the function of the model and with its arguments.
+    ``around`` has functions by the name of those of the model that they stand before: each is called with the function
+    of the model and with its arguments. ``compare`` says what becomes of a comparison.
     """
 
-    functions: Mapping[str, Function]
-    places: Mapping[str, str]
-    name: str
-    is_given: tuple[bool, ...]
+    walked: "_Walked"
     around: Around = field(default_factory=dict)
     compare: Compare = both_sides
 
     def __call__(self, *values: Any) -> Any:
         """The function's value, in its own units."""
-        given = [value for value, is_given in zip(values, self.is_given, strict=True) if is_given]
-        return self.result(self.functions[self.name], given)
+        given = [value for value, is_given in zip(values, self.walked.is_given, strict=True) if is_given]
+        return self.result(self.walked.functions[self.walked.name], given)
 
     def result(self, function: Function, given: list[Any]) -> Any:
         """The value of one function of the module for arguments that are not empty."""
@@ -96,17 +93,28 @@ def symbolic(
     for what is outside the subset.
     """
     before = {emitted_name(item): wrapper for item, wrapper in (around or {}).items()}
-    return Symbolic(*_walked(function, given), before, compare)
+    if not _walked(function, given).collector.is_current():
+        _walked.cache_clear()
+    return Symbolic(_walked(function, given), before, compare)
+
+
+@dataclass(frozen=True, slots=True)
+class _Walked:
+    """A function with all that it calls: what it was composed from, functions of the module, where each was written.
+
+    ``name`` is its own in the module; ``is_given`` says which of its parameters hold numbers.
+    """
+
+    collector: SourceCollector
+    functions: Mapping[str, Function]
+    places: Mapping[str, str]
+    name: str
+    is_given: tuple[bool, ...]
 
 
 @lru_cache(maxsize=32)
-def _walked(
-    function: Callable[..., Any], given: tuple[type | Callable[..., Any], ...]
-) -> tuple[Mapping[str, Function], Mapping[str, str], str, tuple[bool, ...]]:
-    """All functions of the module that a function is composed into, where each was written, and its own name.
-
-    Then which of its parameters hold numbers.
-    """
+def _walked(function: Callable[..., Any], given: tuple[type | Callable[..., Any], ...]) -> _Walked:
+    """The typed functions of a function of the model, for types of its parameters."""
     collector = SourceCollector("@function")
     name = collector.add(function)
     types = tuple(_type_of(item, collector) for item in given)
@@ -115,7 +123,7 @@ def _walked(
         own: f"{item.__module__.removeprefix('ppafo.')}.{item.__qualname__}" for own, item in collector.owners.items()
     }
     functions = {item.name: item for item in module.functions}
-    return functions, places, name, tuple(not is_empty(item) for item in types)
+    return _Walked(collector, functions, places, name, tuple(not is_empty(item) for item in types))
 
 
 def _type_of(item: Any, collector: SourceCollector) -> Type:
@@ -144,7 +152,7 @@ class _Call:
     function: Function
 
     def refused(self, problem: str) -> ProgramError:
-        return ProgramError(f"{self.home.places[self.function.source]}: {problem}, which has no expression")
+        return ProgramError(f"{self.home.walked.places[self.function.source]}: {problem}, which has no expression")
 
     def block(self, body: tuple[Statement, ...], names: dict[str, Any]) -> Any:
         """What some statements return, None where they return nothing; ``names`` are changed."""
@@ -213,7 +221,7 @@ class _Call:
         return term.detail
 
     def _of_call(self, term: Term, *given: Any) -> Any:
-        return self.home.result(self.home.functions[term.detail], list(given))
+        return self.home.result(self.home.walked.functions[term.detail], list(given))
 
     def _of_build(self, term: Term, *parts: Any) -> Any:
         if not isinstance(term.type, Row):
@@ -265,7 +273,9 @@ class _Call:
         """A comparison: a truth value where both numbers are known or it is decided, else an expression."""
         if isinstance(left, int | float) and isinstance(right, int | float):
             return bool(_COMPARISONS[sign](left, right))
-        return self.home.compare(sign, left, right, f"{self.home.places[self.function.source]}: {_in_python(words)}")
+        return self.home.compare(
+            sign, left, right, f"{self.home.walked.places[self.function.source]}: {_in_python(words)}"
+        )
 
     def extreme(self, term: Term, first: Any, second: Any) -> Any:
         """The smaller or the larger of two numbers.

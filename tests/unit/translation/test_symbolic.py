@@ -10,11 +10,20 @@ import pytest
 
 import ppafo
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuild, rebuilt
+from ppafo.engine.scheme.pneumatics import GAMMA, linearise
 from ppafo.engine.scheme.thermal_flows import transport
 from ppafo.errors import ProgramError
 from ppafo.model import sensors
-from ppafo.model.orifice import FlowCurve, fitted_flow_function, orifice_flow
-from ppafo.model.plant import Openings, PlantParameters, ThermalParameters
+from ppafo.model.orifice import FlowCurve, fitted_flow_function, isentropic_flow_function, orifice_flow
+from ppafo.model.plant import (
+    Openings,
+    PlantParameters,
+    PlantState,
+    ThermalParameters,
+    blended_ports,
+    pressures_per_mass,
+)
+from ppafo.model.ports import BlendedPort, blended_port_flow_slopes
 from ppafo.model.valves import dump, proportional, solenoid
 from ppafo.model.vane import gravity_torque
 from ppafo.parameters.plant import plant_parameters
@@ -178,6 +187,30 @@ def test_a_function_may_stand_before_one_of_the_model() -> None:
     plain, changed = casadi.Function("f", [pressure], both)(4e5)
     assert float(changed) == 2.0 * float(plain)
     assert len(seen) == 1
+
+
+@pytest.mark.parametrize("ratios", [(0.9, 0.4), (0.3, 0.7), (0.98, 0.97), (1.1, 0.6)])
+def test_the_jacobian_of_a_step_of_the_lanes_is_that_of_its_own_flows(ratios: tuple[float, float]) -> None:
+    """The lanes have their Jacobian written by hand; here the flows beside it are differentiated."""
+    openings = Openings(source_1=0.6, vent_1=0.1, source_2=0.2, vent_2=0.5)
+    first, second = casadi.SX.sym("first"), casadi.SX.sym("second")
+    types = (PlantParameters, PlantState, BlendedPort, BlendedPort, float, blended_port_flow_slopes)
+    per_mass = pressures_per_mass(PLANT, 1.2)
+    masses = [ratio * PLANT.supply_pressure / each for ratio, each in zip(ratios, per_mass, strict=True)]
+    state = PlantState(1.2, 0.0, first, second, 0.0, 0.0, 0.0)
+    ports, step = blended_ports(PLANT, openings), 1e-3
+    linear, flows = symbolic(linearise, *types)(PLANT, state, *ports, step, blended_port_flow_slopes)
+    into = casadi.vertcat(flows.mass_1, flows.mass_2)
+    found = casadi.jacobian(into, casadi.vertcat(first, second))
+    matrix = casadi.vertcat(casadi.horzcat(linear.a, linear.b), casadi.horzcat(linear.c, linear.d))
+    evaluate = casadi.Function("f", [first, second], [found, matrix])
+    exact, written = (np.array(item) for item in evaluate(*masses))
+    assert np.eye(2) - GAMMA * step * exact == pytest.approx(written, rel=1e-12, abs=1e-15)
+
+
+def test_what_is_outside_the_subset_is_refused_with_file_and_line() -> None:
+    with pytest.raises(ProgramError, match=r"orifice\.py:\d+: .*library function"):
+        symbolic(isentropic_flow_function, float, float)
 
 
 def test_what_has_no_expression_is_refused_by_name() -> None:

@@ -17,6 +17,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.model.orifice import FlowCurve, check_valve_flow, fitted_flow_function
 from ppafo.model.plant import Openings
+from ppafo.model.vane import actuator_torque
 from ppafo.parameters.device import Valve
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
@@ -171,14 +172,15 @@ def programme(scenario: Scenario, intervals: int) -> Programme:
     plant = run.plant
     grid = regular_grid(scenario.duration, intervals)
     scale = max(plant.supply_pressure, plant.dorsiflexion_pressure)
-    pressures = casadi.SX.sym("pressures", 2, grid.times.size)
+    pressures: Any = casadi.SX.sym("pressures", 2, grid.times.size)
     openings = casadi.SX.sym("openings", 2, intervals)
     here = casadi.reshape(casadi.repmat(openings, DEGREE, 1), 2, grid.times.size)
     rates = chamber_rates(run, WAYS, _motion(scenario, grid), scale * pressures, here)
     start = np.array([scenario.initial_pressure_1, scenario.initial_pressure_2]) / scale
     slopes = casadi.vertcat(rates.pressure_1, rates.pressure_2) / scale
     reference = profile_values(scenario.reference, grid.times)[0]
-    error = casadi.DM(reference).T - plant.torque_constant * scale * (pressures[0, :] - pressures[1, :])
+    torque = actuator_torque(scale * pressures[0, :], scale * pressures[1, :], plant.torque_constant)
+    error = casadi.DM(reference).T - torque
     weights = casadi.DM(grid.weights)
     lowest = (1.0 - MARGIN) * plant.atmospheric_pressure / scale
     highest = max(1.0, *start)

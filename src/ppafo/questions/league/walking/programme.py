@@ -9,7 +9,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run, Walk
 from ppafo.engine.scheme.ankle_torque import Direction, leg_torque
 from ppafo.model.command import VENT
-from ppafo.model.contact import QUARTER_TURN, foot_angle
+from ppafo.model.contact import FLAT, foot_angle, prescribed_ankle
 from ppafo.model.gait import GaitNow
 from ppafo.model.plant import PlantParameters
 from ppafo.model.vane import actuator_torque, vane_acceleration
@@ -167,7 +167,7 @@ def _accelerations(
 
 def _flat_angle(walk: Walk, now: GaitNow) -> float:
     """Ankle angle [rad] with which the foot is flat."""
-    return now.shank + QUARTER_TURN - walk.timing.ground_angle
+    return prescribed_ankle(FLAT, now, walk.timing.ground_angle).angle
 
 
 def _toe_height(path: AnklePath, stride: Stride, place: int, angle: Any) -> Any:
@@ -175,10 +175,8 @@ def _toe_height(path: AnklePath, stride: Stride, place: int, angle: Any) -> Any:
     import casadi
 
     now = stride.now[place]
-    level = now.shank + QUARTER_TURN - path.ground_angle
-    ankle = float(path.toe_height(np.array(now.phase), np.array(now.shank), np.array(level))) + path.height
     tilt = foot_angle(now.shank, angle) - path.ground_angle
-    return ankle + path.toe_lever * casadi.sin(tilt) - path.height * casadi.cos(tilt)
+    return path.ankle_height(now.phase) + path.toes_at(casadi.sin(tilt), casadi.cos(tilt))
 
 
 def _residuals(grid: Grid, states: Any, begin: Any, slopes: Any) -> Any:
