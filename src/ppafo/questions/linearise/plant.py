@@ -1,13 +1,14 @@
 """The plant of a run as expressions of named states and inputs, from the text that the lanes step."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.engine.run import Run
 from ppafo.model.plant import ThermalParameters
+from ppafo.model.valves.proportional import NO_SLEW_LIMIT
 from ppafo.model.vane import actuator_torque
 from ppafo.translation.plant_rates import PlantRates, gas_rates, thermal_gas_rates, vane_acceleration
 from ppafo.translation.symbolic import Compare, both_sides, symbolic
@@ -119,12 +120,18 @@ def _gas(run: Run, plant: Any, openings: Any, at: Mapping[str, Any], compare: Co
     return thermal_gas_rates(plant, run.thermal, openings, *motion, pressures, temperatures, compare)
 
 
+def without_slew_limit(run: Run) -> Run:
+    """The run with a valve that requests the opening of its command at once: at rest no slew limit is at work."""
+    is_limited = hasattr(run.valve, "slew_limit")
+    return replace(run, valve=run.valve._replace(slew_limit=NO_SLEW_LIMIT)) if is_limited else run
+
+
 def answers_to_command(run: Run) -> bool:
     """False for a valve that is on or off: no small change of the command changes its openings or its movement."""
     import casadi
 
     command = casadi.SX.sym("command")
     start = leaves(run.program.valve.initial())
-    openings, moves = _valve(run, start, command, both_sides)
+    openings, moves = _valve(without_slew_limit(run), start, command, both_sides)
     slopes = casadi.Function("slopes", [command], [casadi.jacobian(casadi.vertcat(*openings, *moves), command)])
     return any(abs(slope) > 0.0 for value in (-0.5, 0.5) for slope in slopes(value).nonzeros())

@@ -13,8 +13,7 @@ from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures, chamber_volumes
-from ppafo.model.valves.proportional import NO_SLEW_LIMIT
-from ppafo.questions.linearise.plant import VALVE, Plant, plant_of, valve_states
+from ppafo.questions.linearise.plant import VALVE, Plant, plant_of, valve_states, without_slew_limit
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import FreeMotion, Scenario
@@ -101,9 +100,7 @@ def equilibrium(scenario: Scenario) -> Point:
     is_open_loop = scenario.control.kind == OPEN_LOOP
     end = np.array([scenario.duration])
     wanted = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
-    # At rest no slew limit is at work; without one the valve takes what it requests from the command at once.
-    unlimited = {"slew_limit": NO_SLEW_LIMIT} if hasattr(whole.valve, "slew_limit") else {}
-    run = replace(whole, valve=whole.valve._replace(**unlimited))
+    run = without_slew_limit(whole)
     held = None if run.program.angle is not None else 0.0
     found = _steady(run, held, values, wanted)
     if found is None:

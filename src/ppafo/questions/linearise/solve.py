@@ -13,7 +13,6 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
 from ppafo.model.orifice import FlowCurve
-from ppafo.model.plant import Openings
 from ppafo.questions.linearise import EQUILIBRIUM
 from ppafo.questions.linearise.plant import UNITS, Plant, answers_to_command, plant_of
 from ppafo.questions.linearise.point import Point, equilibrium, openings_at, point_at
@@ -25,6 +24,9 @@ MISSING_CASADI = "a linear model needs CasADi: pip install ppafo[control]"
 MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
 ON_THE_EDGE = 1.0e-6
 """Two sides of a comparison that differ by less than this, over the larger one, lie on an edge of the model."""
+
+
+DEAF = "no small change of the command changes it (fully open, dead band, slew limit): the command's column is 0"
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,15 +173,18 @@ class _Sides:
 def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     """The linear model at a point, from the smooth piece that the point lies on."""
     values = dict(point.values)
-    sides = _Sides(values)
-    plant = plant_of(run, point.way, sides)
+    decided = _Sides(values)
+    plant = plant_of(run, point.way, decided)
     matrices = _matrices(plant, values)
     edges = []
-    for place, edge in sides.edges.items():
+    for place, edge in decided.edges.items():
         others = _matrices(plant_of(run, point.way, _Sides(values, place)), values)
         if any(_differs(one, other) for one, other in zip(matrices[:4], others[:4], strict=True)):
             edges.append(edge)
     a, b, c, d, found, shown = matrices
+    sides = sides_of(run, point)
+    if not np.any(b[:, 0]) and not np.any(d[:, 0]):
+        sides["valve"] += f"; {DEAF}"
     return LinearModel(
         scenario=scenario,
         time=point.time,
@@ -194,7 +199,7 @@ def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         c=c,
         d=d,
         rates=found.ravel(),
-        sides=sides_of(run, point),
+        sides=sides,
         edges=tuple(edges),
         delays=Delays(run.command_delay, run.signal_delay, run.period),
     )
@@ -232,16 +237,8 @@ def sides_of(run: Run, point: Point) -> dict[str, str]:
     if point.way == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
         vane = "held by a stop" if is_at_stop else "sticks: friction holds it"
-    return {"valve": _valve(openings, at["command"]), "ankle": vane, **said}
-
-
-def _valve(openings: Openings, command: float) -> str:
-    """What the valve does at a command [-]."""
-    size = max(openings)
-    if size == 0.0:
-        return "closed"
-    full = "; fully open, so that no command opens it further: its column is 0" if abs(command) >= 1.0 else ""
-    return f"feeds chamber {1 if openings.source_1 > 0.0 else 2}, open by {size:.4g}{full}"
+    valve = f"feeds chamber {1 if openings.source_1 > 0.0 else 2}, open by {max(openings):.4g}" if any(openings) else ""
+    return {"valve": valve or "closed", "ankle": vane, **said}
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:

@@ -165,12 +165,22 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     assert [edge.place for edge in at_stop.edges] == [
         "model.valves.proportional.opening_of_command: 1.0 <= abs(command)"
     ]
-    assert "its column is 0" in at_stop.sides["valve"]
+    assert "the command's column is 0" in at_stop.sides["valve"]
     assert not at_stop.b[:, 0].any()
     stuck = linearise("step-response", 0.0, ["initial.pressure_2=atmosphere", "motion.angle=60 deg"])
     assert stuck.sides["ankle"] == "sticks: friction holds it"
     assert [item.name for item in stuck.states] == ["pressure_1", "pressure_2"]
     assert linearise("step-response", 0.1).sides["ankle"] == "slides in plantarflexion"
+
+
+def test_a_valve_at_its_slew_limit_does_not_answer_and_one_that_has_arrived_does() -> None:
+    slow = ("valve.slew_limit=0.05 1/s", *HOLD)
+    moving, steady = linearise(TASK, 0.3, slow), linearise(TASK, overrides=slow)
+    assert "slew limit" in moving.sides["valve"]
+    assert [item.name for item in moving.states][-1] == "valve_opening"
+    assert moving.rates[-1] == 0.05
+    assert [item.name for item in steady.states] == ["pressure_1", "pressure_2"]
+    assert steady.b == pytest.approx(linearise(TASK, overrides=HOLD).b, rel=1e-9, abs=1e-9)
 
 
 def test_a_closed_valve_is_an_edge_and_one_side_of_it_is_taken() -> None:
