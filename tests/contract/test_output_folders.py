@@ -39,6 +39,7 @@ FOLDERS: dict[str, list[str]] = {
     "audit": ["ppafo2011"],
     "schema": ["scenario"],
     "cache": [],
+    "export c": ["c", "step-response"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
 
@@ -50,7 +51,7 @@ FILES = {
 }
 """The words of every command that writes one file, and the file."""
 
-QUICK = ("sets", "sets show", "parts", "audit", "schema", "cache", "gait", "endurance")
+QUICK = ("sets", "sets show", "parts", "audit", "schema", "cache", "gait", "endurance", "export c")
 
 
 def words_of(name: str, out: Path) -> list[str]:

@@ -2,6 +2,7 @@
 
 import ast
 import builtins
+import functools
 import inspect
 import math
 import types
@@ -148,7 +149,11 @@ class Composer(ast.NodeTransformer):
         return getattr(builtins, node.id)
 
     def stand_in(self, value: Any, node: ast.expr) -> ast.expr:
-        """What is written for a value from outside. ProgramError where it is nothing that can be compiled."""
+        """What is written for a value from outside. ProgramError where it is nothing that can be compiled.
+
+        A function that remembers its results (``functools.lru_cache``) is what it remembers.
+        """
+        value = value.__wrapped__ if isinstance(value, functools._lru_cache_wrapper) else value
         # ``inf`` and ``nan`` of math are written by name, as they are in most sources.
         if isinstance(node, ast.Attribute) and self.value_of(node.value) is math:
             return self.global_name("math", node.attr, node)

@@ -14,6 +14,8 @@ TRACED: dict[str, str] = {
     **{name: f"state.{name}" for name in ("mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")},
 }
 """Channels that can be traced, and where a sample has them."""
+TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
+"""Where it has those that a recording has otherwise of gas with an energy balance."""
 
 
 def measure_sample(rows: LaneRows, moment: str) -> list[str]:
@@ -73,7 +75,10 @@ def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
     traced = rows.program.traced
     if not traced:
         return []
-    keep = [f"trace[next_record // trace_every, {row}, lane] = {TRACED[name]}" for row, name in enumerate(traced)]
+    # A trace with less room than samples keeps the last ones.
+    place = "next_record // trace_every % trace.shape[0]"
+    paths = TRACED | (TRUE_MASSES if rows.program.is_thermal else {})
+    keep = [f"trace[{place}, {row}, lane] = {paths[name]}" for row, name in enumerate(traced)]
     return [
         "if next_record % trace_every == 0:",
         *indent(over_lanes([*sample_lines(rows, moment), *keep])),

@@ -38,8 +38,9 @@ class LaneRows:
     One array for all of them lets the compiler see that no two rows overlap.
     """
 
-    def __init__(self, program: Program, collector: SourceCollector) -> None:
+    def __init__(self, program: Program, collector: SourceCollector, lanes: int = 0) -> None:
         self.program = program
+        self.lanes = lanes or lanes_of(program)
         self.add: Callable[[Callable[..., Any] | type], str] = collector.add
         self.state_at = _row_numbers(program.state_rows(), 0)
         self.parameter_at = _row_numbers(program.parameter_rows(), len(self.state_at))

@@ -2,7 +2,7 @@
 
 from ppafo.engine.lane_control import control_loop, remember_commands, signals_before_start
 from ppafo.engine.lane_meters import measure_sample
-from ppafo.engine.lane_rows import LaneRows, indent, lanes_of, over_lanes
+from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.lane_step import plant_loop
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
@@ -37,15 +37,15 @@ def lane_source(program: Program) -> str:
     return write_lanes(program, SourceCollector(INLINE))
 
 
-def write_lanes(program: Program, collector: SourceCollector) -> str:
-    """Source text of a program; ``collector`` then has all that it is made from."""
-    rows = LaneRows(program, collector)
+def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) -> str:
+    """Source text of a program; ``collector`` then has all that it is made from. ``lanes`` 0 is as many as fit."""
+    rows = LaneRows(program, collector, lanes)
     body = [
         COMPILED,
         f"def advance({ARGUMENTS}):",
         *indent(
             [
-                f"x = np.empty(({rows.count}, {lanes_of(program)}))",
+                f"x = np.empty(({rows.count}, {rows.lanes}))",
                 "width = states.shape[1]",
                 *_copy("x", 0, "states", 0, len(rows.state_at)),
                 *_copy("x", len(rows.state_at), "parameters", 0, len(rows.parameter_at)),

@@ -15,7 +15,7 @@ from ppafo.engine.rows import table
 from ppafo.engine.scheme.ankle_torque import DeviceShare
 from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.scheme.walking import WalkState
-from ppafo.model.columns import larger, whole
+from ppafo.model.columns import larger, truncated
 from ppafo.model.course import Course
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import NOTHING_SEEN, GaitSensors
@@ -97,10 +97,10 @@ class Run:
         return self.step * self.steps_per_sample
 
 
-def whole_and_rest(delay: float, step: float) -> tuple[int, float]:
+def whole_and_rest(delay: float, step: float) -> tuple[float, float]:
     """Whole steps in a delay [s] and the rest as a share of a step; either may be an array (runs,)."""
     steps = delay / step
-    complete = whole(np.floor(steps + WHOLE))
+    complete = truncated(steps + WHOLE)
     return complete, larger(0.0, steps - complete)
 
 
@@ -186,8 +186,12 @@ def initial_sensors(run: Run) -> SensorState | NoParameters:
     """Slow sensors that show what is true at the start of a run; nothing where there are none."""
     if not run.program.slow_sensors:
         return NoParameters()
-    initial = run.initial
-    pressure_1, pressure_2 = chamber_pressures(run.plant, initial.angle, initial.mass_1, initial.mass_2)
+    return sensors_at_start(run.plant, run.initial)
+
+
+def sensors_at_start(plant: PlantParameters, initial: PlantState) -> SensorState:
+    """Slow sensors that show what is true in a state."""
+    pressure_1, pressure_2 = chamber_pressures(plant, initial.angle, initial.mass_1, initial.mass_2)
     return SensorState(
         angle=initial.angle,
         pressure_1=pressure_1,

@@ -10,6 +10,7 @@ import inspect
 import re
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, Generic, NamedTuple
@@ -51,11 +52,21 @@ def without_origins(source: str) -> str:
     return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))
 
 
+Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
+"""Makes a definition one of the part of Python that is compiled; it is handed a copy of its own."""
+
+
+def as_it_is(_function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
+    """The definition itself."""
+    return tree
+
+
 @dataclass(slots=True)
 class SourceCollector:
-    """Gathers definitions in the order in which they must stand."""
+    """Gathers definitions in the order in which they must stand; ``adapt`` may write a definition in another way."""
 
     decorator: str
+    adapt: Adaptation = as_it_is
     definitions: dict[str, str] = field(default_factory=dict)
     owners: dict[str, Any] = field(default_factory=dict)
     reads: list[Read] = field(default_factory=list)
@@ -100,7 +111,7 @@ class SourceCollector:
             )
 
     def _function_text(self, function: Any, name: str) -> str:
-        tree = parse_definition(function)
+        tree = parse_definition(function, self.adapt)
         file = function.__code__.co_filename
         made = Made(
             function=function,
@@ -159,7 +170,7 @@ def place_of(item: Any) -> str:
     return f"module {item.__module__}" if code is None else place(code.co_filename, code.co_firstlineno)
 
 
-def parse_definition(function: FunctionType) -> ast.FunctionDef:
+def parse_definition(function: FunctionType, adapt: Adaptation = as_it_is) -> ast.FunctionDef:
     """The definition of a plain function with the lines of its file; refused where it is not what Python runs.
 
     ProgramError where the definition cannot be read or is not what Python runs.
@@ -179,12 +190,13 @@ def parse_definition(function: FunctionType) -> ast.FunctionDef:
         raise refusal(file, code.co_firstlineno, f"'{name}' must be a plain function defined with 'def'")
     if tree.decorator_list:
         raise refusal(file, tree, f"'{name}' is decorated, which cannot be compiled; remove the decorator")
-    check_grammar(tree, file)
+    adapted = adapt(function, tree if adapt is as_it_is else deepcopy(tree))
+    check_grammar(adapted, file)
     if _shape(code) not in (_shape(item) for item in _code_of(tree, function)):
         changed = "is not what its source text says; the file has changed since it was loaded: start again"
         raise refusal(file, tree, f"'{name}' {changed}")
-    check_flow(tree, file, code.co_varnames)
-    return tree
+    check_flow(adapted, file, code.co_varnames)
+    return adapted
 
 
 def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType]:

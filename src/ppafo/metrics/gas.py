@@ -1,10 +1,12 @@
 """Gas and work: what a task costs, and what it gives."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ppafo.metrics.metric import Floats, MetricKind, Readings
+from ppafo.model.columns import choose
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 
@@ -133,6 +135,21 @@ def update_work(state: Work, course: Course, sample: Sample) -> Work:
 WORK = MeterKind("work", Work, start_work, update_work, of_motion=True)
 
 
+def read_gas_supplied(readings: Readings) -> Floats:
+    """``gas_supplied`` [kg]."""
+    return readings.gains["supplied_mass"]
+
+
+def read_gas_vented(readings: Readings) -> Floats:
+    """``gas_vented`` [kg]."""
+    return readings.gains["vented_mass"]
+
+
+def read_gas_leaked(readings: Readings) -> Floats:
+    """``gas_leaked`` [kg]."""
+    return readings.gains["leaked_mass"]
+
+
 def read_gas_imbalance(readings: Readings) -> Floats:
     """``gas_imbalance`` [kg]."""
     stored = readings.gains["mass_1"] + readings.gains["mass_2"]
@@ -140,11 +157,10 @@ def read_gas_imbalance(readings: Readings) -> Floats:
 
 
 def read_energy_imbalance(readings: Readings) -> Floats:
-    """``energy_imbalance`` [J]; nan for gas without an energy balance."""
-    if not set(ENERGIES) <= set(readings.gains):
-        return np.full_like(readings.gains["supplied_mass"], np.nan)
-    supplied, vented, heat, work, stored = (readings.gains[name] for name in ENERGIES)
-    return supplied - vented + heat - work - stored
+    """``energy_imbalance`` [J]."""
+    gains = readings.gains
+    taken = gains["supplied_enthalpy"] - gains["vented_enthalpy"] + gains["wall_heat"]
+    return taken - gains["gas_work"] - gains["gas_energy"]
 
 
 def read_largest_pressure(readings: Readings) -> Floats:
@@ -154,9 +170,9 @@ def read_largest_pressure(readings: Readings) -> Floats:
 
 
 def read_lowest_temperature(readings: Readings) -> Floats:
-    """``lowest_temperature`` [K]; nan for gas without an energy balance."""
+    """``lowest_temperature`` [K]."""
     temperature: Floats = readings.meters[LOWEST_TEMPERATURE.name].temperature
-    return temperature if set(ENERGIES) <= set(readings.gains) else np.full_like(temperature, np.nan)
+    return temperature
 
 
 def read_mechanical_work(readings: Readings) -> Floats:
@@ -177,7 +193,8 @@ def read_gas_per_work(readings: Readings) -> Floats:
 
 def _ratio(above: Floats, below: Floats) -> Floats:
     """One over the other; nan where the other is not above 0."""
-    return above / np.where(below > 0.0, below, np.nan)
+    found: Floats = above / choose(below > 0.0, below, math.nan)
+    return found
 
 
 _BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
@@ -194,7 +211,7 @@ METRICS = (
         "gas taken from the supply",
         ("supplied_mass",),
         gas_supplied,
-        lambda readings: readings.gains["supplied_mass"],
+        read_gas_supplied,
     ),
     MetricKind(
         "gas_vented",
@@ -202,7 +219,7 @@ METRICS = (
         "gas let out to the atmosphere",
         ("vented_mass",),
         gas_vented,
-        lambda readings: readings.gains["vented_mass"],
+        read_gas_vented,
     ),
     MetricKind(
         "gas_leaked",
@@ -210,7 +227,7 @@ METRICS = (
         "gas leaked past the vane, in either direction",
         ("leaked_mass",),
         gas_leaked,
-        lambda readings: readings.gains["leaked_mass"],
+        read_gas_leaked,
     ),
     MetricKind(
         "gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance, read_gas_imbalance

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind
+from ppafo.signals.meter import MeterKind
 
 Floats = NDArray[np.float64]
 
@@ -24,15 +24,15 @@ class Metric:
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What is left of runs that were metered and not recorded; every number is an array (runs,).
+    """What is left of runs that were metered and not recorded; every number is an array (runs,), or a float of one run.
 
-    ``meters`` has the last state of each meter by its name; ``course`` that of the reference, None without one;
+    ``meters`` has the last state of each meter by its name; ``course`` that of the reference, () where none needs it;
     ``interval`` is the time between two samples [s] and ``samples`` their number; ``gains`` has the last less the first
     value of channels; ``traces`` has channels sample by sample (samples, runs).
     """
 
     meters: Mapping[str, Any]
-    course: Course | None
+    course: Any
     interval: Floats
     samples: int
     gains: Mapping[str, Floats]
@@ -45,7 +45,9 @@ class MetricKind:
 
     ``compute(recording)`` returns None where the recording has the channels but not what the metric is about, for
     example no hold for the error on the hold. ``read(readings)`` returns the same for many runs (runs,), nan in place
-    of None, from the meters in ``meters`` and the traces of the channels in ``traced``.
+    of None, from the meters in ``meters`` and the traces of the channels in ``traced``; without a trace it is plain
+    arithmetic with the functions of ``model.columns``, which is translated too. It is asked only of runs that have the
+    channels.
     """
 
     name: str

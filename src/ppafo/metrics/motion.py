@@ -86,7 +86,8 @@ LARGEST_SPEED = MeterKind("largest_speed", LargestSpeed, start_largest_speed, up
 def read_angle_range(readings: Readings) -> Floats:
     """``angle_range`` [rad]."""
     state = readings.meters[ANGLE_RANGE.name]
-    return np.asarray(state.largest - state.smallest)
+    span: Floats = state.largest - state.smallest
+    return span
 
 
 def read_largest_speed(readings: Readings) -> Floats:

@@ -1,8 +1,11 @@
 """The two parts of a torque task: the ramp, and the hold after it."""
 
+import math
+
 import numpy as np
 
 from ppafo.metrics.metric import Floats, Readings
+from ppafo.model.columns import choose
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL
 
@@ -31,13 +34,8 @@ def hold(recording: Recording) -> Recording | None:
 
 
 def spans(readings: Readings) -> tuple[Floats, Floats]:
-    """Number of samples before the hold and of intervals on it, of metered runs; nan where there is no such part.
-
-    ValueError where no meter follows the reference.
-    """
-    if readings.course is None:
-        raise ValueError("no meter that needs the reference was asked for")
-    start = np.asarray(readings.course.hold_start)
+    """Number of samples before the hold and of intervals on it, of metered runs; nan where there is no such part."""
+    start = readings.course.hold_start
     length = readings.samples - 1 - start
-    has_hold = length >= 1.0
-    return np.where(has_hold & (start > 0.0), start, np.nan), np.where(has_hold, length, np.nan)
+    ramp_samples = choose(length >= 1.0, choose(start > 0.0, start, math.nan), math.nan)
+    return ramp_samples, choose(length >= 1.0, length, math.nan)

@@ -1,11 +1,13 @@
 """How restless a task is: sign changes of the command and oscillations of the torque."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ppafo.metrics.metric import Floats, MetricKind, Readings
 from ppafo.metrics.phases import hold, ramp, spans
+from ppafo.model.columns import choose, larger, truncated
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample, starts_hold
 
@@ -109,7 +111,7 @@ def next_swing(state: Swing, value: float, swing: float) -> Swing:
 
 def count_of(turns: Floats) -> Floats:
     """Number of reversals from ``Swing.turns`` (runs,)."""
-    return np.maximum(np.floor(np.abs(turns) - 1.0), 0.0)
+    return truncated(larger(abs(turns) - 1.0, 0.0))
 
 
 class Oscillations(NamedTuple):
@@ -154,8 +156,8 @@ def read_oscillations_hold(readings: Readings) -> Floats:
 
 def _where_swinging(readings: Readings, span: Floats, count: Floats) -> Floats:
     """The count; nan without that part of the task or without a reference to measure against."""
-    largest = 0.0 if readings.course is None else readings.course.largest
-    return np.where(np.isfinite(span) & (np.asarray(largest) != 0.0), count, np.nan)
+    found: Floats = choose(span > 0.0, choose(readings.course.largest != 0.0, count, math.nan), math.nan)
+    return found
 
 
 _REVERSALS = "torque reversals of more than 5 % of the largest reference"

@@ -6,6 +6,7 @@ import numpy as np
 
 from ppafo.metrics.metric import Floats, MetricKind, Readings
 from ppafo.metrics.phases import hold, ramp, spans
+from ppafo.model.columns import root
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample, ends_before_hold
 
@@ -111,19 +112,19 @@ FINAL_ERROR = MeterKind("final_error", FinalError, start_final_error, update_fin
 def read_rms_error(readings: Readings) -> Floats:
     """``rms_error`` [N m]."""
     squares = readings.meters[SQUARED_ERROR.name]
-    return np.asarray(np.sqrt((squares.before_hold + squares.on_hold) / (readings.samples - 1)))
+    return root((squares.before_hold + squares.on_hold) / (readings.samples - 1))
 
 
 def read_rms_error_ramp(readings: Readings) -> Floats:
     """``rms_error_ramp`` [N m]."""
     start, _ = spans(readings)
-    return np.asarray(np.sqrt(readings.meters[SQUARED_ERROR.name].before_hold / start))
+    return root(readings.meters[SQUARED_ERROR.name].before_hold / start)
 
 
 def read_rms_error_hold(readings: Readings) -> Floats:
     """``rms_error_hold`` [N m]."""
     _, length = spans(readings)
-    return np.asarray(np.sqrt(readings.meters[SQUARED_ERROR.name].on_hold / length))
+    return root(readings.meters[SQUARED_ERROR.name].on_hold / length)
 
 
 def read_peak_error(readings: Readings) -> Floats:

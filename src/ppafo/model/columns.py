@@ -36,12 +36,33 @@ def root(number: Number) -> Number:
 
 def larger(first: Any, second: Any) -> Any:
     """The larger of two numbers; where one is a column, run by run."""
-    return np.maximum(first, second) if _has_column(first, second) else max(first, second)
+    if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
+        return np.maximum(first, second)
+    return max(first, second)
 
 
 def smaller(first: Any, second: Any) -> Any:
     """The smaller of two numbers; where one is a column, run by run."""
-    return np.minimum(first, second) if _has_column(first, second) else min(first, second)
+    if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
+        return np.minimum(first, second)
+    return min(first, second)
+
+
+def choose(test: Any, yes: Any, no: Any) -> Any:
+    """The first number where a test holds, else the second; where one of the three is a column, run by run."""
+    return np.where(test, yes, no) if isinstance(test, np.ndarray) else (yes if test else no)
+
+
+def truncated(number: Number) -> Number:
+    """A number from -2^63 to 2^63 without its fraction, as a float; of each in a column."""
+    return np.trunc(number) if isinstance(number, np.ndarray) else float(int(number))
+
+
+def rounded_up(number: Number) -> Number:
+    """The next whole number from a number on, as a float; of each in a column."""
+    part = truncated(number)
+    found: Number = choose(part < number, part + 1.0, part)
+    return found
 
 
 def whole(number: Any) -> Any:
@@ -57,10 +78,6 @@ def at(number: Any, run: int) -> float:
 def first(number: Any) -> float:
     """The number of the first run, in its own unit."""
     return at(number, 0)
-
-
-def _has_column(*numbers: Any) -> bool:
-    return any(isinstance(number, np.ndarray) for number in numbers)
 
 
 def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence[float]], NDArray[np.intp]]:

@@ -27,7 +27,7 @@ def exponential(exponent: float) -> float:
 
     Below -708.39 the result is subnormal, and has fewer digits: it is within 5e-324, not within a share of itself.
     """
-    if math.isnan(exponent):
+    if not abs(exponent) >= 0.0:
         return exponent
     inside = max(-_LARGEST_EXPONENT, min(exponent, _LARGEST_EXPONENT))
     doublings = int(inside / LOGARITHM_OF_2 + (0.5 if inside >= 0.0 else -0.5))

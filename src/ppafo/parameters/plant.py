@@ -1,30 +1,59 @@
 """From a device to the numbers that the plant computes with."""
 
+from typing import NamedTuple
+
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.orifice_curves import area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
 
 
+class Restriction(NamedTuple):
+    """An orifice with a gas: conductance [kg/(s Pa)] and flow function."""
+
+    conductance: float
+    curve: FlowCurve
+
+
+def area_restriction(orifice: Orifice, gas: Gas, linear_ratio: float) -> Restriction:
+    """An orifice in the paper's form with a gas; linear above ``linear_ratio`` [-]. Equations (6), (7)."""
+    conductance = area_conductance(
+        orifice.area,
+        orifice.discharge_coefficient,
+        gas.heat_capacity_ratio,
+        gas.specific_gas_constant,
+        gas.temperature,
+    )
+    return Restriction(conductance, isentropic_curve(gas.heat_capacity_ratio, linear_ratio))
+
+
+def sonic_restriction(orifice: SonicOrifice, gas: Gas, linear_ratio: float) -> Restriction:
+    """An orifice in the form of ISO 6358 with a gas; linear above ``linear_ratio`` [-]."""
+    conductance = sonic_conductance_mass(orifice.sonic_conductance, gas.specific_gas_constant, gas.temperature)
+    return Restriction(conductance, iso6358_curve(orifice.critical_ratio, linear_ratio))
+
+
+def restriction(orifice: Orifice | SonicOrifice, gas: Gas, linear_ratio: float) -> Restriction:
+    """An orifice in either form with a gas."""
+    if isinstance(orifice, SonicOrifice):
+        return sonic_restriction(orifice, gas, linear_ratio)
+    return area_restriction(orifice, gas, linear_ratio)
+
+
 def orifice_conductance(orifice: Orifice | SonicOrifice, gas: Gas) -> float:
     """Conductance [kg/(s Pa)] of an orifice in either form; choked flow over upstream pressure. Equation (6)."""
-    constant = gas.specific_gas_constant
-    if isinstance(orifice, SonicOrifice):
-        return sonic_conductance_mass(orifice.sonic_conductance, constant, gas.temperature)
-    return area_conductance(
-        orifice.area, orifice.discharge_coefficient, gas.heat_capacity_ratio, constant, gas.temperature
-    )
-
-
-def orifice_curve(orifice: Orifice | SonicOrifice, gas: Gas, linear_ratio: float) -> FlowCurve:
-    """Flow function [-] of an orifice in either form, linear above ``linear_ratio`` [-]. Equations (6), (7)."""
-    if isinstance(orifice, SonicOrifice):
-        return iso6358_curve(orifice.critical_ratio, linear_ratio)
-    return isentropic_curve(gas.heat_capacity_ratio, linear_ratio)
+    return restriction(orifice, gas, 0.0).conductance
 
 
 def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParameters:
     """The plant of a device, with a constant external torque T_ex [N m] on a free vane."""
+    ratio = device.flow.linear_ratio
+    valve = restriction(device.valve.orifice, device.gas, ratio)
+    return plant_with(device, valve, restriction(device.actuator.leak, device.gas, ratio), external_torque)
+
+
+def plant_with(device: Device, valve: Restriction, leak: Restriction, external_torque: float) -> PlantParameters:
+    """The plant of a device whose orifices are known; external torque [N m]."""
     actuator, gas, supply = device.actuator, device.gas, device.supply
     return PlantParameters(
         gas_product=gas.specific_gas_constant * gas.temperature,
@@ -44,9 +73,9 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
         supply_pressure=supply.pressure,
         dorsiflexion_pressure=supply.dorsiflexion_pressure,
         atmospheric_pressure=supply.atmospheric_pressure,
-        valve_conductance=orifice_conductance(device.valve.orifice, gas),
-        leak_conductance=orifice_conductance(actuator.leak, gas),
-        valve_curve=orifice_curve(device.valve.orifice, gas, device.flow.linear_ratio),
-        leak_curve=orifice_curve(actuator.leak, gas, device.flow.linear_ratio),
+        valve_conductance=valve.conductance,
+        leak_conductance=leak.conductance,
+        valve_curve=valve.curve,
+        leak_curve=leak.curve,
         relieving=float(supply.relieving),
     )

@@ -1,6 +1,5 @@
 """From settings to a run, of a scenario or a walk: step sizes, rows of parameters, initial gas."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,24 +10,28 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
-from ppafo.engine.refinement import is_slow
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.errors import ScenarioError
-from ppafo.model.chambers import chamber_mass
-from ppafo.model.columns import at, first, larger, over_runs, smaller, whole
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_volumes
-from ppafo.model.regulator import LineState, SupplyLines
+from ppafo.model.columns import at, first, over_runs, whole
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters
+from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters, SensorRates
-from ppafo.model.thermal import wall_exchange
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
+from ppafo.simulation.preparation import (
+    is_slow_held,
+    lines_at_start,
+    rates_of_sensors,
+    state_at_start,
+    step_counts,
+    thermal_gas,
+)
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Thermal
 
 MAXIMUM_STEPS = 1.0e9
-WHOLE = 1.0e-9
 
 Problem = tuple[Any, Callable[[int], str]]
 """What may be wrong with a run: a truth value, or an array of them (runs,), and the line about one of the runs."""
@@ -167,14 +170,13 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a scenario: the largest that divides a sample of its controller, in parts where the error asks."""
-    steps_per_sample = larger(1, whole(np.ceil(scenario.control.period / scenario.time_step - WHOLE)))
-    step = scenario.control.period / steps_per_sample
+    counts = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period)
     return Steps(
-        step=step,
-        step_count=whole(np.ceil(scenario.duration / step - WHOLE)),
-        steps_per_sample=steps_per_sample,
-        record_every=nearly_whole(scenario.output_interval / step),
-        needs_parts=is_adaptive(scenario, plant, step),
+        step=counts.step,
+        step_count=whole(counts.step_count),
+        steps_per_sample=whole(counts.steps_per_sample),
+        record_every=counts.record_every,
+        needs_parts=is_adaptive(scenario, plant, counts.step),
     )
 
 
@@ -202,13 +204,7 @@ def thermal_parameters(walls: Thermal | None, device: Device) -> ThermalParamete
     """How the gas takes up heat, where it has an energy balance."""
     if walls is None:
         return NoParameters()
-    gas = device.gas
-    exchange = wall_exchange(
-        walls.heat_transfer_coefficient, walls.area_per_volume, gas.heat_capacity_ratio, gas.specific_gas_constant
-    )
-    return ThermalParameters(
-        heat_capacity_ratio=gas.heat_capacity_ratio, wall_exchange=exchange, temperature=gas.temperature
-    )
+    return thermal_gas(walls, device.gas)
 
 
 def plant_behind_lines(plant: PlantParameters, lines: SupplyLines | None) -> PlantParameters:
@@ -220,12 +216,7 @@ def initial_lines(plant: PlantParameters, lines: SupplyLines | None) -> Lines | 
     """Both lines at the pressures that their regulators are set to, and nothing let through yet; None without lines."""
     if lines is None:
         return None
-    initial = LineState(
-        mass_1=chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product),
-        mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
-        regulated_mass=0.0,
-    )
-    return Lines(lines, initial)
+    return Lines(lines, lines_at_start(plant, lines))
 
 
 def has_ideal_sensors(scenario: Scenario) -> bool:
@@ -250,8 +241,7 @@ def sensor_rates(scenario: Scenario) -> SensorRates | NoParameters:
     sensors = scenario.sensors
     if not any(first(bandwidth) > 0.0 for bandwidth in sensors.bandwidths):
         return NoParameters()
-    turn = 2.0 * math.pi
-    return SensorRates(angle=turn * sensors.angle_bandwidth, pressure=turn * sensors.pressure_bandwidth)
+    return rates_of_sensors(sensors.angle_bandwidth, sensors.pressure_bandwidth)
 
 
 def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> Any:
@@ -281,24 +271,8 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
         return True
     if not isinstance(scenario.motion, PrescribedMotion) or scenario.motion.profile.kind != "constant":
         return True
-    lowest, highest = angle_range(scenario, plant)
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
-    return np.logical_not(is_slow(plant, step, lowest, highest, stiffness))
-
-
-def nearly_whole(steps: Any) -> Any:
-    """A number of steps, or an array (runs,) of them, to the whole number where it is one to rounding."""
-    counted = np.rint(steps)
-    count = np.where(np.abs(steps - counted) <= WHOLE * steps, counted, steps)
-    return count if isinstance(steps, np.ndarray) else float(count)
-
-
-def angle_range(scenario: Scenario, plant: PlantParameters) -> tuple[float, float]:
-    """Smallest and largest angle [rad] that the vane can reach in this scenario."""
-    if isinstance(scenario.motion, FreeMotion):
-        return plant.angle_min, plant.angle_max
-    lowest, highest = profile_bounds(scenario.motion.profile)
-    return larger(lowest, plant.angle_min), smaller(highest, plant.angle_max)
+    return np.logical_not(is_slow_held(plant, step, scenario.motion.profile.settings["level"], stiffness))
 
 
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
@@ -318,18 +292,7 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
         kind = PROFILES[motion.profile.kind]
         numbers = [motion.profile.settings[item.name] for item in kind.quantities]
         angle, rate, _ = over_runs(lambda *values: kind.value(rebuilt(kind.parameters, values), 0.0), *numbers)
-    volume_1, volume_2 = chamber_volumes(plant, angle)
-    mass_1 = chamber_mass(scenario.initial_pressure_1, volume_1, plant.gas_product)
-    mass_2 = chamber_mass(scenario.initial_pressure_2, volume_2, plant.gas_product)
-    return PlantState(
-        angle=angle,
-        angular_velocity=rate,
-        mass_1=mass_1,
-        mass_2=mass_2,
-        supplied_mass=0.0,
-        vented_mass=0.0,
-        leaked_mass=0.0,
-    )
+    return state_at_start(plant, angle, rate, scenario.initial_pressure_1, scenario.initial_pressure_2)
 
 
 def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifice:

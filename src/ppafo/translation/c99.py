@@ -7,7 +7,7 @@ are exact. Built as ``FLAGS`` say, it gives the bits of the lanes.
 
 import inspect
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 
@@ -52,16 +52,27 @@ def program_source(program: Program) -> str:
 
 def translated(composed: str, collector: SourceCollector) -> str:
     """The same of a composed module that ``collector`` gathered."""
-    module = walk_module(composed)
-    documents = {name: inspect.getdoc(item) or "" for name, item in collector.owners.items()}
-    return c_source(module, documents, "Generated from the functions of ppafo. Not to be edited.")
+    return c_source(
+        walk_module(composed), documents_of(collector), "Generated from the functions of ppafo. Not to be edited."
+    )
 
 
-def c_source(module: Module, documents: Mapping[str, str], title: str) -> str:
-    """A translation unit with all functions of a module; ``documents`` has the docstrings of rows and functions."""
+def documents_of(collector: SourceCollector) -> dict[str, str]:
+    """Docstrings of what was gathered, by the name that it has in a composed module."""
+    return {name: inspect.getdoc(item) or "" for name, item in collector.owners.items()}
+
+
+def c_source(
+    module: Module, documents: Mapping[str, str], title: str, places: Mapping[str, Sequence[str]] | None = None
+) -> str:
+    """A translation unit with all functions of a module.
+
+    ``documents`` has the docstrings of rows and functions; ``places`` has names for the first places of some arrays,
+    which the file around it defines.
+    """
     # What returns nothing but empty rows is never called: an empty value is not written.
     functions = [item for item in module.functions if item.returns is None or not is_empty(item.returns)]
-    writer = _Writer(documents, {item.name for item in functions})
+    writer = _Writer(documents, {item.name for item in functions}, places or {})
     prelude = files("ppafo.translation").joinpath("prelude.h").read_text(encoding="utf-8")
     for item in functions:
         writer.function(item)
@@ -85,6 +96,7 @@ class _Writer:
 
     documents: Mapping[str, str]
     outer: set[str]
+    places: Mapping[str, Sequence[str]]
     structs: list[str] = field(default_factory=list)
     names: dict[Type, str] = field(default_factory=dict)
     owner: str = ""
@@ -161,7 +173,7 @@ class _Body:
 
     def __init__(self, writer: _Writer, item: Function, scopes: Scopes) -> None:
         self.writer = writer
-        self.terms = CTerms(writer.type_name, self.name)
+        self.terms = CTerms(writer.type_name, self.name, writer.places)
         self.item = item
         self.scopes = scopes
         self.kinds: dict[str, Type] = dict(item.parameters) | scopes.types

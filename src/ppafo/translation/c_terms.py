@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from ppafo.translation.typed import BOOL, FLOAT, INT, Array, Items, Row, Term, Type, is_empty
@@ -53,10 +53,14 @@ def member_name(kind: Row, name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class CTerms:
-    """Writes terms; ``type_name`` gives the name of a type in C, ``name`` that of a local name."""
+    """Writes terms; ``type_name`` gives the name of a type in C, ``name`` that of a local name.
+
+    ``places`` has names for the first places of some arrays.
+    """
 
     type_name: Callable[[Type], str]
     name: Callable[[str], str]
+    places: Mapping[str, Sequence[str]]
 
     def term(self, item: Term, least: int = 0) -> str:
         """A term as text, in brackets where what is around it binds more than ``least``."""
@@ -124,11 +128,17 @@ class CTerms:
         assert isinstance(owner.type, Array)
         name = self.name(owner.detail)
         if owner.type.shape:
-            return name + "".join(f"[{self.term(place)}]" for place in places), _ATOM
-        index = self.term(places[0], 9 if len(places) > 1 else 0)
+            further = "".join(f"[{self.term(place)}]" for place in places[1:])
+            return f"{name}[{self.place(owner, places[0])}]{further}", _ATOM
+        index = self.place(owner, places[0], 9 if len(places) > 1 else 0)
         for number, place in enumerate(places[1:], 1):
             index = f"{index if number == 1 else f'({index})'} * {name}.extent[{number}] + {self.term(place, 9)}"
         return f"{name}.values[{index}]", _ATOM
+
+    def place(self, owner: Term, place: Term, least: int = 0) -> str:
+        """The first place in an array, by its name where it has one."""
+        names = self.places.get(owner.detail, ())
+        return names[place.detail] if names and place.kind == "number" else self.term(place, least)
 
     def _of_extent(self, item: Term) -> tuple[str, int]:
         return f"{self.name(item.parts[0].detail)}.extent[{item.detail}]", _ATOM

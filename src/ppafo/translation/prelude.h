@@ -23,7 +23,9 @@
 #define PPAFO_SIDE_BY_SIDE
 #endif
 
-#if defined(__cplusplus)
+#if defined(PPAFO_ENTRY)
+/* Said by the file around this. */
+#elif defined(__cplusplus)
 #define PPAFO_ENTRY extern "C"
 #else
 #define PPAFO_ENTRY extern

@@ -243,10 +243,10 @@ def prepare_ideal(settings: Mapping[str, float]) -> IdealProportional:
 
 def prepare_moving(settings: Mapping[str, float]) -> MovingProportional:
     """Parameters of the moving valve from ``settings`` [SI]."""
-    limit = settings["slew_limit"] or NO_SLEW_LIMIT
+    limit = settings["slew_limit"]
     return MovingProportional(
         dead_band=settings["dead_band"],
-        slew_limit=limit,
+        slew_limit=NO_SLEW_LIMIT if limit == 0.0 else limit,
         frequency=settings["spool_frequency"],
         damping_ratio=settings["spool_damping_ratio"],
     )

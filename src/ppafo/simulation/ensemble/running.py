@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
@@ -12,14 +12,70 @@ from ppafo.engine.metering import add_meters, group_of, meters_of
 from ppafo.engine.program import Program
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
+from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import MetricKind, Readings
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.thermal import energy_per_content
 from ppafo.simulation.sampled import run_in_turn
 
-GAINED = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2")
-"""Channels whose gain follows from the first and the last state."""
 REFERENCE = "reference"
+_WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
 _SAME = 1.0e-6
+
+
+class Totals(NamedTuple):
+    """Gas in the chambers and totals of it [kg] since the start of a run."""
+
+    supplied_mass: float
+    vented_mass: float
+    leaked_mass: float
+    mass_1: float
+    mass_2: float
+
+
+class ThermalTotals(NamedTuple):
+    """The same of gas with an energy balance, with its true masses [kg], and its energies [J]."""
+
+    supplied_mass: float
+    vented_mass: float
+    leaked_mass: float
+    mass_1: float
+    mass_2: float
+    gas_energy: float
+    supplied_enthalpy: float
+    vented_enthalpy: float
+    wall_heat: float
+    gas_work: float
+
+
+def totals(state: PlantState) -> Totals:
+    """Gas [kg] of a state; its numbers may be arrays (runs,)."""
+    return Totals(
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
+        mass_1=state.mass_1,
+        mass_2=state.mass_2,
+    )
+
+
+def thermal_totals(
+    state: PlantState, masses: ThermalState, plant: PlantParameters, thermal: ThermalParameters
+) -> ThermalTotals:
+    """Gas [kg] and energies [J] of a state with an energy balance; numbers may be arrays (runs,)."""
+    per_content = energy_per_content(plant.gas_product, thermal.heat_capacity_ratio)
+    return ThermalTotals(
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
+        mass_1=masses.mass_1,
+        mass_2=masses.mass_2,
+        gas_energy=per_content * (state.mass_1 + state.mass_2),
+        supplied_enthalpy=per_content * masses.supplied_content,
+        vented_enthalpy=per_content * masses.vented_content,
+        wall_heat=per_content * masses.heat_content,
+        gas_work=masses.gas_work,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +169,7 @@ class _MeteredBatch:
         traces = {} if record is None else {name: record[:, row] for row, name in enumerate(program.traced)}
         return Readings(
             meters=meters_of(program, states),
-            course=group_of("course", groups, states) if program.follows_reference else None,
+            course=group_of("course", groups, states) if program.follows_reference else (),
             interval=self.interval[runs],
             samples=self.samples,
             gains={name: last[name] - first[name] for name in last},
@@ -122,32 +178,26 @@ class _MeteredBatch:
 
 
 def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, Floats]:
-    """Gas in the chambers and totals of each run; gas with an energy balance keeps its true masses elsewhere."""
+    """Gas in the chambers and totals of each run, by channel."""
     groups = program.state_rows()
     state = group_of("state", groups, states)
-    totals = {name: getattr(state, name) for name in GAINED}
-    if program.is_thermal:
-        masses = group_of("masses", groups, states)
-        groups = program.parameter_rows()
-        plant, thermal = (group_of(name, groups, parameters) for name in ("plant", "thermal"))
-        per_content = energy_per_content(plant.gas_product, thermal.heat_capacity_ratio)
-        totals |= {
-            "gas_energy": per_content * (state.mass_1 + state.mass_2),
-            "supplied_enthalpy": per_content * masses.supplied_content,
-            "vented_enthalpy": per_content * masses.vented_content,
-            "wall_heat": per_content * masses.heat_content,
-            "gas_work": masses.gas_work,
-            "mass_1": masses.mass_1,
-            "mass_2": masses.mass_2,
-        }
-    return totals
+    if not program.is_thermal:
+        return totals(state)._asdict()
+    masses = group_of("masses", groups, states)
+    groups = program.parameter_rows()
+    plant, thermal = (group_of(name, groups, parameters) for name in ("plant", "thermal"))
+    return thermal_totals(state, masses, plant, thermal)._asdict()
+
+
+def has_channels(program: Program, kind: MetricKind) -> bool:
+    """True where runs of a program have the channels of a metric."""
+    missing = frozenset() if program.is_thermal else _WITH_ENERGY_BALANCE
+    return not missing.intersection(kind.channels) and (program.has_reference or REFERENCE not in kind.channels)
 
 
 def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     program = plain.program
-    available = {
-        name: kind for name, kind in request.metrics.items() if program.has_reference or REFERENCE not in kind.channels
-    }
+    available = {name: kind for name, kind in request.metrics.items() if has_channels(program, kind)}
     # In one order, so that the same metrics are one program in whatever order they are asked for.
     meters = sorted({meter.name: meter for kind in available.values() for meter in kind.meters}.items())
     read_from_traces = dict.fromkeys(channel for kind in available.values() for channel in kind.traced)

@@ -1,0 +1,193 @@
+"""The files of an exported library: header, source, example, make files, licence and a page on how to use it."""
+
+import math
+import re
+import sys
+import textwrap
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+
+from ppafo.engine.lane_source import SAME_MOMENT
+from ppafo.engine.lanes import SIGNAL_ROWS
+from ppafo.engine.run import NEVER_FAILED
+from ppafo.exports.c_library.program import COUNTS, ExportedProgram, Further, c_text
+from ppafo.model.declaration import Quantity
+from ppafo.version import __version__
+
+OUTPUTS = {
+    "angle": ("rad", "angle of the vane"),
+    "angular_velocity": ("rad/s", "its rate"),
+    "pressure_1": ("Pa", "pressure in chamber 1, absolute"),
+    "pressure_2": ("Pa", "pressure in chamber 2, absolute"),
+    "torque": ("N m", "torque of the actuator, above 0 turns the toes down"),
+    "command": ("-", "command to the valve, -1 to 1"),
+    "reference": ("N m", "torque that was asked for"),
+    "temperature_1": ("K", "temperature in chamber 1"),
+    "temperature_2": ("K", "temperature in chamber 2"),
+    "mass_1": ("kg", "gas in chamber 1"),
+    "mass_2": ("kg", "gas in chamber 2"),
+    "supplied_mass": ("kg", "gas from the supply so far"),
+    "vented_mass": ("kg", "gas to the atmosphere so far"),
+    "leaked_mass": ("kg", "gas past the vane so far"),
+}
+"""Unit and meaning of what can be read at each sample."""
+UNITS = {"Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
+_SIGNS = {"below": "<", "at most": "<=", "at least": ">="}
+_MARK = re.compile(r"@(\w+)@")
+_FILES = {
+    "interface.h": "{name}.h",
+    "main.c": "main.c",
+    "Makefile": "Makefile",
+    "CMakeLists.txt": "CMakeLists.txt",
+    "README.md": "README.md",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """Something that can be chosen before a run: its name in C and in ppafo, what it is, and what the scenario has."""
+
+    name: str
+    path: str
+    quantity: Quantity
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """A setting that must be ``below``, ``at most`` or ``at least`` another, but for ``tolerance`` in its unit."""
+
+    name: str
+    relation: str
+    other: str
+    tolerance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Library:
+    """What is to be written.
+
+    ``further`` adds the function that makes the numbers of a run from the settings, ``preparation`` has the lines of C
+    around it, ``other_program`` conditions in C under which another program would be needed. ``words`` fill the page.
+    """
+
+    title: str
+    description: str
+    program: ExportedProgram
+    settings: tuple[Setting, ...]
+    relations: tuple[Relation, ...]
+    preparation: tuple[str, ...]
+    other_program: tuple[str, ...]
+    words: Mapping[str, str]
+    further: Further | None = None
+
+
+def c_identifier(name: str) -> str:
+    """A name as C can have it."""
+    found = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()
+    return found if found[:1].isalpha() else f"run_{found}"
+
+
+def library_files(library: Library) -> dict[str, bytes]:
+    """All files of a library by name."""
+    name, program = c_identifier(library.title), library.program
+    words = _words(library, name)
+    texts = {target.format(name=name): _filled(source, words) for source, target in _FILES.items()}
+    texts["LICENSE"] = _filled("LICENSE", {})
+    head = (
+        f'#include "{name}.h"\n\n#include <string.h>\n\n#if !defined(PPAFO_ENTRY)\n#define PPAFO_ENTRY static\n#endif\n'
+    )
+    title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
+    functions = c_text(program, title, [item.name for item in library.settings], library.further)
+    texts[f"{name}.c"] = f"{head}{functions}\n{_filled('interface.c', words)}"
+    return {file: text.encode() for file, text in sorted(texts.items())}
+
+
+def _filled(file: str, words: Mapping[str, str]) -> str:
+    """A template with its marks replaced."""
+    text = files("ppafo.exports.c_library").joinpath("templates", file).read_text(encoding="utf-8")
+    return _MARK.sub(lambda found: words[found[1]], text)
+
+
+def _words(library: Library, name: str) -> dict[str, str]:
+    program = library.program
+    outputs = ["time", *program.outputs]
+    states, parameters = program.state_places, program.parameter_places
+    return {
+        "name": name,
+        "NAME": name.upper(),
+        "title": library.title,
+        "description": "\n * ".join(textwrap.wrap(library.description.replace("*/", "* /"), 110)),
+        "version": __version__,
+        "never": repr(NEVER_FAILED),
+        "same_moment": repr(SAME_MOMENT),
+        "signal_rows": str(SIGNAL_ROWS),
+        "state_count": str(len(states)),
+        "parameter_count": str(len(parameters)),
+        "count_count": str(len(COUNTS)),
+        "output_count": str(len(program.outputs)),
+        "metric_count": str(len(program.metrics)),
+        "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),
+        "outputs": _members((("time", "s", "since the start"), *((item, *OUTPUTS[item]) for item in program.outputs))),
+        "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
+        "prepare": "\n".join(f"    {line}" for line in library.preparation),
+        "defaults": "\n".join(f"    settings->{item.name} = {item.value!r};" for item in library.settings),
+        "setting_count": str(len(library.settings)),
+        "other_program": "".join(f"\n        || {item}" for item in library.other_program),
+        "ranges": "\n".join([*map(_range, library.settings), *map(_related, library.relations)]),
+        "read_outputs": "\n".join(
+            f"    outputs->{item} = values[{place}];" for place, item in enumerate(program.outputs)
+        ),
+        "read_metrics": "\n".join(
+            f"    given->{kind.name} = found[METRIC_{kind.name.upper()}];" for kind in program.metrics
+        ),
+        "csv_head": ",".join(outputs),
+        "csv_form": ",".join(["%.17g"] * len(outputs)),
+        "csv_values": ",\n".join(f"            outputs.{item}" for item in outputs),
+        "print_metrics": "\n".join(
+            f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", "{kind.summary}");'
+            for kind in program.metrics
+        ),
+        "example": f"{library.settings[0].name} = {library.settings[0].value!r};",
+        **library.words,
+    }
+
+
+def _members(items: Iterable[tuple[str, str, str]]) -> str:
+    """Members of a struct, each with its unit and meaning."""
+    lines = []
+    for name, unit, said in items:
+        comment = f"{UNITS.get(unit, unit) or '-'}: {said}".replace("*/", "* /")
+        lines.append(f"    double {name}; /* {comment} */")
+    return "\n".join(lines)
+
+
+def _said(quantity: Quantity) -> str:
+    """What a setting is, and its range."""
+    low, high = (limit if abs(limit) < math.inf else None for limit in (quantity.minimum, quantity.maximum))
+    above = "" if low is None else f"{'from' if quantity.minimum_allowed else 'above'} {low:g}"
+    below = "" if high is None else f"up to {high:g}"
+    limits = " ".join(filter(None, (above, below)))
+    return f"{quantity.summary or quantity.name}{'; ' if limits else ''}{limits}"
+
+
+def _refused(holds: str, name: str) -> str:
+    """Lines of C that name a setting unless something holds, which it does not for what is no number."""
+    return f'    if (!({holds})) {{\n        return "{name}";\n    }}'
+
+
+def _related(item: Relation) -> str:
+    """Lines of C that refuse a setting that contradicts another."""
+    slack = f" {'-' if item.relation == 'at least' else '+'} {item.tolerance!r}" if item.tolerance else ""
+    holds = f"settings->{item.name} {_SIGNS[item.relation]} settings->{item.other}{slack}"
+    return _refused(holds, item.name)
+
+
+def _range(item: Setting) -> str:
+    """Lines of C that refuse a value that the declaration does not allow, or that is no number."""
+    quantity, value = item.quantity, f"settings->{item.name}"
+    sign = ">=" if quantity.minimum_allowed else ">"
+    low = max(quantity.minimum, -sys.float_info.max)
+    high = min(quantity.maximum, sys.float_info.max)
+    return _refused(f"{value} {sign} {low!r} && {value} <= {high!r}", item.name)

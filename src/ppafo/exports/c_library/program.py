@@ -1,0 +1,137 @@
+"""The composed module of an exported scenario: its lane loop for one run, its metrics, the way from settings there."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from ppafo.engine.lane_meters import TRACED
+from ppafo.engine.lane_rows import indent
+from ppafo.engine.lane_source import INLINE, write_lanes
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.source_text import SourceCollector
+from ppafo.metrics.catalog import METRICS
+from ppafo.metrics.metric import MetricKind, Readings
+from ppafo.simulation.ensemble.running import ThermalTotals, Totals, has_channels, thermal_totals, totals
+from ppafo.translation.c99 import c_source, documents_of
+from ppafo.translation.one_run import one_run_collector
+from ppafo.translation.walk import walk_module
+
+COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
+"""Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.
+
+The last one is 1 where the error decides about the parts of a step, else 0.
+"""
+Further = Callable[[SourceCollector], str]
+"""Writes a further composed function, once it has gathered what that calls."""
+METRICS_ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], int64, float64[::1])")'
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedProgram:
+    """A program with meters for all its metrics, and traces of all its outputs."""
+
+    program: Program
+    metrics: tuple[MetricKind, ...]
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Channels that it gives at each sample, in order."""
+        return self.program.traced
+
+    @property
+    def state_places(self) -> dict[str, str]:
+        """Name of the place of each state row in C, by its path."""
+        return places_of(self.program.state_rows())
+
+    @property
+    def parameter_places(self) -> dict[str, str]:
+        """Name of the place of each parameter row in C, by its path."""
+        return places_of(self.program.parameter_rows())
+
+
+def exported(program: Program) -> ExportedProgram:
+    """The program as it is exported; a metric that needs the whole course of a channel is left out."""
+    metrics = tuple(kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
+    meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
+    missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
+    missing |= set() if program.has_reference else {"reference"}
+    outputs = tuple(name for name in TRACED if name not in missing)
+    return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
+
+
+def places_of(groups: Mapping[str, type]) -> dict[str, str]:
+    """Names in C of the places of all numbers of some groups of rows, by path."""
+    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
+    return {path: f"AT_{re.sub(r'[^A-Za-z0-9]+', '_', path).strip('_').upper()}" for path in paths}
+
+
+def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: Further | None = None) -> str:
+    """All functions of an exported program in C; ``further`` may add one that takes ``settings``, which are named."""
+    collector = one_run_collector(INLINE)
+    entries = [metrics_entry(item, collector), *([] if further is None else [further(collector)])]
+    composed = "\n\n".join([write_lanes(item.program, collector, lanes=1), *entries, ""])
+    state, parameter = list(item.state_places.values()), list(item.parameter_places.values())
+    stepping = [f"AT_STEP_{name.removeprefix('AT_')}" for name in places_of(item.program.step_rows()).values()]
+    own = ["AT_PART_LENGTH", "AT_PART_BEFORE", "AT_PART_REMAINING", "AT_PART_ERROR"]
+    alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
+    places = {
+        "x": [*state, *parameter, *stepping, *own],
+        "states": state,
+        "first": state,
+        "parameters": alone,
+        "counts": [f"COUNT_{name.upper()}" for name in COUNTS],
+        "settings": [f"SETTING_{name.upper()}" for name in settings],
+        "found": [f"METRIC_{kind.name.upper()}" for kind in item.metrics],
+    }
+    counted = [
+        _enumeration("Places of all numbers of a run: states, parameters, and what a step hands on.", places["x"]),
+        _enumeration("Places of the parameters alone.", alone),
+        _enumeration("Places of the numbers of the steps.", places["counts"]),
+        _enumeration("Places of the settings.", places["settings"]),
+        _enumeration("Places of the metrics.", places["found"]),
+    ]
+    documents = documents_of(collector) | {"Readings": Readings.__doc__ or ""}
+    return "\n".join([*counted, c_source(walk_module(composed), documents, title, places)])
+
+
+def _enumeration(said: str, names: Sequence[str]) -> str:
+    lines = "\n".join(f"    {name}," for name in names)
+    return f"/* {said} */\nenum {{\n{lines.removesuffix(',')}\n}};\n"
+
+
+def metrics_entry(item: ExportedProgram, collector: SourceCollector) -> str:
+    """The metrics of a run, from its first and its last states."""
+    program, groups = item.program, item.program.state_rows()
+    names = [kind.name for kind in program.meters]
+    kind, make = (ThermalTotals, thermal_totals) if program.is_thermal else (Totals, totals)
+    further = ", plant, thermal" if program.is_thermal else ""
+    parameters = program.parameter_rows()
+    lines = [f"{name} = {_loaded(name, parameters, 'parameters', collector)}" for name in ("plant", "thermal")]
+    add = collector.add
+    for array in ("first", "states"):
+        state = _loaded("state", groups, array, collector)
+        masses = f", {_loaded('masses', groups, array, collector)}" if program.is_thermal else ""
+        lines.append(f"{array}_total = {add(make)}({state}{masses}{further})")
+    gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind._fields)
+    meters = ", ".join(
+        f"{name}={_loaded(group, groups, 'states', collector)}"
+        for name, group in zip(names, program.meter_groups, strict=True)
+    )
+    course = _loaded("course", groups, "states", collector)
+    lines += [
+        f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples, gains={add(kind)}({gains}))",
+        *(f"found[{place}] = {add(metric.read)}(readings)" for place, metric in enumerate(item.metrics)),
+    ]
+    rows = [
+        f"Meters = namedtuple('Meters', {names!r})",
+        "Readings = namedtuple('Readings', ['meters', 'course', 'samples', 'gains'])",
+    ]
+    return "\n".join([*rows, METRICS_ENTRY, "def metrics(first, states, parameters, samples, found):", *indent(lines)])
+
+
+def _loaded(group: str, groups: Mapping[str, type], array: str, collector: SourceCollector) -> str:
+    """The NamedTuple of a group of rows, from an array of all of them."""
+    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
+    cells = {path: f"{array}[{place}]" for place, path in enumerate(paths)}
+    return row_expression(groups[group], group, cells, collector.add)

@@ -1,0 +1,69 @@
+"""``ppafo export c``."""
+
+import json
+import math
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.controllers.constant import KIND, ConstantParameters
+from ppafo.model.sensors import Measurement
+
+PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "export-to-c.md").read_text(encoding="utf-8")
+
+
+def test_the_commands_of_the_page_write_libraries(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    commands = re.findall(r"^ppafo (.*)$", PAGE, re.MULTILINE)
+    for command in commands:
+        assert main([*shlex.split(command), "--json"]) == 0
+    documents = capsys.readouterr().out.split("\n}\n")
+    files = json.loads(documents[0] + "\n}")["files"]
+    assert files == [
+        "CMakeLists.txt",
+        "LICENSE",
+        "Makefile",
+        "README.md",
+        "main.c",
+        "torque_task_proportional.c",
+        "torque_task_proportional.h",
+    ]
+    assert all((tmp_path / "out" / "c" / file).stat().st_size > 0 for file in files)
+    assert "settings->valve_area = 1.26e-05;" in (tmp_path / "out" / "wide" / "step_response.c").read_text()
+
+
+def with_exponential(
+    law: ConstantParameters, state: tuple[()], wanted: float, seen: Measurement, period: float
+) -> tuple[float, tuple[()]]:
+    """A law that C has no bits for."""
+    return law.command * math.exp(-wanted), state
+
+
+def test_what_cannot_be_translated_is_refused_by_file_and_line_and_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    law = CONTROLLERS["constant"].__class__
+    given = {name: getattr(KIND, name) for name in ("summary", "source", "quantities", "parameters", "initial")}
+    monkeypatch.setitem(CONTROLLERS, "exponential", law(name="exponential", update=with_exponential, **given))
+    folder = tmp_path / "library"
+    changed = ["--set", "controller.kind=exponential"]
+    assert main(["export", "c", "step-response", *changed, "--out", str(folder)]) == 2
+    line = with_exponential.__code__.co_firstlineno + 4
+    assert f"test_export.py:{line}: 'math.exp' is a function of a library" in capsys.readouterr().err
+    assert not folder.exists()
+
+
+def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.txt").write_text("kept")
+    assert main(["export", "c", "step-response", "--out", str(tmp_path)]) == 2
+    assert main(["export", "c", "step-respons", "--out", str(tmp_path / "new")]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert "did you mean 'step-response'" in lines[1]
+    assert [item.name for item in tmp_path.iterdir()] == ["mine.txt"]

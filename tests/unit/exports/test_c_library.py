@@ -1,0 +1,223 @@
+"""A scenario as a library in C: built by its own make file, it prints the bits of Python, and keeps its promises."""
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.exports.c_library import c_library, scenario_library
+from ppafo.metrics.catalog import METRICS
+from ppafo.metrics.metric import Readings
+from ppafo.signals.meter import SAME_LEVEL, Course, Sample, advance_course
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.result import Result
+from ppafo.simulation.simulate import simulate
+
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
+EVERYTHING = (
+    "run.duration=0.2 s",
+    "sensors.delay=2.3 ms",
+    "sensors.pressure_noise=0.1 psi_d",
+    "sensors.pressure_bandwidth=80 Hz",
+    "gas_model.kind=thermal",
+    "gas_model.heat_transfer_coefficient=50 W/(m^2 K)",
+    "gas_model.wall_area_per_volume=100 1/m",
+    "supply_line.plantarflexion.droop=3e6 Pa s/kg",
+    "run.output_interval=0.8 ms",
+    "run.step=0.7 ms",
+)
+"""What makes a program of every feature of a scenario."""
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+
+
+def written(folder: Path, name: str, *overrides: str) -> str:
+    """Write the library of a scenario; its name in C."""
+    contents = c_library(load_scenario(name, overrides))
+    for file, content in contents.items():
+        (folder / file).write_bytes(content)
+    return name.replace("-", "_")
+
+
+def metrics_of(result: Result) -> dict[str, float]:
+    """Metrics of a recording, by the meters, sample by sample in Python."""
+    recording = result.recording
+    last = float(recording["reference"][-1])
+    largest = max(abs(float(recording["reference"][0])), abs(last))
+    course = Course(last, largest, SAME_LEVEL * largest, 0.0)
+    kinds = [kind for kind in METRICS.values() if set(kind.channels) <= set(recording.names) and not kind.traced]
+    meters = {meter.name: meter for kind in kinds for meter in kind.meters}
+    states: dict[str, Any] = {}
+    for number in range(len(recording)):
+        given = {name: float(recording[name][number]) for name in Sample._fields[1:-2]}
+        sample = Sample(number=float(number), temperature_1=0.0, temperature_2=0.0, **given)
+        course = advance_course(course, sample)
+        for name, meter in meters.items():
+            states[name] = meter.update(states[name], course, sample) if number else meter.start(course, sample)
+    totals = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2")
+    gains: Any = {name: recording[name][-1] - recording[name][0] for name in totals}
+    interval: Any = recording.time[1]
+    readings = Readings(states, course, interval, len(recording), gains, {})
+    return {kind.name: float(kind.read(readings)) for kind in kinds}
+
+
+def printed(result: Result, outputs: tuple[str, ...]) -> list[str]:
+    """What the example prints, by Python."""
+    recording = result.recording
+    columns = [recording.time, *(recording[name] for name in outputs)]
+    lines = [",".join(["time", *outputs])]
+    lines += [",".join("%.17g" % value for value in row) for row in zip(*columns, strict=True)]  # noqa: UP031
+    for name, value in metrics_of(result).items():
+        unit, said = METRICS[name].unit, METRICS[name].summary
+        text = f"# {name}: none here: {said}" if np.isnan(value) else f"# {name} = {value:.17g} {unit}: {said}"
+        lines.append(text)
+    return lines
+
+
+def test_the_example_prints_the_torque_task_with_the_bits_of_python(tmp_path: Path) -> None:
+    scenario = load_scenario("torque-task-proportional")
+    name = written(tmp_path, "torque-task-proportional")
+    command = ["make", "-s", "-C", str(tmp_path), f"CFLAGS=-std=c99 -O2 {' '.join(WARNINGS)}", "check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / f"{name}.a").exists()
+    lines = printed(simulate(scenario), scenario_library(scenario).program.outputs)
+    assert len(lines) > 3000
+    assert done.stdout.splitlines() == lines
+
+
+def output_of(folder: Path, name: str, *command: str) -> str:
+    """What the example prints, built by a compiler with flags."""
+    target = folder / "example"
+    sources = [str(folder / f"{name}.c"), str(folder / "main.c")]
+    subprocess.run([*command, *WARNINGS, "-ffp-contract=off", *sources, "-o", str(target), "-lm"], check=True)
+    done = subprocess.run([str(target)], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+def test_everything_at_once_is_clean_under_the_sanitizers_and_the_same_in_c_plus_plus(tmp_path: Path) -> None:
+    name = written(tmp_path, "torque-task-moving-ankle", *EVERYTHING)
+    checked = ("gcc", "-std=c99", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    first = output_of(tmp_path, name, *checked)
+    assert first.count("\n") > 250
+    assert "lowest_temperature = " in first
+    if shutil.which("g++"):
+        assert output_of(tmp_path, name, "g++", "-O2") == first
+
+
+@pytest.fixture(scope="module")
+def step(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    """The library of the step response."""
+    folder = tmp_path_factory.mktemp("step")
+    name = written(folder, "step-response")
+    library = folder / "library.so"
+    flags = ["-std=c99", "-O1", "-ffp-contract=off", "-shared", "-fPIC"]
+    subprocess.run(["gcc", *flags, str(folder / f"{name}.c"), "-o", str(library), "-lm"], check=True)
+    loaded = ctypes.CDLL(str(library))
+    loaded.step_response_size.restype = ctypes.c_size_t
+    loaded.step_response_bad_setting.restype = ctypes.c_char_p
+    return loaded
+
+
+GOING_ON, FINISHED, BAD_SETTING, OTHER_PROGRAM = 0, 1, 4, 5
+LIBRARY = scenario_library(load_scenario("step-response"))
+NAMES = [item.name for item in LIBRARY.settings]
+
+
+class Run:
+    """One run of the step response in C; ``outputs`` are those of the sample that it has reached."""
+
+    def __init__(self, step: ctypes.CDLL, **changes: float) -> None:
+        self.step = step
+        self.settings = (ctypes.c_double * len(NAMES))()
+        step.step_response_defaults(self.settings)
+        for name, value in changes.items():
+            self.settings[NAMES.index(name)] = value
+        self.size = step.step_response_size(self.settings)
+        self.memory = (ctypes.c_double * (self.size // 8 + 1))()
+        self.status = step.step_response_initialise(self.memory, self.settings)
+        self.outputs = np.zeros(1 + len(LIBRARY.program.outputs))
+
+    def advance(self) -> bool:
+        """Go on to the next sample, if there is one."""
+        self.status = self.step.step_response_step(self.memory)
+        values = ctypes.c_void_p(self.outputs.ctypes.data)
+        self.step.step_response_read_outputs(self.memory, values)
+        return bool(self.status == GOING_ON)
+
+    def course(self, samples: int = 1_000_000) -> list[bytes]:
+        """Outputs of the next samples."""
+        found: list[bytes] = []
+        while len(found) < samples and self.advance():
+            found.append(self.outputs.tobytes())
+        return found
+
+
+def test_settings_that_are_changed_in_c_give_what_overrides_give_in_python(step: ctypes.CDLL) -> None:
+    overrides = ["valve.area=9 mm^2", "friction.static_torque=0.9 N m", "run.step=0.5 ms", "gas.temperature=310 K"]
+    recording = simulate("step-response", overrides).recording
+    changes = {"valve_area": 9.0e-6, "friction_static_torque": 0.9, "run_step": 0.5e-3, "gas_temperature": 310.0}
+    columns = [recording.time, *(recording[name] for name in LIBRARY.program.outputs)]
+    assert Run(step, **changes).course() == [np.array(row).tobytes() for row in zip(*columns, strict=True)]
+
+
+def test_runs_do_not_know_of_each_other_and_a_copy_goes_on_as_the_first_would(step: ctypes.CDLL) -> None:
+    alone = Run(step).course()
+    one, other = Run(step), Run(step, valve_area=9.0e-6)
+    turns = [(one.course(1), other.course(1)) for _ in range(200)]
+    copied = Run(step)
+    step.step_response_copy(copied.memory, one.memory)
+    rest = one.course()
+    assert [mine for mine, _ in turns] == [[sample] for sample in alone[:200]]
+    assert turns[-1][0] != turns[-1][1]
+    assert rest == alone[200:] == copied.course()
+    assert (one.status, one.advance()) == (FINISHED, False)
+
+
+@pytest.mark.parametrize(
+    ("setting", "value", "named"),
+    [
+        ("valve_area", -1.0, "valve_area"),
+        ("gas_temperature", np.nan, "gas_temperature"),
+        ("run_duration", np.inf, "run_duration"),
+        ("run_output_interval", 1.0e-4, "run_step"),
+        ("friction_dynamic_torque", 1.0e3, "friction_dynamic_torque"),
+    ],
+)
+def test_a_setting_that_no_file_could_have_is_refused_by_name(
+    step: ctypes.CDLL, setting: str, value: float, named: str
+) -> None:
+    run = Run(step, **{setting: value})
+    assert (run.size, run.status) == (0, BAD_SETTING)
+    assert step.step_response_bad_setting(run.settings) == named.encode()
+
+
+@pytest.mark.parametrize(("setting", "value"), [("valve_delay", 0.01), ("sensors_angle_noise", 0.01)])
+def test_settings_that_need_other_functions_are_refused(step: ctypes.CDLL, setting: str, value: float) -> None:
+    run = Run(step, **{setting: value})
+    assert (run.size, run.status) == (0, OTHER_PROGRAM)
+    assert step.step_response_bad_setting(run.settings) is None
+    assert Run(step, valve_dead_band=0.1).status == GOING_ON
+
+
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake on this machine")
+def test_cmake_builds_the_example_and_runs_it(tmp_path: Path) -> None:
+    written(tmp_path, "step-response")
+    build = tmp_path / "build"
+    subprocess.run(["cmake", "-S", str(tmp_path), "-B", str(build)], check=True, capture_output=True)
+    subprocess.run(["cmake", "--build", str(build)], check=True, capture_output=True)
+    done = subprocess.run(["ctest", "--test-dir", str(build)], check=False, capture_output=True, text=True)
+    assert "100% tests passed" in done.stdout
+
+
+def test_the_licence_is_that_of_the_package() -> None:
+    contents = c_library(load_scenario("step-response"))
+    assert contents["LICENSE"] == (Path(__file__).parents[3] / "LICENSE").read_bytes()
+    page = contents["README.md"].decode()
+    assert "@" not in page
+    assert "52 of them" not in page
+    assert f"{len(NAMES)} of them" in page
