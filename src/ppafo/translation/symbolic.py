@@ -18,9 +18,8 @@ from ppafo.engine.rows import is_number, members
 from ppafo.engine.source_text import SourceCollector, emitted_name
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
-from ppafo.translation.c_terms import CTerms
 from ppafo.translation.typed import FLOAT, INT, Function, Handed, Items, Row, Statement, Term, Type, is_empty
-from ppafo.translation.walk import walk_function
+from ppafo.translation.walk import walk_module
 
 Compare = Callable[[str, Any, Any, str], Any]
 """From a sign, two values and where they are compared: the expression of it, or a truth value where it is decided."""
@@ -44,7 +43,6 @@ _ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
     "/": _quotient,
 }
 _WHOLE_ONLY = frozenset({"//", "%", "&", "|", "^", ">>"})
-_WORDS = CTerms(lambda _: "", lambda name: name)
 
 
 def both_sides(sign: str, left: Any, right: Any, _where: str) -> Any:
@@ -118,7 +116,7 @@ def _walked(function: Callable[..., Any], given: tuple[type | Callable[..., Any]
     collector = SourceCollector("@function")
     name = collector.add(function)
     types = tuple(_type_of(item, collector) for item in given)
-    module = walk_function(collector.text(), name, types)
+    module = walk_module(collector.text(), {name: types})
     places = {
         own: f"{item.__module__.removeprefix('ppafo.')}.{item.__qualname__}" for own, item in collector.owners.items()
     }
@@ -199,14 +197,14 @@ class _Call:
 
     def value(self, term: Term, names: dict[str, Any]) -> Any:
         """The value of a term."""
-        if term.kind == "name":
-            return names.get(term.detail)
+        if term.kind in ("name", "number"):
+            return names.get(term.detail) if term.kind == "name" else term.detail
         parts = [self.value(part, names) for part in term.parts]
         writer: Callable[..., Any] | None = getattr(self, f"_of_{term.kind}", None)
         if writer is not None:
             return writer(term, *parts)
         if term.kind in _COMPARISONS:
-            return self.compared(term.kind, parts[0], parts[1], _WORDS.term(term))
+            return self.compared(term.kind, parts[0], parts[1], _text(term))
         if term.kind in ("min", "max"):
             return self.extreme(term, *parts)
         if term.kind in ("and", "or"):
@@ -214,11 +212,8 @@ class _Call:
         if term.kind not in _ARITHMETIC:
             raise self.refused(f"'{term.kind}' of the lane loop")
         if term.kind in _WHOLE_ONLY and not all(isinstance(part, int) for part in parts):
-            raise self.refused(f"'{_WORDS.term(term)}' of whole numbers")
+            raise self.refused(f"'{_text(term)}' of whole numbers")
         return _ARITHMETIC[term.kind](*parts)
-
-    def _of_number(self, term: Term) -> Any:
-        return term.detail
 
     def _of_call(self, term: Term, *given: Any) -> Any:
         return self.home.result(self.home.walked.functions[term.detail], list(given))
@@ -255,7 +250,7 @@ class _Call:
     def _of_abs(self, term: Term, given: Any) -> Any:
         import casadi
 
-        is_negative = self.compared("<", given, 0.0, f"{_WORDS.term(term.parts[0])} < 0.0")
+        is_negative = self.compared("<", given, 0.0, f"{_text(term.parts[0])} < 0.0")
         if isinstance(is_negative, bool):
             return -given if is_negative else given
         return casadi.fabs(given)
@@ -273,9 +268,7 @@ class _Call:
         """A comparison: a truth value where both numbers are known or it is decided, else an expression."""
         if isinstance(left, int | float) and isinstance(right, int | float):
             return bool(_COMPARISONS[sign](left, right))
-        return self.home.compare(
-            sign, left, right, f"{self.home.walked.places[self.function.source]}: {_in_python(words)}"
-        )
+        return self.home.compare(sign, left, right, f"{self.home.walked.places[self.function.source]}: {words}")
 
     def extreme(self, term: Term, first: Any, second: Any) -> Any:
         """The smaller or the larger of two numbers.
@@ -286,7 +279,7 @@ class _Call:
         import casadi
 
         sign = "<=" if term.kind == "min" else ">"
-        one, other = (_WORDS.term(part) for part in term.parts)
+        one, other = (_text(part) for part in term.parts)
         is_second = self.compared(sign, second, first, f"{other} {sign} {one}")
         if isinstance(is_second, bool):
             return second if is_second else first
@@ -309,11 +302,25 @@ class _Call:
         return casadi.if_else(test, yes, no)
 
 
-def _in_python(words: str) -> str:
-    """A term of C as Python has it."""
-    for own, name in (("ppafo_smaller", "min"), ("ppafo_larger", "max"), ("fabs", "abs"), ("&&", "and"), ("||", "or")):
-        words = words.replace(own, name)
-    return words
+def _text(term: Term, is_inside: bool = False) -> str:
+    """A term as Python has it."""
+    parts = [_text(part, True) for part in term.parts]
+    if term.kind in ("name", "number"):
+        return str(term.detail)
+    if term.kind in ("field", "item"):
+        return f"{parts[0]}.{term.detail}" if term.kind == "field" else f"{parts[0]}[{(*parts, term.detail)[1]}]"
+    if term.kind in ("call", "build", "abs", "min", "max", "sqrt"):
+        name = term.detail if term.kind == "call" else "" if term.kind == "build" else term.kind
+        return f"{name}({', '.join(_text(part) for part in term.parts)})"
+    if term.kind == "convert":
+        return parts[0]
+    if term.kind == "choice":
+        text = f"{parts[1]} if {parts[0]} else {parts[2]}"
+    elif term.kind in ("negative", "not"):
+        return f"-{parts[0]}" if term.kind == "negative" else f"not {parts[0]}"
+    else:
+        text = f" {term.kind} ".join(parts)
+    return f"({text})" if is_inside else text
 
 
 def _returns(item: Statement) -> bool:

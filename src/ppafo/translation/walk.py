@@ -6,7 +6,7 @@ type, so that it is bound here. What is outside the subset is refused with the f
 
 import ast
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,32 +38,22 @@ from ppafo.translation.typed import (
 _ARRAY = re.compile(r"float64\[(.*?)\]|int64|float64")
 
 
-def walk_module(source: str) -> Module:
-    """All functions of a composed module that its entries need. ProgramError for what is outside the subset."""
-    walk = _read(source)
-    for name, node in walk.definitions.items():
-        types = _entry_types(node)
-        if types is not None:
-            walk.function(name, types)
-    return walk.module
+def walk_module(source: str, entries: Mapping[str, tuple[Type, ...]] | None = None) -> Module:
+    """All functions of a composed module that its entries need. ProgramError for what is outside the subset.
 
-
-def walk_function(source: str, name: str, types: tuple[Type, ...]) -> Module:
-    """One function of a composed module for some types of its parameters, and what it calls; it comes last."""
-    walk = _read(source)
-    walk.function(name, types)
-    return walk.module
-
-
-def _read(source: str) -> "_ModuleWalk":
-    """Rows and functions of a composed module, before any is walked."""
+    Entries are functions with types of their parameters, by name; without any those that state them in a decorator.
+    """
     walk = _ModuleWalk(source.split("\n"))
     for node in ast.parse(source).body:
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and isinstance(node.targets[0], ast.Name):
             walk.rows[node.targets[0].id] = ast.literal_eval(node.value.args[1])
         elif isinstance(node, ast.FunctionDef):
             walk.definitions[node.name] = node
-    return walk
+    for name, node in walk.definitions.items():
+        types = _entry_types(node) if entries is None else entries.get(name)
+        if types is not None:
+            walk.function(name, types)
+    return walk.module
 
 
 def _entry_types(node: ast.FunctionDef) -> tuple[Type, ...] | None:
