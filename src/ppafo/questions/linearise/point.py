@@ -40,7 +40,7 @@ class Point:
 
 
 def point_at(scenario: Scenario, time: float) -> Point:
-    """The point that the run of a scenario passes at a time [s], to the next of its steps; ScenarioError outside it."""
+    """The point that the run of a scenario passes at a time [s], to the nearest step; ScenarioError outside the run."""
     if not 0.0 <= time <= scenario.duration * (1.0 + 1.0e-12):
         raise ScenarioError(f"{scenario.name}: --at {time:g} s is outside the run, which lasts {scenario.duration:g} s")
     whole = plan_run(scenario)
@@ -111,6 +111,8 @@ def equilibrium(scenario: Scenario) -> Point:
             f"{scenario.name}: no equilibrium: at {np.degrees(values['angle']):.4g} deg the torque moves the vane; "
             "take --at with a time, or another torque"
         )
+    # A valve that is closed but for rounding is closed.
+    found |= {name: 0.0 for name in ("command", *_spool(found)) if abs(found[name]) < STEADY}
     # What the valve takes from its command at once was no unknown.
     at_rest = dict(zip(valve_states(run.program), numbers(_settled(run, found)), strict=True))
     return Point(None, found | at_rest, way)

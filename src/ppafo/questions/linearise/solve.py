@@ -24,9 +24,10 @@ MISSING_CASADI = "a linear model needs CasADi: pip install ppafo[control]"
 MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
 ON_THE_EDGE = 1.0e-6
 """Two sides of a comparison that differ by less than this, over the larger one, lie on an edge of the model."""
+EQUAL = 1.0e-12
+"""Two sides that differ by less than this, over the larger one, are equal."""
 
-
-DEAF = "no small change of the command changes it (fully open, dead band, slew limit): the command's column is 0"
+DEAF = "no small change of the command changes it (dead band, slew limit, beyond full): the command's column is 0"
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,27 +148,47 @@ def _check(scenario: Scenario, run: Run) -> None:
 
 
 class _Sides:
-    """Decides every comparison at a point, one of them on its ``other_side``, and keeps those that lie on an edge."""
+    """Decides every comparison at a point, one of them on its ``other_side``, and keeps those that lie on an edge.
+
+    Of two equal numbers that one counts as larger which grows faster along one direction, so that all comparisons are
+    decided as they are at one point nearby.
+    """
 
     def __init__(self, values: Mapping[str, float], other_side: str = "") -> None:
         self._values, self._other_side = values, other_side
         self.edges: dict[str, Edge] = {}
 
     def __call__(self, sign: str, left: Any, right: Any, place: str) -> bool:
-        one, other = self._value(left), self._value(right)
-        tests = {"<": one < other, "<=": one <= other, ">": one > other, ">=": one >= other}
+        import casadi
+
+        one, other, ahead = self._evaluated(left, right, casadi.SX(left) - casadi.SX(right))
+        larger = max(abs(one), abs(other))
+        surplus = one - other if abs(one - other) > EQUAL * larger else ahead
+        tests = {"<": surplus < 0.0, "<=": surplus <= 0.0, ">": surplus > 0.0, ">=": surplus >= 0.0}
         is_true = tests.get(sign, (one == other) == (sign == "=="))
-        if sign in tests and abs(one - other) <= ON_THE_EDGE * max(abs(one), abs(other)):
+        if sign in tests and abs(one - other) <= ON_THE_EDGE * larger:
             self.edges[place] = Edge(place, is_true)
         return is_true != (place == self._other_side)
 
-    def _value(self, item: Any) -> float:
+    def _evaluated(self, left: Any, right: Any, surplus: Any) -> tuple[float, float, float]:
+        """Both values at the point, and how fast the one grows beyond the other along the direction."""
         import casadi
 
-        expression = casadi.SX(item)
-        symbols = casadi.symvar(expression)
+        symbols = casadi.symvar(casadi.vertcat(left, right))
         known = [self._values[symbol.name()] for symbol in symbols]
-        return float(casadi.Function("value", symbols, [expression]).call(known)[0])
+        onward = casadi.DM([_direction(symbol.name(), self._values) for symbol in symbols])
+        ahead = casadi.jtimes(surplus, casadi.vertcat(*symbols), onward) if symbols else 0.0
+        found = casadi.Function("values", symbols, [casadi.vertcat(left, right, ahead)]).call(known)[0]
+        one, other, growth = (float(item) for item in found.nonzeros())
+        return one, other, growth
+
+
+def _direction(name: str, values: Mapping[str, float]) -> float:
+    """Where the point nearby lies: the command goes up, or back from a valve that is fully open; the rest counts less."""
+    if name == "command":
+        return 1.0 if abs(values[name]) < 1.0 else -values[name]
+    first = ("pressure_1", "supply_pressure", "angle", "angular_velocity")
+    return 1.0e-6 * max(1.0, abs(values[name])) * (1.0 if name in first else -0.5)
 
 
 def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:

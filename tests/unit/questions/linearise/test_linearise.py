@@ -162,11 +162,12 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     at_stop = linearise("step-response")
     assert at_stop.sides["ankle"] == "held by a stop"
     assert "straight line" in at_stop.sides["source to chamber 1"]
-    assert [edge.place for edge in at_stop.edges] == [
-        "model.valves.proportional.opening_of_command: 1.0 <= abs(command)"
-    ]
-    assert "the command's column is 0" in at_stop.sides["valve"]
-    assert not at_stop.b[:, 0].any()
+    edges = {edge.place: edge.is_true for edge in at_stop.edges}
+    assert edges["model.valves.proportional.opening_of_command: 1.0 <= abs(command)"] is False
+    assert at_stop.b[:, 0].any(), "of a valve that is fully open the side is taken on which it closes"
+    deaf = linearise(TASK, 0.1, ["valve.dead_band=0.5"])
+    assert "the command's column is 0" in deaf.sides["valve"]
+    assert not deaf.b[:, 0].any()
     stuck = linearise("step-response", 0.0, ["initial.pressure_2=atmosphere", "motion.angle=60 deg"])
     assert stuck.sides["ankle"] == "sticks: friction holds it"
     assert [item.name for item in stuck.states] == ["pressure_1", "pressure_2"]
@@ -183,10 +184,28 @@ def test_a_valve_at_its_slew_limit_does_not_answer_and_one_that_has_arrived_does
     assert steady.b == pytest.approx(linearise(TASK, overrides=HOLD).b, rel=1e-9, abs=1e-3)
 
 
-def test_a_closed_valve_is_an_edge_and_one_side_of_it_is_taken() -> None:
-    model = linearise(TASK, 0.0)
+@pytest.mark.parametrize(
+    ("time", "overrides"), [(0.0, ()), (0.0, ("initial.pressure_1=20 psi_g",)), (0.0, ("initial.pressure_2=20 psi_g",))]
+)
+def test_at_a_closed_valve_the_model_is_that_of_an_opening_to_chamber_1(
+    time: float, overrides: tuple[str, ...]
+) -> None:
+    model = linearise(TASK, time, overrides)
+    run = plan_run(model.scenario)
     assert any("command >= 0.0" in edge.place and edge.is_true for edge in model.edges)
-    assert model.b[0, 0] > 0.0 > model.b[1, 0]
+    at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)} | {"external_torque": 0.0}
+    closed, opened = (of_the_textbook(run, None, {**at, "command": command}) for command in (0.0, 1e-3))
+    slopes = [1e3 * (opened[row] - closed[row]) for row in ("rate of pressure_1", "rate of pressure_2")]
+    assert model.b[:, 0] == pytest.approx(slopes, rel=1e-9, abs=1e-6)
+
+
+def test_without_a_leak_a_closed_valve_is_steady_and_its_sides_are_told_apart() -> None:
+    model = linearise(TASK, overrides=(*HOLD, "actuator.leak.area=0 mm^2"))
+    assert model.sides["valve"] == "closed"
+    assert model.inputs[0].value == 0.0
+    assert model.outputs[0].value == pytest.approx(3.0, rel=1e-9)
+    assert not model.a.any()
+    assert any("command >= 0.0" in edge.place for edge in model.edges)
 
 
 def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
