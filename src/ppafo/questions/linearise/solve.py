@@ -184,7 +184,7 @@ class _Sides:
 
 
 def _direction(name: str, values: Mapping[str, float]) -> float:
-    """Where the point nearby lies: the command goes up, or back from a valve that is fully open; the rest counts less."""
+    """Where the point nearby lies: the command goes up, or back from full opening; the rest counts less."""
     if name == "command":
         return 1.0 if abs(values[name]) < 1.0 else -values[name]
     first = ("pressure_1", "supply_pressure", "angle", "angular_velocity")
