@@ -28,7 +28,8 @@ _SEVERAL = 1.0e-6
 
 def answer_of(model: LinearModel) -> Answer:
     """Return the answer of a linear model."""
-    frequency = Figure("frequency-response", _FREQUENCY_CAPTION, lambda: frequency_figure(model))
+    answers = bool(np.any(model.b[:, 0]) or np.any(model.d[:, 0]))
+    frequency = Figure("frequency-response", _FREQUENCY_CAPTION, lambda: frequency_figure(model)) if answers else None
     sections = [
         Section("The point", table=_point_table(model)),
         Section("Which side was taken", table=Table((), tuple(model.sides.items())), remarks=_edges(model)),

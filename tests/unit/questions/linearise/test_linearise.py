@@ -168,6 +168,7 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     deaf = linearise(TASK, 0.1, ["valve.dead_band=0.5"])
     assert "the command's column is 0" in deaf.sides["valve"]
     assert not deaf.b[:, 0].any()
+    assert deaf.answer().figures == ()
     stuck = linearise("step-response", 0.0, ["initial.pressure_2=atmosphere", "motion.angle=60 deg"])
     assert stuck.sides["ankle"] == "sticks: friction holds it"
     assert [item.name for item in stuck.states] == ["pressure_1", "pressure_2"]
