@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from ppafo.questions.find.solve import Found, find
     from ppafo.questions.identify.solve import Identification, identify
     from ppafo.questions.league.solve import League, league
+    from ppafo.questions.linearise.solve import LinearModel, linearise
     from ppafo.questions.montecarlo.estimate import MonteCarlo
     from ppafo.questions.montecarlo.solve import monte_carlo
     from ppafo.questions.parts.solve import Parts, parts
@@ -79,6 +80,7 @@ __all__ = [
     "IdentificationError",
     "KindError",
     "League",
+    "LinearModel",
     "Measurement",
     "Metric",
     "MonteCarlo",
@@ -116,6 +118,7 @@ __all__ = [
     "identify",
     "infer_settings",
     "league",
+    "linearise",
     "list_gaits",
     "list_scenarios",
     "list_sets",
@@ -187,6 +190,7 @@ _HOMES = {
     "ppafo.questions.endurance.solve": ("Endurance", "endurance", "endurance_of_walk"),
     "ppafo.questions.league.solve": ("League", "league"),
     "ppafo.questions.find.solve": ("Found", "find"),
+    "ppafo.questions.linearise.solve": ("LinearModel", "linearise"),
     "ppafo.questions.montecarlo.estimate": ("MonteCarlo",),
     "ppafo.questions.montecarlo.solve": ("monte_carlo",),
     "ppafo.questions.parts.solve": ("Parts", "parts"),

@@ -19,6 +19,7 @@ FOLDERS: dict[str, list[str]] = {
     "montecarlo": ["torque-task-uncertainty", "--metric", "rms_error"],
     "find": ["step-response", "--vary", "supply.pressure=20..90 psi_g", "--such-that", "arrival_time <= 0.3 s"],
     "tune": ["pid-gains"],
+    "linearise": ["torque-task-proportional"],
     "walk": ["--minutes", "0.1"],
     "walk --wearers": ["--wearers", "2"],
     "league": [],

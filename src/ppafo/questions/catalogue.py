@@ -12,6 +12,7 @@ QUESTIONS: dict[str, str] = {
     "sensitivity": "rank uncertain values by their influence: Sobol, Shapley or Morris indices",
     "montecarlo": "draw until the interval of a statistic is narrow enough",
     "find": "find the lowest or highest value that meets a condition on a metric",
+    "linearise": "make a linear model of the plant near one point, for control design",
     "identify": "identify a parameter set, with uncertainty, from bench recordings",
     "validate": "compare a parameter set with recordings, channel by channel",
     "walk": "simulate walking with the device, without it, and healthy",

@@ -6,7 +6,7 @@ type, so that it is bound here. What is outside the subset is refused with the f
 
 import ast
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,8 +38,11 @@ from ppafo.translation.typed import (
 _ARRAY = re.compile(r"float64\[(.*?)\]|int64|float64")
 
 
-def walk_module(source: str) -> Module:
-    """All functions of a composed module that its entries need. ProgramError for what is outside the subset."""
+def walk_module(source: str, entries: Mapping[str, tuple[Type, ...]] | None = None) -> Module:
+    """All functions of a composed module that its entries need. ProgramError for what is outside the subset.
+
+    Entries are functions with types of their parameters, by name; without any those that state them in a decorator.
+    """
     walk = _ModuleWalk(source.split("\n"))
     for node in ast.parse(source).body:
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and isinstance(node.targets[0], ast.Name):
@@ -47,7 +50,7 @@ def walk_module(source: str) -> Module:
         elif isinstance(node, ast.FunctionDef):
             walk.definitions[node.name] = node
     for name, node in walk.definitions.items():
-        types = _entry_types(node)
+        types = _entry_types(node) if entries is None else entries.get(name)
         if types is not None:
             walk.function(name, types)
     return walk.module

@@ -6,6 +6,7 @@ The same path carries the foot with and without the device; toes that come out b
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,15 @@ class AnklePath:
     def toes_over_ankle(self, shank: Floats, ankle: Floats) -> Floats:
         """Height of the toes over the ankle [m], below 0 with a flat foot."""
         tilt = shank - ankle + 0.5 * np.pi - self.ground_angle
-        return np.asarray(self.toe_lever * np.sin(tilt) - self.height * np.cos(tilt))
+        return np.asarray(self.toes_at(np.sin(tilt), np.cos(tilt)))
+
+    def toes_at(self, sine: Any, cosine: Any) -> Any:
+        """Height of the toes over the ankle [m], for sine and cosine of the sole's tilt: numbers or expressions."""
+        return self.toe_lever * sine - self.height * cosine
+
+    def ankle_height(self, phase: float) -> float:
+        """Height of the ankle over the ground [m] at a phase from 0 to 1."""
+        return float(np.interp(phase % 1.0, _GRID, self.up))
 
     def _sole(self, tilt: Floats, lever: float) -> Floats:
         along, up = np.cos(tilt), np.sin(tilt)

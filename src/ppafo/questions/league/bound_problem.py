@@ -1,26 +1,32 @@
-"""The optimal control problem of the lower bound: the flow laws of the engine for an optimiser, and Radau collocation.
+"""The optimal control problem of the lower bound: the plant of the engine for an optimiser, and Radau collocation.
 
-Three differences to the engine: near equal pressures the straight line and the root meet in one smooth curve, a
-supply that takes no gas back closes smoothly too, and the two ways of the valve have an opening each, of which the sum
-is at most 1. Both open at once stands for a valve that switches between them infinitely fast, so that no control of
-the valve can do better.
+The rates of the chambers are the text of the engine as expressions (``translation.plant_rates``), with three
+differences: near equal pressures the straight line and the root of the flow curve meet in one smooth curve, a
+supply that takes no gas back closes smoothly too, and a valve may spend a share of the time at each of its ways. Both
+ways at once stands for a valve that switches between them infinitely fast, so that no control of the valve can do
+better.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ppafo.engine.lanes import Floats
-from ppafo.model.orifice import FlowCurve
-from ppafo.model.plant import PlantParameters, chamber_volumes
+from ppafo.engine.run import Run
+from ppafo.model.orifice import FlowCurve, check_valve_flow, fitted_flow_function
+from ppafo.model.plant import Openings
+from ppafo.model.vane import actuator_torque
+from ppafo.parameters.device import Valve
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
+from ppafo.translation.plant_rates import gas_rates
 
-Openings = Callable[..., tuple[Any, Any, Any, Any]]
-"""From the fractions of time of a valve's ways, towards chamber 1 first, to source 1, vent 1, source 2 and vent 2."""
-
+BOUNDED_VALVES = ("proportional", "solenoid")
+"""Kinds of valves whose ways are known: full command one way, and the other."""
+WAYS = (1.0, -1.0)
+"""Commands [-] of the ways of a valve; the rest of the time the command is 0."""
 CLOSING = 1.0e-3
 """Fraction of the choked flow about which the flow from a supply that takes no gas back rounds off to nothing."""
 DEGREE = 2
@@ -29,86 +35,89 @@ MARGIN = 0.02
 """Fraction of the atmosphere by which the optimiser may step below it, so that nothing lies on a limit."""
 
 
+def at_once(scenario: Scenario) -> Scenario:
+    """The scenario with a valve that follows its command at once."""
+    valve = scenario.device.valve
+    ideal = Valve(valve.kind, valve.orifice, dict.fromkeys(valve.settings, 0.0))
+    return replace(scenario, device=replace(scenario.device, valve=ideal))
+
+
+def mean_openings(run: Run, ways: Sequence[float], shares: Sequence[Any]) -> Openings:
+    """Mean openings [-] of a valve that follows at once, with a share of the time at each command of ``ways``.
+
+    The rest of the time its command is 0. Flows are proportional to openings, so their mean has the mean flow.
+    """
+    valve = run.program.valve
+    at_rest, *found = (valve.instant(run.valve, valve.initial(), command) for command in (0.0, *ways))
+    means = []
+    for place, rest in enumerate(at_rest):
+        changes = [opening[place] - rest for opening in found]
+        moved = [share * change for share, change in zip(shares, changes, strict=True) if change != 0.0]
+        means.append(sum(moved[1:], rest + moved[0]) if moved else rest)
+    source_1, vent_1, source_2, vent_2 = means
+    return Openings(source_1=source_1, vent_1=vent_1, source_2=source_2, vent_2=vent_2)
+
+
+def smooth_flow_function(flow_function: Callable[..., Any], ratio: Any, curve: FlowCurve) -> Any:
+    """The ``flow_function`` of the engine [-] with one smooth curve in the place of the straight line and the corner.
+
+    The gap to equal pressures is kept from falling below that of the line by a mean of fourth powers. Of the line
+    itself half is left: the flow near equal pressures is then hardly ever below the engine's, and a bound may have
+    too much flow but not too little.
+    """
+    gap = 1.0 - ratio
+    meeting = 0.5 * (1.0 - curve.linear_ratio)
+    kept = (gap**4 + meeting**4) ** 0.25
+    half = curve._replace(linear_ratio=1.0 - meeting, linear_slope=1.0 / meeting)
+    return flow_function(1.0 - kept, half) * gap / kept
+
+
+def closing_flow(
+    flow: Callable[..., Any], pressure_a: Any, pressure_b: Any, conductance: Any, takes_back: float, curve: FlowCurve
+) -> Any:
+    """The ``flow`` of the engine [kg/s] through an orifice, which closes smoothly where nothing flows back."""
+    import casadi
+
+    both_ways = flow(pressure_a, pressure_b, 1.0, 1.0, curve)
+    if takes_back > 0.0:
+        return conductance * both_ways
+    rounding = CLOSING * pressure_a
+    return conductance * 0.5 * (both_ways + casadi.sqrt(both_ways * both_ways + rounding * rounding))
+
+
+SMOOTH: dict[Any, Callable[..., Any]] = {
+    fitted_flow_function: smooth_flow_function,
+    check_valve_flow: closing_flow,
+}
+"""What stands before functions of the engine, so that an optimiser can follow them."""
+
+
 @dataclass(frozen=True, slots=True)
 class ChamberRates:
-    """Rates of both pressures [Pa/s] and gas taken from the source [kg/s], as expressions."""
+    """Rates of both pressures [Pa/s] and gas taken from the source [kg/s], as expressions, rows of all points."""
 
     pressure_1: Any
     pressure_2: Any
     supplied: Any
 
 
-@dataclass(frozen=True, slots=True)
-class Volumes:
-    """Volumes of both chambers [m^3] and the rate of the first [m^3/s], rows of all points; the second shrinks."""
-
-    first: Any
-    second: Any
-    rate: Any
-
-
-def proportional_openings(towards_1: Any, towards_2: Any) -> tuple[Any, Any, Any, Any]:
-    """Openings of the spool valve: what feeds one chamber vents the other."""
-    return towards_1, towards_2, towards_2, towards_1
-
-
-def solenoid_openings(towards_1: Any, towards_2: Any) -> tuple[Any, Any, Any, Any]:
-    """Openings of the solenoid pair: a chamber that is not fed is vented."""
-    return towards_1, 1.0 - towards_1, towards_2, 1.0 - towards_2
-
-
-VALVE_OPENINGS: dict[str, Openings] = {"proportional": proportional_openings, "solenoid": solenoid_openings}
-"""By the kind of the valve."""
-
-
-def smooth_flow(pressure_a: Any, pressure_b: Any, conductance: float, curve: FlowCurve) -> Any:
-    """Mass flow from a to b [kg/s] as an expression: that of ``orifice_flow``, smooth at equal pressures."""
-    import casadi
-
-    upstream = casadi.fmax(pressure_a, pressure_b)
-    gap = (pressure_a - pressure_b) / upstream
-    size = casadi.fabs(gap)
-    polynomial: Any = 0.0
-    for coefficient in reversed(curve.coefficients):
-        polynomial = polynomial * size + coefficient
-    # Half the gap of the straight line: the flow near equal pressures is then hardly ever below the engine's, and a
-    # bound may have too much flow but not too little.
-    meeting = 0.5 * (1.0 - curve.linear_ratio)
-    subsonic = polynomial * gap * (gap**4 + meeting**4) ** -0.125
-    is_subsonic = size < 1.0 - curve.critical_ratio
-    return conductance * upstream * casadi.if_else(is_subsonic, subsonic, casadi.sign(gap))
-
-
-def supply_flow(source: float, pressure: Any, plant: PlantParameters) -> Any:
-    """Mass flow from a supply at ``source`` [Pa] through the whole valve [kg/s], none back unless it is relieving."""
-    import casadi
-
-    flow = smooth_flow(source, pressure, plant.valve_conductance, plant.valve_curve)
-    rounding = CLOSING * plant.valve_conductance * source
-    return flow if plant.relieving else 0.5 * (flow + casadi.sqrt(flow * flow + rounding * rounding))
-
-
 def chamber_rates(
-    plant: PlantParameters,
-    openings: Openings,
-    volumes: Volumes,
-    pressures: tuple[Any, Any],
-    ways: tuple[Any, ...],
+    run: Run, ways: Sequence[float], motion: tuple[Any, Any], pressures: Any, shares: Any
 ) -> ChamberRates:
-    """Rates of isothermal chambers at absolute pressures [Pa], for fractions of time of each way. Eqs (3) to (9)."""
-    pressure_1, pressure_2 = pressures
-    source_1, vent_1, source_2, vent_2 = openings(*ways)
-    full, curve, ambient = plant.valve_conductance, plant.valve_curve, plant.atmospheric_pressure
-    leak = smooth_flow(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
-    fed_1 = source_1 * supply_flow(plant.supply_pressure, pressure_1, plant)
-    fed_2 = source_2 * supply_flow(plant.dorsiflexion_pressure, pressure_2, plant)
-    gain_1 = fed_1 - vent_1 * smooth_flow(pressure_1, ambient, full, curve) - leak
-    gain_2 = fed_2 - vent_2 * smooth_flow(pressure_2, ambient, full, curve) + leak
-    return ChamberRates(
-        (plant.gas_product * gain_1 - pressure_1 * volumes.rate) / volumes.first,
-        (plant.gas_product * gain_2 + pressure_2 * volumes.rate) / volumes.second,
-        fed_1 + fed_2,
+    """Rates of isothermal chambers at every point, by the engine's own text. Equations (3) to (9).
+
+    ``motion`` has angles [rad] and rates [rad/s] (1, points), ``pressures`` [Pa absolute] are (2, points), ``shares``
+    (ways, points) of the time at each of the ``ways`` of the valve.
+    """
+    import casadi
+
+    angle, rate, pressure, share = map(casadi.SX.sym, ("angle", "rate", "pressures", "shares"), (1, 1, 2, len(ways)))
+    openings = mean_openings(run, ways, casadi.vertsplit(share))
+    found = gas_rates(run.plant, openings, angle, rate, (pressure[0], pressure[1]), SMOOTH)
+    at_a_point = casadi.Function(
+        "rates", [angle, rate, pressure, share], [found.pressure_1, found.pressure_2, found.supplied]
     )
+    return ChamberRates(*at_a_point(*motion, pressures, shares))
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,23 +168,19 @@ def programme(scenario: Scenario, intervals: int) -> Programme:
     """The programme of a fixed or prescribed scenario."""
     import casadi
 
-    plant = plan_run(scenario).plant
+    run = plan_run(at_once(scenario))
+    plant = run.plant
     grid = regular_grid(scenario.duration, intervals)
     scale = max(plant.supply_pressure, plant.dorsiflexion_pressure)
-    pressures = casadi.SX.sym("pressures", 2, grid.times.size)
+    pressures: Any = casadi.SX.sym("pressures", 2, grid.times.size)
     openings = casadi.SX.sym("openings", 2, intervals)
     here = casadi.reshape(casadi.repmat(openings, DEGREE, 1), 2, grid.times.size)
-    rates = chamber_rates(
-        plant,
-        VALVE_OPENINGS[scenario.device.valve.kind],
-        _volumes(scenario, plant, grid),
-        (scale * pressures[0, :], scale * pressures[1, :]),
-        (here[0, :], here[1, :]),
-    )
+    rates = chamber_rates(run, WAYS, _motion(scenario, grid), scale * pressures, here)
     start = np.array([scenario.initial_pressure_1, scenario.initial_pressure_2]) / scale
     slopes = casadi.vertcat(rates.pressure_1, rates.pressure_2) / scale
     reference = profile_values(scenario.reference, grid.times)[0]
-    error = casadi.DM(reference).T - plant.torque_constant * scale * (pressures[0, :] - pressures[1, :])
+    torque = actuator_torque(scale * pressures[0, :], scale * pressures[1, :], plant.torque_constant)
+    error = casadi.DM(reference).T - torque
     weights = casadi.DM(grid.weights)
     lowest = (1.0 - MARGIN) * plant.atmospheric_pressure / scale
     highest = max(1.0, *start)
@@ -208,12 +213,11 @@ def _residuals(pressures: Any, slopes: Any, start: Floats, grid: Grid) -> Any:
     return casadi.vertcat(*left)
 
 
-def _volumes(scenario: Scenario, plant: PlantParameters, grid: Grid) -> Volumes:
-    """Volumes at every point of a fixed or prescribed ankle, each as a row."""
+def _motion(scenario: Scenario, grid: Grid) -> tuple[Any, Any]:
+    """Angle [rad] and rate [rad/s] of a fixed or prescribed ankle at every point, each as a row."""
     import casadi
 
     if not isinstance(scenario.motion, PrescribedMotion):
         raise TypeError("the bound is for a fixed or prescribed ankle")
-    angle, velocity = profile_values(scenario.motion.profile, grid.times)[:2]
-    rows = [casadi.DM(np.asarray(item)).T for item in chamber_volumes(plant, angle)]
-    return Volumes(rows[0], rows[1], casadi.DM(plant.volume_per_angle * velocity).T)
+    angle, rate = profile_values(scenario.motion.profile, grid.times)[:2]
+    return casadi.DM(angle).T, casadi.DM(rate).T

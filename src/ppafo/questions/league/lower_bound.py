@@ -18,9 +18,8 @@ from ppafo.errors import SimulationError
 from ppafo.metrics.gas import gas_supplied
 from ppafo.metrics.tracking import rms_error
 from ppafo.model.plant import chamber_pressures
-from ppafo.parameters.device import Valve
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.league.bound_problem import VALVE_OPENINGS
+from ppafo.questions.league.bound_problem import BOUNDED_VALVES, at_once
 from ppafo.questions.league.bound_solver import BoundSolver, Optimum
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.plan import plan_run, profile_values
@@ -90,8 +89,8 @@ def check_bounded(scenario: Scenario) -> None:
         raise SimulationError(f"{scenario.name}: the lower bound is for isothermal gas; omit [gas_model]")
     if scenario.supply_lines is not None:
         raise SimulationError(f"{scenario.name}: the lower bound is for constant supplies; omit [supply_line]")
-    if scenario.device.valve.kind not in VALVE_OPENINGS:
-        known = ", ".join(VALVE_OPENINGS)
+    if scenario.device.valve.kind not in BOUNDED_VALVES:
+        known = ", ".join(BOUNDED_VALVES)
         raise SimulationError(f"{scenario.name}: no lower bound for valve '{scenario.device.valve.kind}', only {known}")
     times = np.linspace(0.0, scenario.duration, REFERENCE_POINTS)
     if not np.any(profile_values(scenario.reference, times)[0]):
@@ -125,10 +124,7 @@ def lower_bound(scenario: Scenario, errors: Sequence[float] = (), progress: Repo
 
 def play_optimum(scenario: Scenario, optimum: Optimum) -> Played:
     """What the engine makes of an optimal command, given to it as a recorded one; the valve follows at once."""
-    valve = scenario.device.valve
-    ideal = Valve(valve.kind, valve.orifice, dict.fromkeys(valve.settings, 0.0))
-    control = Control(PYTHON_CONTROLLER, {}, scenario.control.period)
-    bare = replace(scenario, device=replace(scenario.device, valve=ideal), control=control)
+    bare = replace(at_once(scenario), control=Control(PYTHON_CONTROLLER, {}, scenario.control.period))
     run = plan_run(bare)
     command = valve_command(optimum, run.step, run.step_count)
     record = replay(batch_of(run), StepInputs(command, {})).record[:, :, 0]

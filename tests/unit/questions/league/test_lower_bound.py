@@ -9,14 +9,16 @@ import pytest
 
 import ppafo
 from ppafo.errors import SimulationError
-from ppafo.model.orifice import orifice_flow
-from ppafo.model.plant import single_ports
-from ppafo.model.ports import single_port_flow
+from ppafo.model.orifice import FlowCurve, orifice_flow
+from ppafo.model.plant import Openings, blended_ports
+from ppafo.model.ports import BlendedPort, blended_port_flow
 from ppafo.parameters.plant import plant_parameters
-from ppafo.questions.league.bound_problem import smooth_flow, supply_flow
+from ppafo.questions.league.bound_problem import SMOOTH, WAYS, at_once, mean_openings
 from ppafo.questions.league.bound_solver import BoundSolver, Optimum
 from ppafo.questions.league.lower_bound import LowerBound, lower_bound, play_optimum, valve_command
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
+from ppafo.translation.symbolic import symbolic
 
 casadi = pytest.importorskip("casadi", reason="the lower bound needs the extra 'optimal'")
 SHORT = ("run.duration=1 s", "reference.ramp_time=0.4 s")
@@ -41,26 +43,35 @@ def unreachable() -> LowerBound:
 
 def test_the_flow_is_that_of_the_engine_but_for_the_bend_near_equal_pressures() -> None:
     plant = plant_parameters(ppafo.load_device("ppafo2011"))
-    pressure = casadi.SX.sym("p", 2)
-    flow = casadi.Function("flow", [pressure], [smooth_flow(pressure[0], pressure[1], 1e-8, plant.valve_curve)])
+    flow = symbolic(orifice_flow, float, float, float, FlowCurve, around=SMOOTH)
+    first, second = casadi.SX.sym("first"), casadi.SX.sym("second")
+    smooth = casadi.Function("flow", [first, second], [flow(first, second, 1e-8, plant.valve_curve)])
     for ratio in (0.2, 0.5, 0.6, 0.9, 0.99, 0.995, 0.9995):
         for pair in ((4e5, 4e5 * ratio), (4e5 * ratio, 4e5)):
             exact = orifice_flow(*pair, 1e-8, plant.valve_curve)
-            assert float(flow(list(pair))) == pytest.approx(exact, rel=0.002 if ratio <= 0.995 else 0.5)
-    assert float(flow([4e5, 4e5])) == 0.0
+            assert float(smooth(*pair)) == pytest.approx(exact, rel=0.002 if ratio <= 0.995 else 0.5)
+    assert float(smooth(4e5, 4e5)) == 0.0
 
 
 @pytest.mark.parametrize("relieving", [False, True])
 def test_the_supply_is_that_of_the_engine_also_above_its_pressure(relieving: bool) -> None:
     device = ppafo.load_device("ppafo2011", overrides=[f"supply.relieving={str(relieving).lower()}"])
     plant, pressure = plant_parameters(device), casadi.SX.sym("p")
-    fed = casadi.Function("fed", [pressure], [supply_flow(plant.supply_pressure, pressure, plant)])
+    port = blended_ports(plant, Openings(source_1=1.0, vent_1=0.0, source_2=0.0, vent_2=1.0))[0]
+    flow = symbolic(blended_port_flow, float, BlendedPort, FlowCurve, around=SMOOTH)
+    fed = casadi.Function("fed", [pressure], [flow(pressure, port, plant.valve_curve).from_source])
     choked = plant.valve_conductance * plant.supply_pressure
     for ratio in (0.3, 0.7, 0.99, 1.0, 1.01, 1.2, 2.0):
-        port = single_ports(plant, 1.0)[0]
-        exact = single_port_flow(ratio * plant.supply_pressure, port, plant.valve_curve).from_source
+        exact = blended_port_flow(ratio * plant.supply_pressure, port, plant.valve_curve).from_source
         assert float(fed(ratio * plant.supply_pressure)) == pytest.approx(exact, rel=0.002, abs=6e-4 * choked)
     assert (float(fed(2.0 * plant.supply_pressure)) < 0.0) == relieving
+
+
+@pytest.mark.parametrize(("valve", "feeds", "vents"), [("proportional", 0.0, 0.0), ("solenoid", 1.0, 1.0)])
+def test_a_valve_has_the_mean_of_its_ways_and_rests_for_what_is_left(valve: str, feeds: float, vents: float) -> None:
+    run = plan_run(at_once(short_task(f"device.valve={valve}")))
+    found = mean_openings(run, WAYS, (0.3, 0.2))
+    assert found == pytest.approx((0.3, 0.2 + 0.5 * feeds, 0.2, 0.3 + 0.5 * vents))
 
 
 def test_the_curve_falls_from_the_least_error_on(bound: LowerBound, unreachable: LowerBound) -> None:

@@ -17,10 +17,10 @@ import numpy as np
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.questions.league.bound_problem import BOUNDED_VALVES
 from ppafo.questions.league.lower_bound import MISSING_EXTRA, NEARLY
 from ppafo.questions.league.walking.measures import Toes, toes_of
 from ppafo.questions.league.walking.playing import ideal_plan
-from ppafo.questions.league.walking.programme import OPENINGS
 from ppafo.questions.league.walking.solver import FREE, Guess, StrideOptimum, StrideSolver, guess_from_walk
 from ppafo.questions.league.walking.stride import stride_of
 from ppafo.questions.league.walking.task import WalkingTask
@@ -70,7 +70,7 @@ class BoundSearch:
         """A solver that starts from the last good stride, for the desired torque late by a lag [s]."""
         assert self._run.walk is not None, "a league walks"
         stride = stride_of(self._run.walk, self._task.profile, landing, intervals, lag)
-        return StrideSolver(self._run, self._valve, stride, self._toes.path, self._near)
+        return StrideSolver(self._run, stride, self._toes.path, self._near)
 
     def best_landing(self) -> StrideOptimum:
         """The thriftiest stride at the middle error on a coarse grid: landings far apart first, then about the best."""
@@ -143,8 +143,8 @@ def check_bounded(valve: str) -> None:
     """Refuse a valve that the bound cannot be computed for, with the reason; SimulationError."""
     if find_spec("casadi") is None:
         raise SimulationError(MISSING_EXTRA)
-    if valve not in OPENINGS:
-        raise SimulationError(f"no lower bound for valve '{valve}', only {', '.join(OPENINGS)}")
+    if valve not in BOUNDED_VALVES:
+        raise SimulationError(f"no lower bound for valve '{valve}', only {', '.join(BOUNDED_VALVES)}")
 
 
 def walking_bound(

@@ -8,11 +8,12 @@ import numpy as np
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run, Walk
 from ppafo.engine.scheme.ankle_torque import Direction, leg_torque
-from ppafo.model.contact import QUARTER_TURN, foot_angle
+from ppafo.model.command import VENT
+from ppafo.model.contact import FLAT, foot_angle, prescribed_ankle
 from ppafo.model.gait import GaitNow
-from ppafo.model.plant import PlantParameters, chamber_volumes
-from ppafo.model.vane import actuator_torque
-from ppafo.questions.league.bound_problem import MARGIN, ChamberRates, Openings, Volumes, chamber_rates
+from ppafo.model.plant import PlantParameters
+from ppafo.model.vane import actuator_torque, vane_acceleration
+from ppafo.questions.league.bound_problem import MARGIN, ChamberRates, chamber_rates
 from ppafo.questions.league.walking.stride import DEGREE, Grid, Stride
 from ppafo.walking.posture import AnklePath
 
@@ -26,22 +27,9 @@ TINY = 1.0e-9
 HIGHEST = 3.0
 """Largest pressure over the highest of the source: a vane that is pushed may compress its gas."""
 
-MODES = 3
-"""What a valve can do, each for a fraction of the time: feed chamber 1, feed chamber 2, vent both."""
-
-
-def proportional_openings(towards_1: Any, towards_2: Any, vents: Any) -> tuple[Any, Any, Any, Any]:
-    """Openings of the spool valve with its dump valve."""
-    return towards_1, towards_2 + vents, towards_2, towards_1 + vents
-
-
-def solenoid_openings(towards_1: Any, towards_2: Any, _vents: Any) -> tuple[Any, Any, Any, Any]:
-    """Openings of the solenoid pair: a chamber that is not fed is vented, whatever else."""
-    return towards_1, 1.0 - towards_1, towards_2, 1.0 - towards_2
-
-
-OPENINGS: dict[str, Openings] = {"proportional": proportional_openings, "solenoid": solenoid_openings}
-"""By the kind of the valve."""
+WAYS = (1.0, -1.0, VENT)
+"""Commands [-] of what a valve can do, each for a share of the time: feed chamber 1, feed chamber 2, vent both."""
+MODES = len(WAYS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +69,7 @@ class _Unknowns:
     openings: Any
 
 
-def programme(run: Run, valve: str, stride: Stride, path: AnklePath) -> Programme:
+def programme(run: Run, stride: Stride, path: AnklePath) -> Programme:
     """The programme of a stride for the plant and the leg of a run, equations (1) and (11).
 
     ``path`` places the toes over the ground.
@@ -92,7 +80,7 @@ def programme(run: Run, valve: str, stride: Stride, path: AnklePath) -> Programm
     plant, grid = run.plant, stride.grid
     scale = max(plant.supply_pressure, plant.dorsiflexion_pressure)
     unknowns, sticking = _unknowns(grid), casadi.SX.sym("sticking")
-    rates = _chamber_rates(plant, OPENINGS[valve], stride, unknowns, scale)
+    rates = _chamber_rates(run, stride, unknowns, scale)
     pressures = unknowns.pressures
     slopes = casadi.vertcat(rates.pressure_1, rates.pressure_2) / scale
     torque = actuator_torque(scale * pressures[0, :], scale * pressures[1, :], plant.torque_constant)
@@ -148,18 +136,14 @@ def _limits(plant: PlantParameters, grid: Grid, scale: float) -> tuple[Floats, F
     return np.repeat(lowest, counts), np.repeat(highest, counts)
 
 
-def _chamber_rates(
-    plant: PlantParameters, openings: Openings, stride: Stride, unknowns: _Unknowns, scale: float
-) -> ChamberRates:
+def _chamber_rates(run: Run, stride: Stride, unknowns: _Unknowns, scale: float) -> ChamberRates:
     """Rates of both chambers at every point, as rows; their volumes run with the free foot or with the ground."""
     import casadi
 
     angle = casadi.horzcat(unknowns.angle, casadi.DM([item.angle for item in stride.prescribed]).T)
     rate = casadi.horzcat(unknowns.rate, casadi.DM([item.rate for item in stride.prescribed]).T)
-    volumes = Volumes(*chamber_volumes(plant, angle), plant.volume_per_angle * rate)
     here = casadi.reshape(casadi.repmat(unknowns.openings, DEGREE, 1), MODES, stride.grid.times.size)
-    pressures = (scale * unknowns.pressures[0, :], scale * unknowns.pressures[1, :])
-    return chamber_rates(plant, openings, volumes, pressures, tuple(casadi.vertsplit(here)))
+    return chamber_rates(run, WAYS, (angle, rate), scale * unknowns.pressures, here)
 
 
 def _accelerations(
@@ -176,14 +160,14 @@ def _accelerations(
         level = walk.timing.ground_angle
         added = leg_torque(walk.leg, walk.share, stride.contacts[place], now, level, angle, foot)
         largest = plant.dynamic_torque + breakaway * casadi.exp(-((rate / STICKING_SPEED) ** 2))
-        slowed = unknowns.friction[place] * largest + plant.viscous_damping * rate
-        found.append((torque[place] + added - slowed) / plant.inertia)
+        friction = unknowns.friction[place] * largest
+        found.append(vane_acceleration(torque[place] + added, rate, friction, plant.viscous_damping, plant.inertia))
     return casadi.horzcat(*found)
 
 
 def _flat_angle(walk: Walk, now: GaitNow) -> float:
     """Ankle angle [rad] with which the foot is flat."""
-    return now.shank + QUARTER_TURN - walk.timing.ground_angle
+    return prescribed_ankle(FLAT, now, walk.timing.ground_angle).angle
 
 
 def _toe_height(path: AnklePath, stride: Stride, place: int, angle: Any) -> Any:
@@ -191,10 +175,8 @@ def _toe_height(path: AnklePath, stride: Stride, place: int, angle: Any) -> Any:
     import casadi
 
     now = stride.now[place]
-    level = now.shank + QUARTER_TURN - path.ground_angle
-    ankle = float(path.toe_height(np.array(now.phase), np.array(now.shank), np.array(level))) + path.height
     tilt = foot_angle(now.shank, angle) - path.ground_angle
-    return ankle + path.toe_lever * casadi.sin(tilt) - path.height * casadi.cos(tilt)
+    return path.ankle_height(now.phase) + path.toes_at(casadi.sin(tilt), casadi.cos(tilt))
 
 
 def _residuals(grid: Grid, states: Any, begin: Any, slopes: Any) -> Any:

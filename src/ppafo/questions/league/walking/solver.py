@@ -111,10 +111,10 @@ class StrideOptimum:
 class StrideSolver:
     """Optimal strides of one landing on one grid; ``guess`` are unknowns that are near a stride, see ``guessed``."""
 
-    def __init__(self, run: Run, valve: str, stride: Stride, path: AnklePath, guess: Guess) -> None:
+    def __init__(self, run: Run, stride: Stride, path: AnklePath, guess: Guess) -> None:
         import casadi
 
-        built = programme(run, valve, stride, path)
+        built = programme(run, stride, path)
         weights = casadi.SX.sym("weights", 2)
         limited = (
             built.equal_to_zero,

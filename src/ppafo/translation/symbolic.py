@@ -1,0 +1,342 @@
+"""CasADi expressions from the typed functions of a composed module, for exact derivatives and for optimisers.
+
+A function of the model is called with rows of numbers and CasADi symbols, and returns what Python would: floats become
+expressions, loops are written out, a choice between two values keeps both. Where the sides of all comparisons are
+``decided`` at a point, only what holds there is written: the smooth piece of the model that the point lies on.
+"""
+
+import math
+import operator
+from collections import namedtuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+from ppafo.engine.composed_names import is_row
+from ppafo.engine.rows import is_number, members
+from ppafo.engine.source_text import SourceCollector, emitted_name
+from ppafo.errors import ProgramError
+from ppafo.translation import typed
+from ppafo.translation.typed import FLOAT, INT, Function, Handed, Items, Row, Statement, Term, Type, is_empty
+from ppafo.translation.walk import walk_module
+
+Compare = Callable[[str, Any, Any, str], Any]
+"""From a sign, two values and where they are compared: the expression of it, or a truth value where it is decided."""
+Around = Mapping[str, Callable[..., Any]]
+
+
+def _quotient(left: Any, right: Any) -> Any:
+    """A quotient as the lanes have it: infinite, or no number, over 0."""
+    if isinstance(left, int | float) and isinstance(right, int | float) and right == 0:
+        return math.nan if left == 0 or math.isnan(left) else math.copysign(math.inf, left) * math.copysign(1.0, right)
+    return left / right
+
+
+_COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
+    **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
+    **{"==": operator.eq, "!=": operator.ne},
+}
+_ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
+    **{"+": operator.add, "-": operator.sub, "*": operator.mul, "//": operator.floordiv, "%": operator.mod},
+    **{"&": operator.and_, "|": operator.or_, "^": operator.xor, ">>": operator.rshift},
+    "/": _quotient,
+}
+_WHOLE_ONLY = frozenset({"//", "%", "&", "|", "^", ">>"})
+
+
+def both_sides(sign: str, left: Any, right: Any, _where: str) -> Any:
+    """The comparison as an expression, so that a choice keeps both of its values."""
+    return _COMPARISONS[sign](left, right)
+
+
+@dataclass(frozen=True, slots=True)
+class Symbolic:
+    """A function of the model that takes CasADi symbols in the place of floats; call it as the function itself.
+
+    ``around`` has functions by the name of those of the model that they stand before: each is called with the function
+    of the model and with its arguments. ``compare`` says what becomes of a comparison.
+    """
+
+    walked: "_Walked"
+    around: Around = field(default_factory=dict)
+    compare: Compare = both_sides
+
+    def __call__(self, *values: Any) -> Any:
+        """The function's value, in its own units."""
+        given = [value for value, is_given in zip(values, self.walked.is_given, strict=True) if is_given]
+        return self.result(self.walked.functions[self.walked.name], given)
+
+    def result(self, function: Function, given: list[Any]) -> Any:
+        """The value of one function of the module for arguments that are not empty."""
+
+        def own(*values: Any) -> Any:
+            names = [name for name, _ in function.parameters]
+            call = _Call(self, function)
+            return call.block(function.body, dict(zip(names, values, strict=True)))
+
+        before = self.around.get(function.source)
+        return own(*given) if before is None else before(own, *given)
+
+
+def symbolic(
+    function: Callable[..., Any],
+    *given: type | Callable[..., Any],
+    around: Mapping[Callable[..., Any], Callable[..., Any]] | None = None,
+    compare: Compare = both_sides,
+) -> Symbolic:
+    """A function of the model for CasADi, from its text; ``given`` are the types of its parameters.
+
+    These are ``float``, classes of NamedTuples, or functions that are handed over. ProgramError, with file and line,
+    for what is outside the subset.
+    """
+    before = {emitted_name(item): wrapper for item, wrapper in (around or {}).items()}
+    if not _walked(function, given).collector.is_current():
+        _walked.cache_clear()
+    return Symbolic(_walked(function, given), before, compare)
+
+
+@dataclass(frozen=True, slots=True)
+class _Walked:
+    """A function with all that it calls: what it was composed from, functions of the module, where each was written.
+
+    ``name`` is its own in the module; ``is_given`` says which of its parameters hold numbers.
+    """
+
+    collector: SourceCollector
+    functions: Mapping[str, Function]
+    places: Mapping[str, str]
+    name: str
+    is_given: tuple[bool, ...]
+
+
+@lru_cache(maxsize=32)
+def _walked(function: Callable[..., Any], given: tuple[type | Callable[..., Any], ...]) -> _Walked:
+    """The typed functions of a function of the model, for types of its parameters."""
+    collector = SourceCollector("@function")
+    name = collector.add(function)
+    types = tuple(_type_of(item, collector) for item in given)
+    module = walk_module(collector.text(), {name: types})
+    places = {
+        own: f"{item.__module__.removeprefix('ppafo.')}.{item.__qualname__}" for own, item in collector.owners.items()
+    }
+    functions = {item.name: item for item in module.functions}
+    return _Walked(collector, functions, places, name, tuple(not is_empty(item) for item in types))
+
+
+def _type_of(item: Any, collector: SourceCollector) -> Type:
+    """The type of a parameter; functions and rows are added to the module."""
+    if is_row(item):
+        name = collector.add(item)
+        return Row(name, tuple((way.removeprefix("."), _type_of(kind, collector)) for way, kind in members(item)))
+    if isinstance(item, type) and is_number(item):
+        return FLOAT
+    if callable(item) and not members(item):
+        return Handed(collector.add(item))
+    return Items(tuple(_type_of(kind, collector) for _, kind in members(item)))
+
+
+@lru_cache(maxsize=256)
+def _row_class(name: str, fields: tuple[str, ...]) -> Any:
+    """A class of rows whose fields hold expressions."""
+    return namedtuple(name, fields)
+
+
+@dataclass(frozen=True, slots=True)
+class _Call:
+    """One call of a function: ``names`` hold the values so far."""
+
+    home: Symbolic
+    function: Function
+
+    def refused(self, problem: str) -> ProgramError:
+        return ProgramError(f"{self.home.walked.places[self.function.source]}: {problem}, which has no expression")
+
+    def block(self, body: tuple[Statement, ...], names: dict[str, Any]) -> Any:
+        """What some statements return, None where they return nothing; ``names`` are changed."""
+        for place, item in enumerate(body):
+            if isinstance(item, typed.Return):
+                return self.value(item.value, names)
+            if isinstance(item, typed.Assign):
+                names[item.name] = self.value(item.value, names)
+            elif isinstance(item, typed.Count):
+                self.counted(item, names)
+            elif isinstance(item, typed.If):
+                test = self.value(item.test, names)
+                if isinstance(test, bool):
+                    found = self.block(item.body if test else item.otherwise, names)
+                    if found is not None:
+                        return found
+                elif _returns(item):
+                    rest = body[place + 1 :]
+                    yes, no = (self.block((*way, *rest), dict(names)) for way in (item.body, item.otherwise))
+                    return self.chosen(test, yes, no)
+                else:
+                    self.branched(item, test, names)
+            else:
+                raise self.refused(f"'{type(item).__name__.lower()}' of the lane loop")
+        return None
+
+    def branched(self, item: typed.If, test: Any, names: dict[str, Any]) -> None:
+        """Both ways of a branch, and for each name the value that holds."""
+        yes, no = dict(names), dict(names)
+        self.block(item.body, yes)
+        self.block(item.otherwise, no)
+        for name in yes.keys() | no.keys():
+            one, other = yes.get(name, no.get(name)), no.get(name, yes.get(name))
+            names[name] = one if one is other else self.chosen(test, one, other)
+
+    def counted(self, item: typed.Count, names: dict[str, Any]) -> None:
+        """A loop, written out."""
+        start, stop = self.value(item.start, names), self.value(item.stop, names)
+        if not isinstance(start, int) or not isinstance(stop, int) or _returns(item):
+            raise self.refused(f"a loop over '{item.name}' whose end is not written out")
+        for number in range(start, stop, item.step):
+            names[item.name] = number
+            self.block(item.body, names)
+
+    def value(self, term: Term, names: dict[str, Any]) -> Any:
+        """The value of a term."""
+        if term.kind in ("name", "number"):
+            return names.get(term.detail) if term.kind == "name" else term.detail
+        parts = [self.value(part, names) for part in term.parts]
+        writer: Callable[..., Any] | None = getattr(self, f"_of_{term.kind}", None)
+        if writer is not None:
+            return writer(term, *parts)
+        if term.kind in _COMPARISONS:
+            return self.compared(term.kind, parts[0], parts[1], _text(term))
+        if term.kind in ("min", "max"):
+            return self.extreme(term, *parts)
+        if term.kind in ("and", "or"):
+            return _linked(term.kind, *parts)
+        if term.kind not in _ARITHMETIC:
+            raise self.refused(f"'{term.kind}' of the lane loop")
+        if term.kind in _WHOLE_ONLY and not all(isinstance(part, int) for part in parts):
+            raise self.refused(f"'{_text(term)}' of whole numbers")
+        return _ARITHMETIC[term.kind](*parts)
+
+    def _of_call(self, term: Term, *given: Any) -> Any:
+        return self.home.result(self.home.walked.functions[term.detail], list(given))
+
+    def _of_build(self, term: Term, *parts: Any) -> Any:
+        if not isinstance(term.type, Row):
+            return parts
+        return _row_class(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
+
+    def _of_field(self, term: Term, owner: Any) -> Any:
+        return getattr(owner, term.detail)
+
+    def _of_item(self, term: Term, owner: Any, place: int | None = None) -> Any:
+        return owner[term.detail if place is None else place]
+
+    def _of_choice(self, _term: Term, test: Any, yes: Any, no: Any) -> Any:
+        return self.chosen(test, yes, no)
+
+    def _of_negative(self, _term: Term, given: Any) -> Any:
+        return -given
+
+    def _of_not(self, _term: Term, given: Any) -> Any:
+        import casadi
+
+        return not given if isinstance(given, bool) else casadi.logic_not(given)
+
+    def _of_sqrt(self, _term: Term, given: Any) -> Any:
+        import casadi
+
+        if isinstance(given, casadi.SX):
+            return casadi.sqrt(given)
+        return math.sqrt(given) if given >= 0.0 else math.nan
+
+    def _of_abs(self, term: Term, given: Any) -> Any:
+        import casadi
+
+        is_negative = self.compared("<", given, 0.0, f"{_text(term.parts[0])} < 0.0")
+        if isinstance(is_negative, bool):
+            return -given if is_negative else given
+        return casadi.fabs(given)
+
+    def _of_convert(self, term: Term, given: Any) -> Any:
+        import casadi
+
+        if term.type == INT and isinstance(given, casadi.SX):
+            raise self.refused("the whole part of a number")
+        if isinstance(given, casadi.SX):
+            return given
+        return int(given) if term.type == INT else float(given)
+
+    def compared(self, sign: str, left: Any, right: Any, words: str) -> Any:
+        """A comparison: a truth value where both numbers are known or it is decided, else an expression."""
+        if isinstance(left, int | float) and isinstance(right, int | float):
+            return bool(_COMPARISONS[sign](left, right))
+        return self.home.compare(sign, left, right, f"{self.home.walked.places[self.function.source]}: {words}")
+
+    def extreme(self, term: Term, first: Any, second: Any) -> Any:
+        """The smaller or the larger of two numbers.
+
+        Of equal ones these are the second and the first, as if the first were a little larger: only so have the ratio
+        and the sign of two equal pressures, which ``>=`` tells apart, derivatives of one side.
+        """
+        import casadi
+
+        sign = "<=" if term.kind == "min" else ">"
+        one, other = (_text(part) for part in term.parts)
+        is_second = self.compared(sign, second, first, f"{other} {sign} {one}")
+        if isinstance(is_second, bool):
+            return second if is_second else first
+        # Not by CasADi's own functions, whose derivative at equal numbers is the mean of both sides.
+        return casadi.if_else(is_second, second, first)
+
+    def chosen(self, test: Any, yes: Any, no: Any) -> Any:
+        """One of two values, of all numbers in them where they are rows."""
+        import casadi
+
+        if isinstance(test, bool):
+            return yes if test else no
+        if isinstance(yes, tuple):
+            parts = [self.chosen(test, one, other) for one, other in zip(yes, no, strict=True)]
+            return type(yes)(*parts) if hasattr(yes, "_fields") else tuple(parts)
+        if isinstance(yes, int | float) and isinstance(no, int | float) and yes == no:
+            return yes
+        if isinstance(yes, int):
+            raise self.refused("a whole number or truth value that depends on a comparison")
+        return casadi.if_else(test, yes, no)
+
+
+def _text(term: Term, is_inside: bool = False) -> str:
+    """A term as Python has it."""
+    parts = [_text(part, True) for part in term.parts]
+    if term.kind in ("name", "number"):
+        return str(term.detail)
+    if term.kind in ("field", "item"):
+        return f"{parts[0]}.{term.detail}" if term.kind == "field" else f"{parts[0]}[{(*parts, term.detail)[1]}]"
+    if term.kind in ("call", "build", "abs", "min", "max", "sqrt"):
+        name = term.detail if term.kind == "call" else "" if term.kind == "build" else term.kind
+        return f"{name}({', '.join(_text(part) for part in term.parts)})"
+    if term.kind == "convert":
+        return parts[0]
+    if term.kind == "choice":
+        text = f"{parts[1]} if {parts[0]} else {parts[2]}"
+    elif term.kind in ("negative", "not"):
+        return f"-{parts[0]}" if term.kind == "negative" else f"not {parts[0]}"
+    else:
+        text = f" {term.kind} ".join(parts)
+    return f"({text})" if is_inside else text
+
+
+def _returns(item: Statement) -> bool:
+    """True where a statement may end its function or its loop."""
+    if isinstance(item, typed.Return | typed.Leave):
+        return True
+    if isinstance(item, typed.If):
+        return any(map(_returns, (*item.body, *item.otherwise)))
+    return isinstance(item, typed.Count | typed.While) and any(map(_returns, item.body))
+
+
+def _linked(word: str, left: Any, right: Any) -> Any:
+    """Two truth values, known or not, with ``and`` or ``or`` between them."""
+    import casadi
+
+    for one, other in ((left, right), (right, left)):
+        if isinstance(one, bool):
+            return (other if one else False) if word == "and" else (True if one else other)
+    return (casadi.logic_and if word == "and" else casadi.logic_or)(left, right)
