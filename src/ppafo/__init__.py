@@ -9,8 +9,10 @@ Everything below is loaded when it is first used, so that ``import ppafo`` is qu
 """
 
 import importlib
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ppafo.engine.compilers import Compiler, offer
 from ppafo.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -205,6 +207,15 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 _RENAMED = {"run_design": "design", "run_sizing": "size", "run_study": "sweep"}
 """Names of version 0.1 and what they are called now."""
+
+
+def _compiler_of_c(name: str) -> Compiler:
+    """Return a compiler of C, which knows the translation above the engine."""
+    made: Compiler = importlib.import_module("ppafo.translation.native").compiler(name)
+    return made
+
+
+offer({name: partial(_compiler_of_c, name) for name in ("c", "gcc", "clang", "zig")})
 
 
 def __getattr__(name: str) -> Any:
