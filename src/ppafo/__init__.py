@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from ppafo.parameters.audit import audit
     from ppafo.parameters.device import Device
     from ppafo.parameters.parts import Catalogue, Part, load_catalogue
+    from ppafo.questions.bits.solve import bits
     from ppafo.questions.compare.solve import Comparison, compare
     from ppafo.questions.design.file import load_design
     from ppafo.questions.design.solve import Design, design
@@ -107,6 +108,7 @@ __all__ = [
     "Validation",
     "apply_overrides",
     "audit",
+    "bits",
     "compare",
     "compare_walks",
     "design",
@@ -183,6 +185,7 @@ _HOMES = {
     "ppafo.questions.sweep.solve": ("sweep",),
     "ppafo.questions.identify.solve": ("Identification", "identify"),
     "ppafo.questions.reproduce.solve": ("Reproduction", "reproduce"),
+    "ppafo.questions.bits.solve": ("bits",),
     "ppafo.questions.compare.solve": ("Comparison", "compare"),
     "ppafo.questions.design.file": ("load_design",),
     "ppafo.questions.design.solve": ("Design", "design"),

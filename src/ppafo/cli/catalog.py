@@ -27,6 +27,7 @@ COMMANDS: dict[str, str] = {
     "sets": "list parameter sets, or show one with the source of every value",
     "parts": QUESTIONS["parts"],
     "audit": "check a parameter set for contradictions",
+    "bits": QUESTIONS["bits"],
     "cache": "show, compile or remove the compiled models of this computer",
     "schema": "print the JSON Schema of a file format",
 }
@@ -48,7 +49,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "league",
     ),
     "walk": ("walk", "gait", "timing"),
-    "tools": ("cache", "schema"),
+    "tools": ("bits", "cache", "schema"),
 }
 """The commands as the help shows them, by what somebody has come for."""
 

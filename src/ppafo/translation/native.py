@@ -56,6 +56,11 @@ class CCompiler:
         """Version of the compiler, flags, what the processor can do, and the translator itself."""
         return repr((_version(self.command), self.flags, _processor(), _scheme()))
 
+    def described(self) -> str:
+        """Its name and version, as it says them."""
+        said = next(iter(_version(self.command).splitlines()), "")
+        return f"C by {self.name}: {said}" if said else f"C by {self.name}"
+
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
         """Take a composed text to C and compile it; the library stays beside ``path`` where that is a place."""
         translated = _translated(source)
@@ -135,9 +140,11 @@ def _translated(source: str) -> str:
         raise ProgramError(f"{error}; PPAFO_BACKEND=numba can run it") from None
 
 
-def build(source: str, folder: Path, compiler: str = "gcc", flags: Sequence[str] = FLAGS) -> ModuleType:
+def build(
+    source: str, folder: Path, command: Sequence[str] = ("gcc",), flags: Sequence[str] = FLAGS
+) -> ModuleType:
     """Compile C into a library in ``folder`` and load it; ProgramError where the compiler refuses it."""
-    library = _compiled(source, folder, (compiler,), flags)
+    library = _compiled(source, folder, command, flags)
     module = ModuleType(library.stem)
     _fill(module, library)
     return module
