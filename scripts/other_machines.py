@@ -71,7 +71,8 @@ import { readFile } from 'node:fs/promises';
 import { WASI } from 'node:wasi';
 const [program, folder] = process.argv.slice(2);
 const wasi = new WASI({ version: 'preview1', args: ['program', '/in', '/out'], preopens: { '/': folder } });
-const { instance } = await WebAssembly.instantiate(await WebAssembly.compile(await readFile(program)), wasi.getImportObject());
+const built = await WebAssembly.compile(await readFile(program));
+const instance = await WebAssembly.instantiate(built, wasi.getImportObject());
 process.exitCode = wasi.start(instance);
 """
 _ARRAYS, _INTERVAL = 6, 10

@@ -43,8 +43,12 @@ COURSES = {"first-steps": "proportional"}
 DRAWS = 1000
 WALKED = 4.0
 """Seconds of a walk."""
-LONGEST_DRAWN = {True: 1000, False: 200}
-"""Steps of a draw, of a program that walks and of one that does not; some that fail take very many parts for each."""
+LONGEST_DRAWN = 200
+"""Steps of a draw at most."""
+LONGEST_STEPS = 40
+"""The same of steps as long as the gas of a vane that rests allows: one that fails takes 100,000 parts for each."""
+LONGEST_WALKED = 1000
+"""The same of a walk: some tenths of its first stride, and more."""
 SEED = 15
 SPREAD = (0.7, 1.4)
 """Smallest and largest factor on a number of a draw."""
@@ -82,8 +86,8 @@ def drawn_batch(batch: Batch, runs: int = DRAWS, seed: int = SEED) -> Batch:
         word = int(_words(np.array([run], np.uint64), seed + 2)[0])
         rows = len(parameters) - _TIMING_ROWS
         parameters[_TIMING_ROWS + word // 4 % rows, run] *= _IMPOSSIBLE[word % 4]
-    steps = min(batch.clock.step_count, LONGEST_DRAWN[batch.program.walks])
-    clock: Clock = replace(batch.clock, record_every=0, step_count=steps)
+    longest = LONGEST_WALKED if batch.program.walks else LONGEST_STEPS if batch.program.is_adaptive else LONGEST_DRAWN
+    clock: Clock = replace(batch.clock, record_every=0, step_count=min(batch.clock.step_count, longest))
     return Batch(batch.program, clock, parameters, states)
 
 
