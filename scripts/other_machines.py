@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shutil import which
@@ -49,7 +49,8 @@ int main(int count, char **words)
         for (int place = 0; place < 9; ++place) numbers[place] = whole(in);
         if (fread(&interval, sizeof interval, 1, in) != 1) return 3;
         for (int place = 0; place < 2; ++place) {
-            if (fread(arrays[place].values, sizeof(double), size_of(arrays[place]), in) != size_of(arrays[place])) return 3;
+            size_t size = size_of(arrays[place]);
+            if (fread(arrays[place].values, sizeof(double), size, in) != size) return 3;
         }
         ppafo_array flat[6];
         for (int place = 0; place < 6; ++place) {
@@ -145,7 +146,7 @@ class _Calls:
 
     def __init__(self) -> None:
         self.given: list[tuple[Any, ...]] = []
-        self.results = iter(())
+        self.results: Iterator[Any] = iter(())
 
     def module(self, advance: Callable[..., None]) -> ModuleType:
         """Stand for a compiled program."""

@@ -114,7 +114,7 @@ class _Wanted:
 
 
 def load_generated(kind: str, source: str, compiler: Compiler | None = None) -> ModuleType:
-    """Import the module with this source, from the cache where it is there and whole; Numba compiles it, or ``compiler``.
+    """Import the module with this source, from the cache where it is there and whole; Numba or ``compiler`` compiles.
 
     ProgramError where it cannot be compiled, in terms of the file that the function at fault was written in.
     """

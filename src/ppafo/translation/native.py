@@ -27,7 +27,9 @@ FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "
 """What lets gcc take lanes side by side: without them it makes jumps of choices first. The bits stay as they are."""
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
 _LIBRARY = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
-_HOW_TO_INSTALL = "install gcc or clang, or 'pip install ppafo[native]', which brings zig; PPAFO_BACKEND=numba needs none"
+_HOW_TO_INSTALL = (
+    "install gcc or clang, or 'pip install ppafo[native]', which brings zig; PPAFO_BACKEND=numba needs none"
+)
 _TITLE = "Generated from the functions of ppafo. Not to be edited."
 
 
@@ -80,7 +82,7 @@ class CCompiler:
 
 
 def compiler(name: str) -> CCompiler:
-    """Return a compiler by name, gcc, clang or zig, or for ``c`` the first that is here, the one with quick lanes first.
+    """Return a compiler by name, gcc, clang or zig; for ``c`` the first that is here, the one with quick lanes first.
 
     SimulationError where it is not on this machine.
     """
@@ -140,9 +142,7 @@ def _translated(source: str) -> str:
         raise ProgramError(f"{error}; PPAFO_BACKEND=numba can run it") from None
 
 
-def build(
-    source: str, folder: Path, command: Sequence[str] = ("gcc",), flags: Sequence[str] = FLAGS
-) -> ModuleType:
+def build(source: str, folder: Path, command: Sequence[str] = ("gcc",), flags: Sequence[str] = FLAGS) -> ModuleType:
     """Compile C into a library in ``folder`` and load it; ProgramError where the compiler refuses it."""
     library = _compiled(source, folder, command, flags)
     module = ModuleType(library.stem)

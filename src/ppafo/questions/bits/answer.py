@@ -20,7 +20,9 @@ def answer_of(solved: Bits) -> Answer:
         for name, hashes in solved.found.items()
     )
     marked = tuple(number for number, name in enumerate(differing) if differing[name])
-    where = Table((), tuple({"computer": solved.platform, "processor": solved.processor, "by": solved.compiler}.items()))
+    where = Table(
+        (), tuple({"computer": solved.platform, "processor": solved.processor, "by": solved.compiler}.items())
+    )
     remark = "hashes are of the final state and of every recorded sample, with one NaN for all"
     return Answer(
         name="bits",
