@@ -39,7 +39,8 @@ bench: $(READY)
 	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements-bench.lock
 	$(BIN)/python -m benchmarks --out out/bench
 
-# Whether every shipped scenario and walk has the same bits on several processors; each compiles its own models, for minutes.
+# Whether every run has its golden bits on several processors, by several compilers and on emulated machines: an hour or more.
+# 'python scripts/bits.py --renew' writes the golden hashes anew, after a change that is meant to change numbers.
 bits: $(READY)
 	$(BIN)/python scripts/bits.py
 

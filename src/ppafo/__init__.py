@@ -9,8 +9,10 @@ Everything below is loaded when it is first used, so that ``import ppafo`` is qu
 """
 
 import importlib
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ppafo.engine.compilers import Compiler, offer
 from ppafo.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from ppafo.parameters.audit import audit
     from ppafo.parameters.device import Device
     from ppafo.parameters.parts import Catalogue, Part, load_catalogue
+    from ppafo.questions.bits.solve import bits
     from ppafo.questions.compare.solve import Comparison, compare
     from ppafo.questions.design.file import load_design
     from ppafo.questions.design.solve import Design, design
@@ -107,6 +110,7 @@ __all__ = [
     "Validation",
     "apply_overrides",
     "audit",
+    "bits",
     "compare",
     "compare_walks",
     "design",
@@ -184,6 +188,7 @@ _HOMES = {
     "ppafo.questions.sweep.solve": ("sweep",),
     "ppafo.questions.identify.solve": ("Identification", "identify"),
     "ppafo.questions.reproduce.solve": ("Reproduction", "reproduce"),
+    "ppafo.questions.bits.solve": ("bits",),
     "ppafo.questions.compare.solve": ("Comparison", "compare"),
     "ppafo.questions.design.file": ("load_design",),
     "ppafo.questions.design.solve": ("Design", "design"),
@@ -209,6 +214,15 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 _RENAMED = {"run_design": "design", "run_sizing": "size", "run_study": "sweep"}
 """Names of version 0.1 and what they are called now."""
+
+
+def _compiler_of_c(name: str) -> Compiler:
+    """Return a compiler of C, which knows the translation above the engine."""
+    made: Compiler = importlib.import_module("ppafo.translation.native").compiler(name)
+    return made
+
+
+offer({name: partial(_compiler_of_c, name) for name in ("c", "gcc", "clang", "zig")})
 
 
 def __getattr__(name: str) -> Any:

@@ -29,6 +29,7 @@ COMMANDS: dict[str, str] = {
     "parts": QUESTIONS["parts"],
     "audit": "check a parameter set for contradictions",
     "export": "write a scenario for other tools: a library in C",
+    "bits": QUESTIONS["bits"],
     "cache": "show, compile or remove the compiled models of this computer",
     "schema": "print the JSON Schema of a file format",
 }
@@ -51,7 +52,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "league",
     ),
     "walk": ("walk", "gait", "timing"),
-    "tools": ("export", "cache", "schema"),
+    "tools": ("export", "bits", "cache", "schema"),
 }
 """The commands as the help shows them, by what somebody has come for."""
 

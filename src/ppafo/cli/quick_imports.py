@@ -9,11 +9,18 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
+from ppafo.engine.compilers import chosen_compiler
+
 _LINEAR_ALGEBRA = "scipy.linalg"
 
 
 def load_compiler() -> None:
-    """Import Numba without SciPy's linear algebra, which it looks for at import; compiled models have none."""
+    """Import Numba, where it compiles, without SciPy's linear algebra, which it looks for at import; models have none.
+
+    SimulationError where ``PPAFO_BACKEND`` names what is no compiler, or one that is not here.
+    """
+    if chosen_compiler() is not None:
+        return
     if "numba" in sys.modules or _LINEAR_ALGEBRA in sys.modules:
         return
     modules: dict[str, Any] = sys.modules

@@ -14,10 +14,9 @@ import secrets
 import shutil
 import stat
 import sys
-import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,10 +24,11 @@ from types import ModuleType
 
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.engine.compile_errors import mistake
-from ppafo.engine.compile_times import SECONDS_FILE, announce, estimate_seconds, number_models
+from ppafo.engine.compile_times import SECONDS_FILE, SECONDS_PER_BYTE, announce, estimate_seconds, number_models
+from ppafo.engine.compilers import Compiler
 from ppafo.engine.private_folder import WRITTEN_BY_OTHERS, refusal
 from ppafo.engine.program_lock import LOCK, one_process
-from ppafo.engine.shared_functions import compile_text, run_text
+from ppafo.engine.shared_functions import check_numba_can_write, compile_text, numba_files_beside_source, run_text
 from ppafo.engine.source_text import without_origins
 from ppafo.errors import reason
 
@@ -73,33 +73,70 @@ def cache_folder() -> Path | None:
     return folder if folder.is_absolute() else None
 
 
-def load_generated(kind: str, source: str) -> ModuleType:
-    """Import the module with this source, from the cache where it is there and whole.
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """A program: of which kind, its text, and what compiles it where that is not Numba."""
+
+    kind: str
+    source: str
+    compiler: Compiler | None
+
+    @property
+    def name(self) -> str:
+        """Name of its module."""
+        kind = self.kind if self.compiler is None else self.compiler.name
+        return f"ppafo_{kind}_{hashlib.sha256(without_origins(self.source).encode()).hexdigest()[:24]}"
+
+    def place(self, folder: Path) -> Path:
+        """Where it is kept."""
+        compiled_by = _machine() if self.compiler is None else _short_hash(self.compiler.identity())
+        return folder / f"{self.name}-{compiled_by}"
+
+    def compile(self, path: Path) -> ModuleType:
+        """Compile it, beside ``path`` where that is a place."""
+        if self.compiler is not None:
+            return _execute(self.name, self.source, path, self.compiler.compile_text)
+        source = self.source if path.is_absolute() else self.source.replace(_KEPT, _NOT_KEPT)
+        return _run(self.name, source, path, compile_text)
+
+    def load(self, path: Path) -> ModuleType:
+        """Load what was compiled beside ``path``."""
+        if self.compiler is not None:
+            return _execute(self.name, self.source, path, self.compiler.run_text)
+        return _run(self.name, self.source, path, run_text)
+
+    def estimate(self, kept: Iterable[Path]) -> float:
+        """About how long it takes to compile [s]."""
+        kind = self.name.rpartition("_")[0]
+        alike = [place for place in kept if place.name.startswith(f"{kind}_")]
+        usual = SECONDS_PER_BYTE if self.compiler is None else self.compiler.seconds_per_byte
+        return estimate_seconds(self.source, alike, usual)
+
+
+def load_generated(kind: str, source: str, compiler: Compiler | None = None) -> ModuleType:
+    """Import the module with this source, from the cache where it is there and whole; Numba or ``compiler`` compiles.
 
     ProgramError where it cannot be compiled, in terms of the file that the function at fault was written in.
     """
-    name = _name(kind, source)
+    wanted = _Wanted(kind, source, compiler)
     # A second thread must not get a module of which only the beginning has run.
     with _LOADING:
-        return sys.modules[name] if name in sys.modules else _import_program(name, source)
+        return sys.modules[wanted.name] if wanted.name in sys.modules else _import_program(wanted)
 
 
-def load_all(kind: str, sources: Iterable[str]) -> None:
+def load_all(kind: str, sources: Iterable[str], compiler: Compiler | None = None) -> None:
     """Import the modules with these sources; what is said of those that are compiled counts them."""
     with _LOADING:
         folder = cache_folder()
-        missing = [source for source in dict.fromkeys(sources) if not _is_there(_name(kind, source), folder)]
+        programs = [_Wanted(kind, source, compiler) for source in dict.fromkeys(sources)]
+        missing = [wanted.source for wanted in programs if not _is_there(wanted, folder)]
         for number, source in enumerate(missing, 1):
             with number_models(number, len(missing)):
-                load_generated(kind, source)
+                load_generated(kind, source, compiler)
 
 
-def _name(kind: str, source: str) -> str:
-    return f"ppafo_{kind}_{hashlib.sha256(without_origins(source).encode()).hexdigest()[:24]}"
-
-
-def _is_there(name: str, folder: Path | None) -> bool:
-    return name in sys.modules or (folder is not None and os.path.lexists(folder / f"{name}-{_machine()}"))
+def _is_there(wanted: _Wanted, folder: Path | None) -> bool:
+    return wanted.name in sys.modules or (folder is not None and os.path.lexists(wanted.place(folder)))
 
 
 def list_programs(folder: Path) -> list[CachedProgram]:
@@ -132,25 +169,25 @@ def evict(folder: Path) -> None:
             _remove(place)
 
 
-def _import_program(name: str, source: str) -> ModuleType:
+def _import_program(wanted: _Wanted) -> ModuleType:
     folder = cache_folder()
     why_not = refusal(folder)
     if folder is None or why_not:
         logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
-        return _compile_in_memory(name, source)
-    kept = folder / f"{name}-{_machine()}"
-    module = _load_kept_module(kept, name, source)
+        return _compile_in_memory(wanted)
+    kept = wanted.place(folder)
+    module = _load_kept_module(kept, wanted)
     if module is not None:
         return module
     try:
         with one_process(kept):
-            return _load_kept_module(kept, name, source) or _compile_and_keep(kept, name, source)
+            return _load_kept_module(kept, wanted) or _compile_and_keep(kept, wanted)
     except OSError as error:
         logger.warning("ppafo: the compiled model is not kept in %s: %s", folder, reason(error))
-        return _compile_in_memory(name, source)
+        return _compile_in_memory(wanted)
 
 
-def _load_kept_module(kept: Path, name: str, source: str) -> ModuleType | None:
+def _load_kept_module(kept: Path, wanted: _Wanted) -> ModuleType | None:
     """Return the module of a program that is there and whole; one that is damaged is removed."""
     if not os.path.lexists(kept):
         return None
@@ -159,81 +196,65 @@ def _load_kept_module(kept: Path, name: str, source: str) -> ModuleType | None:
         _remove(kept)
         return None
     try:
-        module = _run(name, source, kept / f"{name}.py", run_text)
+        module = wanted.load(kept / f"{wanted.name}.py")
         os.utime(kept)
     except OSError:  # another process has removed it in this instant, or the disk is full
-        return sys.modules.get(name)
+        return sys.modules.get(wanted.name)
     return module
 
 
-def _compile_and_keep(kept: Path, name: str, source: str) -> ModuleType:
+def _compile_and_keep(kept: Path, wanted: _Wanted) -> ModuleType:
     """Compile a program in a folder aside, which takes its place when it is whole."""
     aside = kept.with_name(f".writing-{secrets.token_hex(8)}")
     try:
         aside.mkdir(mode=0o700)
-        path = aside / f"{name}.py"
-        path.write_text(source, encoding="utf-8")
+        path = aside / f"{wanted.name}.py"
+        path.write_text(wanted.source, encoding="utf-8")
         start = time.perf_counter()
-        with announce(estimate_seconds(source, _entries_named(kept.parent, _PROGRAM)), f"kept in {kept.parent}"):
-            module = _run(name, source, path, compile_text)
+        with announce(wanted.estimate(_entries_named(kept.parent, _PROGRAM)), f"kept in {kept.parent}"):
+            module = wanted.compile(path)
         (aside / SECONDS_FILE).write_text(f"{time.perf_counter() - start:.2f}", encoding="ascii")
         (aside / _CHECKSUMS).write_text(json.dumps(_checksums(aside), indent=2), encoding="utf-8")
         with contextlib.suppress(OSError):  # another process was quicker, with the same program
             aside.rename(kept)
         evict(kept.parent)
     except OSError:
-        sys.modules.pop(name, None)
+        sys.modules.pop(wanted.name, None)
         raise
     finally:
         _remove(aside)
     return module
 
 
-def _compile_in_memory(name: str, source: str) -> ModuleType:
-    with announce(estimate_seconds(source, ()), "not kept"):
-        return _run(name, source.replace(_KEPT, _NOT_KEPT), Path(f"<{name}>"), compile_text)
+def _compile_in_memory(wanted: _Wanted) -> ModuleType:
+    with announce(wanted.estimate(()), "not kept"):
+        return wanted.compile(Path(f"<{wanted.name}>"))
 
 
 def _run(name: str, source: str, path: Path, execute: Callable[[str, str, ModuleType], None]) -> ModuleType:
-    """Return the module made by running its source; Python's own compiled file, which may be damaged, is not asked."""
-    module = ModuleType(name)
-    module.__file__ = str(path)
-    sys.modules[name] = module
+    """Return the module that Numba makes by running its source."""
     from numba.core.errors import NumbaError
 
     try:
-        with _numba_files_beside_source():
+        with numba_files_beside_source():
             if path.is_absolute():
-                _check_numba_can_write(path.parent / "__pycache__")
-            execute(source, str(path), module)
+                check_numba_can_write(path.parent / "__pycache__")
+            return _execute(name, source, path, execute)
     except NumbaError as error:
-        del sys.modules[name]
         raise mistake(str(error), source) from None
+
+
+def _execute(name: str, source: str, path: Path, execute: Callable[[str, str, ModuleType], None]) -> ModuleType:
+    """Return the module that ``execute`` fills; Python's own compiled file, which may be damaged, is not asked."""
+    module = ModuleType(name)
+    module.__file__ = str(path)
+    sys.modules[name] = module
+    try:
+        execute(source, str(path), module)
     except BaseException:
         del sys.modules[name]
         raise
     return module
-
-
-@contextlib.contextmanager
-def _numba_files_beside_source() -> Iterator[None]:
-    """Let Numba keep its files in the program's folder: those of ``NUMBA_CACHE_DIR`` are checked by nobody."""
-    from numba.core import config
-
-    others = {name: getattr(config, name) for name in ("CACHE_DIR", "CACHE_LOCATOR_CLASSES") if hasattr(config, name)}
-    try:
-        for name in others:
-            setattr(config, name, "")
-        yield
-    finally:
-        for name, value in others.items():
-            setattr(config, name, value)
-
-
-def _check_numba_can_write(folder: Path) -> None:
-    """Raise OSError where Numba would take another folder, of which nobody knows what is in it."""
-    folder.mkdir(mode=0o700, exist_ok=True)
-    tempfile.TemporaryFile(dir=folder).close()
 
 
 @cache
@@ -244,6 +265,10 @@ def _machine() -> str:
 
     processor = cpu_target.target_context.codegen().magic_tuple()
     described = repr((processor, numba.__version__, sys.implementation.cache_tag))
+    return _short_hash(described)
+
+
+def _short_hash(described: str) -> str:
     return hashlib.sha256(described.encode()).hexdigest()[:12]
 
 

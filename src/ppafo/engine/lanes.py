@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.cache import load_all, load_generated
+from ppafo.engine.compilers import Compiler, chosen_compiler
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lane_source import INLINE, SAME_MOMENT, write_lanes
 from ppafo.engine.program import Program
@@ -90,14 +91,14 @@ def load_program(program: Program) -> ModuleType:
 
     A program is written anew where a number or function that it was made from stands for something else by now.
     """
-    return load_source(_current_source(program))
+    return load_source(_current_source(program), chosen_compiler())
 
 
 def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
     chosen = dict.fromkeys(programs)
     if len(chosen) > 1:
-        load_all("lanes", map(_current_source, chosen))
+        load_all("lanes", map(_current_source, chosen), chosen_compiler())
 
 
 def _current_source(program: Program) -> str:
@@ -117,9 +118,9 @@ def write_source(program: Program) -> tuple[SourceCollector, str]:
 
 
 @lru_cache(maxsize=64)
-def load_source(source: str) -> ModuleType:
+def load_source(source: str, compiler: Compiler | None = None) -> ModuleType:
     """The module of a source."""
-    return load_generated("lanes", source)
+    return load_generated("lanes", source, compiler)
 
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:

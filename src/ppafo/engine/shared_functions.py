@@ -5,8 +5,12 @@ calls, so that what is shared is the same to the last bit; the hash is in its sy
 """
 
 import ast
+import contextlib
 import gc
 import hashlib
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -92,3 +96,24 @@ def _define(node: ast.stmt, path: str, name: str, key: str, used: dict[str, Any]
     if isinstance(node, ast.FunctionDef):
         made.py_func.__qualname__ = f"{name}_{key}"
     return made
+
+
+@contextlib.contextmanager
+def numba_files_beside_source() -> Iterator[None]:
+    """Let Numba keep its files in the program's folder: those of ``NUMBA_CACHE_DIR`` are checked by nobody."""
+    from numba.core import config
+
+    others = {name: getattr(config, name) for name in ("CACHE_DIR", "CACHE_LOCATOR_CLASSES") if hasattr(config, name)}
+    try:
+        for name in others:
+            setattr(config, name, "")
+        yield
+    finally:
+        for name, value in others.items():
+            setattr(config, name, value)
+
+
+def check_numba_can_write(folder: Path) -> None:
+    """Raise OSError where Numba would take another folder, of which nobody knows what is in it."""
+    folder.mkdir(mode=0o700, exist_ok=True)
+    tempfile.TemporaryFile(dir=folder).close()

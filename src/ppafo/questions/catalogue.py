@@ -21,6 +21,7 @@ QUESTIONS: dict[str, str] = {
     "design": "find Pareto-optimal parts and settings: error, gas and mass",
     "size": "find the smallest valve, pressure and bottle for a torque profile and hours of use",
     "parts": "list real parts with the origin of every figure",
+    "bits": "check that this computer finds the same numbers as every other, to the last bit",
     "tune": "tune gains for an objective under constraints, optionally robust",
     "league": "rank every controller on a task against what is possible at best",
 }

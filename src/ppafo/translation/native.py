@@ -1,9 +1,17 @@
 """A program built from its C by a compiler of this machine; it does what the compiled module of the lanes does."""
 
 import ctypes
+import hashlib
+import importlib.util
+import platform
 import subprocess
+import sys
+import tempfile
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from shutil import which
 from types import ModuleType
 from typing import Any
 
@@ -11,26 +19,158 @@ import numpy as np
 
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
-from ppafo.errors import ProgramError
-from ppafo.translation.c99 import FLAGS
+from ppafo.errors import ProgramError, SimulationError, reason
+from ppafo.translation.c99 import FLAGS, c_source
+from ppafo.translation.walk import walk_module
+
+FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "sra-max-scalarization-size-Ospeed=4096")
+"""What lets gcc take lanes side by side: without them it makes jumps of choices first. The bits stay as they are."""
+_THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
+_LIBRARY = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
+_HOW_TO_INSTALL = (
+    "install gcc or clang, or 'pip install ppafo[native]', which brings zig; PPAFO_BACKEND=numba needs none"
+)
+_TITLE = "Generated from the functions of ppafo. Not to be edited."
 
 
 class _Array(ctypes.Structure):
-    _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
+    _fields_ = (("values", ctypes.c_void_p), ("extent", ctypes.c_int64 * 3))
 
 
-def build(source: str, folder: Path, compiler: str = "gcc", flags: Sequence[str] = FLAGS) -> ModuleType:
+@dataclass(frozen=True, slots=True)
+class CCompiler:
+    """A compiler of C of this machine, as the engine takes one: its name, the command that runs it."""
+
+    name: str
+    command: tuple[str, ...]
+
+    @property
+    def seconds_per_byte(self) -> float:
+        """What a common computer takes for a byte of the composed text [s]."""
+        return 2.0e-5
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Those for the bits, and those for this processor."""
+        return (*FLAGS, _THIS_PROCESSOR, *(FOR_GCC if self.name == "gcc" else ()))
+
+    def identity(self) -> str:
+        """Version of the compiler, flags, what the processor can do, and the translator itself."""
+        return repr((_version(self.command), self.flags, _processor(), _scheme()))
+
+    def described(self) -> str:
+        """Its name and version, as it says them."""
+        said = next(iter(_version(self.command).splitlines()), "")
+        return f"C by {self.name}: {said}" if said else f"C by {self.name}"
+
+    def compile_text(self, source: str, path: str, module: ModuleType) -> None:
+        """Take a composed text to C and compile it; the library stays beside ``path`` where that is a place."""
+        translated = _translated(source)
+        if Path(path).is_absolute():
+            self._build(translated, Path(path).parent)
+            self.run_text(source, path, module)
+            return
+        with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
+            _fill(module, self._build(translated, Path(folder)))
+
+    def run_text(self, _source: str, path: str, module: ModuleType) -> None:
+        """Load the library beside ``path``."""
+        _fill(module, Path(path).with_name(_LIBRARY))
+
+    def _build(self, source: str, folder: Path) -> Path:
+        return _compiled(source, folder, self.command, self.flags)
+
+
+def compiler(name: str) -> CCompiler:
+    """Return a compiler by name, gcc, clang or zig; for ``c`` the first that is here, the one with quick lanes first.
+
+    SimulationError where it is not on this machine.
+    """
+    wanted = ("clang", "zig", "gcc") if name == "c" else (name,)
+    for candidate in wanted:
+        command = _command(candidate)
+        if command:
+            return CCompiler(candidate, command)
+    missing = "no compiler of C" if name == "c" else f"'{name}' is not"
+    raise SimulationError(f"PPAFO_BACKEND={name}: {missing} on this computer: {_HOW_TO_INSTALL}")
+
+
+@cache
+def _command(name: str) -> tuple[str, ...]:
+    """The command of a compiler; empty where it is not on this machine."""
+    if name != "zig":
+        found = which(name)
+        return (found,) if found else ()
+    package = importlib.util.find_spec("ziglang")
+    if package is not None and package.origin is not None:
+        return (str(Path(package.origin).with_name("zig.exe" if sys.platform == "win32" else "zig")), "cc")
+    found = which("zig")
+    return (found, "cc") if found else ()
+
+
+@cache
+def _version(command: tuple[str, ...]) -> str:
+    done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)
+    return done.stdout
+
+
+@cache
+def _processor() -> str:
+    """What the processor can do, as the system says it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return f"{platform.machine()} {platform.processor()}"
+    wanted = ("model name", "flags", "Features", "CPU implementer", "CPU part", "isa")
+    return "\n".join(sorted({line for line in lines if line.startswith(wanted)}))
+
+
+@cache
+def _scheme() -> str:
+    """Hash of the translator: the same text may become other C in another version of it."""
+    found = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.iterdir()):
+        if file.suffix in (".py", ".h"):
+            found.update(file.read_bytes())
+    return found.hexdigest()
+
+
+def _translated(source: str) -> str:
+    try:
+        return c_source(walk_module(source), {}, _TITLE)
+    except ProgramError as error:
+        raise ProgramError(f"{error}; PPAFO_BACKEND=numba can run it") from None
+
+
+def build(source: str, folder: Path, command: Sequence[str] = ("gcc",), flags: Sequence[str] = FLAGS) -> ModuleType:
     """Compile C into a library in ``folder`` and load it; ProgramError where the compiler refuses it."""
-    written, library = folder / "program.c", folder / "program.so"
-    written.write_text(source, encoding="utf-8")
-    command = [compiler, *flags, "-shared", "-fPIC", str(written), "-o", str(library), "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise ProgramError(f"{compiler} refuses the program: {(done.stderr.strip().splitlines() or [''])[0]}")
-    entry = ctypes.CDLL(str(library)).advance
+    library = _compiled(source, folder, command, flags)
     module = ModuleType(library.stem)
-    vars(module)["advance"] = lambda *given: entry(*map(_handed, given))
+    _fill(module, library)
     return module
+
+
+def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence[str]) -> Path:
+    """The library that a compiler makes of C, in a folder."""
+    written, library = folder / "program.c", folder / _LIBRARY
+    written.write_text(source, encoding="utf-8")
+    position = () if sys.platform == "win32" else ("-fPIC",)
+    line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
+    try:
+        done = subprocess.run(line, capture_output=True, text=True, check=False)
+    except OSError as error:
+        raise SimulationError(f"{Path(command[0]).name} cannot be run: {reason(error)}") from error
+    if done.returncode != 0:
+        said = next(iter(done.stderr.strip().splitlines()), f"it ended with {done.returncode}")
+        raise ProgramError(f"{Path(command[0]).name} refuses the program: {said}")
+    return library
+
+
+def _fill(module: ModuleType, library: Path) -> None:
+    """Give a module the ``advance`` of a library."""
+    entry = ctypes.CDLL(str(library)).advance
+    entry.restype = None
+    module.__dict__["advance"] = lambda *given: entry(*map(_handed, given))
 
 
 def run_native(program: ModuleType, batch: Batch) -> BatchResult:
@@ -50,5 +190,5 @@ def _handed(value: Any) -> Any:
     """An argument as C takes it."""
     if isinstance(value, np.ndarray):
         extent = (ctypes.c_int64 * 3)(*value.shape, *(0,) * (3 - value.ndim))
-        return _Array(value.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), extent)
+        return _Array(value.ctypes.data, extent)
     return ctypes.c_double(value) if isinstance(value, float) else ctypes.c_int64(value)

@@ -370,7 +370,7 @@ def test_functions_keep_names_and_docstrings() -> None:
 @pytest.mark.parametrize("name", ["torque-task-proportional", "step-response"])
 def test_c_has_the_bits_of_the_lanes_in_runs_that_fail_too(name: str, tmp_path: Path) -> None:
     alone = plain_batch(name)
-    drawn = drawn_batch(alone, 40)
+    drawn = drawn_batch(alone, 200)
     native = build(program_source(alone.program), tmp_path, flags=("-std=c99", "-O1", "-ffp-contract=off", "-fwrapv"))
     assert digest(run_native(native, alone)) == digest(run_batch(alone))
     expected = run_batch(drawn)

@@ -1,0 +1,80 @@
+"""Golden bits: every scenario and walk has its hash, a part of them is found here, and another number is named."""
+
+import json
+import shutil
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.engine.lanes import BatchResult
+from ppafo.errors import SimulationError
+from ppafo.questions.bits import runs, solve
+from ppafo.simulation.loading import list_scenarios
+from ppafo.walking import list_walks
+
+needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+CHEAP = "torque-task-proportional"
+
+
+def test_every_scenario_and_walk_has_golden_hashes_and_the_quick_ones_are_among_them() -> None:
+    golden = solve.golden_hashes()
+    assert set(golden) == set(runs.names())
+    assert {*list_scenarios(), *list_walks(), *solve.QUICK} <= set(golden)
+    assert all(0 < hashes["failed"] < runs.DRAWS // 2 for hashes in golden.values())
+    assert len({hashes["draws"] for hashes in golden.values()}) == len(golden)
+
+
+def test_numba_finds_the_golden_bits_of_the_torque_task_on_this_computer(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bits", CHEAP, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["differs"] == {}
+    assert document["hashes"][CHEAP] == solve.golden_hashes()[CHEAP]
+    assert document["compiler"].startswith("Numba ")
+
+
+@needs_gcc
+def test_gcc_finds_the_golden_bits_of_a_walk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", "gcc")
+    found = solve.bits(["off"])
+    assert found.is_same
+    assert found.compiler.startswith("C by gcc: gcc")
+
+
+def test_another_hash_is_named_and_the_command_ends_with_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    golden: dict[str, Any] = {name: dict(hashes) for name, hashes in solve.golden_hashes().items()}
+    golden[CHEAP]["draws"] = "0" * 16
+    monkeypatch.setattr(solve, "golden_hashes", lambda: golden)
+    assert main(["bits", CHEAP]) == 1
+    said = capsys.readouterr().out
+    assert f"{CHEAP}: not the golden bits" in said
+    assert "differs: the draws" in said
+
+
+def test_a_name_without_a_hash_is_refused_with_the_nearest() -> None:
+    with pytest.raises(
+        SimulationError, match=r"no golden hash of 'of', did you mean 'off'\?; there are: step-response"
+    ):
+        solve.bits(["of"])
+
+
+def test_the_last_bit_of_one_number_is_another_hash_and_what_a_nan_is_made_of_is_not() -> None:
+    result = BatchResult(np.array([[1.0, np.nan]]), np.zeros((1, 1, 2)))
+    other = replace(result, states=np.array([[np.nextafter(1.0, 2.0), np.nan]]))
+    signed = replace(result, states=np.array([[1.0, -np.nan]]))
+    assert runs.digest(result) == runs.digest(signed) != runs.digest(other)
+
+
+def test_draws_are_made_of_whole_numbers_and_spread_over_their_range() -> None:
+    plain = runs.plain_batch(CHEAP)
+    drawn = runs.drawn_batch(plain, 1000)
+    assert (drawn.parameters[:5] == plain.parameters[:5]).all()
+    row = np.flatnonzero(plain.parameters[:, 0] > 0.0)[7]
+    factors = np.delete(drawn.parameters[row] / plain.parameters[row], np.arange(0, 1000, 10))
+    assert 0.7 <= factors.min() < 0.702
+    assert 1.398 < factors.max() < 1.4
+    assert abs(factors.mean() - 1.05) < 0.02

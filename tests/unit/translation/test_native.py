@@ -1,0 +1,115 @@
+"""Programs by a compiler of C instead of Numba: the same bits, the same cache, and one line where it cannot be."""
+
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.engine.cache import list_programs
+from ppafo.engine.lanes import Batch, load_program, load_source, run_batch
+from ppafo.engine.run import batch_of
+from ppafo.errors import ProgramError, SimulationError
+from ppafo.questions.bits.runs import digest, drawn_batch
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.translation import native
+
+needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+SHORT = ["run.duration=20 ms"]
+
+
+@pytest.fixture(scope="module")
+def batch() -> Batch:
+    """The torque task of the proportional valve, short."""
+    return batch_of(plan_run(load_scenario("torque-task-proportional", SHORT)))
+
+
+def by(compiler: str, batch: Batch, monkeypatch: pytest.MonkeyPatch, threads: int = 1) -> str:
+    monkeypatch.setenv("PPAFO_BACKEND", compiler)
+    load_source.cache_clear()
+    return digest(run_batch(batch, threads))
+
+
+def forget_programs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a new process."""
+    for name in [item for item in sys.modules if item.startswith("ppafo_gcc_")]:
+        monkeypatch.delitem(sys.modules, name)
+
+
+@needs_gcc
+def test_gcc_and_numba_give_the_same_bits_on_any_number_of_threads(
+    batch: Batch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn = drawn_batch(batch, 100)
+    assert by("numba", drawn, monkeypatch) == by("gcc", drawn, monkeypatch) == by("gcc", drawn, monkeypatch, threads=2)
+
+
+@needs_gcc
+def test_a_program_of_gcc_is_kept_found_again_and_made_anew_where_it_is_damaged(
+    batch: Batch, fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    compiled: list[Path] = []
+    compile_c = native._compiled
+
+    def counted(source: str, folder: Path, *given: Any) -> Path:
+        compiled.append(folder)
+        return compile_c(source, folder, *given)
+
+    monkeypatch.setattr(native, "_compiled", counted)
+    forget_programs(monkeypatch)
+    expected = by("gcc", batch, monkeypatch)
+    (kept,) = list_programs(fresh_cache)
+    assert kept.place.name.startswith("ppafo_gcc_")
+    forget_programs(monkeypatch)
+    assert by("gcc", batch, monkeypatch) == expected
+    assert len(compiled) == 1
+    library = kept.place / "program.so"
+    # Another file in its place: what is loaded already stays as it is.
+    copy = library.with_name("copy")
+    copy.write_bytes(library.read_bytes() + b"x")
+    copy.replace(library)
+    forget_programs(monkeypatch)
+    assert by("gcc", batch, monkeypatch) == expected
+    assert len(compiled) == 2
+    assert "is damaged; it is made anew" in caplog.text
+
+
+@needs_gcc
+def test_without_a_folder_for_it_a_program_of_gcc_runs_all_the_same(
+    batch: Batch, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    expected = by("gcc", batch, monkeypatch)
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path / "file"))
+    forget_programs(monkeypatch)
+    assert by("gcc", batch, monkeypatch) == expected
+    assert "compiled models are not kept" in caplog.text
+
+
+def test_a_name_that_is_no_compiler_is_refused_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", "gc")
+    assert main(["simulate", "torque-task-proportional", "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert said == "ppafo: PPAFO_BACKEND: 'gc' is none of numba, c, gcc, clang, zig, did you mean 'gcc'?\n"
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("name", "missing"), [("c", "no compiler of C"), ("clang", "'clang' is not on this computer")])
+def test_a_computer_without_a_compiler_is_told_what_to_install(
+    name: str, missing: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(native, "_command", lambda _: ())
+    monkeypatch.setenv("PPAFO_BACKEND", name)
+    with pytest.raises(SimulationError, match=rf"{missing}.*gcc or clang.*ppafo\[native\]"):
+        load_program(batch_of(plan_run(load_scenario("torque-task-proportional", SHORT))).program)
+
+
+def test_what_has_no_c_is_refused_with_the_way_to_run_it() -> None:
+    source = "import math\n@njit('void(float64[:, ::1])')\ndef advance(x):\n    x[0, 0] = math.exp(x[0, 0])\n"
+    with pytest.raises(ProgramError, match="cannot be translated; PPAFO_BACKEND=numba can run it"):
+        native._translated(source)
