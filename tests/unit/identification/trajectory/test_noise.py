@@ -237,7 +237,7 @@ def step_of_a_drift(segments: list[Floats], longest: float) -> tuple[float, floa
             memory = math.exp(-1.0 / timescale)
             root = np.linalg.cholesky(np.eye(count) + step**2 / (1.0 - memory**2) * memory**lags)
             white = [np.linalg.solve(root, np.column_stack([ones, one])) for one in segments]
-            products = sum(one.T @ one for one in white)
+            products = np.sum([one.T @ one for one in white], axis=0)
             left = products[1, 1] - products[0, 1] ** 2 / products[0, 0]
             spread = len(segments) * np.sum(np.log(np.diag(root))) + 0.5 * math.log(products[0, 0])
             logarithms.append(-spread - 0.5 * (count * len(segments) - 1) * math.log(left))
