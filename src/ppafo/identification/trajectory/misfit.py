@@ -15,6 +15,7 @@ from ppafo.identification.trajectory.posterior import LinearModel, NoiseDraw, dr
 from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment
 from ppafo.identification.trajectory.sensor_noise import SensorNoise, sensor_noise
 from ppafo.identification.trajectory.weighing import WhitenedFit
+from ppafo.identification.trajectory.whitening import Drift
 
 ALARM = 5.0e-4
 """Chance below which one of the comparisons is called a misfit.
@@ -130,8 +131,12 @@ def _fit_apart(
     apart = LinearModel(columns, model.sensors, np.zeros(width), np.zeros((width, width)))
     whole = whiten(apart, found.noises, weights)
     columns[:, -1] -= columns[:, :-1] @ np.linalg.lstsq(whole[:, :-1], whole[:, -1], rcond=None)[0]
+    # Parts take much of a slow drift with them. Its numbers are drawn without their columns, but from what they leave,
+    # which may look white, the draws would not find it again.
     noises = [
-        sensor_noise(apart.segments(apart.residuals, place), sensor.is_given)
+        sensor.noise
+        if isinstance(sensor.noise.shape, Drift)
+        else sensor_noise(apart.segments(apart.residuals, place), sensor.is_given)
         for place, sensor in enumerate(found.sensors)
     ]
     return apart, tuple(noises)

@@ -171,11 +171,12 @@ def _numbers_of(shape: Shape) -> Floats:
 def _shape_of(numbers: Floats, before: Shape, longest: float) -> tuple[Shape, float] | None:
     """Return the shape with these numbers and the logarithm of its prior, None where the prior is 0.
 
-    The prior is even in the logarithms of a drift, and in the reflection coefficients of an autoregression.
+    The prior is even in the standard deviation of the steps of a drift and in the logarithm of its memory, and in the
+    reflection coefficients of an autoregression. One even in the logarithm of the former has drifts too small.
     """
     if isinstance(before, Drift):
         is_inside = LOG_RATIO[0] <= numbers[0] <= LOG_RATIO[1] and 0.0 <= numbers[1] <= longest
-        return (drift_of(numbers, before.is_zeroed), 0.0) if is_inside else None
+        return (drift_of(numbers, before.is_zeroed), 0.5 * float(numbers[0])) if is_inside else None
     reflections = np.tanh(numbers)
     if np.abs(reflections).max() > _LARGEST:
         return None
