@@ -19,35 +19,57 @@ WARM = 1000
 
 
 class Instance:
-    """An instance that runs from 0 s, with parameters by name; ``files`` is where the unit was unpacked before."""
+    """An instance that runs from 0 s, with parameters by name; ``events`` uses the event mode of FMI 3."""
 
-    def __init__(self, unit: str, given: Mapping[str, float] | None = None, files: str | None = None) -> None:
+    def __init__(self, unit: str, given: Mapping[str, float] | None = None, events: bool = False) -> None:
         import fmpy
 
         self.description = fmpy.read_model_description(unit)
-        self.files = fmpy.extract(unit) if files is None else files
-        self.is_own = files is None
+        self.files = fmpy.extract(unit)
         self.numbers = {item.name: item.valueReference for item in self.description.modelVariables}
-        self.slave: Any = fmpy.instantiate_fmu(self.files, self.description, fmi_type="CoSimulation")
+        further = {"event_mode_used": True, "early_return_allowed": True} if events else {}
+        self.slave: Any = fmpy.instantiate_fmu(self.files, self.description, fmi_type="CoSimulation", **further)
+        self.is_of_fmi_3 = self.description.fmiVersion == "3.0"
         self.time = 0.0
-        self.slave.setupExperiment(startTime=0.0)
-        self.slave.enterInitializationMode()
+        begin(self.slave)
         for name, value in (given or {}).items():
             self.set(name, value)
         self.slave.exitInitializationMode()
 
     def get(self, name: str) -> float:
         """A variable in SI units."""
-        return float(self.slave.getReal([self.numbers[name]])[0])
+        read = self.slave.getFloat64 if self.is_of_fmi_3 else self.slave.getReal
+        return float(read([self.numbers[name]])[0])
 
     def set(self, name: str, value: float) -> None:
         """Set a variable in SI units."""
-        self.slave.setReal([self.numbers[name]], [value])
+        write = self.slave.setFloat64 if self.is_of_fmi_3 else self.slave.setReal
+        write([self.numbers[name]], [value])
 
-    def go_to(self, time: float) -> None:
-        """Go to a time [s] in one step."""
-        self.slave.doStep(self.time, time - self.time)
+    def go_to(self, time: float) -> Any:
+        """Go to a time [s] in one step; what FMPy returns of it."""
+        found = self.slave.doStep(self.time, time - self.time)
         self.time = time
+        return found
+
+    def kept(self) -> bytes:
+        """The state, written out."""
+        slave = self.slave
+        state = slave.getFMUState() if self.is_of_fmi_3 else slave.getFMUstate()
+        found = slave.serializeFMUState(state) if self.is_of_fmi_3 else slave.serializeFMUstate(state)
+        self.drop(state)
+        return bytes(found)
+
+    def restored(self, written: bytes) -> Any:
+        """Take a state that was written out; the state in the memory of the unit, to be dropped."""
+        slave = self.slave
+        state = slave.deserializeFMUState(written) if self.is_of_fmi_3 else slave.deSerializeFMUstate(written)
+        (slave.setFMUState if self.is_of_fmi_3 else slave.setFMUstate)(state)
+        return state
+
+    def drop(self, state: Any) -> None:
+        """Free a state."""
+        (self.slave.freeFMUState if self.is_of_fmi_3 else self.slave.freeFMUstate)(state)
 
     def course(self, first: float, last: float) -> list[float]:
         """Torque and pressures at every step from one time [s] to another."""
@@ -62,8 +84,14 @@ class Instance:
         """Free the instance."""
         self.slave.terminate()
         self.slave.freeInstance()
-        if self.is_own:
-            shutil.rmtree(self.files, ignore_errors=True)
+        shutil.rmtree(self.files, ignore_errors=True)
+
+
+def begin(slave: Any) -> None:
+    """Let an instance be prepared, from 0 s on."""
+    if hasattr(slave, "setupExperiment"):
+        slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
 
 
 def growth_of(unit: str, count: int, warm: int = WARM) -> int:
@@ -85,14 +113,17 @@ def growth_of(unit: str, count: int, warm: int = WARM) -> int:
 
 
 def again(slave: Any) -> None:
-    """Free an instance, make it anew from the same library, run it for two steps."""
-    slave.fmi2FreeInstance(slave.component)
+    """Free an instance, make it anew from the same library, run it for two steps and keep its state between."""
+    is_of_fmi_3 = hasattr(slave, "fmi3FreeInstance")
+    (slave.fmi3FreeInstance if is_of_fmi_3 else slave.fmi2FreeInstance)(slave.component)
     slave.instantiate()
-    slave.setupExperiment(startTime=0.0)
-    slave.enterInitializationMode()
+    begin(slave)
     slave.exitInitializationMode()
     slave.doStep(0.0, STEP)
-    slave.freeFMUstate(slave.getFMUstate())
+    if is_of_fmi_3:
+        slave.freeFMUState(slave.getFMUState())
+    else:
+        slave.freeFMUstate(slave.getFMUstate())
     slave.doStep(STEP, STEP)
 
 

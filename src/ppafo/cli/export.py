@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     library = actions.add_parser("c", help=_C, description=f"{_C[:1].upper()}{_C[1:]}.")
     unit = actions.add_parser("fmu", help=_UNIT, description=f"{_UNIT[:1].upper()}{_UNIT[1:]}.")
-    unit.add_argument("--fmi", type=int, choices=(2,), default=2, help="version of FMI (default: 2)")
+    unit.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI (default: 2)")
     unit.add_argument(
         "--platforms",
         metavar="LIST",

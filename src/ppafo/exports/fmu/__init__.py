@@ -12,14 +12,18 @@ from ppafo.errors import ScenarioError, nearest_name
 from ppafo.exports.c_library import scenario_library
 from ppafo.exports.c_library.files import c_identifier, library_files
 from ppafo.exports.fmu.binaries import FLAGS, PLATFORMS, Platform, build
-from ppafo.exports.fmu.description import description_of_fmi2
+from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
 from ppafo.exports.fmu.variables import Interface, change_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
 
 _MARK = re.compile(r"@(\w+)@")
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
-_HEADERS = {2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h")}
+_HEADERS = {
+    2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
+    3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
+}
+_DESCRIBED = {2: description_of_fmi2, 3: description_of_fmi3}
 
 
 _LOOP_TIME = (
@@ -44,13 +48,15 @@ def functional_unit(scenario: Scenario, fmi: int, platforms: Sequence[str]) -> d
     main = f"fmi{fmi}.c"
     said = _said(interface, chosen)
     contents = {
-        "modelDescription.xml": description_of_fmi2(interface, identifier, token, said),
+        "modelDescription.xml": _DESCRIBED[fmi](interface, identifier, token, said),
         "documentation/index.html": _page(interface, chosen, main),
         "documentation/licenses/license.txt": files("ppafo.exports.c_library")
         .joinpath("templates", "LICENSE")
         .read_bytes(),
         **{f"sources/{name}": content for name, content in sources.items()},
     }
+    if fmi == 3:
+        contents["sources/buildDescription.xml"] = build_description_of_fmi3(identifier, " ".join(FLAGS[1:]))
     for name, item in chosen.items():
         folder = item.folder_2 if fmi == 2 else item.folder_3
         contents[f"binaries/{folder}/{identifier}{item.suffix}"] = build(name, sources, main)
@@ -71,6 +77,7 @@ def closed_loop(scenario: Scenario) -> Interface:
         outputs=library.program.outputs,
         shows_metrics=True,
         is_step_fixed=False,
+        clock="ticks when the controller decides, every controller.period",
         hidden=frozenset(),
         inputs=(),
         words={},
@@ -103,6 +110,7 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "changes": "".join(change_of(interface, item) for item in library.settings),
         "first_inputs": ", ".join([*(repr(item.start) for item in interface.inputs), "0.0"]),
         "token": "@token@",
+        "has_clock": "true" if interface.clock else "false",
         **interface.words,
     }
     unit = "\n".join(_filled(file, words) for file in ("unit.c", interface.template))

@@ -49,6 +49,53 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str, said:
     return _text(root)
 
 
+def description_of_fmi3(interface: Interface, identifier: str, token: str, said: str) -> bytes:
+    """The description for FMI 3.0."""
+    variables = variables_of(interface)
+    root = Xml.Element("fmiModelDescription", _head("3.0", interface, said, instantiationToken=token))
+    has_clock = interface.clock is not None
+    internal = {"fixedInternalStepSize": repr(interface.step)} if interface.is_step_fixed else {}
+    Xml.SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=identifier,
+        canGetAndSetFMUState="true",
+        canSerializeFMUState="true",
+        canHandleVariableCommunicationStepSize=_truth(not interface.is_step_fixed),
+        hasEventMode=_truth(has_clock),
+        mightReturnEarlyFromDoStep=_truth(has_clock),
+        **internal,
+    )
+    _units(root, variables)
+    categories = Xml.SubElement(root, "LogCategories")
+    Xml.SubElement(categories, "Category", name="logStatusError", description="why a call failed")
+    _experiment(root, interface)
+    table = Xml.SubElement(root, "ModelVariables")
+    first = 1 + max(item.number for item in variables)
+    if interface.clock is not None:
+        clock = {"valueReference": str(first), "description": interface.clock, "causality": "output"}
+        Xml.SubElement(table, "Clock", {"name": "controller.clock", **clock, "intervalVariability": "triggered"})
+    time = {"name": "time", "valueReference": str(first + 1), "description": "time", "causality": "independent"}
+    Xml.SubElement(table, "Float64", {**time, "variability": "continuous", "unit": "s"})
+    for item in variables:
+        Xml.SubElement(table, "Float64", {**_scalar(item), **_real(item)})
+    structure = Xml.SubElement(root, "ModelStructure")
+    outputs = [item.number for item in variables if item.causality == "output"] + [first] * has_clock
+    for name in ("Output", "InitialUnknown"):
+        for number in outputs:
+            Xml.SubElement(structure, name, valueReference=str(number))
+    return _text(root)
+
+
+def build_description_of_fmi3(identifier: str, flags: str) -> bytes:
+    """How the sources of a unit of FMI 3.0 are built."""
+    root = Xml.Element("fmiBuildDescription", fmiVersion="3.0")
+    built = Xml.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
+    sources = Xml.SubElement(built, "SourceFileSet", language="C99", compilerOptions=flags)
+    Xml.SubElement(sources, "SourceFile", name="fmi3.c")
+    return _text(root)
+
+
 def _head(version: str, interface: Interface, said: str, **further: str) -> dict[str, str]:
     return {
         "fmiVersion": version,

@@ -46,7 +46,7 @@ class Interface:
 
     ``template`` has the C that moves it on, ``words`` what is filled in there. ``time`` says for people how it goes
     on, ``tuning`` when a changed parameter is taken. ``step`` is the communication step that it takes by default [s],
-    ``is_step_fixed`` true where others must be multiples of it.
+    ``is_step_fixed`` true where others must be multiples of it. ``clock`` is what the clock of the controller says.
     """
 
     name: str
@@ -59,6 +59,7 @@ class Interface:
     outputs: tuple[str, ...]
     shows_metrics: bool
     is_step_fixed: bool
+    clock: str | None
     hidden: frozenset[str]
     inputs: tuple[Input, ...]
     words: dict[str, str]

@@ -181,21 +181,13 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real current, fmi2Real length, fmi2Bo
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
     instance *given = (instance *)c;
-    const size_t size = bytes_of(&given->item);
-    size_t *kept = (size_t *)realloc(*state, sizeof(double) + size);
-    if (kept == NULL) {
-        return done(given, refuse(&given->item, "no memory"));
-    }
-    *kept = size;
-    write_state(&given->item, (double *)(void *)kept + 1);
-    *state = kept;
-    return fmi2OK;
+    return done(given, keep_state(&given->item, state));
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
     instance *given = (instance *)c;
-    return done(given, read_state(&given->item, (const double *)state + 1, *(const size_t *)state));
+    return done(given, read_state(&given->item, bytes_in(state), size_of_state(state)));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
@@ -209,38 +201,20 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
     (void)c;
-    *size = *(const size_t *)state;
+    *size = size_of_state(state);
     return fmi2OK;
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
     instance *given = (instance *)c;
-    if (size < *(const size_t *)state) {
-        return done(given, refuse(&given->item, "the state has %lu bytes", (unsigned long)*(const size_t *)state));
-    }
-    memcpy(bytes, (const double *)state + 1, *(const size_t *)state);
-    return fmi2OK;
+    return done(given, state_to(&given->item, state, bytes, size));
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
     instance *given = (instance *)c;
-    unit tried;
-    size_t *kept;
-    memset(&tried, 0, sizeof(tried));
-    if (!read_state(&tried, bytes, size)) {
-        return done(given, refuse(&given->item, "%s", tried.said));
-    }
-    free(tried.run);
-    kept = (size_t *)realloc(*state, sizeof(double) + size);
-    if (kept == NULL) {
-        return done(given, refuse(&given->item, "no memory"));
-    }
-    *kept = size;
-    memcpy((double *)(void *)kept + 1, bytes, size);
-    *state = kept;
-    return fmi2OK;
+    return done(given, state_from(&given->item, bytes, size, state));
 }
 
 /* What this unit has not: other types of variables, derivatives, steps that are still under way. */

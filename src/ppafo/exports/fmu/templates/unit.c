@@ -9,7 +9,8 @@ enum {
     FIRST_OUTPUT = SETTINGS,
     FIRST_METRIC = FIRST_OUTPUT + OUTPUTS,
     FIRST_INPUT = FIRST_METRIC + METRICS,
-    FIRST_BEYOND = FIRST_INPUT + INPUTS
+    TICK = FIRST_INPUT + INPUTS, /* the clock of the controller */
+    TIME
 };
 
 /* Paths of the settings. */
@@ -30,7 +31,9 @@ typedef struct {
     int64_t run_bytes;
     int64_t phase;
     int64_t is_stale; /* 1 where something was set that the run does not know of yet */
-    int64_t ticks;    /* samples of the controller up to now */
+    int64_t ticks;    /* samples of the controller up to now, less the first */
+    int64_t is_event; /* 1 in the event mode of FMI 3 */
+    int64_t is_tick;  /* 1 while the clock of the controller is active */
     double start;     /* the time of the tool at which the run begins */
     double time;      /* since then */
     double inputs[INPUTS + 1];
@@ -118,6 +121,7 @@ static bool begin(unit *item)
     item->now.run_bytes = (int64_t)size;
     item->now.is_stale = 0;
     item->now.ticks = 0;
+    item->now.is_tick = 1;
     item->now.time = 0.0;
     return take_first_sample(item);
 }
@@ -134,6 +138,12 @@ static bool renew(unit *item)
     return true;
 }
 
+static bool is_input(uint32_t variable)
+{
+    const uint32_t end = TICK;
+    return variable >= FIRST_INPUT && variable < end;
+}
+
 /* A variable by its number. What is calculated is calculated anew while the unit is being prepared. */
 static bool get_value(unit *item, uint32_t variable, double *value)
 {
@@ -141,11 +151,15 @@ static bool get_value(unit *item, uint32_t variable, double *value)
         *value = ((const double *)&item->now.settings)[variable];
         return true;
     }
-    if (variable >= FIRST_INPUT && variable < FIRST_BEYOND) {
+    if (is_input(variable)) {
         *value = item->now.inputs[variable - FIRST_INPUT];
         return true;
     }
-    if (variable >= FIRST_BEYOND) {
+    if (variable == TIME) {
+        *value = item->now.start + item->now.time;
+        return true;
+    }
+    if (variable >= TICK) {
         return refuse(item, "there is no variable %lu", (unsigned long)variable);
     }
     if (item->now.phase <= UNIT_BEGINNING && item->now.is_stale && !begin(item)) {
@@ -165,7 +179,7 @@ static bool get_value(unit *item, uint32_t variable, double *value)
 
 static bool set_value(unit *item, uint32_t variable, double value)
 {
-    if (variable >= FIRST_INPUT && variable < FIRST_BEYOND) {
+    if (is_input(variable)) {
         item->now.inputs[variable - FIRST_INPUT] = value;
         item->now.is_stale = item->now.is_stale || item->now.phase <= UNIT_BEGINNING;
         return true;
@@ -233,5 +247,65 @@ static bool read_state(unit *item, const void *from, size_t size)
     free(item->run);
     item->run = run;
     item->now = state;
+    return true;
+}
+
+/* A state on its own: how many bytes it has, then these. */
+static void *made_state(unit *item, void *before, size_t size)
+{
+    size_t *kept = (size_t *)realloc(before, sizeof(double) + size);
+    if (kept == NULL) {
+        (void)refuse(item, "no memory");
+    } else {
+        *kept = size;
+    }
+    return kept;
+}
+
+static char *bytes_in(void *kept)
+{
+    return (char *)kept + sizeof(double);
+}
+
+static size_t size_of_state(const void *kept)
+{
+    return *(const size_t *)kept;
+}
+
+static bool keep_state(unit *item, void **kept)
+{
+    void *made = made_state(item, *kept, bytes_of(item));
+    if (made == NULL) {
+        return false;
+    }
+    write_state(item, bytes_in(made));
+    *kept = made;
+    return true;
+}
+
+static bool state_from(unit *item, const void *bytes, size_t size, void **kept)
+{
+    void *made;
+    unit tried;
+    memset(&tried, 0, sizeof(tried));
+    if (!read_state(&tried, bytes, size)) {
+        return refuse(item, "%s", tried.said);
+    }
+    free(tried.run);
+    made = made_state(item, *kept, size);
+    if (made == NULL) {
+        return false;
+    }
+    memcpy(bytes_in(made), bytes, size);
+    *kept = made;
+    return true;
+}
+
+static bool state_to(unit *item, void *kept, void *bytes, size_t size)
+{
+    if (size < size_of_state(kept)) {
+        return refuse(item, "the state has %lu bytes", (unsigned long)size_of_state(kept));
+    }
+    memcpy(bytes, bytes_in(kept), size_of_state(kept));
     return true;
 }
