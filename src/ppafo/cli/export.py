@@ -25,6 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     unit = actions.add_parser("fmu", help=_UNIT, description=f"{_UNIT[:1].upper()}{_UNIT[1:]}.")
     unit.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI (default: 2)")
     unit.add_argument(
+        "--interface",
+        choices=("loop", "plant"),
+        default="loop",
+        help="the closed loop, or the plant alone with a command and the ankle as inputs (default: loop)",
+    )
+    unit.add_argument(
         "--platforms",
         metavar="LIST",
         help="what it is to run on, separated by commas: linux64, win64, ... (default: this computer)",
@@ -55,11 +61,13 @@ def _library(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 
 
 def _unit(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
-    from ppafo.exports.fmu import functional_unit
+    from ppafo.exports.fmu import closed_loop, functional_unit
     from ppafo.exports.fmu.binaries import host_platform
+    from ppafo.exports.fmu.plant import plant_alone
     from ppafo.simulation.loading import load_scenario
 
     chosen = [host_platform()] if parsed.platforms is None else parsed.platforms.split(",")
     platforms = list(dict.fromkeys(name.strip() for name in chosen if name is not None))
-    contents = functional_unit(load_scenario(parsed.scenario, parsed.overrides), parsed.fmi, platforms)
+    interface = {"loop": closed_loop, "plant": plant_alone}[parsed.interface]
+    contents = functional_unit(interface(load_scenario(parsed.scenario, parsed.overrides)), parsed.fmi, platforms)
     return contents, f"fmpy simulate {shlex.quote(str(parsed.out / next(iter(contents))))} --show-plot"

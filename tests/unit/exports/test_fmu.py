@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import ScenarioError
-from ppafo.exports.fmu import functional_unit
+from ppafo.exports.fmu import closed_loop, functional_unit
 from ppafo.exports.fmu.binaries import host_platform
 from ppafo.exports.fmu.variables import FIXED_NAMES
 from ppafo.simulation.loading import load_scenario
@@ -26,7 +26,7 @@ SHORT = ("run.duration=0.3 s", "reference.ramp_time=0.1 s")
 
 def written(folder: Path, name: str, overrides: tuple[str, ...] = SHORT, fmi: int = 2) -> str:
     """Write a unit; its path."""
-    ((file, content),) = functional_unit(load_scenario(name, overrides), fmi, ["linux64"]).items()
+    ((file, content),) = functional_unit(closed_loop(load_scenario(name, overrides)), fmi, ["linux64"]).items()
     (folder / file).write_bytes(content)
     return str(folder / file)
 
@@ -231,6 +231,6 @@ def test_the_unit_holds_sources_that_build_it_without_a_warning(unit: str, tmp_p
 
 def test_what_nobody_has_run_is_asked_for_by_name_and_marked() -> None:
     with pytest.raises(ScenarioError, match="did you mean 'linux64'"):
-        functional_unit(load_scenario("step-response"), 2, ["linux46"])
+        functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux46"])
     with pytest.raises(ScenarioError, match="no name in FMI 2"):
-        functional_unit(load_scenario("step-response"), 2, ["linux-aarch64"])
+        functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux-aarch64"])

@@ -37,9 +37,8 @@ _LOOP_TUNING = (
 )
 
 
-def functional_unit(scenario: Scenario, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
+def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
     """A unit by the name of its file. ProgramError for what cannot be translated or built."""
-    interface = closed_loop(scenario)
     chosen = {name: _platform(name, fmi) for name in platforms}
     identifier = c_identifier(interface.library.title)
     sources = _sources(interface, fmi)

@@ -1,6 +1,7 @@
 """The description of a unit that a tool reads before it loads it: modelDescription.xml of FMI 2 and 3."""
 
 from collections.abc import Iterable
+from typing import Any
 from xml.etree import ElementTree as Xml
 
 from ppafo.exports.fmu.variables import Interface, Variable, variables_of
@@ -41,11 +42,11 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str, said:
         row = Xml.SubElement(table, "ScalarVariable", _scalar(item))
         Xml.SubElement(row, "Real", _real(item))
     structure = Xml.SubElement(root, "ModelStructure")
-    for name in ("Outputs", "InitialUnknowns"):
+    for name, known in {"Outputs": {"dependencies": ""}, "InitialUnknowns": {}}.items():
         section = Xml.SubElement(structure, name)
         for place, item in enumerate(variables, start=1):
             if item.causality == "output":
-                Xml.SubElement(section, "Unknown", index=str(place))
+                Xml.SubElement(section, "Unknown", {"index": str(place), **known})
     return _text(root)
 
 
@@ -54,7 +55,7 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str, said:
     variables = variables_of(interface)
     root = Xml.Element("fmiModelDescription", _head("3.0", interface, said, instantiationToken=token))
     has_clock = interface.clock is not None
-    internal = {"fixedInternalStepSize": repr(interface.step)} if interface.is_step_fixed else {}
+    internal: dict[str, Any] = {"fixedInternalStepSize": repr(interface.step)} if interface.is_step_fixed else {}
     Xml.SubElement(
         root,
         "CoSimulation",
@@ -81,9 +82,9 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str, said:
         Xml.SubElement(table, "Float64", {**_scalar(item), **_real(item)})
     structure = Xml.SubElement(root, "ModelStructure")
     outputs = [item.number for item in variables if item.causality == "output"] + [first] * has_clock
-    for name in ("Output", "InitialUnknown"):
+    for name, known in {"Output": {"dependencies": ""}, "InitialUnknown": {}}.items():
         for number in outputs:
-            Xml.SubElement(structure, name, valueReference=str(number))
+            Xml.SubElement(structure, name, {"valueReference": str(number), **known})
     return _text(root)
 
 

@@ -43,9 +43,3 @@ static bool go_to(unit *item, double time)
     item->now.ticks = (int64_t)(time / period + 1.0e-6);
     return true;
 }
-
-/* When the controller decides, counted from 0, since the start. */
-static double time_of_tick(const unit *item, int64_t tick)
-{
-    return (double)tick * item->run->parameters[PARAMETER_TIMING_PERIOD];
-}

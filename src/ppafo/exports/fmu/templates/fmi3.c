@@ -39,6 +39,12 @@ static bool has_none(fmi3Instance instance, size_t count)
     return count == 0 || refuse(item, "this unit has no such variables, derivatives or modes");
 }
 
+/* When the controller decides, counted from 0, since the start. */
+static double time_of_tick(const unit *item, int64_t tick)
+{
+    return (double)tick * item->run->parameters[PARAMETER_TIMING_PERIOD];
+}
+
 const char *fmi3GetVersion(void)
 {
     return fmi3Version;
