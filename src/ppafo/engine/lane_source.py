@@ -37,12 +37,18 @@ def lane_source(program: Program) -> str:
     return write_lanes(program, SourceCollector(INLINE))
 
 
-def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) -> str:
-    """Source text of a program; ``collector`` then has all that it is made from. ``lanes`` 0 is as many as fit."""
+def write_lanes(program: Program, collector: SourceCollector) -> str:
+    """Source text of a program; ``collector`` then has all that it is made from."""
+    advance = lane_loop(program, collector, "advance")
+    return f"{HEADER}\n\n{collector.text()}\n\n\n{advance}\n"
+
+
+def lane_loop(program: Program, collector: SourceCollector, name: str, lanes: int = 0) -> str:
+    """The function that runs one block of a program, of some lanes, 0 for as many as fit."""
     rows = LaneRows(program, collector, lanes)
     body = [
         COMPILED,
-        f"def advance({ARGUMENTS}):",
+        f"def {name}({ARGUMENTS}):",
         *indent(
             [
                 f"x = np.empty(({rows.count}, {rows.lanes}))",
@@ -54,7 +60,7 @@ def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) ->
             ]
         ),
     ]
-    return f"{HEADER}\n\n{collector.text()}\n\n\n" + "\n".join(body) + "\n"
+    return "\n".join(body)
 
 
 def all_steps(rows: LaneRows) -> list[str]:

@@ -68,7 +68,7 @@ def c_source(
     """A translation unit with all functions of a module.
 
     ``documents`` has the docstrings of rows and functions; ``places`` has names for the first places of some arrays,
-    which the file around it defines.
+    which the file around it defines, ``x`` for those of all functions, ``advance.x`` for that of one.
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
     functions = [item for item in module.functions if item.returns is None or not is_empty(item.returns)]
@@ -103,6 +103,14 @@ class _Writer:
     names: dict[Type, str] = field(default_factory=dict)
     locals: dict[str, set[str]] = field(default_factory=dict)
     owner: str = ""
+
+    def places_in(self, function: str) -> Mapping[str, Sequence[str]]:
+        """Names for the first places of the arrays of a function."""
+        own = f"{function}."
+        return {
+            **self.places,
+            **{key.removeprefix(own): names for key, names in self.places.items() if key.startswith(own)},
+        }
 
     def type_name(self, kind: Type) -> str:
         """Name of a type in C; a struct is written where it is met first."""
@@ -177,7 +185,7 @@ class _Body:
 
     def __init__(self, writer: _Writer, item: Function, scopes: Scopes) -> None:
         self.writer = writer
-        self.terms = CTerms(writer.type_name, self.name, writer.places)
+        self.terms = CTerms(writer.type_name, self.name, writer.places_in(item.source))
         self.item = item
         self.scopes = scopes
         self.kinds: dict[str, Type] = dict(item.parameters) | scopes.types

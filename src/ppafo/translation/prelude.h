@@ -15,7 +15,9 @@
 #define PPAFO_INLINE static inline
 #endif
 
-#if defined(__clang__)
+#if defined(PPAFO_SIDE_BY_SIDE)
+/* Said by the file around this. */
+#elif defined(__clang__)
 #define PPAFO_SIDE_BY_SIDE _Pragma("clang loop vectorize(assume_safety)")
 #elif defined(__GNUC__)
 #define PPAFO_SIDE_BY_SIDE _Pragma("GCC ivdep")

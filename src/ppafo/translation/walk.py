@@ -6,7 +6,7 @@ type, so that it is bound here. What is outside the subset is refused with the f
 
 import ast
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +15,7 @@ from ppafo.engine.plain_python import refusal
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
 from ppafo.translation.expressions import Expressions
-from ppafo.translation.scopes import counters, needed
+from ppafo.translation.scopes import Names, changed, needed
 from ppafo.translation.typed import (
     BOOL,
     FLOAT,
@@ -72,7 +72,7 @@ class _ModuleWalk:
     done: dict[tuple[str, tuple[Type, ...]], Function] = field(default_factory=dict)
     open: set[tuple[str, tuple[Type, ...]]] = field(default_factory=set)
     names: set[str] = field(default_factory=set)
-    found: dict[str, "_Names"] = field(default_factory=dict)
+    found: dict[str, Names] = field(default_factory=dict)
     module: Module = field(default_factory=Module)
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
@@ -102,24 +102,6 @@ class _ModuleWalk:
         return refusal(found.file, found.line, problem)
 
 
-@dataclass(frozen=True, slots=True)
-class _Names:
-    """Names of a definition: all of them, those that are read, those that only count; looked for once."""
-
-    every: frozenset[str]
-    read: frozenset[str]
-    counters: frozenset[str]
-
-    @classmethod
-    def of(cls, definition: ast.FunctionDef) -> "_Names":
-        """The names of a definition."""
-        nodes = list(ast.walk(definition))
-        named = [node for node in nodes if isinstance(node, ast.Name)]
-        every = {node.id for node in named} | {node.arg for node in nodes if isinstance(node, ast.arg)}
-        read = {node.id for node in named if isinstance(node.ctx, ast.Load)}
-        return cls(frozenset(every), frozenset(read), frozenset(counters(nodes)))
-
-
 class _FunctionWalk:
     """One function for one choice of types; gone through again where a name turns out to hold a wider type."""
 
@@ -128,7 +110,7 @@ class _FunctionWalk:
         self.definition = definition
         self.types: dict[str, Type] = {}
         if definition.name not in module.found:
-            module.found[definition.name] = _Names.of(definition)
+            module.found[definition.name] = Names.of(definition)
         found = module.found[definition.name]
         self.names, self.read = found.every, found.read
         self.made: set[str] = set()
@@ -229,7 +211,7 @@ class _FunctionWalk:
             raise self.refused(node, f"'{ast.unparse(call)}' goes nowhere")
         self.note_type(name, INT, node)
         before: list[Statement] = []
-        if stop.reads & {name, *_changed(node.body)}:
+        if stop.reads & {name, *changed(node.body)}:
             # Python asks for the end of a range once.
             end = self.fresh(f"{name}_stop", INT)
             before, stop = [self.assign(end, stop, node)], Term("name", INT, (), end)
@@ -241,7 +223,7 @@ class _FunctionWalk:
         owner = self.values.term(whole)
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
             raise self.refused(node, f"'{ast.unparse(node.iter)}' is no tuple of one type")
-        if owner.reads & {name, *_changed(node.body)}:
+        if owner.reads & {name, *changed(node.body)}:
             raise self.refused(node, f"a loop over '{ast.unparse(node.iter)}' that changes it")
         places = range(len(owner.type.types))
         if isinstance(node.iter, ast.Subscript):
@@ -343,21 +325,3 @@ class _FunctionWalk:
 def _is_empty_array(node: ast.Call) -> bool:
     """True for ``np.empty(...)``."""
     return isinstance(node.func, ast.Attribute) and node.func.attr == "empty"
-
-
-def _changed(body: Iterable[ast.stmt]) -> set[str]:
-    """Names that some statements give values."""
-    found: set[str] = set()
-    for statement in body:
-        if isinstance(statement, ast.Assign):
-            found.update(item.id for target in statement.targets for item in _parts(target) if isinstance(item, ast.Name))
-        elif isinstance(statement, ast.AugAssign | ast.For):
-            found.update(item.id for item in _parts(statement.target) if isinstance(item, ast.Name))
-        if isinstance(statement, ast.If | ast.For | ast.While):
-            found |= _changed(statement.body) | _changed(statement.orelse)
-    return found
-
-
-def _parts(target: ast.expr) -> list[ast.expr]:
-    """What is on the left of an assignment, one by one."""
-    return target.elts if isinstance(target, ast.Tuple) else [target]

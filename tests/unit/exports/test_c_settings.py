@@ -24,7 +24,7 @@ SPREAD = (0.7, 1.4)
 VARIED: dict[str, tuple[str, ...]] = {
     "step-response": (),
     "torque-task-anti-windup": (),
-    "torque-task-moving-ankle": (),
+    "torque-task-moving-ankle": ("valve.sonic_conductance=9e-10 m^3/(s Pa)", "valve.critical_ratio=0.3"),
     "torque-task-proportional": (),
     "torque-task-slow-valve": ("controller.kind=feedback_linearisation",),
     "torque-task-solenoid": (

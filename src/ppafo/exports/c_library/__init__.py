@@ -7,7 +7,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.run import batch_of
 from ppafo.exports.c_library.files import Library, library_files
 from ppafo.exports.c_library.preparation import Preparation, relations_of, settings_of
-from ppafo.exports.c_library.program import ExportedProgram, exported
+from ppafo.exports.c_library.program import exported
 from ppafo.metrics.catalog import METRICS
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import Orifice, SonicOrifice
@@ -42,12 +42,12 @@ def scenario_library(scenario: Scenario) -> Library:
         relations=relations_of(scenario),
         preparation=("double given[SETTINGS];", *given, f"prepare({arrays});"),
         other_program=_other_program(scenario, program.program),
-        words=_words(scenario, program),
+        words=_words(scenario),
         further=lambda collector: Preparation(scenario, program.program, collector).text(),
     )
 
 
-def _words(scenario: Scenario, program: ExportedProgram) -> dict[str, str]:
+def _words(scenario: Scenario) -> dict[str, str]:
     """What the page of the library says of this scenario."""
     supply, motion = scenario.device.supply, scenario.motion
     moves = f"prescribed, `{motion.profile.kind}`" if isinstance(motion, PrescribedMotion) else "free"
@@ -65,20 +65,12 @@ def _words(scenario: Scenario, program: ExportedProgram) -> dict[str, str]:
     ]
     zero = [f"`valve_{name}`" for name in _choosing(scenario) if not scenario.device.valve.settings[name] > 0.0]
     flawless = [] if any(scenario.sensors.flaws) else ["all of `sensors_` but the seed"]
-    parts = "" if program.program.is_adaptive or not program.program.is_held else _WHOLE_STEPS
     left_out = [kind.name for kind in METRICS.values() if kind.traced]
     return {
         "fixed": "\n".join(f"- {item};" for item in fixed),
         "at_zero": f"here 0 are {', '.join([*zero, *flawless]) or 'none'}",
-        "parts": parts,
         "left_out": ", ".join(f"`{name}`" for name in left_out),
     }
-
-
-_WHOLE_STEPS = """
-
-This vane is held, and its chambers are slow enough for whole steps. Settings that make them faster (a wider valve, less
-volume) need a shorter `run_step`, else they give the status below too."""
 
 
 def _form(orifice: Orifice | SonicOrifice) -> str:
@@ -97,7 +89,6 @@ def _other_program(scenario: Scenario, program: Program) -> tuple[str, ...]:
         _differs([f"sensors_{name}" for name in bandwidths], program.slow_sensors),
     ]
     interval = "prepared->counts[COUNT_INTERVAL]"
-    found.append(f"(prepared->counts[COUNT_NEEDS_PARTS] != 0.0) != {_truth(program.is_adaptive)}")
     found.append(f"({interval} != (double)(int64_t){interval}) != {_truth(program.samples_inside)}")
     return tuple(found)
 

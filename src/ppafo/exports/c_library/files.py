@@ -11,7 +11,7 @@ from importlib.resources import files
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
-from ppafo.exports.c_library.program import COUNTS, ExportedProgram, Further, c_text
+from ppafo.exports.c_library.program import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further, c_text
 from ppafo.model.declaration import Quantity
 from ppafo.version import __version__
 
@@ -32,6 +32,14 @@ OUTPUTS = {
     "leaked_mass": ("kg", "gas past the vane so far"),
 }
 """Unit and meaning of what can be read at each sample."""
+_ALONE = """#if !defined(PPAFO_ENTRY)
+#define PPAFO_ENTRY static
+#endif
+/* Loops over lanes have one turn here. */
+#define PPAFO_SIDE_BY_SIDE
+
+"""
+"""What the functions are told that stand in the file of a library."""
 UNITS = {"Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
 _SIGNS = {"below": "<", "at most": "<=", "at least": ">="}
 _MARK = re.compile(r"@(\w+)@")
@@ -95,9 +103,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     words = _words(library, name)
     texts = {target.format(name=name): _filled(source, words) for source, target in _FILES.items()}
     texts["LICENSE"] = _filled("LICENSE", {})
-    head = (
-        f'#include "{name}.h"\n\n#include <string.h>\n\n#if !defined(PPAFO_ENTRY)\n#define PPAFO_ENTRY static\n#endif\n'
-    )
+    head = f'#include "{name}.h"\n\n#include <string.h>\n\n{_ALONE}'
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
     functions = c_text(program, title, [item.name for item in library.settings], library.further)
     texts[f"{name}.c"] = f"{head}{functions}\n{_filled('interface.c', words)}"
@@ -122,6 +128,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "version": __version__,
         "never": repr(NEVER_FAILED),
         "same_moment": repr(SAME_MOMENT),
+        "advance": f"(run->needs_parts == 1 ? {IN_PARTS} : {WHOLE})" if program.chooses_parts else WHOLE,
         "signal_rows": str(SIGNAL_ROWS),
         "state_count": str(len(states)),
         "parameter_count": str(len(parameters)),
@@ -149,7 +156,9 @@ def _words(library: Library, name: str) -> dict[str, str]:
             f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", "{kind.summary}");'
             for kind in program.metrics
         ),
-        "example": f"{library.settings[0].name} = {library.settings[0].value!r};",
+        "example": next(
+            f"{item.name} = {item.value!r};" for item in library.settings if item.name == "supply_pressure"
+        ),
         **library.words,
     }
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from ppafo.engine.lane_meters import TRACED
 from ppafo.engine.lane_rows import indent
-from ppafo.engine.lane_source import INLINE, write_lanes
+from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector
@@ -24,6 +24,9 @@ The last one is 1 where the error decides about the parts of a step, else 0.
 """
 Further = Callable[[SourceCollector], str]
 """Writes a further composed function, once it has gathered what that calls."""
+WHOLE, IN_PARTS = "advance", "advance_in_parts"
+"""Names of the lane loops in C: of whole steps or of the one there is, and of steps in parts where there are both."""
+_STEPS = {WHOLE: "AT_STEP", IN_PARTS: "AT_PARTED"}
 METRICS_ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], int64, float64[::1])")'
 
 
@@ -33,6 +36,21 @@ class ExportedProgram:
 
     program: Program
     metrics: tuple[MetricKind, ...]
+
+    @property
+    def loops(self) -> dict[str, Program]:
+        """Programs of its lane loops, by their names in C.
+
+        A held vane without lines has two: its settings decide whether the error decides about the parts of a step.
+        """
+        if not self.chooses_parts:
+            return {WHOLE: self.program}
+        return {WHOLE: replace(self.program, is_adaptive=False), IN_PARTS: replace(self.program, is_adaptive=True)}
+
+    @property
+    def chooses_parts(self) -> bool:
+        """True where the settings decide whether the error decides about the parts of a step."""
+        return self.program.is_held and not self.program.has_lines
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -70,13 +88,13 @@ def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: 
     """All functions of an exported program in C; ``further`` may add one that takes ``settings``, which are named."""
     collector = one_run_collector(INLINE)
     entries = [metrics_entry(item, collector), *([] if further is None else [further(collector)])]
-    composed = "\n\n".join([write_lanes(item.program, collector, lanes=1), *entries, ""])
+    loops = [lane_loop(program, collector, name, lanes=1) for name, program in item.loops.items()]
+    composed = "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
     state, parameter = list(item.state_places.values()), list(item.parameter_places.values())
-    stepping = [f"AT_STEP_{name.removeprefix('AT_')}" for name in places_of(item.program.step_rows()).values()]
-    own = ["AT_PART_LENGTH", "AT_PART_BEFORE", "AT_PART_REMAINING", "AT_PART_ERROR"]
     alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
+    steps = {name: _stepping(program, _STEPS[name]) for name, program in item.loops.items()}
     places = {
-        "x": [*state, *parameter, *stepping, *own],
+        **{f"{name}.x": [*state, *parameter, *stepping] for name, stepping in steps.items()},
         "states": state,
         "first": state,
         "parameters": alone,
@@ -85,7 +103,11 @@ def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: 
         "found": [f"METRIC_{kind.name.upper()}" for kind in item.metrics],
     }
     counted = [
-        _enumeration("Places of all numbers of a run: states, parameters, and what a step hands on.", places["x"]),
+        _enumeration("Places of all numbers of a run: states, then parameters.", [*state, *parameter]),
+        *(
+            _enumeration(f"Places of what a step of {name} hands on.", stepping, len(state) + len(parameter))
+            for name, stepping in steps.items()
+        ),
         _enumeration("Places of the parameters alone.", alone),
         _enumeration("Places of the numbers of the steps.", places["counts"]),
         _enumeration("Places of the settings.", places["settings"]),
@@ -95,9 +117,16 @@ def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: 
     return "\n".join([*counted, c_source(walk_module(composed), documents, title, places)])
 
 
-def _enumeration(said: str, names: Sequence[str]) -> str:
-    lines = "\n".join(f"    {name}," for name in names)
-    return f"/* {said} */\nenum {{\n{lines.removesuffix(',')}\n}};\n"
+def _stepping(program: Program, prefix: str) -> list[str]:
+    """Names of the places of what a step hands on, and of its parts."""
+    handed = [name.removeprefix("AT_") for name in places_of(program.step_rows()).values()]
+    return [f"{prefix}_{name}" for name in (*handed, "PART_LENGTH", "PART_BEFORE", "PART_REMAINING", "PART_ERROR")]
+
+
+def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
+    begin = f" = {first}" if first else ""
+    lines = ",\n".join([f"    {names[0]}{begin}", *(f"    {name}" for name in names[1:])])
+    return f"/* {said} */\nenum {{\n{lines}\n}};\n"
 
 
 def metrics_entry(item: ExportedProgram, collector: SourceCollector) -> str:

@@ -26,6 +26,7 @@ struct @name@_run {
     int64_t sample_count;  /* in all */
     int64_t samples_taken;
     int64_t samples_shown;
+    int64_t needs_parts;   /* 1 where the error decides about the parts of a step */
     int64_t signal_delay;  /* steps */
     int64_t command_delay;
     /* Late signals and commands follow in memory. */
@@ -112,6 +113,7 @@ size_t @name@_size(const @name@_settings *settings)
     run->steps = (int64_t)prepared.counts[COUNT_STEPS];
     run->steps_per_sample = (int64_t)prepared.counts[COUNT_STEPS_PER_SAMPLE];
     run->sample_count = (int64_t)(((double)run->steps + SAME_MOMENT) / run->interval) + 1;
+    run->needs_parts = prepared.counts[COUNT_NEEDS_PARTS] != 0.0 ? 1 : 0;
     run->signal_delay = (int64_t)prepared.counts[COUNT_SIGNAL_DELAY];
     run->command_delay = (int64_t)prepared.counts[COUNT_COMMAND_DELAY];
     values = values_of_history(run->signal_delay, run->command_delay);
@@ -132,7 +134,7 @@ static void take_sample(@name@_run *run)
     if (until > run->steps || run->samples_taken + 1 == run->sample_count) {
         until = run->steps;
     }
-    advance(array_of(run->states, STATES, 1, 0), array_of(run->parameters, PARAMETERS, 1, 0),
+    @advance@(array_of(run->states, STATES, 1, 0), array_of(run->parameters, PARAMETERS, 1, 0),
         array_of(history, @signal_rows@, slots, 1),
         array_of(history + @signal_rows@ * slots, run->command_delay + 2, 1, 0), array_of(history, 0, STATES, 1),
         array_of(run->samples[0], 2, OUTPUTS, 1), run->steps_done, until - run->steps_done, run->steps,
