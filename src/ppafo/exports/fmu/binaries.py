@@ -33,7 +33,7 @@ class Platform:
 PLATFORMS = {
     "linux64": Platform("linux64", "x86_64-linux", "x86_64-linux-gnu.2.17", ".so", "run in the tests"),
     "win64": Platform("win64", "x86_64-windows", "x86_64-windows-gnu", ".dll", "run under Wine"),
-    "linux-aarch64": Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "not run"),
+    "linux-aarch64": Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "run under qemu"),
     "darwin64": Platform("darwin64", "x86_64-darwin", "x86_64-macos", ".dylib", "not run"),
     "darwin-aarch64": Platform(None, "aarch64-darwin", "aarch64-macos", ".dylib", "not run"),
 }
@@ -52,7 +52,7 @@ def host_platform() -> str | None:
 
 def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
     """The library of a unit for a platform. ProgramError where no compiler is there for it, or it refuses."""
-    command = [*_compiler(name), *FLAGS, *HIDDEN]
+    command = [*compiler_for(name), *FLAGS, *HIDDEN]
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
@@ -65,7 +65,8 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
         return library.read_bytes()
 
 
-def _compiler(name: str) -> Sequence[str]:
+def compiler_for(name: str) -> Sequence[str]:
+    """The words of a compiler for a platform. ProgramError where there is none."""
     if importlib.util.find_spec("ziglang") is not None:
         return [
             sys.executable,

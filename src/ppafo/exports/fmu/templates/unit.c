@@ -134,6 +134,7 @@ static bool renew(unit *item)
         return false;
     }
     memcpy(item->run->parameters, prepared.parameters, sizeof(prepared.parameters));
+    item->run->needs_parts = prepared.counts[COUNT_NEEDS_PARTS] != 0.0 ? 1 : 0;
     item->now.is_stale = 0;
     return true;
 }
