@@ -71,7 +71,8 @@ def drawn(scenario: Scenario) -> tuple[dict[str, Any], Scenario]:
         item.path: np.clip(item.value * draw.uniform(*SPREAD, RUNS), item.quantity.minimum, item.quantity.maximum)
         for item in settings
     }
-    # Whole numbers of steps too, which are one by rounding only.
+    # Many steps to a sample, and whole numbers of them that are whole by rounding only.
+    columns["run.step"][::2] *= draw.uniform(0.005, 0.1, RUNS // 2)
     columns["run.output_interval"][: RUNS // 2] = 3.0 * columns["run.step"][: RUNS // 2]
     columns["controller.period"][: RUNS // 2] = 2.0 * columns["run.step"][: RUNS // 2]
     varied = with_numbers(scenario, {path: column for path, column in columns.items() if path not in TIMES})
