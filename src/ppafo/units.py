@@ -116,6 +116,11 @@ def base_value(value: float, unit: str) -> float:
     return base + (STANDARD_ATMOSPHERE if kind == "g" else 0.0)
 
 
+def dimension(unit: str) -> dict[str, int]:
+    """Return the powers of the base dimensions of a unit, such as ``[mass]`` and ``[angle]``."""
+    return {name: round(float(str(power))) for name, power in _parse_unit(unit)[0].dimensionality.items()}
+
+
 @functools.lru_cache(maxsize=512)
 def _conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     """Return scale, offset and whether the atmosphere is to be added; in decimals, so that 8.4 g is 0.0084 kg."""

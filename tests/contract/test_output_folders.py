@@ -40,6 +40,7 @@ FOLDERS: dict[str, list[str]] = {
     "schema": ["scenario"],
     "cache": [],
     "export c": ["c", "step-response"],
+    "export fmu": ["fmu", "step-response"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
 

@@ -28,7 +28,7 @@ COMMANDS: dict[str, str] = {
     "sets": "list parameter sets, or show one with the source of every value",
     "parts": QUESTIONS["parts"],
     "audit": "check a parameter set for contradictions",
-    "export": "write a scenario for other tools: a library in C",
+    "export": "write a scenario for other tools: a library in C, an FMU",
     "bits": QUESTIONS["bits"],
     "cache": "show, compile or remove the compiled models of this computer",
     "schema": "print the JSON Schema of a file format",

@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
 
 from ppafo.cli.output import (
@@ -14,27 +15,59 @@ from ppafo.cli.output import (
 )
 
 _C = "write a scenario as a library in C: header, source, example, make files"
+_UNIT = "write a scenario as a functional mock-up unit (FMU) for co-simulation"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     library = actions.add_parser("c", help=_C, description=f"{_C[:1].upper()}{_C[1:]}.")
-    library.add_argument("scenario", metavar="SCENARIO", help="name of a scenario, or a .toml file")
-    add_override_argument(library)
-    add_json_argument(library)
-    library.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
+    unit = actions.add_parser("fmu", help=_UNIT, description=f"{_UNIT[:1].upper()}{_UNIT[1:]}.")
+    unit.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI (default: 2)")
+    unit.add_argument(
+        "--interface",
+        choices=("loop", "plant"),
+        default="loop",
+        help="the closed loop, or the plant alone with a command and the ankle as inputs (default: loop)",
+    )
+    unit.add_argument(
+        "--platforms",
+        metavar="LIST",
+        help="what it is to run on, separated by commas: linux64, win64, ... (default: this computer)",
+    )
+    for parser_of_one in (library, unit):
+        parser_of_one.add_argument("scenario", metavar="SCENARIO", help="name of a scenario, or a .toml file")
+        add_override_argument(parser_of_one)
+        add_json_argument(parser_of_one)
+        parser_of_one.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Write the files of a library, and say what to run next."""
+    """Write the files of a scenario for another tool, and say what to do next."""
+    check_output(parsed)
+    contents, following = {"c": _library, "fmu": _unit}[parsed.action](parsed)
+    write_files(parsed, contents)
+    document = {"folder": str(parsed.out), "files": list(contents), "next": following}
+    print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)
+    return EXIT_GOOD
+
+
+def _library(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.c_library import c_library
     from ppafo.simulation.loading import load_scenario
 
-    check_output(parsed)
     contents = c_library(load_scenario(parsed.scenario, parsed.overrides))
-    write_files(parsed, contents)
-    command = f"make -C {shlex.quote(str(parsed.out))} check"
-    document = {"folder": str(parsed.out), "files": list(contents), "next": command}
-    print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {command}", document, parsed.json)
-    return EXIT_GOOD
+    return contents, f"make -C {shlex.quote(str(parsed.out))} check"
+
+
+def _unit(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
+    from ppafo.exports.fmu import closed_loop, functional_unit
+    from ppafo.exports.fmu.binaries import host_platform
+    from ppafo.exports.fmu.plant import plant_alone
+    from ppafo.simulation.loading import load_scenario
+
+    chosen = [host_platform()] if parsed.platforms is None else parsed.platforms.split(",")
+    platforms = list(dict.fromkeys(name.strip() for name in chosen if name is not None))
+    interface = {"loop": closed_loop, "plant": plant_alone}[parsed.interface]
+    contents = functional_unit(interface(load_scenario(parsed.scenario, parsed.overrides)), parsed.fmi, platforms)
+    return contents, f"fmpy simulate {shlex.quote(str(parsed.out / next(iter(contents))))} --show-plot"

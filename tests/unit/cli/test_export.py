@@ -4,6 +4,7 @@ import json
 import math
 import re
 import shlex
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,9 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers.constant import KIND, ConstantParameters
 from ppafo.model.sensors import Measurement
 
-PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "export-to-c.md").read_text(encoding="utf-8")
+PAGES = Path(__file__).parents[3] / "docs" / "how-to"
+PAGE = (PAGES / "export-to-c.md").read_text(encoding="utf-8")
+PAGE_OF_UNITS = (PAGES / "export-to-fmu.md").read_text(encoding="utf-8")
 
 
 def test_the_commands_of_the_page_write_libraries(
@@ -36,6 +39,23 @@ def test_the_commands_of_the_page_write_libraries(
     ]
     assert all((tmp_path / "out" / "c" / file).stat().st_size > 0 for file in files)
     assert "settings->valve_area = 1.26e-05;" in (tmp_path / "out" / "wide" / "step_response.c").read_text()
+
+
+def test_the_commands_of_the_page_write_units(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("ppafo.exports.fmu.build", lambda *given: str(given[0]).encode())
+    for command in re.findall(r"^ppafo (.*)$", PAGE_OF_UNITS, re.MULTILINE):
+        assert main(shlex.split(command)) == 0
+    (unit,) = (tmp_path / "out" / "unit").glob("*.fmu")
+    assert str(unit.relative_to(tmp_path)) in PAGE_OF_UNITS
+    assert (tmp_path / "out" / "plant" / "torque_task_proportional_plant.fmu").exists()
+    with zipfile.ZipFile(unit) as archive:
+        names = archive.namelist()
+        assert archive.read("sources/torque_task_proportional.c").startswith(b"#include")
+    assert {"modelDescription.xml", "documentation/index.html", "sources/fmi2.c", "sources/unit.c"} <= set(names)
+    assert "next: fmpy simulate out/unit/torque_task_proportional.fmu" in capsys.readouterr().out
 
 
 def with_exponential(

@@ -1,0 +1,101 @@
+"""The plant of a scenario alone: valve, gas and supply under a command, on a vane that is free or moved."""
+
+from dataclasses import replace
+
+from ppafo.control.catalog import PROFILES
+from ppafo.engine.lanes import SIGNAL_ROWS
+from ppafo.exports.c_library import scenario_library
+from ppafo.exports.fmu.variables import Input, Interface
+from ppafo.simulation.preparation import step_counts
+from ppafo.simulation.scenario import Control, FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Sensors
+
+COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0)
+TIME = (
+    "Inputs are taken at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
+    "divides it further where its error asks for that. {motion} There is no end."
+)
+LED = "From there on the angle goes on with the angular velocity that is given; the next step begins at the next angle."
+FREE = "The external torque is constant until the next one."
+TUNING = "They are taken at the next communication step."
+
+_FOLLOW_ANGLE = """\
+    settings->motion_profile_start_level = inputs[1];
+    settings->motion_profile_level = inputs[1] + 2.0 * inputs[2];
+    settings->motion_profile_ramp_start = 0.0;
+    settings->motion_profile_ramp_time = 2.0;"""
+_LEAD_ANGLE = """\
+    rows[PARAMETER_PATH_START_LEVEL] = inputs[1];
+    rows[PARAMETER_PATH_LEVEL] = inputs[1] + inputs[2] * (2.0 * length);
+    rows[PARAMETER_PATH_RAMP_START] = time;
+    rows[PARAMETER_PATH_RAMP_TIME] = 2.0 * length;"""
+
+
+def plant_alone(scenario: Scenario) -> Interface:
+    """The plant; a free vane takes an external torque, one whose angle is prescribed takes angle and rate."""
+    chosen = _scenario_of_plant(scenario)
+    library = scenario_library(chosen)
+    is_led = isinstance(chosen.motion, PrescribedMotion)
+    hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
+    hidden |= {item.path for item in library.settings if item.path.startswith(("sensors.", "motion.profile."))}
+    hidden |= {"motion.external_torque"}
+    unseen = {"command", *(("angle", "angular_velocity") if is_led else ())}
+    return Interface(
+        name=chosen.name,
+        library=library,
+        template="plant.c",
+        time=TIME.format(motion=LED if is_led else FREE),
+        tuning=TUNING,
+        step=chosen.time_step,
+        duration=scenario.duration,
+        outputs=tuple(name for name in library.program.outputs if name not in unseen),
+        shows_metrics=False,
+        is_step_fixed=True,
+        clock=None,
+        hidden=frozenset(hidden),
+        inputs=_inputs(chosen),
+        words={
+            "signal_rows": str(SIGNAL_ROWS),
+            "follow": _FOLLOW_ANGLE if is_led else "    settings->motion_external_torque = inputs[1];",
+            "lead": _LEAD_ANGLE if is_led else "    rows[PARAMETER_PLANT_EXTERNAL_TORQUE] = inputs[1];",
+        },
+    )
+
+
+def _scenario_of_plant(scenario: Scenario) -> Scenario:
+    """The scenario with a command that is handed in at every step of its engine, and its ankle led from outside."""
+    step = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period).step
+    motion = scenario.motion
+    if isinstance(motion, PrescribedMotion):
+        angle, _, _ = _path_at_start(motion)
+        settings = {"start_level": angle, "level": angle, "ramp_start": 0.0, "ramp_time": 2.0}
+        motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
+    return replace(
+        scenario,
+        name=f"{scenario.name}-plant",
+        description=f"The plant alone of this scenario: {scenario.description}",
+        time_step=step,
+        output_interval=step,
+        control=Control("constant", {"command": 0.0}, step),
+        sensors=Sensors(),
+        motion=motion,
+    )
+
+
+def _path_at_start(motion: PrescribedMotion) -> tuple[float, float, float]:
+    from ppafo.simulation.plan import profile_parameters
+
+    found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
+    return found
+
+
+def _inputs(scenario: Scenario) -> tuple[Input, ...]:
+    motion = scenario.motion
+    if isinstance(motion, FreeMotion):
+        said = "torque T_ex on the vane, above 0 works against plantarflexion"
+        return (COMMAND, Input("external_torque", "N m", said, motion.external_torque))
+    angle = motion.profile.settings["start_level"]
+    return (
+        COMMAND,
+        Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle),
+        Input("angular_velocity", "rad/s", "its rate", 0.0),
+    )

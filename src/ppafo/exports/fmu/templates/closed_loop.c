@@ -1,0 +1,45 @@
+/* ---- The closed loop: it goes from sample to sample, with outputs those of the last one. ---- */
+
+static void follow_inputs(unit *item)
+{
+    (void)item;
+}
+
+static bool go_to_sample(unit *item, int64_t sample)
+{
+    while (item->run->samples_shown <= sample) {
+        switch (@name@_step(item->run)) {
+        case @NAME@_GOING_ON:
+            break;
+        case @NAME@_FINISHED:
+            return refuse(item, "the run ends at run.duration = %g s: set that before the start", item->now.settings.run_duration);
+        default:
+            return refuse(item, "the run left what is possible after %g s: try a smaller run.step, and check inertia, volumes and areas",
+                item->now.time);
+        }
+    }
+    return true;
+}
+
+static bool take_first_sample(unit *item)
+{
+    return go_to_sample(item, 0);
+}
+
+/* Go on to a time since the start; every sample that is due by then, to a millionth of their interval, is taken. */
+static bool go_to(unit *item, double time)
+{
+    const double period = item->run->parameters[PARAMETER_TIMING_PERIOD];
+    if (!(time >= item->now.time - 1.0e-6 * time_of(item->run, 1) && time < 1.0e15 * time_of(item->run, 1))) {
+        return refuse(item, "time %g s cannot be reached from %g s", time, item->now.time);
+    }
+    if (item->now.is_stale && !renew(item)) {
+        return false;
+    }
+    if (!go_to_sample(item, (int64_t)(time / time_of(item->run, 1) + 1.0e-6))) {
+        return false;
+    }
+    item->now.time = time;
+    item->now.ticks = (int64_t)(time / period + 1.0e-6);
+    return true;
+}

@@ -1,0 +1,100 @@
+/* ---- The plant alone: it goes on by steps of the engine, under inputs that are constant from one point to the next. ---- */
+
+/* Settings at the start that the inputs have. */
+static void follow_inputs(unit *item)
+{
+    @name@_settings *settings = &item->now.settings;
+    const double *inputs = item->now.inputs;
+    (void)inputs;
+    settings->controller_period = settings->run_step;
+    settings->run_output_interval = settings->run_step;
+@follow@
+}
+
+/* The inputs as numbers of the run, from a time on, for a length of time. */
+static void lead(unit *item, double time, double length)
+{
+    double *rows = item->run->parameters;
+    const double *inputs = item->now.inputs;
+    const double command = inputs[0] < -1.0 ? -1.0 : inputs[0];
+    (void)time;
+    (void)length;
+    rows[PARAMETER_CONTROLLER_COMMAND] = command > 1.0 ? 1.0 : command;
+@lead@
+}
+
+static bool are_inputs_numbers(unit *item)
+{
+    int place;
+    for (place = 0; place < INPUTS; ++place) {
+        if (item->now.inputs[place] - item->now.inputs[place] != 0.0) {
+            return refuse(item, "an input is no finite number");
+        }
+    }
+    return true;
+}
+
+/* Do some steps, then take a sample. */
+static bool do_steps(unit *item, int64_t steps)
+{
+    @name@_run *run = item->run;
+    double *history = (double *)(run + 1);
+    const int64_t slots = run->signal_delay + 2;
+    const int64_t until = run->steps_done + steps;
+    const int64_t sample = run->steps_done > 0 || steps > 0 ? 1 : 0;
+    bool is_finite = true;
+    int place;
+    advance(array_of(run->states, STATES, 1, 0), array_of(run->parameters, PARAMETERS, 1, 0),
+        array_of(history, @signal_rows@, slots, 1),
+        array_of(history + @signal_rows@ * slots, run->command_delay + 2, 1, 0), array_of(history, 0, STATES, 1),
+        array_of(run->samples[0], 2, OUTPUTS, 1), run->steps_done, steps, until, run->steps_per_sample,
+        sample > 0 ? (double)until : 1.0, sample, sample, 1, run->signal_delay, run->command_delay);
+    run->steps_done = until;
+    run->samples_taken = sample + 1;
+    run->samples_shown = sample + 1;
+    for (place = 0; place < STATES; ++place) {
+        is_finite = is_finite && run->states[place] - run->states[place] == 0.0;
+    }
+    if (!is_finite || run->states[AT_RESULT_FAILURE_TIME] != NEVER_FAILED) {
+        return refuse(item, "the run left what is possible after %g s: try a smaller run.step, and check inertia, volumes and areas",
+            item->now.time);
+    }
+    return true;
+}
+
+static bool take_first_sample(unit *item)
+{
+    if (!are_inputs_numbers(item)) {
+        return false;
+    }
+    lead(item, 0.0, 1.0);
+    return do_steps(item, 0);
+}
+
+/* Go on to a time since the start that is a whole number of steps of the engine, to a thousandth. */
+static bool go_to(unit *item, double time)
+{
+    const double step = item->run->parameters[PARAMETER_TIMING_STEP];
+    const double wanted = time / step;
+    const double done = (double)item->run->steps_done;
+    int64_t until;
+    if (!(wanted >= done - 1.0e-3 && wanted < 1.0e15)) {
+        return refuse(item, "time %g s cannot be reached from %g s", time, item->now.time);
+    }
+    until = (int64_t)(wanted + 0.5);
+    if (fabs(wanted - (double)until) > 1.0e-3) {
+        return refuse(item, "time %g s lies between the steps of the engine: a communication step is a multiple of run.step, %g s",
+            time, step);
+    }
+    if (!are_inputs_numbers(item) || (item->now.is_stale && !renew(item))) {
+        return false;
+    }
+    if (until > item->run->steps_done) {
+        lead(item, done * step, ((double)until - done) * step);
+        if (!do_steps(item, until - item->run->steps_done)) {
+            return false;
+        }
+    }
+    item->now.time = time;
+    return true;
+}

@@ -1,0 +1,236 @@
+"""A scenario as a functional mock-up unit: it has the bits of the lanes in FMPy, and keeps the promises of FMI."""
+
+import importlib
+import importlib.util
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.errors import ScenarioError
+from ppafo.exports.fmu import closed_loop, functional_unit
+from ppafo.exports.fmu.binaries import host_platform
+from ppafo.exports.fmu.variables import FIXED_NAMES
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.simulate import simulate
+from scripts.instances import Instance, growth_of
+
+fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")
+pytestmark = pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")
+SHORT = ("run.duration=0.3 s", "reference.ramp_time=0.1 s")
+
+
+def written(folder: Path, name: str, overrides: tuple[str, ...] = SHORT, fmi: int = 2) -> str:
+    """Write a unit; its path."""
+    ((file, content),) = functional_unit(closed_loop(load_scenario(name, overrides)), fmi, ["linux64"]).items()
+    (folder / file).write_bytes(content)
+    return str(folder / file)
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def unit(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> str:
+    """The torque task, of both versions of FMI."""
+    return written(tmp_path_factory.mktemp("unit"), "torque-task-proportional", fmi=request.param)
+
+
+@pytest.fixture
+def instance(unit: str) -> Iterator[Instance]:
+    """The torque task at its start."""
+    made = Instance(unit)
+    yield made
+    made.close()
+
+
+def outputs_of(unit: str) -> list[str]:
+    """Names of the outputs."""
+    variables = fmpy.read_model_description(unit).modelVariables
+    return [item.name for item in variables if item.causality == "output" and item.type != "Clock"]
+
+
+def largest_difference(unit: str, name: str, overrides: tuple[str, ...]) -> dict[str, float]:
+    """Largest difference of each output in FMPy from the lanes, at all samples."""
+    scenario = load_scenario(name, overrides)
+    recording = simulate(scenario).recording
+    given = {"stop_time": scenario.duration, "step_size": scenario.output_interval}
+    names = outputs_of(unit)
+    found = fmpy.simulate_fmu(unit, output=names, output_interval=scenario.output_interval, **given)
+    assert len(found) == len(recording)
+    assert np.ptp(found["torque"]) > 1.0
+    return {item: float(np.abs(found[item] - recording[item]).max()) for item in names}
+
+
+def test_fmpy_finds_no_fault_and_every_output_is_that_of_the_lanes_to_the_last_bit(unit: str) -> None:
+    assert importlib.import_module("fmpy.validation").validate_fmu(unit) == []
+    assert set(largest_difference(unit, "torque-task-proportional", SHORT).values()) == {0.0}
+
+
+def test_a_free_vane_with_an_open_loop_has_the_bits_of_the_lanes_too(tmp_path: Path) -> None:
+    unit = written(tmp_path, "step-response", ())
+    assert set(largest_difference(unit, "step-response", ()).values()) == {0.0}
+
+
+def test_the_toolbox_for_units_finds_nothing(unit: str) -> None:
+    if importlib.util.find_spec("fmu_manipulation_toolbox") is None:
+        pytest.skip("fmu-manipulation-toolbox is not installed (pip install -e .[dev])")
+    command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", unit, "-check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    said = done.stdout + done.stderr
+    assert done.returncode == 0
+    assert "compliant with FMI-" in said
+    assert not [line for line in said.splitlines() if line.startswith(("ERROR", "WARNING", "CRITICAL"))]
+
+
+def test_every_setting_is_a_parameter_with_its_unit_and_metrics_can_be_read(unit: str, instance: Instance) -> None:
+    described = fmpy.read_model_description(unit)
+    found = {item.name: item for item in described.modelVariables}
+    area = found["valve.area"]
+    assert (area.causality, area.variability, area.unit) == ("parameter", "tunable", "m^2")
+    assert float(area.start) == load_scenario("torque-task-proportional").device.valve.orifice.area
+    assert {found[name].variability for name in ("gas.temperature", "run.step", "motion.angle")} == {"fixed"}
+    assert all(found[name].variability == "fixed" for name in found if name.split(".")[-1] in FIXED_NAMES)
+    units = {item.name: item.baseUnit for item in described.unitDefinitions}
+    assert (units["N m s/rad"].kg, units["N m s/rad"].m, units["N m s/rad"].s, units["N m s/rad"].rad) == (1, 2, -1, -1)
+    expected = simulate("torque-task-proportional", SHORT).metrics
+    instance.go_to(0.3)
+    read = {name: instance.get(f"metrics.{name}") for name in ("rms_error_hold", "gas_supplied", "largest_pressure")}
+    assert read == pytest.approx({name: expected[name].value for name in read}, rel=1e-12)
+
+
+def test_two_instances_at_once_do_not_know_of_each_other(unit: str) -> None:
+    scenario = "torque-task-proportional"
+    wide = (*SHORT, "valve.area=9 mm^2")
+    expected = [simulate(scenario, given).recording["torque"] for given in (SHORT, wide)]
+    one, other = Instance(unit), Instance(unit, {"valve.area": 9.0e-6})
+    for number, torques in enumerate(zip(*expected, strict=True)):
+        if number:
+            one.go_to(number * 1e-3)
+            other.go_to(number * 1e-3)
+        assert (one.get("torque"), other.get("torque")) == torques
+    one.close()
+    other.close()
+
+
+def test_a_state_that_is_restored_goes_on_with_the_same_bits(instance: Instance, unit: str) -> None:
+    instance.go_to(0.1)
+    kept = instance.kept()
+    first = instance.course(0.1, 0.2)
+    later = Instance(unit)
+    for other in (instance, later):
+        state = other.restored(kept)
+        assert other.course(0.1, 0.2) == first
+        other.drop(state)
+    later.close()
+
+
+def test_a_state_of_something_else_is_refused_and_changes_nothing(instance: Instance, unit: str) -> None:
+    instance.go_to(0.1)
+    given = instance.kept()
+    for wrong in (given[:100], given[:-8], bytes(len(given)), given[:40] + b"\xff" * 8 + given[48:]):
+        with pytest.raises(Exception, match=r"De[sS]erializeFMU[sS]tate"):
+            instance.restored(wrong)
+    other = Instance(unit)
+    other.go_to(0.1)
+    assert other.course(0.1, 0.2) == instance.course(0.1, 0.2)
+    other.close()
+
+
+def test_the_clock_of_fmi_3_ticks_when_the_controller_decides(tmp_path: Path) -> None:
+    slow = (*SHORT, "controller.period=5 ms")
+    unit = written(tmp_path, "torque-task-proportional", slow, fmi=3)
+    command = simulate("torque-task-proportional", slow).recording["command"]
+    instance = Instance(unit, events=True)
+    slave, clock = instance.slave, [instance.numbers["controller.clock"]]
+    ticks, time, seen = [], 0.0, [instance.get("command")]
+    assert slave.getClock(clock) == [True]
+    slave.updateDiscreteStates()
+    assert slave.getClock(clock) == [False]
+    slave.enterStepMode()
+    for end in (0.012, 0.03, 0.1):
+        while time < end:
+            needs_event, _, is_early, time = slave.doStep(time, end - time)
+            assert is_early == (time < end)
+            if needs_event:
+                ticks.append(round(time, 9))
+                seen.append(instance.get("command"))
+                slave.enterEventMode()
+                assert slave.getClock(clock) == [True]
+                slave.updateDiscreteStates()
+                slave.enterStepMode()
+    assert ticks == [round(0.005 * number, 9) for number in range(1, 21)]
+    assert seen == list(command[:101:5])
+    instance.close()
+
+
+def test_steps_of_any_length_show_the_last_sample_that_is_due(instance: Instance) -> None:
+    torque = simulate("torque-task-proportional", SHORT).recording["torque"]
+    for time in (0.0004, 0.0017, 0.1, 0.12345, 0.2999):
+        instance.go_to(time)
+        assert instance.get("torque") == torque[int(time * 1000 + 1e-6)]
+
+
+def test_a_tunable_parameter_changes_the_run_from_there_on_and_a_fixed_one_is_refused(
+    instance: Instance, unit: str
+) -> None:
+    plain = Instance(unit)
+    plain.go_to(0.1)
+    instance.go_to(0.1)
+    instance.set("reference.level", 1.0)
+    assert instance.get("torque") == plain.get("torque")
+    instance.go_to(0.3)
+    plain.go_to(0.3)
+    assert instance.get("reference") == 1.0
+    assert plain.get("reference") == 6.0
+    assert 1.0 < instance.get("torque") < 0.5 * plain.get("torque")
+    with pytest.raises(Exception, match=r"fmi2SetReal|fmi3SetFloat64"):
+        instance.set("gas.temperature", 310.0)
+    plain.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("valve.area", -1.0, "valve.area"),
+        ("valve.delay", 0.01, "other functions"),
+        ("gas.temperature", float("nan"), "gas.temperature"),
+    ],
+)
+def test_parameters_that_cannot_be_are_refused_by_name(
+    unit: str, name: str, value: float, said: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(Exception, match="ExitInitializationMode"):
+        Instance(unit, {name: value})
+    assert said in capfd.readouterr().out
+
+
+def test_a_run_that_has_ended_says_which_parameter_makes_it_longer(
+    instance: Instance, capfd: pytest.CaptureFixture[str]
+) -> None:
+    instance.go_to(0.3)
+    with pytest.raises(Exception, match="DoStep"):
+        instance.go_to(0.302)
+    assert "run.duration = 0.3 s" in capfd.readouterr().out
+
+
+def test_instances_are_freed_without_growth(unit: str) -> None:
+    assert growth_of(unit, 1000, warm=200) < 100_000
+
+
+def test_the_unit_holds_sources_that_build_it_without_a_warning(unit: str, tmp_path: Path) -> None:
+    with zipfile.ZipFile(unit) as archive:
+        archive.extractall(tmp_path)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-fsyntax-only"]
+    subprocess.run(["gcc", *flags, *map(str, (tmp_path / "sources").glob("fmi?.c"))], check=True)
+    page = (tmp_path / "documentation" / "index.html").read_text()
+    assert "<td>linux64</td><td>run in the tests</td>" in page
+    assert "@" not in page
+
+
+def test_what_nobody_has_run_is_asked_for_by_name_and_marked() -> None:
+    with pytest.raises(ScenarioError, match="did you mean 'linux64'"):
+        functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux46"])
+    with pytest.raises(ScenarioError, match="no name in FMI 2"):
+        functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux-aarch64"])
