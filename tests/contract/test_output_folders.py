@@ -39,6 +39,7 @@ FOLDERS: dict[str, list[str]] = {
     "audit": ["ppafo2011"],
     "schema": ["scenario"],
     "cache": [],
+    "bits": ["off"],
     "export c": ["c", "step-response"],
     "export fmu": ["fmu", "step-response"],
 }
