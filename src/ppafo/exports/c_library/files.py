@@ -52,11 +52,12 @@ _FILES = {
 }
 
 
-_TAKEN = frozenset(
-    "main unit fmi2 fmi3 prepared all check clean test makefile readme license con aux nul prn assert complex ctype errno "
-    "fenv float inttypes iso646 limits locale math setjmp signal stdarg stdbool stddef stdint stdio stdlib string tgmath "
-    "time wchar wctype".split()
-)
+_OWN_FILES = {"main", "unit", "fmi2", "fmi3", "makefile", "readme", "license"}
+_OWN_TARGETS = {"all", "check", "clean", "test", "prepared"}
+_OF_WINDOWS = {"con", "aux", "nul", "prn"}
+_HEADERS_1 = {"assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits", "locale", "math"}
+_HEADERS_2 = {"setjmp", "signal", "stdarg", "stdbool", "stddef", "stdint", "stdio", "stdlib", "string", "tgmath"}
+_TAKEN = _OWN_FILES | _OWN_TARGETS | _OF_WINDOWS | _HEADERS_1 | _HEADERS_2 | {"time", "wchar", "wctype"}
 """Names that a library cannot have: of its other files and types, of targets in make files, of headers of C."""
 
 
