@@ -114,8 +114,9 @@ def _not_a_table(spot: _Spot, detail: ErrorDetails) -> str:
 
 
 def _any_other(spot: _Spot, detail: ErrorDetails) -> str:
-    message = detail["msg"].removeprefix("Input should be ").removeprefix("String should ")
-    return f"{spot.path} = {quote(detail['input'])}: must be {one_line(message)}"
+    _, wanted, must = detail["msg"].partition(" should ")
+    said = f"must {must}" if wanted else f"must be {detail['msg']}"
+    return f"{spot.path} = {quote(detail['input'])}: {one_line(said)}"
 
 
 def _quoted_names(text: str) -> list[str]:

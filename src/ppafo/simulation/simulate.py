@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
@@ -112,10 +113,18 @@ def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, F
         "mass_2": (rows["state.mass_2"], "kg"),
     }
     if scenario.control.kind != OPEN_LOOP:
-        channels["reference"] = (profile_values(scenario.reference, times)[0], "N m")
+        channels["reference"] = (profile_values(scenario.reference, _moments(run, times.size))[0], "N m")
     channels |= gas_channels(scenario.device.gas, run, rows)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(scenario.name, times, values, kind="simulated")
+
+
+def _moments(run: Run, count: int) -> Floats:
+    """Times of the first samples [s], shape (count,), rounded as the engine does, so that a reference has its bits."""
+    steps = np.arange(count, dtype=np.float64) * run.record_every
+    whole = np.round(steps)
+    moments: Floats = np.where(np.abs(steps - whole) <= SAME_MOMENT, whole, steps) * run.step
+    return moments
 
 
 def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:

@@ -4,6 +4,7 @@ import ctypes
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -122,9 +123,9 @@ def test_everything_at_once_is_clean_under_the_sanitizers_and_the_same_in_c_plus
 class Loaded:
     """The library of a scenario, built and loaded."""
 
-    def __init__(self, scenario: str, folder: Path) -> None:
-        self.name = written(folder, scenario)
-        self.exported = scenario_library(load_scenario(scenario))
+    def __init__(self, scenario: str, folder: Path, overrides: tuple[str, ...] = ()) -> None:
+        self.name = written(folder, scenario, *overrides)
+        self.exported = scenario_library(load_scenario(scenario, overrides))
         self.settings = [item.name for item in self.exported.settings]
         library = folder / "library.so"
         flags = ["-std=c99", "-O1", "-ffp-contract=off", "-shared", "-fPIC"]
@@ -233,6 +234,27 @@ def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: s
     assert (run.size, run.status) == (0, OTHER_PROGRAM)
     assert step.call("bad_setting", run.settings, returns=ctypes.c_char_p) is None
     assert Run(step, valve_dead_band=0.1).status == GOING_ON
+
+
+def test_the_reference_has_its_bits_at_samples_between_the_steps(tmp_path: Path) -> None:
+    overrides = ("run.duration=0.1 s", "controller.rate=333 Hz", "run.output_interval=1 ms")
+    library = Loaded("torque-task-proportional", tmp_path, overrides)
+    at = 1 + library.exported.program.outputs.index("reference")
+    found = [float(np.frombuffer(sample)[at]) for sample in Run(library).course()]
+    assert found == simulate("torque-task-proportional", overrides).recording["reference"].tolist()
+
+
+@pytest.mark.parametrize("taken", ["main", "unit", "fmi2", "check", "string"])
+def test_a_scenario_with_the_name_of_another_file_or_target_is_called_otherwise(taken: str) -> None:
+    contents = c_library(replace(load_scenario("step-response"), name=taken))
+    assert {f"run_{taken}.c", f"run_{taken}.h", "main.c"} <= set(contents)
+    assert f"check: run_{taken}\n" in contents["Makefile"].decode()
+
+
+def test_a_description_cannot_end_or_begin_a_comment() -> None:
+    described = replace(load_scenario("step-response"), description="first /* and last */ of a comment")
+    head = c_library(described)["step_response.h"].decode().split("#ifndef")[0]
+    assert (head.count("/*"), head.count("*/")) == (1, 1)
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake on this machine")

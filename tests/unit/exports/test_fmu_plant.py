@@ -1,5 +1,6 @@
 """The plant alone as a functional mock-up unit: under the commands of a closed loop it moves as that did."""
 
+import ctypes
 import importlib
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from ppafo.exports.fmu.plant import plant_alone
 from ppafo.signals.recording import Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
-from scripts.instances import STEP, Instance
+from scripts.instances import STEP, Instance, begin
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")
 pytestmark = pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")
@@ -139,6 +140,33 @@ def test_a_step_that_the_engine_does_not_take_and_an_input_that_is_no_number_are
     assert "an input is no finite number" in capfd.readouterr().out
     instance.close()
     full.close()
+
+
+def test_a_first_sample_that_was_refused_does_not_let_the_unit_begin(
+    free: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    instance = Instance(free)
+    instance.slave.reset()
+    begin(instance.slave)
+    instance.set("command", float("inf"))
+    with pytest.raises(Exception, match="GetReal"):
+        instance.get("torque")
+    with pytest.raises(Exception, match="ExitInitializationMode"):
+        instance.slave.exitInitializationMode()
+    instance.set("command", 0.5)
+    instance.slave.exitInitializationMode()
+    assert "an input is no finite number" in capfd.readouterr().out
+    with pytest.raises(Exception, match="SetFMUstate"):
+        instance.slave.setFMUstate(ctypes.c_void_p(None))
+    instance.close()
+
+
+def test_an_angle_at_the_start_that_cannot_be_is_refused_as_an_input(
+    moved: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(Exception, match="ExitInitializationMode"):
+        Instance(moved, {"angle": 50.0})
+    assert "an input is out of range" in capfd.readouterr().out
 
 
 def test_a_tunable_parameter_is_taken_at_the_next_step(free: str) -> None:

@@ -262,6 +262,11 @@ def test_a_name_of_a_set_that_is_too_long_is_a_clean_error(name: str) -> None:
     assert len(message) < 400
 
 
+def test_a_name_that_is_too_long_says_how_long_it_may_be() -> None:
+    with pytest.raises(ScenarioError, match=r": must have at most 100 characters$"):
+        scenario_from_dict({**tomllib.loads(TEXT), "name": "x" * 101})
+
+
 def test_empty_binary_and_foreign_encodings_are_named() -> None:
     for content, reason in ((b" \n", "is empty"), (b"\x00\xff\x80", "UTF-8"), ("é".encode("latin-1"), "UTF-8")):
         assert reason in problem_with(content)

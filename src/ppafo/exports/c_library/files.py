@@ -52,6 +52,15 @@ _FILES = {
 }
 
 
+_OWN_FILES = {"main", "unit", "fmi2", "fmi3", "makefile", "readme", "license"}
+_OWN_TARGETS = {"all", "check", "clean", "test", "prepared"}
+_OF_WINDOWS = {"con", "aux", "nul", "prn"}
+_HEADERS_1 = {"assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits", "locale", "math"}
+_HEADERS_2 = {"setjmp", "signal", "stdarg", "stdbool", "stddef", "stdint", "stdio", "stdlib", "string", "tgmath"}
+_TAKEN = _OWN_FILES | _OWN_TARGETS | _OF_WINDOWS | _HEADERS_1 | _HEADERS_2 | {"time", "wchar", "wctype"}
+"""Names that a library cannot have: of its other files and types, of targets in make files, of headers of C."""
+
+
 @dataclass(frozen=True, slots=True)
 class Setting:
     """Something that can be chosen before a run: its name in C and in ppafo, what it is, and what the scenario has."""
@@ -90,6 +99,12 @@ class Library:
     words: Mapping[str, str]
     further: Further | None = None
 
+    @property
+    def name(self) -> str:
+        """Its name in C, which its files have too."""
+        name = c_identifier(self.title)
+        return f"run_{name}" if name in _TAKEN else name
+
 
 def c_identifier(name: str) -> str:
     """A name as C can have it."""
@@ -99,7 +114,7 @@ def c_identifier(name: str) -> str:
 
 def library_files(library: Library) -> dict[str, bytes]:
     """All files of a library by name."""
-    name, program = c_identifier(library.title), library.program
+    name, program = library.name, library.program
     words = _words(library, name)
     texts = {target.format(name=name): _filled(source, words) for source, target in _FILES.items()}
     texts["LICENSE"] = _filled("LICENSE", {})
@@ -124,7 +139,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
-        "description": "\n * ".join(textwrap.wrap(library.description.replace("*/", "* /"), 110)),
+        "description": "\n * ".join(textwrap.wrap(_in_comment(library.description), 110)),
         "version": __version__,
         "never": repr(NEVER_FAILED),
         "same_moment": repr(SAME_MOMENT),
@@ -167,9 +182,14 @@ def _members(items: Iterable[tuple[str, str, str]]) -> str:
     """Members of a struct, each with its unit and meaning."""
     lines = []
     for name, unit, said in items:
-        comment = f"{UNITS.get(unit, unit) or '-'}: {said}".replace("*/", "* /")
+        comment = _in_comment(f"{UNITS.get(unit, unit) or '-'}: {said}")
         lines.append(f"    double {name}; /* {comment} */")
     return "\n".join(lines)
+
+
+def _in_comment(text: str) -> str:
+    """A text without what ends a comment in C or begins another."""
+    return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 def _said(quantity: Quantity) -> str:

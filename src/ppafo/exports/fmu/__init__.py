@@ -10,7 +10,7 @@ from importlib.resources import files
 
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.exports.c_library import scenario_library
-from ppafo.exports.c_library.files import c_identifier, library_files
+from ppafo.exports.c_library.files import library_files
 from ppafo.exports.fmu.binaries import FLAGS, PLATFORMS, Platform, build
 from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
 from ppafo.exports.fmu.variables import Interface, change_of
@@ -40,7 +40,7 @@ _LOOP_TUNING = (
 def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
     """A unit by the name of its file. ProgramError for what cannot be translated or built."""
     chosen = {name: _platform(name, fmi) for name in platforms}
-    identifier = c_identifier(interface.library.title)
+    identifier = interface.library.name
     sources = _sources(interface, fmi)
     token = hashlib.sha256(b"".join(sources.values())).hexdigest()[:32]
     sources = {name: content.replace(b"@token@", token.encode()) for name, content in sources.items()}
@@ -96,7 +96,7 @@ def _platform(name: str, fmi: int) -> Platform:
 def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
     """The sources by name, with a mark where the token will be."""
     library = interface.library
-    name = c_identifier(library.title)
+    name = library.name
     written = library_files(library)
     paths = "\n".join(f'    "{item.path}",' for item in library.settings)
     words = {

@@ -67,7 +67,7 @@ size_t @name@_size(const @name@_settings *settings);
 /* Go on to the next sample, the first time to that at the start. */
 @name@_status @name@_step(@name@_run *run);
 
-/* The sample to which the last step led. */
+/* The sample to which the last step led; all 0 before the first step. */
 void @name@_read_outputs(const @name@_run *run, @name@_outputs *outputs);
 
 /* The metrics of all samples so far. */

@@ -187,7 +187,7 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
     instance *given = (instance *)c;
-    return done(given, read_state(&given->item, bytes_in(state), size_of_state(state)));
+    return done(given, restore_state(&given->item, state));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)

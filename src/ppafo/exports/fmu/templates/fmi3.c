@@ -265,8 +265,7 @@ fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
 
 fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
 {
-    unit *item = &((unit_instance *)instance)->item;
-    return done(instance, read_state(item, bytes_in(FMUState), size_of_state(FMUState)));
+    return done(instance, restore_state(&((unit_instance *)instance)->item, FMUState));
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)

@@ -87,6 +87,18 @@ static const char *path_of(const char *name)
     return name;
 }
 
+/* True for a setting that is none of the unit's variables: it follows from the inputs. */
+static bool is_hidden(const char *path)
+{
+    int place;
+    for (place = 0; place < SETTINGS; ++place) {
+        if (path == PATHS[place]) {
+            return CHANGES[place] == 'h';
+        }
+    }
+    return false;
+}
+
 /* The numbers of a run for the settings, if they are good. */
 static bool prepare_unit(unit *item, prepared_run *prepared)
 {
@@ -94,7 +106,9 @@ static bool prepare_unit(unit *item, prepared_run *prepared)
     follow_inputs(item);
     bad = @name@_bad_setting(&item->now.settings);
     if (bad != NULL) {
-        return refuse(item, "parameter %s is out of range or contradicts another", path_of(bad));
+        const char *path = path_of(bad);
+        return is_hidden(path) ? refuse(item, "an input is out of range (it sets %s)", path)
+                               : refuse(item, "parameter %s is out of range or contradicts another", path);
     }
     prepare_run(&item->now.settings, prepared);
     if (is_other_program(&item->now.settings, prepared)) {
@@ -119,11 +133,11 @@ static bool begin(unit *item)
     }
     (void)@name@_initialise(item->run, &item->now.settings);
     item->now.run_bytes = (int64_t)size;
-    item->now.is_stale = 0;
     item->now.ticks = 0;
     item->now.is_tick = 1;
     item->now.time = 0.0;
-    return take_first_sample(item);
+    item->now.is_stale = take_first_sample(item) ? 0 : 1;
+    return !item->now.is_stale;
 }
 
 /* Let the run know of parameters that were changed under way. */
@@ -271,6 +285,15 @@ static char *bytes_in(void *kept)
 static size_t size_of_state(const void *kept)
 {
     return *(const size_t *)kept;
+}
+
+/* Become what was kept. */
+static bool restore_state(unit *item, void *kept)
+{
+    if (kept == NULL) {
+        return refuse(item, "this is no state of this unit");
+    }
+    return read_state(item, bytes_in(kept), size_of_state(kept));
 }
 
 static bool keep_state(unit *item, void **kept)
