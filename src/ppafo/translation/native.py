@@ -114,15 +114,21 @@ def _command(name: str) -> tuple[str, ...]:
 
 @cache
 def _version(command: tuple[str, ...]) -> str:
-    return _asked([*command, "--version"]).stdout
+    return asked([*command, "--version"], _OTHERWISE).stdout
 
 
-def _asked(line: Sequence[str]) -> "subprocess.CompletedProcess[str]":
-    """What a compiler says and how it ends; SimulationError where it cannot be run."""
+def asked(line: Sequence[str], remedy: str, folder: str | None = None) -> "subprocess.CompletedProcess[str]":
+    """What a compiler says and how it ends, run in ``folder``; SimulationError with a remedy where it cannot be run."""
     try:
-        return subprocess.run(line, capture_output=True, encoding="utf-8", errors="replace", check=False)
+        return subprocess.run(line, cwd=folder, capture_output=True, encoding="utf-8", errors="replace", check=False)
     except OSError as error:
-        raise SimulationError(f"{line[0]} cannot be run: {reason(error)}; {_OTHERWISE}") from error
+        raise SimulationError(f"{line[0]} cannot be run: {reason(error)}; {remedy}") from error
+
+
+def complaint(done: "subprocess.CompletedProcess[str]") -> str:
+    """The line in which a compiler says what is wrong; how it ended where it says nothing."""
+    lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
+    return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
 
 
 @cache
@@ -167,11 +173,9 @@ def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence
     written.write_text(source, encoding="utf-8")
     position = () if sys.platform == "win32" else ("-fPIC",)
     line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
-    done, name = _asked(line), Path(command[0]).name
+    done, name = asked(line, _OTHERWISE), Path(command[0]).name
     if done.returncode != 0:
-        lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
-        said = next((text for text in lines if "error" in text), next(filter(str.strip, lines)))
-        raise ProgramError(f"{name} refuses the program: {one_line(said)}; {_OTHERWISE}")
+        raise ProgramError(f"{name} refuses the program: {complaint(done)}; {_OTHERWISE}")
     if not library.is_file():
         raise SimulationError(f"{name} says that all is well, but made no library; {_OTHERWISE}")
     return library
