@@ -41,6 +41,15 @@ def load_scenario(
     return _scenario(ScenarioRequest(label(file), file, folder, document, tuple(overrides), parameter_set))
 
 
+def scenario_or_load(scenario: Scenario | str | Path, overrides: Iterable[str] = ()) -> Scenario:
+    """Return a scenario as it is, or load it by name or path; ScenarioError for overrides of one that is loaded."""
+    if not isinstance(scenario, Scenario):
+        return load_scenario(scenario, overrides)
+    if tuple(overrides):
+        raise ScenarioError(f"{scenario.name}: overrides are for the name or file of a scenario, not for a loaded one")
+    return scenario
+
+
 def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
     """Return the scenario in the bytes of a TOML file; relative paths in it begin in ``folder``.
 

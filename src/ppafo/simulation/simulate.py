@@ -17,7 +17,7 @@ from ppafo.model.thermal import energy_per_content
 from ppafo.model.vane import gravity_torque, sliding_friction
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
-from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.result import Result, Status
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
@@ -34,12 +34,12 @@ REMEDY = (
 
 
 def simulate(scenario: Scenario | str | Path, overrides: Sequence[str] = ()) -> Result:
-    """Run one scenario: an object, the name of a shipped one, or a file; ``overrides`` as on the command line.
+    """Run one scenario: an object, or the name of a shipped one or a file, with ``overrides`` as on the command line.
 
     A run that diverges is a Result with that status, up to the time of failure. ScenarioError or ParameterError for
     bad input.
     """
-    chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
+    chosen = scenario_or_load(scenario, overrides)
     return results_of(chosen, [plan_run(chosen)])[0]
 
 
@@ -169,7 +169,7 @@ def _external_torque(
 
 def compile_models(scenarios: Iterable[Scenario | str | Path]) -> None:
     """Compile the models of scenarios into the cache, unless they are there; nothing is run."""
-    chosen = [item if isinstance(item, Scenario) else load_scenario(item) for item in scenarios]
+    chosen = [scenario_or_load(item) for item in scenarios]
     programs = [plan_run(item).program for item in chosen]
     load_programs(programs)
     for program in programs:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ppafo.errors import StudyError, first_twice, nearest_name
-from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.simulation.loading import load_scenario, scenario_from_dict, scenario_or_load
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.study import Configuration, Study
 
@@ -35,7 +35,7 @@ def choose_configurations(
     else:
         _check_no_restriction(study)
         pairs = configurations.items() if isinstance(configurations, Mapping) else _with_names(configurations)
-        found = tuple(Configuration(name, _scenario(item)) for name, item in pairs)
+        found = tuple(Configuration(name, scenario_or_load(item)) for name, item in pairs)
     if len(found) < 2:
         raise StudyError(f"a comparison needs at least two configurations, there is {len(found)}")
     return tuple(replace(item, scenario=with_overrides(item.scenario, overrides)) for item in found)
@@ -76,16 +76,12 @@ def _reload(scenario: Scenario, more: Sequence[str]) -> Scenario:
 
 def _with_names(scenarios: Sequence[Scenario | str | Path]) -> list[tuple[str, Scenario]]:
     """Return scenarios by their own names; StudyError where two are called the same."""
-    found = [_scenario(item) for item in scenarios]
+    found = [scenario_or_load(item) for item in scenarios]
     names = [scenario.name for scenario in found]
     repeated = first_twice(names)
     if repeated is not None:
         raise StudyError(f"two of the scenarios are named '{repeated}'; give them different names in a study file")
     return list(zip(names, found, strict=True))
-
-
-def _scenario(item: Scenario | str | Path) -> Scenario:
-    return item if isinstance(item, Scenario) else load_scenario(item)
 
 
 def _check_no_restriction(study: Study | None) -> None:

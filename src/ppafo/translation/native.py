@@ -19,7 +19,7 @@ import numpy as np
 
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
-from ppafo.errors import ProgramError, SimulationError, reason
+from ppafo.errors import ProgramError, SimulationError, one_line, reason
 from ppafo.translation.c99 import FLAGS, c_source
 from ppafo.translation.walk import walk_module
 
@@ -30,6 +30,7 @@ _LIBRARY = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform,
 _HOW_TO_INSTALL = (
     "install gcc or clang, or 'pip install ppafo[native]', which brings zig; PPAFO_BACKEND=numba needs none"
 )
+_OTHERWISE = "PPAFO_BACKEND=numba needs no compiler"
 _TITLE = "Generated from the functions of ppafo. Not to be edited."
 
 
@@ -70,8 +71,11 @@ class CCompiler:
             self._build(translated, Path(path).parent)
             self.run_text(source, path, module)
             return
-        with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
-            _fill(module, self._build(translated, Path(folder)))
+        try:
+            with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
+                _fill(module, self._build(translated, Path(folder)))
+        except OSError as error:
+            raise SimulationError(f"what {self.name} makes cannot be used: {reason(error)}; {_OTHERWISE}") from error
 
     def run_text(self, _source: str, path: str, module: ModuleType) -> None:
         """Load the library beside ``path``."""
@@ -110,8 +114,21 @@ def _command(name: str) -> tuple[str, ...]:
 
 @cache
 def _version(command: tuple[str, ...]) -> str:
-    done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)
-    return done.stdout
+    return asked([*command, "--version"], _OTHERWISE).stdout
+
+
+def asked(line: Sequence[str], remedy: str, folder: str | None = None) -> "subprocess.CompletedProcess[str]":
+    """What a compiler says and how it ends, run in ``folder``; SimulationError with a remedy where it cannot be run."""
+    try:
+        return subprocess.run(line, cwd=folder, capture_output=True, encoding="utf-8", errors="replace", check=False)
+    except OSError as error:
+        raise SimulationError(f"{line[0]} cannot be run: {reason(error)}; {remedy}") from error
+
+
+def complaint(done: "subprocess.CompletedProcess[str]") -> str:
+    """The line in which a compiler says what is wrong; how it ended where it says nothing."""
+    lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
+    return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
 
 
 @cache
@@ -156,19 +173,20 @@ def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence
     written.write_text(source, encoding="utf-8")
     position = () if sys.platform == "win32" else ("-fPIC",)
     line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
-    try:
-        done = subprocess.run(line, capture_output=True, text=True, check=False)
-    except OSError as error:
-        raise SimulationError(f"{Path(command[0]).name} cannot be run: {reason(error)}") from error
+    done, name = asked(line, _OTHERWISE), Path(command[0]).name
     if done.returncode != 0:
-        said = next(iter(done.stderr.strip().splitlines()), f"it ended with {done.returncode}")
-        raise ProgramError(f"{Path(command[0]).name} refuses the program: {said}")
+        raise ProgramError(f"{name} refuses the program: {complaint(done)}; {_OTHERWISE}")
+    if not library.is_file():
+        raise SimulationError(f"{name} says that all is well, but made no library; {_OTHERWISE}")
     return library
 
 
 def _fill(module: ModuleType, library: Path) -> None:
     """Give a module the ``advance`` of a library."""
-    entry = ctypes.CDLL(str(library)).advance
+    try:
+        entry = ctypes.CDLL(str(library)).advance
+    except AttributeError:
+        raise SimulationError(f"the library that was made of the program lacks what is in it; {_OTHERWISE}") from None
     entry.restype = None
     module.__dict__["advance"] = lambda *given: entry(*map(_handed, given))
 

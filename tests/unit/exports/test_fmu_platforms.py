@@ -4,6 +4,7 @@ import io
 import os
 import shutil
 import subprocess
+import sys
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree as Xml
@@ -11,7 +12,8 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
-from ppafo.exports.fmu import closed_loop, functional_unit
+from ppafo.errors import SimulationError
+from ppafo.exports.fmu import binaries, closed_loop, functional_unit
 from ppafo.exports.fmu.binaries import PLATFORMS, compiler_for
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
@@ -80,3 +82,24 @@ def test_what_no_test_here_runs_is_marked_in_the_unit(monkeypatch: pytest.Monkey
         assert b"Not run: darwin64." in archive.read("modelDescription.xml")
         assert b"<td>darwin64</td><td>not run</td>" in archive.read("documentation/index.html")
     assert {name for name, item in PLATFORMS.items() if item.tried == "not run"} == PLATFORMS.keys() - RUNNERS.keys()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the compilers that fail are shell scripts")
+@pytest.mark.parametrize(
+    ("script", "line"),
+    [
+        ("#!/no/such/interpreter\n", "cannot be run: no such file or directory"),
+        ("#!/bin/sh\nexit 0\n", "says that all is well, but made no unit for linux64"),
+        ("#!/bin/sh\nkill -9 $$\n", "does not build the unit for linux64: it ended with -9"),
+        ("#!/bin/sh\nprintf '\\377\\n' >&2\nexit 1\n", "does not build the unit for linux64: \ufffd"),
+    ],
+)
+def test_a_compiler_that_fails_halfway_is_said_in_one_line(
+    script: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = tmp_path / "gcc"
+    broken.write_text(script, encoding="utf-8")
+    broken.chmod(0o755)
+    monkeypatch.setattr(binaries, "compiler_for", lambda _: [str(broken)])
+    with pytest.raises(SimulationError, match=line):
+        binaries.build("linux64", {"unit.c": b""}, "unit.c")

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.engine.cache import list_programs
+from ppafo.engine.cache import list_programs, load_generated
 from ppafo.engine.lanes import Batch, load_program, load_source, run_batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError, SimulationError
@@ -107,6 +107,46 @@ def test_a_computer_without_a_compiler_is_told_what_to_install(
     monkeypatch.setenv("PPAFO_BACKEND", name)
     with pytest.raises(SimulationError, match=rf"{missing}.*gcc or clang.*ppafo\[native\]"):
         load_program(batch_of(plan_run(load_scenario("torque-task-proportional", SHORT))).program)
+
+
+OBEYS = '#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\n'
+BROKEN = {
+    "no interpreter": ("#!/no/such/interpreter\n", "cannot be run: no such file or directory"),
+    "no program": ("\0\1\2", "cannot be run: exec format error"),
+    "no library": (f"{OBEYS}exit 0\n", "says that all is well, but made no library"),
+    "half a library": (
+        f'{OBEYS}for word; do [ "$last" = -o ] && printf half > "$word"; last="$word"; done\n',
+        "what gcc makes cannot be used: .*file too short",
+    ),
+    "another library": (
+        f'{OBEYS}for word; do last="$own"; [ "$flag" = -o ] && own="$word"; flag="$word"; done\n'
+        'echo "int x;" | exec REAL -shared -fPIC -xc - -o "$own"\n',
+        "lacks what is in it",
+    ),
+    "killed": (f"{OBEYS}kill -9 $$\n", "refuses the program: it ended with -9"),
+    "no utf-8": ("#!/bin/sh\nprintf '\\377\\n' >&2\nexit 1\n", "refuses the program: \ufffd"),
+    "a warning first": (f"{OBEYS}echo warning: w >&2; echo p.c:3: error: e >&2; exit 1\n", "the program: p.c:3: error"),
+}
+
+
+@needs_gcc
+@pytest.mark.skipif(sys.platform == "win32", reason="the compilers that fail are shell scripts")
+@pytest.mark.parametrize("how", BROKEN)
+def test_a_compiler_that_fails_halfway_is_said_in_one_line_and_leaves_nothing(
+    how: str,
+    fresh_cache: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    script, line = BROKEN[how]
+    broken = tmp_path / "gcc"
+    broken.write_text(script.replace("REAL", str(shutil.which("gcc"))), encoding="utf-8")
+    broken.chmod(0o755)
+    compiler = native.CCompiler("gcc", (str(broken),))
+    source = f"@njit('void(float64[:, ::1])')\ndef advance(x):\n    x[0, 0] = {len(how)}.5\n"
+    with pytest.raises(SimulationError, match=f"{line}.*PPAFO_BACKEND=numba needs no compiler"):
+        load_generated("lanes", source, compiler)
+    assert list(fresh_cache.iterdir()) == []
 
 
 def test_what_has_no_c_is_refused_with_the_way_to_run_it() -> None:

@@ -3,7 +3,6 @@
 import importlib.util
 import platform
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -11,8 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ppafo.errors import ProgramError
+from ppafo.translation.native import asked, complaint
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
+_ANOTHER = "install gcc, clang or 'pip install ppafo[native]' anew"
 HIDDEN = ("-shared", "-fPIC", "-fvisibility=hidden")
 
 
@@ -58,10 +59,11 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
             (Path(folder) / file).write_bytes(content)
         library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
         mathematics = [] if name == "win64" else ["-lm"]
-        done = _run([*command, main, "-o", library.name, *mathematics], folder)
+        done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder)
         if done.returncode != 0:
-            said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip())
-            raise ProgramError(f"{command[0]} does not build the unit for {name}: {said}")
+            raise ProgramError(f"{command[0]} does not build the unit for {name}: {complaint(done)}")
+        if not library.is_file():
+            raise ProgramError(f"{command[0]} says that all is well, but made no unit for {name}; {_ANOTHER}")
         return library.read_bytes()
 
 
@@ -83,7 +85,3 @@ def compiler_for(name: str) -> Sequence[str]:
         return [found, "-s"]
     needed = "gcc, clang or the package ziglang" if name == "linux64" else "the package ziglang"
     raise ProgramError(f"platform {name} needs {needed} (pip install 'ppafo[native]')")
-
-
-def _run(command: Sequence[str], folder: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)

@@ -10,7 +10,7 @@ from importlib.resources import files
 from ppafo.answers import Solved
 from ppafo.engine.compilers import chosen_compiler
 from ppafo.engine.lanes import load_programs, run_batch
-from ppafo.errors import SimulationError, nearest_name
+from ppafo.errors import SimulationError, nearest_name, one_line
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.bits.runs import hashes_of, names, plain_batch
 
@@ -18,6 +18,7 @@ GOLDEN = files("ppafo.questions.bits").joinpath("golden.json")
 QUICK = ("torque-task-proportional", "torque-task-solenoid", "torque-task-moving-ankle", "step-response", "off")
 """What is run where nothing is asked for: Numba compiles it within a minute on a common computer."""
 PARTS = {"rows": "rows of the run", "run": "the run", "draws": "the draws", "failed": "how many draws fail"}
+_DAMAGED = "golden.json of this installation of ppafo is damaged; install ppafo anew"
 
 Hashes = Mapping[str, Mapping[str, str | int]]
 
@@ -43,9 +44,15 @@ class Bits(Solved):
 
 
 def golden_hashes() -> Hashes:
-    """Return the hashes that every computer must find, by name."""
-    found: Hashes = json.loads(GOLDEN.read_text(encoding="utf-8"))
-    return found
+    """Return the hashes that every computer must find, by name; SimulationError where their file is damaged."""
+    try:
+        found = json.loads(GOLDEN.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise SimulationError(f"{_DAMAGED}: {one_line(error)}") from None
+    entries = list(found.values()) if isinstance(found, dict) else []
+    if not entries or not all(isinstance(item, dict) and item.keys() == PARTS.keys() for item in entries):
+        raise SimulationError(f"{_DAMAGED}: it is to have {', '.join(PARTS)} of each scenario, walk and course")
+    return dict(found)
 
 
 def bits(
@@ -57,8 +64,10 @@ def bits(
     """Return whether scenarios, walks and 1,000 draws of each program have the golden bits on this computer.
 
     ``names`` are those to run, by default some, and all where ``everything`` is asked for. SimulationError for a name
-    that there is not, and where nothing can be compiled.
+    that there is not, for names beside ``everything``, and where nothing can be compiled.
     """
+    if everything and names:
+        raise SimulationError("--all takes all scenarios, walks and courses: give no names beside it")
     golden = golden_hashes()
     chosen = tuple(golden) if everything else tuple(dict.fromkeys(names)) or QUICK
     for name in chosen:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ppafo.answers import Solved
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line
 from ppafo.progress import Report
-from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.configurations import with_overrides
 from ppafo.studies.draws import Uncertainty
@@ -112,7 +112,7 @@ def find(
     range. What happens between two values of the grid on one side of the condition is not seen. StudyError or
     ScenarioError for bad input, and where every run fails.
     """
-    base = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    base = scenario_or_load(scenario)
     base = with_overrides(base, overrides)
     path, low, high = _range(vary, base)
     condition = _condition(such_that, base)

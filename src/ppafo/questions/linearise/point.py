@@ -44,7 +44,7 @@ def point_at(scenario: Scenario, time: float) -> Point:
     if not 0.0 <= time <= scenario.duration * (1.0 + 1.0e-12):
         raise ScenarioError(f"{scenario.name}: --at {time:g} s is outside the run, which lasts {scenario.duration:g} s")
     whole = plan_run(scenario)
-    steps = max(1, round(time / whole.step)) if time > 0.0 else 0
+    steps = min(round(time / whole.step), whole.step_count)
     return Point(steps * whole.step, *_after(scenario, whole, steps))
 
 

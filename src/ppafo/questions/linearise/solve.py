@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,12 @@ import numpy as np
 from ppafo.answers import Solved
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
-from ppafo.errors import ScenarioError
+from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.orifice import FlowCurve
 from ppafo.questions.linearise import EQUILIBRIUM
-from ppafo.questions.linearise.plant import UNITS, Plant, answers_to_command, plant_of
+from ppafo.questions.linearise.plant import UNITS, VALVE, Plant, answers_to_command, plant_of
 from ppafo.questions.linearise.point import Point, equilibrium, openings_at, point_at
-from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 
@@ -94,15 +95,17 @@ class LinearModel(Solved):
         return found[np.argsort(np.abs(found))]
 
     def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> Any:
-        """Frequency response (frequencies,) of an output to an input, complex, in SI; frequencies [Hz]."""
-        row = [item.name for item in self.outputs].index(output)
-        column = [item.name for item in self.inputs].index(source)
+        """Frequency response (frequencies,) of an output to an input, complex, in SI; frequencies [Hz].
+
+        ScenarioError for a name that is no output or input.
+        """
+        row, column = _place(output, self.outputs, "output"), _place(source, self.inputs, "input")
         eye = np.eye(len(self.states))
         return np.array(
             [
                 self.c[row] @ np.linalg.solve(2.0j * np.pi * frequency * eye - self.a, self.b[:, column])
                 + self.d[row, column]
-                for frequency in frequencies.tolist()
+                for frequency in np.asarray(frequencies, dtype=np.float64).ravel().tolist()
             ]
         )
 
@@ -116,6 +119,15 @@ class LinearModel(Solved):
         return control.ss(self.a, self.b, self.c, self.d, name=self.scenario.name.replace("-", "_"), **names)
 
 
+def _place(name: str, items: Sequence[Variable], kind: str) -> int:
+    """Number of a variable; ScenarioError for a name that is none."""
+    names = [item.name for item in items]
+    if name not in names:
+        hint = nearest_name(name, names)
+        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; there are: {', '.join(names)}")
+    return names.index(name)
+
+
 def linearise(
     scenario: Scenario | str | Path, at: float | str = EQUILIBRIUM, overrides: Sequence[str] = ()
 ) -> LinearModel:
@@ -127,10 +139,10 @@ def linearise(
     """
     if find_spec("casadi") is None:
         raise ScenarioError(MISSING_CASADI)
-    chosen = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
+    chosen = scenario_or_load(scenario, overrides)
     run = plan_run(chosen)
     _check(chosen, run)
-    if isinstance(at, str) and at != EQUILIBRIUM:
+    if at != EQUILIBRIUM and not isinstance(at, Real):
         raise ScenarioError(f"{chosen.name}: --at '{at}' is neither a time nor '{EQUILIBRIUM}'")
     point = equilibrium(chosen) if isinstance(at, str) else point_at(chosen, at)
     return _model(chosen, run, point)
@@ -187,6 +199,8 @@ def _direction(name: str, values: Mapping[str, float]) -> float:
     """Where the point nearby lies: the command goes up, or back from full opening; the rest counts less."""
     if name == "command":
         return 1.0 if abs(values[name]) < 1.0 else -values[name]
+    if name in (f"{VALVE}requested", f"{VALVE}opening"):
+        return 1.0e-6 if values[name] < 1.0 else -1.0e-6
     first = ("pressure_1", "supply_pressure", "angle", "angular_velocity")
     return 1.0e-6 * max(1.0, abs(values[name])) * (1.0 if name in first else -0.5)
 

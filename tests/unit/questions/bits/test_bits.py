@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,36 @@ def test_a_name_without_a_hash_is_refused_with_the_nearest() -> None:
         SimulationError, match=r"no golden hash of 'of', did you mean 'off'\?; there are: step-response"
     ):
         solve.bits(["of"])
+
+
+def test_names_beside_all_are_refused() -> None:
+    with pytest.raises(SimulationError, match=r"--all takes all .*: give no names beside it"):
+        solve.bits([CHEAP], everything=True)
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    [
+        b"",
+        b'{"off": {"rows": "',
+        b"\xff\xfe",
+        b"[" * 100_000,
+        b"[]",
+        b"{}",
+        solve.GOLDEN.read_bytes().replace(b'"draws"', b'"drawn"', 1),
+        json.dumps(dict.fromkeys(runs.names(), 1)).encode(),
+    ],
+    ids=["empty", "half", "no text", "too deep", "a list", "nothing", "another part", "numbers"],
+)
+def test_a_damaged_file_of_hashes_ends_with_2_and_one_line_not_with_1_as_other_bits_do(
+    damaged: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "golden.json").write_bytes(damaged)
+    monkeypatch.setattr(solve, "GOLDEN", tmp_path / "golden.json")
+    assert main(["bits", CHEAP]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("ppafo: golden.json of this installation of ppafo is damaged; install ppafo anew: ")
+    assert said.count("\n") == 1
 
 
 def test_the_last_bit_of_one_number_is_another_hash_and_what_a_nan_is_made_of_is_not() -> None:

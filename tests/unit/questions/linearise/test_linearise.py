@@ -200,6 +200,34 @@ def test_at_a_closed_valve_the_model_is_that_of_an_opening_to_chamber_1(
     assert model.b[:, 0] == pytest.approx(slopes, rel=1e-9, abs=1e-6)
 
 
+def test_a_closed_spool_is_taken_to_open_to_chamber_1_too() -> None:
+    model = linearise("torque-task-slow-valve", 0.0)
+    run = plan_run(model.scenario)
+    column = [item.name for item in model.states].index("valve_opening")
+    at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)} | {"external_torque": 0.0}
+    closed, opened = (of_the_textbook(run, None, {**at, "valve_opening": value}) for value in (0.0, 1e-3))
+    slopes = [1e3 * (opened[row] - closed[row]) for row in ("rate of pressure_1", "rate of pressure_2")]
+    assert model.a[:2, column] == pytest.approx(slopes, rel=1e-9, abs=1e-6)
+    assert slopes[0] > 1e6
+
+
+def test_a_time_is_taken_to_the_nearest_step_before_the_first_one_too() -> None:
+    assert [linearise(TASK, at).time for at in (1e-9, 4e-4, 6e-4, 3.0)] == [0.0, 0.0, 1e-3, 3.0]
+
+
+def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearModel) -> None:
+    assert steady.response([1.0]) == pytest.approx(steady.response(np.array([1.0])))  # type: ignore[arg-type]
+    with pytest.raises(ScenarioError, match=r"no output 'torqe', did you mean 'torque'.*there are: torque"):
+        steady.response(np.array([1.0]), "torqe")
+    with pytest.raises(ScenarioError, match="no input 'reference'; there are: command"):
+        steady.response(np.array([1.0]), source="reference")
+    with pytest.raises(ScenarioError, match="--at 'None' is neither a time nor 'equilibrium'"):
+        linearise(TASK, None)  # type: ignore[arg-type]
+    for answer in (linearise, ppafo.simulate):
+        with pytest.raises(ScenarioError, match="overrides are for the name or file of a scenario"):
+            answer(steady.scenario, overrides=["run.duration=1 s"])
+
+
 def test_without_a_leak_a_closed_valve_is_steady_and_its_sides_are_told_apart() -> None:
     model = linearise(TASK, overrides=(*HOLD, "actuator.leak.area=0 mm^2"))
     assert model.sides["valve"] == "closed"
