@@ -3,9 +3,9 @@
     python scripts/false_alarms.py --wearers 1000 --out out/false-alarms
 
 A stop on good sensors is a false alarm, and the exit code is then 1. A pause, and a foot that is lifted only, are for
-what walking does; they are counted apart, by the last sign of each wearer. Every configuration and course that is done
-is kept in the folder, and a second call goes on where the first one ended. It prints a table of
-docs/walking-faults.md.
+what walking does; they are counted apart, by the last sign of each wearer: who sat last, and the others. Every
+configuration and course that is done is kept in the folder, and a second call goes on where the first one ended. It
+prints a table of docs/walking-faults.md.
 """
 
 import argparse
@@ -29,7 +29,10 @@ SENSORS = {
 }
 """Good sensors: what stands between foot and controller."""
 
-HEAD = ("Course", "Sensors", "Configuration", "Wearers", "Stops", "Not always helped", "Last sign of these")
+SITS = "endless_phase"
+"""The sign of who sits: on the courses of the package before the first stride or after the last one."""
+
+HEAD = ("Course", "Sensors", "Configuration", "Wearers", "Stops", "Sat last", "Less help else", "Last sign of these")
 
 
 def counted(configuration: str, course: str, sensors: str, wearers: int) -> dict[str, object]:
@@ -48,8 +51,10 @@ def line(course: str, sensors: str, configuration: str, found: dict[str, object]
     """One row of the table."""
     seen = found["signs"]
     assert isinstance(seen, dict), "as counted"
-    words = ", ".join(f"{name} {count}" for name, count in seen.items()) or "-"
-    cells = (course, sensors, configuration, found["wearers"], found["stops"], found["less"], words)
+    sat = seen.get(SITS, 0)
+    others = {name: count for name, count in seen.items() if name != SITS}
+    words = ", ".join(f"{name} {count}" for name, count in others.items()) or "-"
+    cells = (course, sensors, configuration, found["wearers"], found["stops"], sat, sum(others.values()), words)
     return f"| {' | '.join(map(str, cells))} |"
 
 

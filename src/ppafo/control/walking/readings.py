@@ -29,9 +29,9 @@ class LastReadings(NamedTuple):
 
 
 class Landing(NamedTuple):
-    """Lowest ankle angle of this swing and the highest since [rad], that of a strike in doubt, late ones in a row.
+    """Lowest ankle angle of this swing, or since the strike [rad]; highest of the swing after it; strikes in doubt.
 
-    The angle of a strike is 0 where the foot lands in time.
+    ``in_doubt`` is the angle of a strike [rad], 0 where the foot lands in time; ``late`` are late ones in a row.
     """
 
     lowest: float
@@ -81,7 +81,10 @@ TURNED_UP = 0.07
 """Angle [rad] by which a foot has turned up when a strike is seen that is in doubt: 4 deg; of some wearers it is 3."""
 
 TURNS_DOWN, IS_FLAT = 0.01, 0.026
-"""Angles [rad]: a foot that turns down by more lands now, one that turns up by more until the toes load is flat."""
+"""Angles [rad]: a foot that turns down by more lands now, one that turns up by more until the toes load is flat.
+
+One that is still lifted as it strikes turns up first, and then down: by more than the second angle it lands now too.
+"""
 
 LATE_STRIDES = 1.5
 """More strides in a row than this are late: the last step of a walk may be flat too."""
@@ -190,17 +193,18 @@ def next_landing(
     A foot that is lifted turns up in the air too, but down again on its heel.
     """
     angle, swings = readings.angle, phase.phase == SWING
-    lower = swings & ((before.phase != SWING) | (angle < last.lowest))
+    lower = (swings != (before.phase == SWING)) | (angle < last.lowest)
     highest = max(last.highest, angle) if swings else last.highest
     strikes = (before.phase == SWING) & (phase.phase == LANDING)
     turned_up = max(last.highest, readings.slow_angle) - angle > TURNED_UP
     in_doubt = (angle if turned_up & (steady > 0.5) else 0.0) if strikes else last.in_doubt
+    lands = (angle > in_doubt + TURNS_DOWN) | ((phase.phase == LANDING) & (not lower) & (angle > last.lowest + IS_FLAT))
     is_late = (before.phase == LANDING) & (last.in_doubt - angle > IS_FLAT)
     flat = lifts(before.phase) & (phase.phase == MID_STANCE)
     return Landing(
         lowest=angle if lower else last.lowest,
         highest=angle if lower else highest,
-        in_doubt=0.0 if angle > in_doubt + TURNS_DOWN else in_doubt,
+        in_doubt=0.0 if lands else in_doubt,
         late=(last.late + 1.0 if is_late else 0.0) if flat else last.late,
     )
 

@@ -24,21 +24,23 @@ ANKLE = (1.50, 1.75, 1.35, 1.33, 1.92, 1.50, 1.50)
 """Ankle angle [rad] at times after a strike [s]: it slaps, rolls over the foot, pushes and is lifted."""
 
 
-def forces(time: float) -> tuple[float, float]:
-    """Forces [N] under heel and toes: the heel from the strike until 0.4 s, the toes from 0.06 to 0.63 s."""
+def forces(time: float, toes: float = 0.06) -> tuple[float, float]:
+    """Forces [N] under heel and toes: the heel from the strike until 0.4 s, the toes from a time [s] to 0.63 s."""
     share = time % 1.0
     heel = min(4.0e3 * share, 500.0 * (1.0 - share / 0.4))
-    toe = min(4.0e3 * (share - 0.06), 6.0e3 * (0.63 - share), 400.0 + 300.0 * share)
+    toe = min(4.0e3 * (share - toes), 6.0e3 * (0.63 - share), 400.0 + 300.0 * share)
     return max(heel, 0.0), max(toe, 0.0)
 
 
-def watched(late: list[float], ankle: tuple[float, ...] = ANKLE) -> list[SafetyState]:
+def watched(
+    late: list[float], ankle: tuple[float, ...] = ANKLE, shares: tuple[float, ...] = SHARES, toes: float = 0.06
+) -> list[SafetyState]:
     """The safety state at each sample of strides of 1 s; the forces of each stride come late by a time [s]."""
     state, phase, found = safety.START, phases.START, []
     for sample in range(1000 * len(late)):
         time = sample * PERIOD
-        heel, toe = forces(max(time - late[sample // 1000], 0.0))
-        seen = GaitMeasurement(float(np.interp(time % 1.0, SHARES, ankle)), 1.02e5, 1.02e5, 0.0, heel, toe)
+        heel, toe = forces(max(time - late[sample // 1000], 0.0), toes)
+        seen = GaitMeasurement(float(np.interp(time % 1.0, shares, ankle)), 1.02e5, 1.02e5, 0.0, heel, toe)
         after = phases.next_phase_state(PHASES, phase, heel, toe, PERIOD)
         state = safety.monitor(RULES, state, phase, after, seen, PERIOD)
         phase = after
@@ -76,6 +78,12 @@ def test_one_late_strike_is_that_of_who_stops() -> None:
 def test_a_foot_that_is_still_lifted_when_it_strikes_is_no_sign() -> None:
     turning_up = (1.50, 1.75, 1.35, 1.33, 1.92, 1.75, 1.50)
     assert watched([0.0] * 7, turning_up)[-1].ventings == 0.0
+
+
+def test_a_foot_that_slaps_after_it_was_lifted_through_its_strike_is_no_sign() -> None:
+    shares = (0.0, 0.045, 0.085, 0.40, 0.46, 0.63, 0.96, 1.0)
+    ankle = (1.77, 1.63, 1.69, 1.35, 1.33, 1.92, 1.85, 1.77)
+    assert watched([0.0] * 7, ankle, shares, toes=0.085)[-1].ventings == 0.0
 
 
 FED, FILLS, EMPTIES = 0.06, 4.0e6, 0.05
