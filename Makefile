@@ -7,10 +7,14 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce test coverage quick check format bench bits lock clean
+.PHONY: reproduce gallery test coverage quick check format bench bits page lock clean
 
 reproduce: $(READY)
 	$(BIN)/ppafo reproduce --out out/reproduce
+
+# Ready workbenches, each one file that simulates in a browser: out/gallery/*.html.
+gallery: $(READY)
+	$(BIN)/python scripts/gallery.py out/gallery
 
 test: check
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
@@ -43,6 +47,12 @@ bench: $(READY)
 # 'python scripts/bits.py --renew' writes the golden hashes anew, after a change that is meant to change numbers.
 bits: $(READY)
 	$(BIN)/python scripts/bits.py
+
+# Script and style of the page that simulates, from page/ into the package; needs node, which nobody else does.
+page:
+	npm ci --prefix page --no-audit --no-fund
+	npm run --prefix page check
+	npm run --prefix page build
 
 $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "ppafo needs Python 3.11 or newer; try: make PYTHON=python3.12")'

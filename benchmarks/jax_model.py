@@ -38,7 +38,7 @@ def flow_function(ratio: Array, curve: Curve) -> Array:
 
 
 def flow_function_slope(ratio: Array, curve: Curve) -> tuple[Array, Array]:
-    """As ``flow_function``, with its derivative [-]."""
+    """As ``flow_function``, with the slope that the lanes take [-]."""
     import jax.numpy as jnp
 
     gap = 1.0 - ratio
@@ -50,8 +50,8 @@ def flow_function_slope(ratio: Array, curve: Curve) -> tuple[Array, Array]:
     polynomial = polynomial * inside + curve.terms[0]
     root = jnp.sqrt(inside)
     value = root * polynomial
-    curved = (0.5 * polynomial + inside * derivative) / root
-    slope = jnp.where(gap < curve.linear_gap, value / curve.linear_gap, curved)
+    # As in the lanes: near equal pressures the chord from there, in twice the linear region.
+    slope = jnp.where(gap < 2.0 * curve.linear_gap, polynomial, 0.5 * polynomial + inside * derivative) / root
     slope = jnp.where(gap > curve.critical_gap, 0.0, slope)
     return value * jnp.minimum(gap / curve.linear_gap, 1.0), -slope
 

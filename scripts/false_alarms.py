@@ -29,15 +29,19 @@ SENSORS = {
 }
 """Good sensors: what stands between foot and controller."""
 
+WEARERS = {"impaired": (), "nondisabled": ("wearer.keeps_gait=1",)}
+"""Whose foot drops, and who keeps the measured gait whatever the device does."""
+
 SITS = "endless_phase"
 """The sign of who sits: on the courses of the package before the first stride or after the last one."""
 
 HEAD = ("Course", "Sensors", "Configuration", "Wearers", "Stops", "Sat last", "Less help else", "Last sign of these")
 
 
-def counted(configuration: str, course: str, sensors: str, wearers: int) -> dict[str, object]:
+def counted(configuration: str, course: str, sensors: str, who: str, wearers: int) -> dict[str, object]:
     """Walk a course with many wearers: how many there were, were stopped, had less help, and by which last sign."""
-    people = walk_population(load_walk(configuration, [f"course={course}", *SENSORS[sensors]]), None, wearers)
+    overrides = [f"course={course}", *SENSORS[sensors], *WEARERS[who]]
+    people = walk_population(load_walk(configuration, overrides), None, wearers)
     return {
         "wearers": people.count,
         "diverged": people.diverged,
@@ -65,6 +69,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("out/false-alarms"), help="folder of what is done")
     parser.add_argument("--course", nargs="*", default=list_courses(), choices=list_courses(), help="which courses")
     parser.add_argument("--sensors", nargs="*", default=["ideal"], choices=list(SENSORS), help="which good sensors")
+    parser.add_argument("--who", default="impaired", choices=list(WEARERS), help="whose foot it is")
     parser.add_argument("--configuration", nargs="*", default=CONFIGURATIONS, help="which walks of the package")
     return parser.parse_args()
 
@@ -78,10 +83,10 @@ def main() -> int:
     for configuration in given.configuration:
         for sensors in given.sensors:
             for course in given.course:
-                file = given.out / f"{configuration}-{sensors}-{course}-{given.wearers}.json"
+                file = given.out / f"{configuration}-{sensors}-{course}-{given.who}-{given.wearers}.json"
                 if not file.exists():
                     aside = file.with_suffix(".part")
-                    aside.write_text(json.dumps(counted(configuration, course, sensors, given.wearers)))
+                    aside.write_text(json.dumps(counted(configuration, course, sensors, given.who, given.wearers)))
                     aside.rename(file)
                 found = json.loads(file.read_text())
                 stops += found["stops"]

@@ -113,7 +113,12 @@ MACHINES = {
     "arm": OtherMachine(
         "64-bit ARM, emulated by qemu", ("-target", "aarch64-linux-musl", "-static"), "", ("qemu-aarch64",)
     ),
-    "wasm": OtherMachine("WebAssembly under node", ("-target", "wasm32-wasi"), ".wasm", ("node",)),
+    "wasm": OtherMachine(
+        "WebAssembly with vectors under node",
+        ("-target", "wasm32-wasi", "-mcpu=generic+simd128+bulk_memory"),
+        ".wasm",
+        ("node",),
+    ),
     "windows": OtherMachine("Windows under Wine", ("-target", "x86_64-windows-gnu"), ".exe", ("wine64", "wine")),
 }
 

@@ -3,7 +3,7 @@
 Every kind of fault begins at 20 instants of a stride, with four configurations. A run is good where the controller
 pauses or stops and no harm is done from half a second later on, or where no harm is done at all. Harm is: toes lower in
 mid-swing than without the device, or more than 1 N m against the foot's way (plantarflexion on a loaded heel or in
-mid-swing, dorsiflexion on the toes). It prints the table of docs/how-to/let-it-walk.md.
+mid-swing, dorsiflexion on the toes). It prints the table of docs/walking-faults.md.
 """
 
 import sys

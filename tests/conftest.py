@@ -3,7 +3,8 @@
 import dataclasses
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
@@ -11,8 +12,21 @@ from typing import Any, NoReturn
 import pytest
 
 from ppafo.engine import cache
+from ppafo.engine.compilers import BACKEND_VARIABLE
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
+
+TESTS = Path(__file__).parent
+BY_NUMBA = (
+    "unit/engine",
+    "unit/questions/bits",
+    "unit/cli/test_start_up.py",
+    "contract",
+    "convergence",
+    "judge",
+    "acceptance",
+)
+"""Tests of the lanes as users have them. zig compiles for the others, with the same bits in a fraction of the time."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -43,6 +57,16 @@ def _unwatched(run: Callable[..., ModuleType]) -> Callable[..., ModuleType]:
 
 def _skip_test(name: str, source: str) -> NoReturn:
     pytest.skip("needs a compiled model, and the tests are to be quick")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiler_of_models(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Let zig compile what is not BY_NUMBA, if it is here and no other compiler is asked for."""
+    place = Path(request.node.path).relative_to(TESTS).as_posix()
+    with pytest.MonkeyPatch.context() as patch:
+        if not place.startswith(BY_NUMBA) and find_spec("ziglang") and BACKEND_VARIABLE not in os.environ:
+            patch.setenv(BACKEND_VARIABLE, "zig")
+        yield
 
 
 @pytest.fixture

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         UnitError,
     )
     from ppafo.gait import Gait, list_gaits, load_gait
+    from ppafo.live.workbench import workbench
     from ppafo.metrics import Metric, evaluate
     from ppafo.model.sensors import Measurement
     from ppafo.parameters import ParameterSet, apply_overrides, list_sets, load_device, load_parameter_set
@@ -155,6 +156,7 @@ __all__ = [
     "validate",
     "walk",
     "walk_population",
+    "workbench",
 ]
 
 _HOMES = {
@@ -171,6 +173,7 @@ _HOMES = {
         "UnitError",
     ),
     "ppafo.gait": ("Gait", "list_gaits", "load_gait"),
+    "ppafo.live.workbench": ("workbench",),
     "ppafo.metrics": ("Metric", "evaluate"),
     "ppafo.model.sensors": ("Measurement",),
     "ppafo.parameters": ("ParameterSet", "apply_overrides", "list_sets", "load_device", "load_parameter_set"),
@@ -222,7 +225,13 @@ def _compiler_of_c(name: str) -> Compiler:
     return made
 
 
-offer({name: partial(_compiler_of_c, name) for name in ("c", "gcc", "clang", "zig")})
+def _warp_compiler() -> Compiler:
+    """Return NVIDIA Warp, for a graphics card where there is one."""
+    made: Compiler = importlib.import_module("ppafo.translation.warp").compiler()
+    return made
+
+
+offer({**{name: partial(_compiler_of_c, name) for name in ("c", "gcc", "clang", "zig")}, "warp": _warp_compiler})
 
 
 def __getattr__(name: str) -> Any:

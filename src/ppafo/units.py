@@ -86,14 +86,14 @@ def parse_quantity(text: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPH
 
 def to_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
     """Return ``value`` in ``si_unit``: ``Pa_a`` for a pressure level, ``Pa_d`` for a pressure difference."""
-    scale, offset, counts_from_atmosphere = _conversion(unit, si_unit)
+    scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
     exact = Decimal(repr(_finite(value, value))) * scale + offset
     return _finite(float(exact) + (atmosphere if counts_from_atmosphere else 0.0), f"{value:g} {unit}")
 
 
 def from_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
     """Return the SI ``value`` in ``unit``: the inverse of ``to_si``."""
-    scale, offset, counts_from_atmosphere = _conversion(unit, si_unit)
+    scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
     above = _finite(value, value) - (atmosphere if counts_from_atmosphere else 0.0)
     return float((Decimal(repr(above)) - offset) / scale)
 
@@ -122,7 +122,7 @@ def dimension(unit: str) -> dict[str, int]:
 
 
 @functools.lru_cache(maxsize=512)
-def _conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
+def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     """Return scale, offset and whether the atmosphere is to be added; in decimals, so that 8.4 g is 0.0084 kg."""
     given, kind = _parse_unit(unit)
     wanted, _ = _parse_unit(si_unit)

@@ -42,6 +42,8 @@ FOLDERS: dict[str, list[str]] = {
     "bits": ["off"],
     "export c": ["c", "step-response"],
     "export fmu": ["fmu", "step-response"],
+    "firmware": ["torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
+    "chip": ["torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
 
@@ -50,10 +52,11 @@ FILES = {
     "new scenario": (["mine"], "mine.toml"),
     "gait record": (["falisse2019-subject1", "--strides", "1"], "walk.csv"),
     "gait export": (["{result}"], "walk.sto"),
+    "workbench": (["step-response"], "page.html"),
 }
 """The words of every command that writes one file, and the file."""
 
-QUICK = ("sets", "sets show", "parts", "audit", "schema", "cache", "gait", "endurance", "export c")
+QUICK = ("sets", "sets show", "parts", "audit", "schema", "cache", "gait", "endurance", "export c", "firmware")
 
 
 def words_of(name: str, out: Path) -> list[str]:

@@ -13,7 +13,14 @@ from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.engine.reference.derivative import ExactOrifice, joined_thermal_rates, thermal_gas_rates
 from ppafo.engine.scheme.joined_chambers import plant_with_joined_chambers
 from ppafo.engine.scheme.motion import with_gas
-from ppafo.engine.scheme.pneumatics import begin_still_gas, second_still_stage, still_change
+from ppafo.engine.scheme.pneumatics import (
+    begin_still_gas,
+    held_chambers,
+    held_pressures,
+    second_still_stage,
+    still_change,
+)
+from ppafo.engine.scheme.stage_flows import sloped_flows, stage_flows
 from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures
 from ppafo.model.ports import single_port_flow, single_port_flow_slopes
 from ppafo.model.valves import solenoid_recycling
@@ -22,7 +29,7 @@ from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import ProfileChoice
-from ppafo.walking.planning import vented_state
+from ppafo.walking.preparation import vented_state
 
 K, PRODUCT, ROOM, SOURCE = 1.3, 8.314 * 298.0 / 0.044, 101_325.0, 101_325.0 + 50.0 * 6_894.757
 CHOKED = math.sqrt(K / PRODUCT * (2.0 / (K + 1.0)) ** ((K + 1.0) / (K - 1.0)))
@@ -54,6 +61,7 @@ def stepped(*overrides: str) -> Course:
     plant = plant_parameters(device)
     valve, coils = solenoid_recycling.prepare(device.valve.settings), solenoid_recycling.parted_long_ago()
     state = vented_state(plant, math.radians(75.0), 0.0)
+    held = held_chambers(plant, state.angle)
     rows = []
     for number in range(round(0.6 / STEP) + 1):
         time = number * STEP
@@ -62,8 +70,10 @@ def stepped(*overrides: str) -> Course:
         shown, coils = solenoid_recycling.advance(valve, coils, command, time, STEP)
         ports = solenoid_recycling.connect(plant, shown)
         joined = plant_with_joined_chambers(plant, solenoid_recycling.joined_opening(shown))
-        begun = begin_still_gas(joined, state, *ports, STEP, single_port_flow_slopes)
-        second = second_still_stage(joined, begun, *ports, single_port_flow)
+        flowing = sloped_flows(joined, *held_pressures(held, state), *ports, single_port_flow_slopes)
+        begun = begin_still_gas(state, held, flowing, STEP)
+        passing = stage_flows(joined, begun.end_1, begun.end_2, *ports, single_port_flow)
+        second = second_still_stage(begun, passing)
         state = with_gas(state, still_change(joined, begun, second, STEP))
     return Course(*np.array(rows).T)
 

@@ -66,13 +66,22 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True)
+class LivePart:
+    """A part of a page that simulates: HTML with its own script, and the policy that allows that script alone."""
+
+    policy: str
+    html: str
+
+
+@dataclass(frozen=True, slots=True)
 class Answer:
     """What a question came to.
 
     ``name`` is the stem of its files, and the command's name unless ``command`` says another; ``kicker`` says above
     the title what kind of page this is. ``lead`` are the first paragraphs. ``data`` is plain and in SI. ``passed`` is
     false where a check failed. ``kind`` says where the numbers come from: ``simulated``, ``synthetic`` or ``measured``.
-    ``files`` are further files by name. ``page`` makes a page of its own from the drawn figures.
+    ``files`` are further files by name. ``page`` makes a page of its own from the drawn figures. ``live`` makes the
+    part of the page that simulates, None where there can be none.
     """
 
     name: str
@@ -86,6 +95,7 @@ class Answer:
     files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)
     command: str = ""
     page: Callable[[Mapping[str, bytes]], bytes] | None = None
+    live: Callable[[], LivePart | None] | None = None
 
     @property
     def figures(self) -> tuple[Figure, ...]:

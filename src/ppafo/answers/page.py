@@ -1,4 +1,4 @@
-"""Pages of HTML in one file: no scripts, nothing to fetch, figures inside."""
+"""Pages of HTML in one file: nothing to fetch, figures inside, no script but that of a part that simulates."""
 
 import base64
 from collections.abc import Mapping
@@ -26,6 +26,7 @@ def page_of(answer: Answer, drawn: Mapping[str, bytes]) -> bytes:
         "origin": _ORIGINS[answer.kind],
         "data": f"{answer.name}.json",
         "versions": f"ppafo {__version__}",
+        "live": None if answer.live is None else answer.live(),
     }
     return render_page("answer.html.jinja", values).encode()
 

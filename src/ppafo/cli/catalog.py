@@ -5,6 +5,7 @@ from ppafo.questions.catalogue import QUESTIONS
 COMMANDS: dict[str, str] = {
     "reproduce": QUESTIONS["reproduce"],
     "simulate": "run a scenario and write its recording, metrics and figure",
+    "workbench": "write scenarios as one page that simulates them while sliders are dragged",
     "unreported": QUESTIONS["unreported"],
     "sweep": QUESTIONS["sweep"],
     "compare": QUESTIONS["compare"],
@@ -28,7 +29,9 @@ COMMANDS: dict[str, str] = {
     "sets": "list parameter sets, or show one with the source of every value",
     "parts": QUESTIONS["parts"],
     "audit": "check a parameter set for contradictions",
-    "export": "write a scenario for other tools: a library in C, an FMU",
+    "export": "write a scenario or a walk for other tools: a library in C, an FMU",
+    "firmware": "write a scenario's controller as firmware for a small processor",
+    "chip": "run a scenario with its controller on the simulator of a small processor",
     "bits": QUESTIONS["bits"],
     "cache": "show, compile or remove the compiled models of this computer",
     "schema": "print the JSON Schema of a file format",
@@ -36,7 +39,7 @@ COMMANDS: dict[str, str] = {
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "the paper": ("reproduce", "unreported"),
-    "your device": ("new", "simulate", "plot", "sets", "parts", "audit"),
+    "your device": ("new", "simulate", "workbench", "plot", "sets", "parts", "audit"),
     "from bench to model": ("rig", "identify", "validate"),
     "decide": (
         "sweep",
@@ -52,7 +55,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "league",
     ),
     "walk": ("walk", "gait", "timing"),
-    "tools": ("export", "bits", "cache", "schema"),
+    "tools": ("export", "firmware", "chip", "bits", "cache", "schema"),
 }
 """The commands as the help shows them, by what somebody has come for."""
 

@@ -14,8 +14,8 @@ from ppafo.cli.output import (
     write_files,
 )
 
-_C = "write a scenario as a library in C: header, source, example, make files"
-_UNIT = "write a scenario as a functional mock-up unit (FMU) for co-simulation"
+_C = "write a scenario or a walk as a library in C: header, source, example, make files"
+_UNIT = "write a scenario or a walk as a functional mock-up unit (FMU) for co-simulation"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--interface",
         choices=("loop", "plant"),
         default="loop",
-        help="the closed loop, or the plant alone with a command and the ankle as inputs (default: loop)",
+        help="the closed loop, or the plant alone under a command and the motion of its ankle (default: loop)",
     )
     unit.add_argument(
         "--platforms",
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what it is to run on, separated by commas: linux64, win64, ... (default: this computer)",
     )
     for parser_of_one in (library, unit):
-        parser_of_one.add_argument("scenario", metavar="SCENARIO", help="name of a scenario, or a .toml file")
+        parser_of_one.add_argument("scenario", metavar="SCENARIO", help="name of a scenario or a walk, or a .toml file")
         add_override_argument(parser_of_one)
         add_json_argument(parser_of_one)
         parser_of_one.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
@@ -54,9 +54,9 @@ def run(parsed: argparse.Namespace) -> int:
 
 def _library(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.c_library import c_library
-    from ppafo.simulation.loading import load_scenario
+    from ppafo.exports.loading import load_exportable
 
-    contents = c_library(load_scenario(parsed.scenario, parsed.overrides))
+    contents = c_library(load_exportable(parsed.scenario, parsed.overrides))
     return contents, f"make -C {shlex.quote(str(parsed.out))} check"
 
 
@@ -64,10 +64,10 @@ def _unit(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.fmu import closed_loop, functional_unit
     from ppafo.exports.fmu.binaries import host_platform
     from ppafo.exports.fmu.plant import plant_alone
-    from ppafo.simulation.loading import load_scenario
+    from ppafo.exports.loading import load_exportable
 
     chosen = [host_platform()] if parsed.platforms is None else parsed.platforms.split(",")
     platforms = list(dict.fromkeys(name.strip() for name in chosen if name is not None))
     interface = {"loop": closed_loop, "plant": plant_alone}[parsed.interface]
-    contents = functional_unit(interface(load_scenario(parsed.scenario, parsed.overrides)), parsed.fmi, platforms)
+    contents = functional_unit(interface(load_exportable(parsed.scenario, parsed.overrides)), parsed.fmi, platforms)
     return contents, f"fmpy simulate {shlex.quote(str(parsed.out / next(iter(contents))))} --show-plot"

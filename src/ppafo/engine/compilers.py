@@ -1,4 +1,4 @@
-"""Which compiler makes a program of its text: Numba, or one of C, which is handed over from above.
+"""Which compiler makes a program of its text: Numba, or one of C or of kernels, which is handed over from above.
 
 The engine writes the text of a program and knows no other language. What compiles it through another one is offered by
 the package as a whole, where it is imported, and taken where ``PPAFO_BACKEND`` asks for it.
@@ -29,6 +29,10 @@ class Compiler(Protocol):
     @property
     def seconds_per_byte(self) -> float:
         """What a common computer takes for a byte of the text, until this one has compiled something [s]."""
+
+    @property
+    def runs_at_once(self) -> int:
+        """Most runs of a call where the text is that of one lane, run for each column; 0 for a block of lanes."""
 
     def __hash__(self) -> int:
         """Tells compilers apart."""

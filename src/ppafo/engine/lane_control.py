@@ -2,6 +2,7 @@
 
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.scheme.parts import SAME_INSTANT
+from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.model.gait_sensors import GaitMeasurement, late_measurement, measure_gait, samples_late
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, follow_signals, measure
@@ -63,21 +64,24 @@ def sense(rows: LaneRows) -> list[str]:
 def current_readings(rows: LaneRows) -> list[str]:
     """Lines that make what the sensors show at the present."""
     if not rows.program.slow_sensors:
-        return ["angle = state.angle", pressures_of(rows, "state")]
+        held = [rows.load("held")] if rows.program.keeps_volumes else []
+        return ["angle = state.angle", *held, f"pressure_1, pressure_2 = {pressures_now(rows)}"]
     return [rows.load("sensor_state"), *[f"{name} = sensor_state.{name}" for name in SIGNALS]]
 
 
+def pressures_now(rows: LaneRows) -> str:
+    """Expression for both pressures of ``state``."""
+    return f"{rows.add(held_pressures)}(held, state)" if rows.program.keeps_volumes else pressures_of(rows, "state")
+
+
 def pressures_of(rows: LaneRows, state: str) -> str:
-    """Line that makes the pressures of a state."""
-    given = f"plant, {state}.angle, {state}.mass_1, {state}.mass_2"
-    return f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}({given})"
+    """Expression for both pressures of any state."""
+    return f"{rows.add(chamber_pressures)}(plant, {state}.angle, {state}.mass_1, {state}.mass_2)"
 
 
 def sense_gait(rows: LaneRows) -> list[str]:
     """Lines that make the measurement ``seen`` of a walking leg."""
-    pressures = (
-        f"pressure_1, pressure_2 = {rows.add(chamber_pressures)}(plant, state.angle, state.mass_1, state.mass_2)"
-    )
+    pressures = f"pressure_1, pressure_2 = {pressures_now(rows)}"
     if rows.program.ideal_sensors:
         return [
             rows.load("walk"),
@@ -129,7 +133,7 @@ def sense_end(rows: LaneRows, flag: str = "") -> list[str]:
     program = rows.program
     if not (program.slow_sensors or program.late_signals) or program.walks:
         return []
-    lines = [pressures_of(rows, "after"), "angle = after.angle"]
+    lines = [f"pressure_1, pressure_2 = {pressures_of(rows, 'after')}", "angle = after.angle"]
     if program.slow_sensors:
         following = f"{rows.add(follow_signals)}(sensor_rates, sensor_state, angle, pressure_1, pressure_2, length)"
         lines += [rows.load("sensor_rates"), rows.load("sensor_state"), f"sensed = {following}"]

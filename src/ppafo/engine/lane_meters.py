@@ -4,16 +4,35 @@ Samples are the ones that a recording would have. The course of the reference, o
 once before the first sample, then followed.
 """
 
+from ppafo.engine.lane_control import pressures_now
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
-from ppafo.model.plant import chamber_pressures
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths
 from ppafo.model.vane import actuator_torque
-from ppafo.signals.meter import SAME_LEVEL, Sample, advance_course, is_away
+from ppafo.signals.meter import SAME_LEVEL, Sample, WalkSample, advance_course, is_away
 
 TRACED: dict[str, str] = {
     **{name: f"sample.{name}" for name in Sample._fields if name != "number"},
     **{name: f"state.{name}" for name in ("mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")},
 }
 """Channels that can be traced, and where a sample has them."""
+TRACED_IN_WALKS: dict[str, str] = {
+    "strides": "walk.strides",
+    "phase": "walk.now.phase",
+    "contact": "walk.contact",
+    "shank_angle": "walk.now.shank",
+    "healthy_angle": "walk.now.ankle",
+    "external_torque": "walk.external_torque",
+    "heel_force": "walk.heel_force",
+    "toe_force": "walk.toe_force",
+    "push_off_work": "walk.push_off_work",
+    "controller_phase": "controller_state.phase.phase",
+    "safe_state": "controller_state.safety.level",
+    "gait_fraction": "clock.fraction",
+}
+"""Further ones of a walk: how the path of a number of its state ends, which not every controller has."""
+REQUEST = "controller_state.request.torque"
+"""Where a controller of walking keeps the torque that it wants, if it wants one."""
 TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
 """Where it has those that a recording has otherwise of gas with an energy balance."""
 
@@ -46,8 +65,8 @@ def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
 def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     """Lines that make the sample of a lane."""
     add, program = rows.add, rows.program
-    pressures = add(chamber_pressures)
-    wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]"
+    has_reference = program.has_reference and not program.walks
+    wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]" if has_reference else "0.0"
     thermal = ("thermal", "masses") if program.is_thermal else ()
     warm = [f"thermal.temperature * (state.mass_{chamber} / masses.mass_{chamber})" for chamber in (1, 2)]
     values = {
@@ -62,13 +81,47 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
         "temperature_1": warm[0] if thermal else "0.0",
         "temperature_2": warm[1] if thermal else "0.0",
     }
+    of_walk: dict[str, str] = {}
+    if program.walks:
+        wanted, of_walk = _of_state(rows, REQUEST), _walk_values(rows)
+    groups = ("walk", "controller_state") if program.walks else ()
     return [
-        *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal)],
-        f"pressure_1, pressure_2 = {pressures}(plant, state.angle, state.mass_1, state.mass_2)",
+        *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal, *groups)],
+        *([rows.load("held")] if program.keeps_volumes else []),
+        f"pressure_1, pressure_2 = {pressures_now(rows)}",
         f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
-        f"wanted = {wanted if program.has_reference else '0.0'}",
-        f"sample = {add(Sample)}({', '.join(f'{name}={value}' for name, value in values.items())})",
+        f"wanted = {wanted}",
+        f"sample = {add(WalkSample if of_walk else Sample)}"
+        f"({', '.join(f'{name}={value}' for name, value in (values | of_walk).items())})",
     ]
+
+
+def _walk_values(rows: LaneRows) -> dict[str, str]:
+    """What a sample of a walk has beside the others."""
+    totals = ("strides", "push_off_work", "slap_rates", "clearances", "toe_landings")
+    return {
+        "supplied_mass": "state.supplied_mass",
+        **{name: f"walk.{name}" for name in totals},
+        "phase": _of_state(rows, TRACED_IN_WALKS["controller_phase"]),
+        "level": _of_state(rows, TRACED_IN_WALKS["safe_state"]),
+        "time": "next_record * (timing.step * interval)",
+    }
+
+
+def _of_state(rows: LaneRows, path: str) -> str:
+    """A number of the state, 0 where this program has none."""
+    return path if path in rows.state_at else "0.0"
+
+
+def walk_traces(program: Program) -> dict[str, str]:
+    """Channels of ``TRACED_IN_WALKS`` that a program has, and the paths of their numbers."""
+    if not program.walks:
+        return {}
+    paths = [path for name, row in program.state_rows().items() for path in leaf_paths(row, name)]
+    found = {
+        name: next((path for path in paths if path.endswith(ending)), "") for name, ending in TRACED_IN_WALKS.items()
+    }
+    return {name: path for name, path in found.items() if path}
 
 
 def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
@@ -77,7 +130,7 @@ def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
         return []
     # A trace with less room than samples keeps the last ones.
     place = "next_record // trace_every % trace.shape[0]"
-    paths = TRACED | (TRUE_MASSES if rows.program.is_thermal else {})
+    paths = TRACED | walk_traces(rows.program) | (TRUE_MASSES if rows.program.is_thermal else {})
     keep = [f"trace[{place}, {row}, lane] = {paths[name]}" for row, name in enumerate(traced)]
     return [
         "if next_record % trace_every == 0:",

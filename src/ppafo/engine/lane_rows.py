@@ -71,10 +71,6 @@ class LaneRows:
         groups = self.program.step_rows()
         return [f"{self.cells[path]} = {path}" for name in names for path in leaf_paths(groups[name], name)]
 
-    def load_first_stage(self) -> list[str]:
-        """Lines that load what the first stage of the gas handed on."""
-        return [self.load(name) for name in ("begun", "gas", "shown")]
-
 
 def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]

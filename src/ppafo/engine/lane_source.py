@@ -5,6 +5,7 @@ from ppafo.engine.lane_meters import measure_sample
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.lane_step import plant_loop
 from ppafo.engine.program import Program
+from ppafo.engine.scheme.pneumatics import held_chambers
 from ppafo.engine.source_text import SourceCollector
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
@@ -37,14 +38,17 @@ def lane_source(program: Program) -> str:
     return write_lanes(program, SourceCollector(INLINE))
 
 
-def write_lanes(program: Program, collector: SourceCollector) -> str:
-    """Source text of a program; ``collector`` then has all that it is made from."""
-    advance = lane_loop(program, collector, "advance")
+def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) -> str:
+    """Source text of a program of some lanes, 0 for as many as fit; ``collector`` then has all that it is made from."""
+    advance = lane_loop(program, collector, "advance", lanes)
     return f"{HEADER}\n\n{collector.text()}\n\n\n{advance}\n"
 
 
 def lane_loop(program: Program, collector: SourceCollector, name: str, lanes: int = 0) -> str:
-    """The function that runs one block of a program, of some lanes, 0 for as many as fit."""
+    """The function that runs one block of a program, of some lanes, 0 for as many as fit.
+
+    That of one lane takes the first column of its arrays, however many there are.
+    """
     rows = LaneRows(program, collector, lanes)
     body = [
         COMPILED,
@@ -52,15 +56,24 @@ def lane_loop(program: Program, collector: SourceCollector, name: str, lanes: in
         *indent(
             [
                 f"x = np.empty(({rows.count}, {rows.lanes}))",
-                "width = states.shape[1]",
-                *_copy("x", 0, "states", 0, len(rows.state_at)),
-                *_copy("x", len(rows.state_at), "parameters", 0, len(rows.parameter_at)),
+                f"width = {'1' if rows.lanes == 1 else 'states.shape[1]'}",
+                *over_rows(len(rows.state_at), "x[row, lane] = states[row, lane]"),
+                *over_rows(len(rows.parameter_at), f"x[{len(rows.state_at)} + row, lane] = parameters[row, lane]"),
+                *hold_chambers(rows),
                 *all_steps(rows),
-                *_copy("states", 0, "x", 0, len(rows.state_at)),
+                *over_rows(len(rows.state_at), "states[row, lane] = x[row, lane]"),
             ]
         ),
     ]
     return "\n".join(body)
+
+
+def hold_chambers(rows: LaneRows) -> list[str]:
+    """Finds the chambers of a held vane, once for all steps."""
+    if not rows.program.keeps_volumes:
+        return []
+    held = f"held = {rows.add(held_chambers)}(plant, state.angle)"
+    return over_lanes([rows.load("plant"), rows.load("state"), held, *rows.keep("held")])
 
 
 def all_steps(rows: LaneRows) -> list[str]:
@@ -98,7 +111,7 @@ def between_samples(rows: LaneRows) -> list[str]:
 def at_sample(rows: LaneRows, moment: str) -> list[str]:
     """What is done at a sample, if one is due at ``moment``, counted in steps."""
     is_metered = rows.program.is_metered
-    take = measure_sample(rows, moment) if is_metered else RECORD
+    take = measure_sample(rows, moment) if is_metered else record_sample(rows)
     # A program without meters takes no more samples than there is room for.
     last = "last_record" if is_metered else "record.shape[0] - 1"
     return [
@@ -109,16 +122,15 @@ def at_sample(rows: LaneRows, moment: str) -> list[str]:
     ]
 
 
-RECORD = [
-    "for row in range(record.shape[1]):",
-    "    for lane in range(record.shape[2]):",
-    "        record[next_record, row, lane] = x[row, lane]",
-]
-
-
-def _copy(target: str, target_row: int, source: str, source_row: int, rows: int) -> list[str]:
+def record_sample(rows: LaneRows) -> list[str]:
+    """Lines that write the state of the runs to the record."""
     return [
-        f"for row in range({rows}):",
-        "    for lane in range(width):",
-        f"        {target}[{target_row} + row, lane] = {source}[{source_row} + row, lane]",
+        "for row in range(record.shape[1]):",
+        f"    for lane in range({'1' if rows.lanes == 1 else 'record.shape[2]'}):",
+        "        record[next_record, row, lane] = x[row, lane]",
     ]
+
+
+def over_rows(count: int, line: str) -> list[str]:
+    """A line for all lanes of the first rows."""
+    return [f"for row in range({count}):", "    for lane in range(width):", f"        {line}"]

@@ -7,9 +7,10 @@ that are through wait, masked, and no lane sees another.
 """
 
 from ppafo.engine.lane_control import sense_end
+from ppafo.engine.lane_gas import begin_gas, feed, open_valve, pass_gas
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.lane_walk import lead_walk, mark_stride
-from ppafo.engine.scheme import joined_chambers, motion, parts, pneumatics, supply_lines, thermal_gas, walking
+from ppafo.engine.scheme import motion, parts, thermal_gas, walking
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -24,7 +25,10 @@ def plant_loop(rows: LaneRows) -> list[str]:
 
 
 def over_phases(prelude: list[str], all_phases: list[list[str]]) -> list[str]:
-    """Each phase in a loop of its own: loops this short let the processor work on several lanes at once."""
+    """Each phase in a loop of its own: loops this short let the processor work on several lanes at once.
+
+    It looks some hundred instructions ahead, and one lane's division or root waits for the one before.
+    """
     return [line for phase in all_phases for line in over_lanes([*prelude, *phase])]
 
 
@@ -34,6 +38,7 @@ def opening(rows: LaneRows) -> list[str]:
     names += ["thermal", "masses"] if rows.program.is_thermal else []
     names += ["leg", "share", "gait_timing", "walk"] if rows.program.walks else []
     names += ["lines", "line_state"] if rows.program.has_lines else []
+    names += ["held"] if rows.program.keeps_volumes else []
     return [*[rows.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
 
 
@@ -51,10 +56,11 @@ def step_in_parts(rows: LaneRows) -> list[str]:
         f"for part in range({MAXIMUM_PARTS}):",
         *indent(over_lanes([*part_opening(rows), *measure(rows)])),
         *indent(over_phases(inside, phases(rows))),
-        "    longest = 0.0",
+        # A sum of whole numbers is taken of several lanes at once, a largest float is not.
+        "    waiting = 0",
         "    for lane in range(width):",
-        f"        longest = max(longest, {rows.remaining})",
-        "    if longest == 0.0:",
+        f"        waiting += 1 if {rows.remaining} > 0.0 else 0",
+        "    if waiting == 0:",
         "        break",
         "else:",
         *indent(over_lanes(give_up(rows))),
@@ -115,42 +121,15 @@ def phases(rows: LaneRows) -> list[list[str]]:
     """Both stages of the gas over ``length`` [s] from ``time`` [s], what leads to them, and the state at the end."""
     program = rows.program
     is_free = program.angle is None
-    kept = rows.keep("gas", "shown") if is_free else rows.keep("begun", "gas", "shown")
-    valve_state = rows.keep("next_valve") if program.is_adaptive else rows.store("valve_state")
-    before = [*lead_walk(rows), [*begin(rows), *kept, *valve_state]]
+    kept = rows.keep("gas") if is_free else rows.keep("begun", "gas")
+    first = [rows.load("flowing"), *lead(rows), begin_gas(rows), *kept]
+    before = [*lead_walk(rows), open_valve(rows), first, pass_gas(rows)]
     if not is_free:
         return [*before, [*feed(rows), *finish(rows)]]
     error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
     loaded = [rows.load("begun"), rows.load("change")]
     loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
     return [*before, [*feed(rows), *rows.keep("change"), *error], [*loaded, *finish(rows)]]
-
-
-def begin(rows: LaneRows) -> list[str]:
-    """The valve, and the first stage of the step."""
-    valve, add = rows.program.valve, rows.add
-    after = "next_valve" if rows.program.is_adaptive else "valve_state"
-    return [
-        f"shown, {after} = {add(valve.advance)}(valve, valve_state, command, time, length)",
-        *connect(rows, "line_state"),
-        *lead(rows),
-        begin_gas(rows),
-    ]
-
-
-def connect(rows: LaneRows, line_state: str) -> list[str]:
-    """The ports of both chambers; where there are lines, at the pressures that they have in ``line_state``.
-
-    A valve that joins the chambers makes the leak between them as wide as it stands open.
-    """
-    source, valve = "plant", rows.program.valve
-    if rows.program.has_lines:
-        source = f"{rows.add(supply_lines.plant_at_line_pressures)}(plant, lines, {line_state})"
-    lines = [f"port_1, port_2 = {rows.add(valve.connect)}({source}, shown)"]
-    if valve.joint is not None:
-        opening = f"{rows.add(valve.joint.opening)}(shown)"
-        lines.append(f"plant = {rows.add(joined_chambers.plant_with_joined_chambers)}(plant, {opening})")
-    return lines
 
 
 def lead(rows: LaneRows) -> list[str]:
@@ -169,81 +148,18 @@ def lead(rows: LaneRows) -> list[str]:
     ]
 
 
-def begin_gas(rows: LaneRows) -> str:
-    """The first stage of the gas."""
-    program, add = rows.program, rows.add
-    given = f"port_1, port_2, length, {add(program.valve.port_flow_slopes)}"
-    if program.has_lines:
-        begun = f"state, masses, next_angle, {given}" if program.is_thermal else f"state, next_angle, {given}"
-        if program.is_thermal:
-            return f"gas = {add(supply_lines.begin_fed_thermal_gas)}(plant, thermal, lines, line_state, {begun})"
-        return f"gas = {add(supply_lines.begin_fed_gas)}(plant, lines, line_state, {begun})"
-    if program.is_thermal:
-        return f"gas = {add(thermal_gas.begin_thermal_gas)}(plant, thermal, state, masses, next_angle, {given})"
-    if program.is_held:
-        return f"gas = {add(pneumatics.begin_still_gas)}(plant, state, {given})"
-    return f"gas = {add(pneumatics.begin_moving_gas)}(plant, state, next_angle, {given})"
-
-
-def feed(rows: LaneRows) -> list[str]:
-    """The second stage: the gas of the step, and in parts that may be refused the error of the gas."""
-    program, add = rows.program, rows.add
-    flow = add(program.valve.port_flow)
-    gas = "gas.chambers" if program.has_lines else "gas"
-    is_still = program.is_held and not program.has_lines
-    given = f"port_1, port_2, {flow}"
-    if program.is_thermal:
-        second = f"{add(thermal_gas.second_thermal_stage)}(plant, thermal, {gas}, {given})"
-        change = f"{add(thermal_gas.thermal_change)}(plant, thermal, {gas}, second, length)"
-        error = f"{add(thermal_gas.thermal_error)}(plant, {gas}, second, length)"
-        shifted = f"{add(thermal_gas.thermal_opening_error)}(plant, {gas}, shift, length)"
-    else:
-        still = gas if is_still else f"{gas}.still"
-        next_angle = "state.angle" if program.is_held else "begun.next_angle"
-        stage = pneumatics.second_still_stage if is_still else pneumatics.second_moving_stage
-        second = f"{add(stage)}(plant, {gas}, {given})"
-        whole = pneumatics.still_change if is_still else pneumatics.moving_change
-        change = f"{add(whole)}(plant, {still}, second, length)"
-        error = f"{add(pneumatics.gas_error)}(plant, {still}, second, {next_angle}, length)"
-        shifted = f"{add(pneumatics.opening_error)}(plant, {still}, shift, {next_angle}, length)"
-    lines = [*rows.load_first_stage(), *connect(rows, "gas.lines.after")]
-    lines += [f"second = {second}", f"change = {change}", *feed_lines(rows)]
-    if not program.is_adaptive:
-        return lines
-    if program.has_lines:
-        error = f"max({error}, {add(supply_lines.line_error)}(plant, lines, gas.lines.after, next_lines))"
-    moves = program.valve.shift
-    if moves is not None:
-        lines += [rows.load("next_valve"), f"shift = {add(moves)}(valve_state, next_valve)"]
-    return [*lines, f"gas_error = {error}" + (f" + {shifted}" if moves else "")]
-
-
-def feed_lines(rows: LaneRows) -> list[str]:
-    """Lines that bring regulators and lines to the end of the step, kept apart where it may be refused."""
-    program, add = rows.program, rows.add
-    if not program.has_lines:
-        return []
-    end = supply_lines.end_thermal_lines if program.is_thermal else supply_lines.end_lines
-    before, moved = ("plant, thermal", "second") if program.is_thermal else ("plant", "change")
-    given = f"{before}, lines, line_state, gas, {moved}, port_2, length, {add(program.valve.port_flow)}"
-    if program.is_adaptive:
-        return [f"next_lines = {add(end)}({given})", *rows.keep("next_lines")]
-    return [f"line_state = {add(end)}({given})", *rows.store("line_state")]
-
-
 def finish(rows: LaneRows) -> list[str]:
     """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
     program, add = rows.program, rows.add
     lines = [*with_gas(rows), *end_motion(rows), *with_work(rows)]
+    if not program.is_parted:
+        return [*lines, *store_all(rows, ""), *judge(rows), *sense_end(rows)]
+    lines += [rows.load("next_valve"), *([rows.load("next_lines")] if program.has_lines else [])]
     if not program.is_adaptive:
-        lines += [*store_all(rows, ""), *judge(rows)]
-        if not program.is_parted:
-            return [*lines, *sense_end(rows)]
-        return [*lines, f"taken = {rows.remaining} > 0.0", *sense_end(rows, "taken"), *add_up(rows)]
+        stored = [*store_all(rows, "taken"), *judge(rows, "taken"), *sense_end(rows, "taken")]
+        return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *add_up(rows)]
     return [
         *lines,
-        rows.load("next_valve"),
-        *([rows.load("next_lines")] if program.has_lines else []),
         "error = max(error, gas_error) / timing.tolerance",
         f"error = error if {positive(rows)} else {parts.MAXIMUM_ERROR!r}",
         f"refused = {add(parts.is_refused)}(error, length) and not result.failure_time <= time",
@@ -278,11 +194,9 @@ def end_motion(rows: LaneRows) -> list[str]:
     if program.walks:
         follow = rows.cells["gait_sensors.follow_rate"]
         given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, next_gait, length"
-        lines = [rows.load("next_gait"), f"after, walk = {add(walking.end_walk)}({given})", *rows.store("walk")]
-        lines += mark_stride(rows)
+        lines = [rows.load("next_gait"), f"after, walk_after = {add(walking.end_walk)}({given})", *mark_stride(rows)]
         if program.is_thermal:
-            assumed = f"{add(walking.next_angle)}(plant, leg, walk_before, begun)"
-            lines.insert(1, "walk_before = walk")
+            assumed = f"{add(walking.next_angle)}(plant, leg, walk, begun)"
             lines.append(f"after = {add(thermal_gas.after_motion)}(plant, thermal, after, {assumed}, after.angle)")
         return lines
     if program.angle is None:
@@ -300,7 +214,9 @@ def store_all(rows: LaneRows, flag: str) -> list[str]:
     lines = rows.store("state", "after", flag)
     if rows.program.is_thermal:
         lines += rows.store("masses", "warmed", flag)
-    if rows.program.is_adaptive:
+    if rows.program.walks:
+        lines += rows.store("walk", "walk_after", flag)
+    if rows.program.is_parted:
         lines += rows.store("valve_state", "next_valve", flag)
         lines += rows.store("line_state", "next_lines", flag) if rows.program.has_lines else []
     return lines

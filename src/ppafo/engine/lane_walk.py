@@ -3,30 +3,42 @@
 from ppafo.engine.lane_rows import LaneRows
 from ppafo.engine.scheme import walking
 from ppafo.model.course import gait_on_course, shown_toe_force, stands_on_toes
-from ppafo.model.gait import gait_at
+from ppafo.model.gait import GaitMeasured, GaitNow, gait_of, measured_at, place_at
 
 
 def lead_walk(rows: LaneRows) -> list[list[str]]:
-    """Two phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
+    """Phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
     if not rows.program.walks:
         return []
-    gait = next_gait(rows)
     foot = f"{rows.add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)"
     return [
-        [rows.load("gait"), *gait],
+        *next_gait(rows),
         [rows.load("next_gait"), f"begun = {foot}", *rows.keep("begun")],
     ]
 
 
-def next_gait(rows: LaneRows) -> list[str]:
-    """Lines that make the gait at the end of the step: stride after stride, or on a course, with its marks."""
-    if not rows.program.takes_course:
-        return [f"next_gait = {rows.add(gait_at)}(gait, gait_timing, leg, time + length)", *rows.keep("next_gait")]
-    given = "gait, walk_course, gait_timing, leg, time + length"
+def next_gait(rows: LaneRows) -> list[list[str]]:
+    """Phases that make the gait at the end of the step: stride after stride, or on a course, with its marks."""
+    add = rows.add
+    if rows.program.takes_course:
+        given = "gait, walk_course, gait_timing, leg, time + length"
+        made = f"next_gait, marks = {add(gait_on_course)}({given})"
+        return [[rows.load("gait"), rows.load("walk_course"), made, *rows.keep("next_gait", "marks")]]
+    cells = {name: rows.cells[f"next_gait.{name}"] for name in GaitNow._fields}
+    measured = [cells[name] for name in GaitMeasured._fields]
+    rest = [name for name in GaitNow._fields if name not in GaitMeasured._fields]
     return [
-        rows.load("walk_course"),
-        f"next_gait, marks = {rows.add(gait_on_course)}({given})",
-        *rows.keep("next_gait", "marks"),
+        [f"place = {add(place_at)}(gait_timing, time + length)", *rows.keep("place")],
+        [
+            rows.load("gait"),
+            rows.load("place"),
+            f"measured = {add(measured_at)}(gait, gait_timing, leg, place)",
+            *[f"{cells[name]} = measured.{name}" for name in GaitMeasured._fields],
+        ],
+        [
+            f"next_gait = {add(gait_of)}(leg, {add(GaitMeasured)}({', '.join(measured)}))",
+            *[f"{cells[name]} = next_gait.{name}" for name in rest],
+        ],
     ]
 
 
@@ -34,7 +46,10 @@ def mark_stride(rows: LaneRows) -> list[str]:
     """Lines that add what marks a stride of a course: a scuff on the toe sensor, a forefoot on the edge of a stair."""
     if not rows.program.takes_course:
         return []
-    add, cells = rows.add, rows.cells
-    force = f"{add(shown_toe_force)}(walk.toe_force, marks, {cells['gait_sensors.follow_rate']}, length)"
-    toes = f"{add(stands_on_toes)}(walk.toes_first, marks)"
-    return [rows.load("marks"), f"{cells['walk.toe_force']} = {force}", f"{cells['walk.toes_first']} = {toes}"]
+    add, follow = rows.add, rows.cells["gait_sensors.follow_rate"]
+    marked = {
+        "toe_force": f"{add(shown_toe_force)}(walk_after.toe_force, marks, {follow}, length)",
+        "toes_first": f"{add(stands_on_toes)}(walk_after.toes_first, marks)",
+    }
+    fields = ", ".join(marked.get(name, f"walk_after.{name}") for name in walking.WalkState._fields)
+    return [rows.load("marks"), f"walk_after = {add(walking.WalkState)}({fields})"]

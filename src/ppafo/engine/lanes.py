@@ -1,5 +1,7 @@
 """Runs many devices at once: blocks of up to 32 lanes, spread over threads, the same numbers in any order.
 
+Where a graphics card runs them, a block is as many runs as it takes at once.
+
 A run's result does not depend on its block, its place in it or the number of threads, because every lane goes
 through the same instructions and no lane sees another.
 """
@@ -91,30 +93,37 @@ def load_program(program: Program) -> ModuleType:
 
     A program is written anew where a number or function that it was made from stands for something else by now.
     """
-    return load_source(_current_source(program), chosen_compiler())
+    compiler = chosen_compiler()
+    return load_source(_current_source(program, _lanes_for(compiler)), compiler)
 
 
 def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
     chosen = dict.fromkeys(programs)
     if len(chosen) > 1:
-        load_all("lanes", map(_current_source, chosen), chosen_compiler())
+        compiler = chosen_compiler()
+        load_all("lanes", [_current_source(program, _lanes_for(compiler)) for program in chosen], compiler)
 
 
-def _current_source(program: Program) -> str:
+def _lanes_for(compiler: Compiler | None) -> int:
+    """Lanes in the text that a compiler takes, 0 for as many as fit."""
+    return 1 if compiler is not None and compiler.runs_at_once else 0
+
+
+def _current_source(program: Program, lanes: int) -> str:
     """The source of a program, written anew where it is out of date."""
-    collector, source = write_source(program)
+    collector, source = write_source(program, lanes)
     if collector.is_current():
         return source
     write_source.cache_clear()
-    return write_source(program)[1]
+    return write_source(program, lanes)[1]
 
 
 @lru_cache(maxsize=64)
-def write_source(program: Program) -> tuple[SourceCollector, str]:
-    """What a program is made from, and its source."""
+def write_source(program: Program, lanes: int = 0) -> tuple[SourceCollector, str]:
+    """What a program is made from, and its source for some lanes, 0 for as many as fit."""
     collector = SourceCollector(INLINE)
-    return collector, write_lanes(program, collector)
+    return collector, write_lanes(program, collector, lanes)
 
 
 @lru_cache(maxsize=64)
@@ -138,7 +147,8 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     """Run a batch block by block, and give each result away at once: ``take(runs, result)``, from several threads."""
     module = load_program(batch.program)
     runs = batch.states.shape[1]
-    lanes = lanes_of(batch.program)
+    compiler = chosen_compiler()
+    lanes = (compiler.runs_at_once if compiler else 0) or lanes_of(batch.program)
     starts = range(0, runs, lanes)
     workers = min(len(starts), threads or os.cpu_count() or 1)
 

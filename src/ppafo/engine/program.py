@@ -9,14 +9,15 @@ from ppafo.control.profiles import CONSTANT
 from ppafo.engine.scheme.ankle_torque import DeviceShare
 from ppafo.engine.scheme.motion import FreePart, PrescribedStep
 from ppafo.engine.scheme.parts import Pace
-from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, StillGas
+from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, MovingGas, StillGas
+from ppafo.engine.scheme.stage_flows import SlopedFlows, StageFlows
 from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
 from ppafo.engine.scheme.thermal_flows import ThermalFlows
 from ppafo.engine.scheme.thermal_gas import ThermalGas
 from ppafo.engine.scheme.walking import WalkState, WalkStep
 from ppafo.model.course import Course as WalkCourse
 from ppafo.model.course import Marks
-from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
+from ppafo.model.gait import GaitNow, GaitPlace, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
@@ -153,22 +154,30 @@ class Program:
         """True where the angle is prescribed by a profile that never changes."""
         return self.angle is CONSTANT
 
+    @property
+    def keeps_volumes(self) -> bool:
+        """True where the chambers of a held vane are worked out once; gas of lines or with heat counts as moving."""
+        return self.is_held and not (self.is_thermal or self.has_lines)
+
     def step_rows(self) -> dict[str, type]:
-        """Groups of numbers that the first stage of a step hands to the later phases, in order."""
+        """Groups of numbers that a phase of a step hands to the later ones, in order."""
         free = WalkStep if self.walks else FreePart
         begun = free if self.angle is None else (NoParameters if self.is_held else PrescribedStep)
         fed, free_gas = (FedThermalGas, ThermalGas) if self.is_thermal else (FedGas, MovingGas)
-        still = self.is_held and not self.is_thermal
-        gas = fed if self.has_lines else (StillGas if still else free_gas)
+        gas = fed if self.has_lines else (StillGas if self.keeps_volumes else free_gas)
         change = ThermalFlows if self.is_thermal else GasChange
         _, shown, _ = get_type_hints(self.valve.connect).values()
         return {
+            **({"place": GaitPlace} if self.walks and not self.takes_course else {}),
             **({"next_gait": GaitNow} if self.walks else {}),
             **({"marks": Marks} if self.takes_course else {}),
+            **({"held": HeldChambers} if self.keeps_volumes else {}),
             "begun": begun,
+            "flowing": SlopedFlows,
             "gas": gas,
+            "passing": StageFlows,
             "shown": shown,
             **({"change": change} if self.angle is None else {}),
-            **({"next_valve": self.valve.state} if self.is_adaptive else {}),
-            **({"next_lines": LineState} if self.is_adaptive and self.has_lines else {}),
+            **({"next_valve": self.valve.state} if self.is_parted else {}),
+            **({"next_lines": LineState} if self.is_parted and self.has_lines else {}),
         }

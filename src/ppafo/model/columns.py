@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 Number = TypeVar("Number", float, NDArray[np.float64])
 """A float, or an array of them: what a function of plain arithmetic takes and gives back."""
 Result = TypeVar("Result")
+Problem = tuple[Any, Callable[[int], str]]
+"""What may be wrong with a run: a truth value, or an array of them (runs,), and the line about one of the runs."""
 
 
 def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:

@@ -19,6 +19,12 @@ QUARTER_TURN = 1.5707963267948966
 FADING_TIME = 0.02
 """Time [s] in which a difference of angle at a hand-over falls to a third: about that of a foot slap."""
 
+NEARLY_FLAT = 0.05235987755982989
+"""The measured foot stands on heel and toes while within this angle [rad], 3 deg, of flat; beyond it the heel is up.
+
+Assumed: pad and sole of a loaded heel yield by some millimetres, so that the toes touch before the foot is flat.
+"""
+
 
 class Ankle(NamedTuple):
     """Angle [rad], rate [rad/s] and acceleration [rad/s^2] of the ankle that the ground and the shank prescribe."""
@@ -48,9 +54,12 @@ def foot_angle(shank: float, ankle: float) -> float:
     return shank - ankle + QUARTER_TURN
 
 
-def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float) -> Ankle:
-    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, else it is as measured."""
-    flat = contact > 1.5 and contact < 2.5
+def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float, keeps_gait: float) -> Ankle:
+    """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, else it is as measured.
+
+    Of a wearer who keeps the gait (1) it is as measured all the time.
+    """
+    flat = contact > 1.5 and contact < 2.5 and keeps_gait < 0.5
     return Ankle(
         now.shank + QUARTER_TURN - ground_angle if flat else now.ankle,
         now.shank_rate if flat else now.ankle_rate,
@@ -58,19 +67,25 @@ def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float) -> Ankle
     )
 
 
-def landing(contact: float, timing: GaitTiming, now: GaitNow, angle: float, offset: float) -> Landing:
-    """Contact at the end of a step from that of the step, the gait then, and the ankle angle [rad] then."""
+def landing(
+    contact: float, timing: GaitTiming, now: GaitNow, angle: float, offset: float, keeps_gait: float
+) -> Landing:
+    """Contact at the end of a step from that of the step, the gait then, and the ankle angle [rad] then.
+
+    The foot of a wearer who keeps the gait (1) rolls its last degrees slowly, while its toes carry already.
+    """
     stance = now.phase < timing.toe_off
     strikes = contact == SWING and stance
     flat_angle = now.shank + QUARTER_TURN - timing.ground_angle
-    slaps = contact == HEEL and angle >= flat_angle and now.phase < timing.heel_off
+    touches_angle = flat_angle - (NEARLY_FLAT if keeps_gait > 0.5 else 0.0)
+    slaps = contact == HEEL and angle >= touches_angle and now.phase < timing.heel_off
     rises = contact > 0.5 and contact < 2.5 and now.phase >= timing.heel_off
     leaves = contact != SWING and not stance
     after = HEEL if strikes else contact
     after = FLAT if slaps else after
     after = TOE if rises else after
     after = SWING if leaves else after
-    difference = angle - flat_angle if slaps else offset
+    difference = angle - (now.ankle if keeps_gait > 0.5 else flat_angle) if slaps else offset
     difference = angle - now.ankle if rises else difference
     return Landing(
         contact=after,

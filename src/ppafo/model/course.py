@@ -14,7 +14,7 @@ from ppafo.model.contact import QUARTER_TURN
 from ppafo.model.fourier import Harmonic, Series, acceleration_at, harmonics, rate_at, value_at
 from ppafo.model.gait import GaitNow, GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
-from ppafo.model.turns import TURN, sine_and_cosine
+from ppafo.model.turns import TURNS_OF_RADIAN, sine_and_cosine
 
 PARTS = 32
 NEVER = 1.0e6
@@ -209,8 +209,8 @@ def gait_on_course(
     up = pace.stride * hurry * hurry * value_at(gait.knee_up, at)
     walks = blend(min(hurry / WALKS_ABOVE, 1.0)).value
     carried = pace.load + walks * (value_at(gait.force, at) - pace.load)
-    sine_shank, cosine_shank = sine_and_cosine(shank / TURN)
-    sine_foot, cosine_foot = sine_and_cosine((shank - ankle.angle) / TURN + 0.25)
+    sine_shank, cosine_shank = sine_and_cosine(shank * TURNS_OF_RADIAN)
+    sine_foot, cosine_foot = sine_and_cosine((shank - ankle.angle) * TURNS_OF_RADIAN + 0.25)
     torque = torque_of_shank(
         leg, sine_shank, cosine_shank, sine_foot, cosine_foot, shank_rate, shank_acceleration, forward, up
     )

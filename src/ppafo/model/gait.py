@@ -1,10 +1,10 @@
 """A measured gait as periodic functions, and the leg that it prescribes at an instant."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from ppafo.model.fourier import Series, acceleration_at, harmonics, rate_at, value_at
+from ppafo.model.fourier import HARMONICS, Harmonic, Series, acceleration_at, harmonics, rate_at, value_at
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
-from ppafo.model.turns import TURN, sine_and_cosine
+from ppafo.model.turns import TURNS_OF_RADIAN, sine_and_cosine
 
 
 class GaitSeries(NamedTuple):
@@ -36,6 +36,29 @@ class GaitTiming(NamedTuple):
     clearance_from: float
     clearance_to: float
     ground_angle: float
+
+
+class GaitPlace(NamedTuple):
+    """A place in the stride: phase in turns, cosines and sines of its multiples."""
+
+    phase: float
+    at: Annotated[tuple[Harmonic, ...], HARMONICS]
+
+
+class GaitMeasured(NamedTuple):
+    """What was measured of a gait at an instant: the numbers with which ``GaitNow`` begins, as it has them."""
+
+    phase: float
+    shank: float
+    shank_rate: float
+    shank_acceleration: float
+    ankle: float
+    ankle_rate: float
+    ankle_acceleration: float
+    moment: float
+    force: float
+    knee_forward: float
+    knee_up: float
 
 
 class GaitNow(NamedTuple):
@@ -70,34 +93,63 @@ def phase_at(timing: GaitTiming, time: float) -> float:
 
 def gait_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, time: float) -> GaitNow:
     """The gait of a person with this leg at a time [s]; body mass and gravity make newtons of body weights."""
+    return gait_of(leg, measured_at(gait, timing, leg, place_at(timing, time)))
+
+
+def place_at(timing: GaitTiming, time: float) -> GaitPlace:
+    """The place in the stride at a time [s]."""
     phase = phase_at(timing, time)
-    at = harmonics(phase)
-    shank = value_at(gait.shank, at)
-    shank_rate = rate_at(gait.shank, at, timing.frequency)
-    shank_acceleration = acceleration_at(gait.shank, at, timing.frequency)
-    ankle = value_at(gait.ankle, at)
-    ankle_rate = rate_at(gait.ankle, at, timing.frequency)
-    ankle_acceleration = acceleration_at(gait.ankle, at, timing.frequency)
-    forward, up = value_at(gait.knee_forward, at), value_at(gait.knee_up, at)
-    sine_shank, cosine_shank = sine_and_cosine(shank / TURN)
-    sine_foot, cosine_foot = sine_and_cosine((shank - ankle) / TURN + 0.25)
-    carried = torque_of_shank(
-        leg, sine_shank, cosine_shank, sine_foot, cosine_foot, shank_rate, shank_acceleration, forward, up
-    )
-    return GaitNow(
-        phase=phase,
-        shank=shank,
-        shank_rate=shank_rate,
-        shank_acceleration=shank_acceleration,
-        ankle=ankle,
-        ankle_rate=ankle_rate,
-        ankle_acceleration=ankle_acceleration,
+    return GaitPlace(phase, harmonics(phase))
+
+
+def measured_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, place: GaitPlace) -> GaitMeasured:
+    """What was measured of a gait at a place in the stride, in newtons of this leg."""
+    at = place.at
+    return GaitMeasured(
+        phase=place.phase,
+        shank=value_at(gait.shank, at),
+        shank_rate=rate_at(gait.shank, at, timing.frequency),
+        shank_acceleration=acceleration_at(gait.shank, at, timing.frequency),
+        ankle=value_at(gait.ankle, at),
+        ankle_rate=rate_at(gait.ankle, at, timing.frequency),
+        ankle_acceleration=acceleration_at(gait.ankle, at, timing.frequency),
         moment=leg.body_mass * value_at(gait.moment, at),
         force=max(leg.body_mass * leg.gravity * value_at(gait.force, at), 0.0),
-        knee_forward=forward,
-        knee_up=up,
+        knee_forward=value_at(gait.knee_forward, at),
+        knee_up=value_at(gait.knee_up, at),
+    )
+
+
+def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
+    """What was measured, with what follows of it for this leg."""
+    sine_shank, cosine_shank = sine_and_cosine(now.shank * TURNS_OF_RADIAN)
+    sine_foot, cosine_foot = sine_and_cosine((now.shank - now.ankle) * TURNS_OF_RADIAN + 0.25)
+    carried = torque_of_shank(
+        leg,
+        sine_shank,
+        cosine_shank,
+        sine_foot,
+        cosine_foot,
+        now.shank_rate,
+        now.shank_acceleration,
+        now.knee_forward,
+        now.knee_up,
+    )
+    moving = foot_inertia_about_ankle(leg) * now.ankle_acceleration + leg.ankle_damping * now.ankle_rate
+    return GaitNow(
+        phase=now.phase,
+        shank=now.shank,
+        shank_rate=now.shank_rate,
+        shank_acceleration=now.shank_acceleration,
+        ankle=now.ankle,
+        ankle_rate=now.ankle_rate,
+        ankle_acceleration=now.ankle_acceleration,
+        moment=now.moment,
+        force=now.force,
+        knee_forward=now.knee_forward,
+        knee_up=now.knee_up,
         sine_shank=sine_shank,
         cosine_shank=cosine_shank,
         sine_healthy_foot=sine_foot,
-        healthy_torque=carried + foot_inertia_about_ankle(leg) * ankle_acceleration + leg.ankle_damping * ankle_rate,
+        healthy_torque=carried + moving,
     )

@@ -27,6 +27,36 @@ class Sample(NamedTuple):
     temperature_2: float
 
 
+class WalkSample(NamedTuple):
+    """One sample of a walk: what ``Sample`` has, and where the stride is.
+
+    ``reference`` is the torque that the controller wants, 0 of one that wants none. ``supplied_mass`` [kg],
+    ``strides``, ``push_off_work`` [J], ``slap_rates`` [rad/s], ``clearances`` [m] and ``toe_landings`` are totals since
+    the start, as in the state of the leg; ``phase`` is the one that the controller sees, ``level`` how much it helps.
+    ``time`` [s] since the start.
+    """
+
+    number: float
+    angle: float
+    angular_velocity: float
+    pressure_1: float
+    pressure_2: float
+    torque: float
+    command: float
+    reference: float
+    temperature_1: float
+    temperature_2: float
+    supplied_mass: float
+    strides: float
+    push_off_work: float
+    slap_rates: float
+    clearances: float
+    toe_landings: float
+    phase: float
+    level: float
+    time: float
+
+
 class Course(NamedTuple):
     """What is known of the whole reference [N m], and where it rests.
 
@@ -74,14 +104,14 @@ def starts_hold(course: Course, sample: Sample) -> bool:
 class MeterKind:
     """Something worked out from samples: ``state`` is a NamedTuple class of floats, so are its nested ones.
 
-    ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one; what
-    ``course`` says of the hold is right up to this sample. A meter without ``needs_course`` must not look at it; one
-    that is ``of_motion`` stays as it started while the vane stands still.
+    ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one; samples
+    of a walk are ``WalkSample``. What ``course`` says of the hold is right up to this sample. A meter without
+    ``needs_course`` must not look at it; one that is ``of_motion`` stays as it started while the vane stands still.
     """
 
     name: str
     state: type
-    start: Callable[[Course, Sample], Any]
-    update: Callable[[Any, Course, Sample], Any]
+    start: Callable[[Course, Any], Any]
+    update: Callable[[Any, Course, Any], Any]
     needs_course: bool = False
     of_motion: bool = False

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ppafo.control.fixed.converter import SETTINGS as CONVERTER
+from ppafo.control.fixed.kind import FIXED, FLOAT
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
@@ -14,6 +16,7 @@ from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.parameter_set import chosen_valve, entry_text
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
+    ARITHMETIC,
     AT_REST,
     INITIAL,
     PRESSURE_WORDS,
@@ -29,7 +32,14 @@ from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read
 from ppafo.simulation.motion import read_motion, read_profile
 from ppafo.simulation.overriding import OverriddenDocument, device_paths, scenario_paths, split_override
 from ppafo.simulation.reading import Reading, quantity_text
-from ppafo.simulation.scenario import Assumption, Control, Origin, ProfileChoice, Scenario, Sensors
+from ppafo.simulation.scenario import (
+    Assumption,
+    Control,
+    Origin,
+    ProfileChoice,
+    Scenario,
+    Sensors,
+)
 
 _SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
@@ -138,7 +148,12 @@ def _initial_pressure(reading: Reading, chamber: int, supply: Supply) -> float:
 
 def _control(reading: Reading, period: float) -> Control:
     kind = kind_at(reading.document, "controller")
-    return Control(kind, reading.section("controller", controller_settings(kind)), period)
+    arithmetic = value_at(reading.document, ARITHMETIC) or FLOAT
+    settings = reading.section("controller", controller_settings(kind, arithmetic))
+    for item in () if arithmetic == FIXED else CONVERTER:
+        if value_at(reading.document, f"controller.{item.name}") is not None:
+            raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
+    return Control(kind, settings, period, arithmetic=arithmetic)
 
 
 def _sensors(reading: Reading, clock: Clock) -> Sensors:

@@ -9,6 +9,9 @@ from dataclasses import replace
 from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.control.fixed.catalog import FIXED_LAWS
+from ppafo.control.fixed.converter import SETTINGS as CONVERTER
+from ppafo.control.fixed.kind import FIXED
 from ppafo.errors import KindError, ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity
@@ -62,6 +65,7 @@ THERMAL_GAS = (
 RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.0e-6, 1.0e8)
 PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6)
 SAMPLING = (RATE, PERIOD)
+ARITHMETIC = "controller.arithmetic"
 
 TORQUE_LEVEL = Quantity("level", "N m", "", None, -1.0e4, 1.0e4)
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
@@ -84,9 +88,10 @@ SECTIONS = (
 TEXTS = ("name", "description", "device.set", "device.valve")
 
 
-def controller_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of a controller of the catalogue, none where it is unknown."""
-    return CONTROLLERS[kind].quantities if kind in CONTROLLERS else ()
+def controller_settings(kind: str, arithmetic: object = None) -> tuple[Quantity, ...]:
+    """Return the settings of a controller of the catalogue, none where it is unknown; ``fixed`` adds a converter."""
+    converter = CONVERTER if arithmetic == FIXED and kind in FIXED_LAWS else ()
+    return (*CONTROLLERS[kind].quantities, *converter) if kind in CONTROLLERS else ()
 
 
 def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
@@ -114,7 +119,7 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
         if motion == "prescribed"
         else (),
         "initial": INITIAL,
-        "controller": SAMPLING + controller_settings(kind_at(document, "controller")),
+        "controller": SAMPLING + controller_settings(kind_at(document, "controller"), value_at(document, ARITHMETIC)),
         "reference": profile_settings(kind_at(document, "reference"), TORQUE_LEVEL),
         "sensors": (*SENSORS, SEED),
         "gas_model": gas_settings(kind_at(document, "gas_model")),
@@ -126,6 +131,7 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
     kinds = ["motion.kind", "controller.kind", "reference.kind", "gas_model.kind"]
+    kinds += [ARITHMETIC] if kind_at(document, "controller") in FIXED_LAWS else []
     return (*TEXTS, *kinds, *(["motion.profile.kind"] if kind_at(document, "motion") == "prescribed" else []))
 
 

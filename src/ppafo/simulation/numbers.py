@@ -12,7 +12,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SECTIONS, SONIC_FORM
-from ppafo.parameters.device import Orifice, SonicOrifice
+from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.parameter_set import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.simulation import declaration
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
@@ -38,10 +38,20 @@ def chosen_path(path: str, scenario: Scenario) -> str:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declaration of every number of a scenario and its device, by path; both forms of an orifice."""
+    kinds = declaration.quantities(_kinds(scenario))
+    return device_numbers(scenario.device) | kinds | _angle_of_held_vane(scenario)
+
+
+def device_numbers(device: Device) -> dict[str, Quantity]:
+    """Return the declaration of every number of a device, by path; both forms of an orifice."""
     found = {f"{section}.{item.name}": item for section in _DEVICE_SECTIONS for item in SECTIONS[section]}
     found |= {f"actuator.leak.{item.name}": item for item in ORIFICE}
-    found |= {f"valve.{item.name}": item for item in (*ORIFICE, *VALVES[scenario.device.valve.kind].quantities)}
-    return found | declaration.quantities(_kinds(scenario)) | _angle_of_held_vane(scenario)
+    return found | {f"valve.{item.name}": item for item in (*ORIFICE, *VALVES[device.valve.kind].quantities)}
+
+
+def device_number_at(device: Device, path: str) -> float:
+    """Return the number at a path of ``device_numbers``, in SI units; not of the form in which an orifice is not."""
+    return _number(device, _place_in_device(path, device))
 
 
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
@@ -54,7 +64,7 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     if PRESSURE_PATH in chosen and SECOND_PRESSURE_PATH not in chosen and scenario.device.supply.has_one_pressure:
         chosen[SECOND_PRESSURE_PATH] = chosen[PRESSURE_PATH]
     for section, place in _ORIFICES.items():
-        form = other_form(scenario, section)
+        form = other_form(scenario.device, section)
         if any(f"{section}.{name}" in chosen for name in form):
             new = {name: chosen.pop(f"{section}.{name}") for name in form}
             kind = SonicOrifice if "sonic_conductance" in form else Orifice
@@ -66,15 +76,17 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
 
 def number_at(scenario: Scenario, path: str) -> float:
     """Return the number at a path of ``declared_numbers`` that is not in ``TIMES``, in SI units."""
-    node: Any = scenario
-    for part in _place(chosen_path(path, scenario), scenario):
+    return _number(scenario, _place(chosen_path(path, scenario), scenario))
+
+
+def _number(node: Any, place: tuple[str, ...]) -> float:
+    for part in place:
         node = node[part] if isinstance(node, Mapping) else getattr(node, part)
     return float(node)
 
 
-def other_form(scenario: Scenario, section: str) -> tuple[str, ...]:
+def other_form(device: Device, section: str) -> tuple[str, ...]:
     """Return the names of the form in which an orifice (``valve`` or ``actuator.leak``) is not given."""
-    device = scenario.device
     orifice = device.valve.orifice if section == "valve" else device.actuator.leak
     return tuple(item.name for item in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
 
@@ -84,7 +96,7 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     motion: dict[str, Any] = {"kind": "free"}
     if isinstance(scenario.motion, PrescribedMotion):
         motion = {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
-    controller = {"kind": scenario.control.kind}
+    controller = {"kind": scenario.control.kind, "arithmetic": scenario.control.arithmetic}
     gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
     gas |= {} if scenario.supply_lines is None else {SECTION: {}}
     if scenario.control.kind == constant.KIND.name:
@@ -105,9 +117,6 @@ def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
         return (_INITIAL[path],)
     if path == HELD_ANGLE and not isinstance(scenario.motion, FreeMotion):
         return ("motion", "profile", "settings", "level")
-    if section == "valve":
-        is_orifice = name in _names(scenario.device.valve.orifice)
-        return ("device", "valve", "orifice" if is_orifice else "settings", name)
     if section.startswith(f"{SECTION}."):
         return ("supply_lines", f"{name}_{1 + LINES.index(section.removeprefix(f'{SECTION}.'))}")
     return {
@@ -117,7 +126,14 @@ def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
         "reference": ("reference", "settings", name),
         "sensors": ("sensors", _OF_SENSORS.get(name, name)),
         "gas_model": ("thermal", _OF_WALLS.get(name, name)),
-    }.get(section, ("device", *path.split(".")))
+    }.get(section, ("device", *_place_in_device(path, scenario.device)))
+
+
+def _place_in_device(path: str, device: Device) -> tuple[str, ...]:
+    section, _, name = path.rpartition(".")
+    if section == "valve":
+        return ("valve", "orifice" if name in _names(device.valve.orifice) else "settings", name)
+    return tuple(path.split("."))
 
 
 def _names(node: object) -> frozenset[str]:

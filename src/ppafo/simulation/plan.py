@@ -13,7 +13,7 @@ from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.errors import ScenarioError
-from ppafo.model.columns import at, first, over_runs, whole
+from ppafo.model.columns import Problem, at, first, over_runs, whole
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters, SensorRates
@@ -21,6 +21,7 @@ from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
+from ppafo.simulation.fixed_point import fixed_controller
 from ppafo.simulation.preparation import (
     is_slow_held,
     lines_at_start,
@@ -32,9 +33,6 @@ from ppafo.simulation.preparation import (
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Thermal
 
 MAXIMUM_STEPS = 1.0e9
-
-Problem = tuple[Any, Callable[[int], str]]
-"""What may be wrong with a run: a truth value, or an array of them (runs,), and the line about one of the runs."""
 
 
 def plan_run(scenario: Scenario) -> Run:
@@ -148,11 +146,16 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     device, motion, control = scenario.device, scenario.motion, scenario.control
     plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     in_lanes = control.kind != PYTHON_CONTROLLER
+    fixed = (
+        fixed_controller(scenario, plant.torque_constant, profile_bounds(scenario.reference))
+        if control.is_fixed
+        else None
+    )
     pieces = Pieces(
         device=device,
         valve=VALVES[device.valve.kind].choose({name: first(value) for name, value in device.valve.settings.items()}),
-        controller=CONTROLLERS[control.kind] if in_lanes else None,
-        settings=control.settings,
+        controller=(CONTROLLERS[control.kind] if fixed is None else fixed.kind) if in_lanes else None,
+        settings=control.settings if fixed is None else fixed.numbers,
         reference=scenario.reference,
         path=None if isinstance(motion, FreeMotion) else motion.profile,
         sensors=sensor_parameters(scenario),
@@ -165,7 +168,8 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     run = compose_run(
         pieces, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
     )
-    return run, (_too_many_steps(scenario, run.step, run.step_count),)
+    further = () if fixed is None else fixed.problems
+    return run, (_too_many_steps(scenario, run.step, run.step_count), *further)
 
 
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ppafo.control.fixed.kind import FIXED, FLOAT
 from ppafo.control.kind import PythonController
 from ppafo.errors import ScenarioError
 from ppafo.model.regulator import SupplyLines
@@ -103,18 +104,26 @@ class Sensors:
 class Control:
     """A sampled controller: kind in ``control.catalog.CONTROLLERS``, settings in SI units, sample period [s].
 
-    With kind ``python`` there are no settings and ``custom`` is asked sample by sample.
+    With kind ``python`` there are no settings and ``custom`` is asked sample by sample. With ``arithmetic`` ``fixed``
+    it is the integer form that runs, and the settings have those of its converter too.
     """
 
     kind: str
     settings: Mapping[str, float]
     period: float
     custom: PythonController | None = None
+    arithmetic: str = FLOAT
+
+    @property
+    def is_fixed(self) -> bool:
+        """True where the controller computes with whole numbers."""
+        return self.arithmetic == FIXED
 
     @property
     def label(self) -> str:
         """The controller in a few words."""
         name = self.kind if self.custom is None else f"{self.kind}, {type(self.custom).__name__}"
+        name = f"{name} on whole numbers" if self.is_fixed else name
         return f"{name}, every {self.period:g} s"
 
 

@@ -11,6 +11,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, WithJsonSchema
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.control.fixed.catalog import FIXED_LAWS
+from ppafo.control.fixed.converter import SETTINGS as CONVERTER
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration, supply_line
@@ -87,11 +89,17 @@ def _motion() -> Any:
 
 def _controller() -> Any:
     sampling = {item.name: optional(number_type(item), _description(item)) for item in declaration.SAMPLING}
+    arithmetic = Literal["float", "fixed"]
+    said = "floats, or fixed: whole numbers as a small processor has them; float unless given"
+    whole = {"arithmetic": optional(arithmetic, said)} | quantity_fields(CONVERTER)
     return one_of(
         [
             table(
                 f"{model_name(name)}Controller",
-                kind_field(name, kind.summary) | sampling | quantity_fields(kind.quantities),
+                kind_field(name, kind.summary)
+                | sampling
+                | (whole if name in FIXED_LAWS else {})
+                | quantity_fields(kind.quantities),
             )
             for name, kind in CONTROLLERS.items()
         ]

@@ -36,7 +36,7 @@ WIDTH = 118
 TIED = "\N{NO-BREAK SPACE}"
 """Stands between two words that stay on one line."""
 
-_SCALARS = {"bool": "bool", "int": "int64_t", "float": "double"}
+_SCALARS = {"bool": "bool", "int": "int64_t", "float": "double", "int16": "int16_t", "int32": "int32_t"}
 LANE = "lane"
 """Loops over this name see no other turn of themselves, which the compiler is told."""
 
@@ -63,17 +63,22 @@ def documents_of(collector: SourceCollector) -> dict[str, str]:
 
 
 def c_source(
-    module: Module, documents: Mapping[str, str], title: str, places: Mapping[str, Sequence[str]] | None = None
+    module: Module,
+    documents: Mapping[str, str],
+    title: str,
+    places: Mapping[str, Sequence[str]] | None = None,
+    prelude: str = "prelude.h",
 ) -> str:
     """A translation unit with all functions of a module.
 
     ``documents`` has the docstrings of rows and functions; ``places`` has names for the first places of some arrays,
-    which the file around it defines, ``x`` for those of all functions, ``advance.x`` for that of one.
+    which the file around it defines, ``x`` for those of all functions, ``advance.x`` for that of one. ``prelude`` is
+    the file with what stands before all of them.
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
     functions = [item for item in module.functions if item.returns is None or not is_empty(item.returns)]
     writer = _Writer(documents, {item.name for item in functions}, places or {})
-    prelude = files("ppafo.translation").joinpath("prelude.h").read_text(encoding="utf-8")
+    before = files("ppafo.translation").joinpath(prelude).read_text(encoding="utf-8")
     bodies = [writer.function(item) for item in functions]
     # Now all structs have their names, which no local name may hide: what has one is written again.
     structs = {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
@@ -81,7 +86,7 @@ def c_source(
     for place, item in enumerate(functions):
         if writer.locals[item.name] & structs:
             bodies[place] = writer.function(item)
-    return "\n".join([_comment(title), prelude, *writer.structs, *bodies])
+    return "\n".join([_comment(title), before, *writer.structs, *bodies])
 
 
 def _comment(text: str, further: Iterable[str] = ()) -> str:
@@ -215,8 +220,8 @@ class _Body:
     def declared(self, name: str) -> str:
         """A declaration without a value of its own: a number begins as 0, so that no compiler fears for it."""
         kind = self.kinds[name]
-        begin = {"bool": " = false", "int": " = 0", "float": " = 0.0"}
-        value = begin[kind.name] if isinstance(kind, typed.Scalar) else ""
+        begin = {"bool": " = false", "float": " = 0.0"}
+        value = begin.get(kind.name, " = 0") if isinstance(kind, typed.Scalar) else ""
         return f"{self.writer.type_name(kind)} {self.name(name)}{value}"
 
     def line(self, text: str, level: int) -> Iterator[str]:
@@ -269,7 +274,10 @@ class _Body:
         start, stop = self.terms.term(item.start), self.terms.term(item.stop, 6)
         if item.name == LANE:
             yield from self.line("PPAFO_SIDE_BY_SIDE", level)
-        yield from self.line(f"for (int64_t {counter} = {start}; {counter} {sign} {stop}; {change}) {{", level)
+        yield from self.line(
+            f"for ({self.writer.type_name(item.start.type)} {counter} = {start}; {counter} {sign} {stop}; {change}) {{",
+            level,
+        )
         if not is_own:
             yield from self.line(f"{name} = {counter};", level + 1)
         yield from self.block(item.body, level + 1)

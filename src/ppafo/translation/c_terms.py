@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from ppafo.translation.typed import BOOL, FLOAT, INT, Array, Items, Row, Term, Type, is_empty
+from ppafo.translation.typed import BOOL, FLOAT, INT, INT16, INT32, Array, Items, Row, Term, Type, is_empty
 
 _RESERVED = frozenset(
     word
@@ -29,6 +29,7 @@ _MACRO = re.compile(
 _WORDS = {"and": "&&", "or": "||"}
 _LEVELS = {"or": 2, "and": 3, **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 5), "+": 8, "-": 8, "*": 9, "/": 9}
 _CHOICE, _SIGN, _ATOM = 1, 10, 11
+_WORKED_OUT = frozenset({"+", "-", "*", "&", "|", "^", ">>", "min", "max", "choice", "negative"})
 _HELPERS = {
     "min": "ppafo_smaller",
     "max": "ppafo_larger",
@@ -69,6 +70,13 @@ class CTerms:
 
     def written(self, item: Term) -> tuple[str, int]:
         """A term as text, and how strongly it holds together."""
+        if item.type == INT16 and item.kind in _WORKED_OUT:
+            # What is worked out from 16 bits has those of an int in C, which are 16 or 32.
+            return f"(int16_t)({self.worked_out(item)[0]})", _SIGN
+        return self.worked_out(item)
+
+    def worked_out(self, item: Term) -> tuple[str, int]:
+        """A term as C works it out."""
         writer: Callable[[Term], tuple[str, int]] | None = getattr(self, f"_of_{item.kind}", None)
         if writer is not None:
             return writer(item)
@@ -90,7 +98,7 @@ class CTerms:
     def helper(self, item: Term) -> str:
         """A call of a function of the prelude."""
         given = ", ".join(self.term(part) for part in item.parts)
-        if item.kind in ("min", "max") and item.type == INT:
+        if item.kind in ("min", "max") and item.type in (INT, INT16, INT32):
             first, second = (self.term(part, 6) for part in item.parts)
             sign = "<" if item.kind == "min" else ">"
             return f"({second} {sign} {first} ? {second} : {first})"
@@ -100,6 +108,9 @@ class CTerms:
         value = item.detail
         if item.type == BOOL:
             return ("true" if value else "false"), _ATOM
+        if item.type in (INT16, INT32):
+            text = f"INT32_C({abs(value)})" if item.type == INT32 else str(abs(value))
+            return (text, _ATOM) if value >= 0 else (f"-{text}", _SIGN)
         if item.type == INT:
             return (f"INT64_C({value})" if value >= 0 else f"-INT64_C({-value})"), _ATOM if value >= 0 else _SIGN
         if math.isnan(value):
@@ -156,6 +167,9 @@ class CTerms:
 
     def _of_convert(self, item: Term) -> tuple[str, int]:
         given = item.parts[0]
+        if item.type in (INT16, INT32):
+            text = f"({self.term(given, _CHOICE + 1)} ? 1 : 0)" if given.type == BOOL else self.term(given, _SIGN)
+            return f"({'int16_t' if item.type == INT16 else 'int32_t'}){text}", _SIGN
         if given.type == FLOAT:
             return f"ppafo_whole_part({self.term(given)})", _ATOM
         if given.type == BOOL:

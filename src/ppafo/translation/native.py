@@ -51,13 +51,18 @@ class CCompiler:
         return 2.0e-5
 
     @property
+    def runs_at_once(self) -> int:
+        """None: a call takes a block of lanes."""
+        return 0
+
+    @property
     def flags(self) -> tuple[str, ...]:
         """Those for the bits, and those for this processor."""
         return (*FLAGS, _THIS_PROCESSOR, *(FOR_GCC if self.name == "gcc" else ()))
 
     def identity(self) -> str:
         """Version of the compiler, flags, what the processor can do, and the translator itself."""
-        return repr((_version(self.command), self.flags, _processor(), _scheme()))
+        return repr((_version(self.command), self.flags, described_processor(), translator_hash()))
 
     def described(self) -> str:
         """Its name and version, as it says them."""
@@ -66,7 +71,7 @@ class CCompiler:
 
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
         """Take a composed text to C and compile it; the library stays beside ``path`` where that is a place."""
-        translated = _translated(source)
+        translated = translated_text(source)
         if Path(path).is_absolute():
             self._build(translated, Path(path).parent)
             self.run_text(source, path, module)
@@ -132,7 +137,7 @@ def complaint(done: "subprocess.CompletedProcess[str]") -> str:
 
 
 @cache
-def _processor() -> str:
+def described_processor() -> str:
     """What the processor can do, as the system says it."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
@@ -143,7 +148,7 @@ def _processor() -> str:
 
 
 @cache
-def _scheme() -> str:
+def translator_hash() -> str:
     """Hash of the translator: the same text may become other C in another version of it."""
     found = hashlib.sha256()
     for file in sorted(Path(__file__).parent.iterdir()):
@@ -152,7 +157,8 @@ def _scheme() -> str:
     return found.hexdigest()
 
 
-def _translated(source: str) -> str:
+def translated_text(source: str) -> str:
+    """The C of a composed text; ProgramError, with the way to run it, for what has none."""
     try:
         return c_source(walk_module(source), {}, _TITLE)
     except ProgramError as error:

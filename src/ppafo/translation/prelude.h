@@ -1,13 +1,17 @@
+#if !defined(PPAFO_INLINE)
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+#endif
 
 #if defined(__FAST_MATH__) || (defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0)
 #error "strict arithmetic in 64 bits is needed: no -ffast-math, no x87"
 #endif
 
-#if defined(__GNUC__)
+#if defined(PPAFO_INLINE)
+/* Said by the file around this, which has what the headers have. */
+#elif defined(__GNUC__)
 #define PPAFO_INLINE static inline __attribute__((always_inline, unused))
 #elif defined(_MSC_VER)
 #define PPAFO_INLINE static __forceinline

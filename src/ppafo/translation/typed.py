@@ -6,12 +6,14 @@ from typing import Any, TypeAlias
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """One number: ``bool``, ``int`` (64 bits, products wrap) or ``float`` (64 bits)."""
+    """One number: ``bool``, ``int`` (64 bits, products wrap), ``float`` (64 bits), ``int16`` or ``int32``."""
 
     name: str
 
 
 BOOL, INT, FLOAT = Scalar("bool"), Scalar("int"), Scalar("float")
+INT16, INT32 = Scalar("int16"), Scalar("int32")
+"""What ``widths`` makes of whole numbers for small processors; the walk itself finds none."""
 _ORDER = (BOOL, INT, FLOAT)
 
 

@@ -14,6 +14,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.model.source import content_energy
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
 from ppafo.parameters.device import Device
+from ppafo.parameters.provenance import Entry
 from ppafo.simulation.declaration import THERMAL, kind_at, value_at
 from ppafo.simulation.reading import Reading, quantity_text
 from ppafo.simulation.supply_line import SECTION as LINES
@@ -42,7 +43,7 @@ _FOLLOWS = {
 _OWN = tuple(f"{LINES}.plantarflexion.{name}" for name in ("droop", "largest_flow"))
 """What the bottle's own regulator says instead."""
 
-_SAME_GAS = 1.0e-2
+_SAME_GAS, _SAME_PRESSURE = 1.0e-2, 2.0e-3
 _FASTEST = 1.0e3
 """Rate [1/s] up to which a walk follows what warms and cools: within a millisecond, the step of the lanes."""
 
@@ -103,7 +104,7 @@ class BottleSupply:
         return {
             f"{SECTION}.{path}": f"{format_quantity(entry.value, entry.unit)}, assumed: {entry.source}"
             for path, entry in self.bottle.entries.items()
-            if entry.origin == "assumed" and path != "regulator.set_pressure"
+            if entry.origin == "assumed"
         }
 
     def to_dict(self) -> dict[str, Any]:
@@ -136,7 +137,8 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
         bottle = load_bottle(_place(section["name"], folder), own)
     except ParameterError as error:
         raise ParameterError(f"{reading.file}: [{SECTION}]: {error}") from error
-    bottle = replace(bottle, regulator=bottle.regulator._replace(set_pressure=device.supply.pressure))
+    _check_set_pressure(reading, bottle, device, section["name"])
+    bottle = _set_to_supply(bottle, device)
     numbers = _numbers(reading, section, bottle)
     line = isobar(bottle.fluid.table, bottle.regulator.set_pressure)
     supply = BottleSupply(
@@ -144,6 +146,26 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
     )
     _check(reading, device, supply)
     return supply
+
+
+def _check_set_pressure(reading: Reading, bottle: Bottle, device: Device, name: str) -> None:
+    """Refuse a file that sets its regulator to another pressure; bottles of the package have the paper's pressure."""
+    own, given = bottle.regulator.set_pressure, device.supply.pressure
+    if Path(name).suffix != ".toml" or abs(own - given) <= _SAME_PRESSURE * given:
+        return
+    atmosphere = device.supply.atmospheric_pressure
+    raise ScenarioError(
+        f"{reading.file}: {NAME}: {name} sets {_SET_PRESSURE} to {quantity_text(own, 'Pa_a', atmosphere)}, and "
+        f"supply.pressure is {quantity_text(given, 'Pa_a', atmosphere)}: give both the same"
+    )
+
+
+def _set_to_supply(bottle: Bottle, device: Device) -> Bottle:
+    """Return the bottle with its regulator set to the supply pressure of the device, in its entries too."""
+    pressure = device.supply.pressure
+    entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
+    regulator = bottle.regulator._replace(set_pressure=pressure)
+    return replace(bottle, regulator=regulator, entries={**bottle.entries, _SET_PRESSURE: entry})
 
 
 def _place(name: str, folder: Path) -> str | Path:

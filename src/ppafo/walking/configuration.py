@@ -12,6 +12,7 @@ from ppafo.parameters.device import Device
 from ppafo.simulation.scenario import Thermal
 from ppafo.walking.bottle_supply import BottleSupply
 from ppafo.walking.course import WalkingCourse
+from ppafo.walking.sensor_settings import NEVER, SensorSettings
 from ppafo.walking.wearer import Wearer
 
 
@@ -23,6 +24,7 @@ class Configuration:
     how the gas takes up heat, None where it keeps its temperature. ``course`` is what the wearer does one after the
     other, None where stride follows equal stride.
     ``bottle`` is the one that the device hangs on, None where its supply does not end.
+    ``sensor_settings`` are what ``gait_sensors`` were made from, None where they were not read from a file.
     ``wearer_origin`` says in words whose body mass it is.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
@@ -46,6 +48,7 @@ class Configuration:
     course: WalkingCourse | None = None
     wearer_origin: str = "the paper's subject"
     bottle: BottleSupply | None = None
+    sensor_settings: SensorSettings | None = None
 
     @property
     def has_ideal_sensors(self) -> bool:
@@ -55,7 +58,3 @@ class Configuration:
         failing = any(fault.time < NEVER for fault in gait if isinstance(fault, Fault))
         _, *rest = (value for value in gait if not isinstance(value, Fault))
         return not (any(noise) or any(rest) or failing)
-
-
-NEVER = 1.0e9
-"""Time [s] of a fault that does not happen."""

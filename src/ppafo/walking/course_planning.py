@@ -13,9 +13,10 @@ from ppafo.gait import Gait
 from ppafo.model.course import NEVER, PARTS, STANDS_AT, Course, CoursePart
 from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import GaitNow, GaitTiming
-from ppafo.model.leg import LegParameters, torque_of_shank
+from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
 from ppafo.walking.course import FASTEST, SLOWEST, Segment, WalkingCourse
+from ppafo.walking.preparation import standing_on
 
 Numbers = Any
 """A float, or an array (wearers,): the arithmetic is the same."""
@@ -262,24 +263,11 @@ def turns_walked(course: Course, time: float) -> Numbers:
 def standing_gait(leg: LegParameters, timing: GaitTiming, course: Course) -> GaitNow:
     """Where a course begins: shank vertical, foot flat, both at rest; numbers may be arrays (wearers,)."""
     first = course.parts[0]
+    sine, cosine = flat_foot(timing)
+    return standing_on(leg, timing.ground_angle, sine, cosine, first.turns, first.load)
+
+
+def flat_foot(timing: GaitTiming) -> tuple[Numbers, Numbers]:
+    """Sine and cosine of the angle of the flat foot over the horizontal; floats or arrays (wearers,)."""
     ground: Numbers = timing.ground_angle
-    upright = 0.0 * ground
-    sine_foot, cosine_foot = sine_and_cosine(ground / (2.0 * math.pi))
-    torque: Any = torque_of_shank
-    return GaitNow(
-        phase=first.turns,
-        shank=upright,
-        shank_rate=upright,
-        shank_acceleration=upright,
-        ankle=0.5 * math.pi - ground,
-        ankle_rate=upright,
-        ankle_acceleration=upright,
-        moment=upright,
-        force=leg.body_mass * leg.gravity * first.load,
-        knee_forward=upright,
-        knee_up=upright,
-        sine_shank=upright,
-        cosine_shank=1.0 + upright,
-        sine_healthy_foot=sine_foot,
-        healthy_torque=torque(leg, 0.0, 1.0, sine_foot, cosine_foot, 0.0, 0.0, 0.0, 0.0),
-    )
+    return sine_and_cosine(ground / (2.0 * math.pi))

@@ -71,6 +71,12 @@ FAULT_KINDS = {
 }
 
 
+def fault_numbers(sensor: str, kind: str) -> tuple[Quantity, ...]:
+    """Return the numbers of a fault of a sensor, none without a kind."""
+    further = {"stuck": (READINGS[sensor],), "distorted": DISTORTIONS[sensor]}
+    return (FAULT_TIME, PERIOD_OF_FAULT, *further.get(kind, ())) if kind else ()
+
+
 def controller_settings(kind: str) -> tuple[Quantity, ...]:
     """Return the settings of a walking controller, none where it is unknown."""
     known = walking_controllers()

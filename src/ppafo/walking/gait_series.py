@@ -7,15 +7,13 @@ import numpy as np
 
 from ppafo.gait import Gait
 from ppafo.gait.gait import Curve
+from ppafo.model.contact import NEARLY_FLAT
 from ppafo.model.fourier import HARMONICS, Harmonic, Series
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.signals.recording import Floats
 
 FLAT_FROM, FLAT_TO = 0.15, 0.35
 """Phases between which every foot stands flat; the angle of the foot is taken from there."""
-
-NEARLY_FLAT = math.radians(3.0)
-"""The heel has left the ground when the foot is steeper than flat by this; the toes are about to meet it at as much."""
 
 USUAL_HEEL_RISE, LATEST_HEEL_RISE = 0.6, 0.95
 """Shares of the stance at which the heel rises where the angles do not show it, and at the latest."""

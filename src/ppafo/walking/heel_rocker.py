@@ -1,7 +1,7 @@
 """How the heel rolls: the lever of the ground force about the ankle over the tilt of the foot, fitted to a gait."""
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,22 +9,31 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.gait import Gait
 from ppafo.signals.recording import Floats
 from ppafo.walking.gait_series import foot_angles, gait_timing, landing_phase, truncate
-from ppafo.walking.wearer import Wearer
+from ppafo.walking.preparation import rocker_on_heel
+from ppafo.walking.wearer import HeelRocker, Wearer
 
 ROLL_ANGLES = tuple(math.radians(degrees) for degrees in range(2, 16))
 """Tilts [rad] at which the lever of the ground force may have risen half of the way."""
 
 
-@dataclass(frozen=True, slots=True)
-class HeelRocker:
-    """Lever [m] of the ground force behind the ankle: nearly flat, far up, and the tilt [rad] half of the way up."""
+LONGER_THAN_A_FOOT = 1.0e3
+"""Lever [m] where nothing was measured: that of the heel bounds it."""
+
+
+class RockerFit(NamedTuple):
+    """What a gait tells of its heel: lever [m] nearly flat, what it gains far up, the tilt [rad] half way up."""
 
     flat: float
-    raised: float
+    rise: float
     half: float
 
 
 def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
+    """The lever over the tilt of the foot, as fitted to the gait and bounded by the heel of a wearer."""
+    return rocker_on_heel(*fit_rocker(gait), wearer.heel_lever)
+
+
+def fit_rocker(gait: Gait) -> RockerFit:
     """The lever over the tilt of the measured foot while it comes down on its heel alone, by least squares.
 
     From the measured moment, which horizontal forces are part of, or without one from the centre of pressure. A heel
@@ -34,12 +43,12 @@ def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
     phases = np.linspace(0.0, landing_phase(gait), 151)
     levers = _measured_levers(gait, phases)
     if levers is None or gait.vertical_force is None:
-        return HeelRocker(wearer.heel_lever, wearer.heel_lever, ROLL_ANGLES[0])
+        return RockerFit(LONGER_THAN_A_FOOT, 0.0, ROLL_ANGLES[0])
     tilt = np.maximum(foot_angles(gait, phases) - gait_timing(gait).ground_angle, 0.0)
     force = np.maximum(truncate(gait.vertical_force).values_at(phases), 0.0)
-    flat = min(max(float(levers[-1]), 0.0), wearer.heel_lever)
+    flat = max(float(levers[-1]), 0.0)
     _, rise, half = min(_rise(half, tilt, levers - flat, force) for half in ROLL_ANGLES)
-    return HeelRocker(flat, min(max(flat + rise, flat), wearer.heel_lever), half)
+    return RockerFit(flat, rise, half)
 
 
 def _measured_levers(gait: Gait, phases: Floats) -> Floats | None:

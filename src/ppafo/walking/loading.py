@@ -14,9 +14,7 @@ from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.gait import NORMATIVE, Gait, load_gait
-from ppafo.model.declaration import Quantity
-from ppafo.model.elementary import exponential
-from ppafo.model.gait_sensors import Fault, GaitSensors
+from ppafo.model.gait_sensors import GaitSensors
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters import apply_overrides, build_device, load_parameter_set
@@ -28,28 +26,26 @@ from ppafo.simulation.reading import Reading
 from ppafo.simulation.supply_line import SECTION as LINES
 from ppafo.walking import bottle_supply
 from ppafo.walking.bottle_supply import BottleSupply, read_bottle
-from ppafo.walking.configuration import NEVER, Configuration
+from ppafo.walking.configuration import Configuration
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.course import WalkingCourse, load_course
 from ppafo.walking.declaration import (
-    ANGLE_BANDWIDTH,
-    DISTORTIONS,
-    FAULT_TIME,
+    BANDWIDTHS,
     FAULTY,
-    PERIOD_OF_FAULT,
     PRESSURE_BANDWIDTH,
-    READINGS,
     SEED,
     STEP,
     THRESHOLDS,
     WALK_SENSORS,
     controller_settings,
+    fault_numbers,
     quantities,
     timing_settings,
 )
 from ppafo.walking.gait_subject import read_wearer, wearer_origin
 from ppafo.walking.planning import course_of_walk, walking_valve
 from ppafo.walking.schema import walk_file
+from ppafo.walking.sensor_settings import FaultSettings, SensorSettings, sensors_of
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 _TURN = 2.0 * math.pi
@@ -102,7 +98,8 @@ def load_walk(
     is_named = gait is not None or "gait" in document
     carried = read_bottle(reading, device, folder if bottle is None else Path())
     lines = _lines(reading, document, device, carried)
-    gait_sensors = _gait_sensors(reading)
+    sensor_settings = _sensor_settings(reading)
+    gait_sensors = sensors_of(sensor_settings, _period(reading))
     configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
@@ -113,6 +110,7 @@ def load_walk(
         settings=_controller_settings(reading, law, device) | _timing_settings(reading, device, gait_sensors),
         sensors=_sensors(reading),
         gait_sensors=gait_sensors,
+        sensor_settings=sensor_settings,
         period=_period(reading),
         step=reading.number("run.step", STEP),
         assumed=dict(document.get("assumed", {}))
@@ -265,55 +263,20 @@ def _sensors(reading: Reading) -> SensorParameters:
     )
 
 
-def _gait_sensors(reading: Reading) -> GaitSensors:
-    values = reading.section("sensors", WALK_SENSORS)
-    faults = {f"{sensor}_fault": _fault(reading, sensor) for sensor in FAULTY}
-    return GaitSensors(
-        follow_rate=_TURN * values["force_bandwidth"],
-        force_noise=values["force_noise"],
-        force_quantum=values["force_resolution"],
-        lost_share=values["lost_share"],
-        angle_memory=_memory(reading, ANGLE_BANDWIDTH),
-        pressure_memory=_memory(reading, PRESSURE_BANDWIDTH),
-        angle_lost_share=values["angle_lost_share"],
-        pressure_lost_share=values["pressure_lost_share"],
-        **faults,
-    )
+def _sensor_settings(reading: Reading) -> SensorSettings:
+    numbers = reading.section("sensors", WALK_SENSORS)
+    for bandwidth in BANDWIDTHS:
+        path = f"sensors.{bandwidth.name}"
+        if value_at(reading.document, path) is not None:
+            numbers[bandwidth.name] = reading.number(path, bandwidth)
+    return SensorSettings(numbers, {sensor: _fault(reading, sensor) for sensor in FAULTY})
 
 
-def _memory(reading: Reading, bandwidth: Quantity) -> float:
-    """Return what is left of a sensor's last value after one sample, 0 where no bandwidth is given."""
-    path = f"sensors.{bandwidth.name}"
-    if value_at(reading.document, path) is None:
-        return 0.0
-    return exponential(-_TURN * reading.number(path, bandwidth) * _period(reading))
-
-
-def _fault(reading: Reading, sensor: str) -> Fault:
+def _fault(reading: Reading, sensor: str) -> FaultSettings:
     section = f"faults.{sensor}"
     kind = kind_at(reading.document, section)
-    if not kind:
-        return Fault(time=NEVER, holds=0.0, reading=0.0)
-    time = reading.number(f"{section}.time", FAULT_TIME)
-    period = reading.number(f"{section}.period", PERIOD_OF_FAULT)
-    if kind != "distorted":
-        shown = reading.number(f"{section}.reading", READINGS[sensor])
-        return Fault(time=time, holds=1.0 if kind == "frozen" else 0.0, reading=shown, period=period)
-    wrong = {item.name: reading.number(f"{section}.{item.name}", item) for item in DISTORTIONS[sensor]}
-    return Fault(
-        time=time,
-        holds=0.0,
-        reading=0.0,
-        distorts=1.0,
-        gain=wrong["gain"],
-        offset=wrong["offset"],
-        drift=wrong["drift"],
-        crosstalk=wrong.get("crosstalk", 0.0),
-        memory=exponential(-_period(reading) / wrong["lag"]) if wrong["lag"] > 0.0 else 0.0,
-        lost_fraction=wrong["lost_share"],
-        period=period,
-        late_samples=float(round(wrong["delay"] / _period(reading))),
-    )
+    items = fault_numbers(sensor, kind)
+    return FaultSettings(kind, {item.name: reading.number(f"{section}.{item.name}", item) for item in items})
 
 
 def _period(reading: Reading) -> float:

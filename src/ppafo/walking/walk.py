@@ -180,6 +180,11 @@ def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
     return block.result()
 
 
+def record_interval(seconds: float) -> float:
+    """Time [s] between two samples of the record of a walk of this length [s]."""
+    return next(interval for longest, interval in RECORD_INTERVALS if seconds <= longest)
+
+
 def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
     """The plan of a walk of this length [s]."""
     return WalkPlan(
@@ -194,7 +199,7 @@ def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
         duration=seconds,
         period=configuration.period,
         step=configuration.step,
-        record_interval=next(interval for longest, interval in RECORD_INTERVALS if seconds <= longest),
+        record_interval=record_interval(seconds),
         supply_lines=configuration.supply_lines,
         thermal=configuration.thermal,
         course=configuration.course,

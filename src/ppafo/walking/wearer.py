@@ -1,6 +1,7 @@
 """Who wears the device: segments of one leg and the ankle, in SI units."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.model.declaration import Quantity
@@ -35,6 +36,14 @@ WEARER = (
 """Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008."""
 
 
+class HeelRocker(NamedTuple):
+    """Lever [m] of the ground force behind the ankle: nearly flat, far up, and the tilt [rad] half of the way up."""
+
+    flat: float
+    raised: float
+    half: float
+
+
 @dataclass(frozen=True, slots=True)
 class Wearer:
     """One leg of a person; lengths [m], masses [kg], inertias [kg m^2], the ankle as in ``LegParameters``."""
@@ -56,27 +65,32 @@ class Wearer:
     keeps_gait: float
 
     def leg(self) -> LegParameters:
-        """The leg as the engine takes it."""
-        return LegParameters(
-            shank_length=self.shank_length,
-            shank_mass_centre=self.shank_mass_centre,
-            shank_mass=self.shank_mass,
-            shank_inertia=self.shank_inertia,
-            foot_mass_centre=self.foot_mass_centre,
-            foot_mass=self.foot_mass,
-            foot_inertia=self.foot_inertia,
-            body_mass=self.body_mass,
-            ankle_stiffness=self.ankle_stiffness,
-            ankle_rest_angle=self.ankle_rest_angle,
-            ankle_damping=self.ankle_damping,
-            residual_share=self.residual_share,
-            keeps_gait=self.keeps_gait,
-            heel_lever=self.heel_lever,
-            flat_heel_lever=self.heel_lever,
-            heel_roll_angle=1.0,
-            toe_lever=self.toe_lever,
-            gravity=STANDARD_GRAVITY,
-        )
+        """The leg as the engine takes it, on a heel that does not roll."""
+        return leg_parameters(self, HeelRocker(self.heel_lever, self.heel_lever, 1.0))
+
+
+def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
+    """The leg of a wearer as the engine takes it."""
+    return LegParameters(
+        shank_length=wearer.shank_length,
+        shank_mass_centre=wearer.shank_mass_centre,
+        shank_mass=wearer.shank_mass,
+        shank_inertia=wearer.shank_inertia,
+        foot_mass_centre=wearer.foot_mass_centre,
+        foot_mass=wearer.foot_mass,
+        foot_inertia=wearer.foot_inertia,
+        body_mass=wearer.body_mass,
+        ankle_stiffness=wearer.ankle_stiffness,
+        ankle_rest_angle=wearer.ankle_rest_angle,
+        ankle_damping=wearer.ankle_damping,
+        residual_share=wearer.residual_share,
+        keeps_gait=wearer.keeps_gait,
+        heel_lever=rocker.raised,
+        flat_heel_lever=rocker.flat,
+        heel_roll_angle=rocker.half,
+        toe_lever=wearer.toe_lever,
+        gravity=STANDARD_GRAVITY,
+    )
 
 
 def paper_subject() -> Wearer:

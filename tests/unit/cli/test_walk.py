@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.live.page import bundled, digest
 from ppafo.questions.walk import solve
 from ppafo.storage import read_csv, read_netcdf
 from ppafo.storage.recordings import read_recording
@@ -48,6 +49,13 @@ def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("walks") / "solenoid"
     assert main(["walk", *SHORT, "--out", str(folder)]) == 0
     return folder
+
+
+def test_a_foot_that_slaps_more_than_without_the_device_is_remarked_where_the_number_stands(walked: Path) -> None:
+    text = (walked / "walk.txt").read_text(encoding="utf-8")
+    worn, bare, _ = next(line for line in text.splitlines() if line.startswith("Rate of the foot")).split()[-3:]
+    assert float(worn) < float(bare) < 0.0
+    assert "remark: the foot comes down faster than without the device" in text
 
 
 def test_a_walk_prints_its_table_and_where_the_files_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -93,7 +101,8 @@ def test_the_report_holds_figures_and_numbers(walked: Path) -> None:
     assert page.count("data:image/svg+xml;base64,") == 3
     assert "Gas per stride (g)" in page
     assert "data:image/gif;base64," in page
-    assert "<script" not in page
+    assert page.count("<script>") == 1
+    assert digest(bundled("loader.js")) in page.split("</head>")[0]
 
 
 def test_the_animation_is_small_and_moves(walked: Path) -> None:

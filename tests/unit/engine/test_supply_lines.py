@@ -12,6 +12,7 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, begin_moving_gas, moving_change, second_moving_stage
+from ppafo.engine.scheme.stage_flows import SlopedFlows, sloped_flows, stage_flows
 from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, plant_at_line_pressures
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
@@ -22,7 +23,8 @@ from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import initial_lines
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking import load_walk
-from ppafo.walking.planning import plan_walk, vented_state
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.preparation import vented_state
 from ppafo.walking.walk import plan_of
 
 ANGLE = 1.7
@@ -57,9 +59,16 @@ def open_ports(plant: PlantParameters) -> tuple[SinglePort, SinglePort]:
     return port_1, SinglePort(plant.valve_conductance, plant.dorsiflexion_pressure, 1.0, 1.0)
 
 
+def flowing_now(plant: PlantParameters, state: PlantState, ports: tuple[SinglePort, SinglePort]) -> SlopedFlows:
+    """All flows of a state."""
+    pressures = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
+    return sloped_flows(plant, *pressures, *ports, single_port_flow_slopes)
+
+
 def end_of(plant: PlantParameters, begun: MovingGas, ports: tuple[SinglePort, SinglePort], step: float) -> GasChange:
     """What a step [s] adds [kg], from its first stage."""
-    return moving_change(plant, begun.still, second_moving_stage(plant, begun, *ports, single_port_flow), step)
+    flowing = stage_flows(plant, begun.still.end_1, begun.still.end_2, *ports, single_port_flow)
+    return moving_change(plant, begun.still, second_moving_stage(begun, flowing), step)
 
 
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
@@ -67,10 +76,11 @@ def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     state, gas = vented_state(plant, ANGLE, 0.0), full_lines(plant, lines)
     for _ in range(round(DURATION / step)):
         ports = open_ports(plant_at_line_pressures(plant, lines, gas))
-        begun = begin_fed_gas(plant, lines, gas, state, ANGLE, *ports, step, single_port_flow_slopes)
+        begun = begin_fed_gas(plant, lines, gas, state, ANGLE, flowing_now(plant, state, ports), step)
         ports = open_ports(plant_at_line_pressures(plant, lines, begun.lines.after))
         change = end_of(plant, begun.chambers, ports, step)
-        gas = end_lines(plant, lines, gas, begun, change, ports[1], step, single_port_flow)
+        from_2 = single_port_flow(begun.chambers.still.end_2, ports[1], plant.valve_curve).from_source
+        gas = end_lines(plant, lines, gas, begun, change, from_2, step)
         state = with_gas(state, change)
     return Filled(state, gas)
 
@@ -145,7 +155,7 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
     plant, step = device(), 2.5e-4
     ports, state = open_ports(plant), vented_state(plant, ANGLE, 0.0)
     for _ in range(round(DURATION / step)):
-        begun = begin_moving_gas(plant, state, ANGLE, *ports, step, single_port_flow_slopes)
+        begun = begin_moving_gas(plant, state, ANGLE, flowing_now(plant, state, ports), step)
         state = with_gas(state, end_of(plant, begun, ports, step))
     ideal = np.array(chamber_pressures(plant, ANGLE, state.mass_1, state.mass_2))
     away = []

@@ -217,6 +217,7 @@ def test_runs_do_not_know_of_each_other_and_a_copy_goes_on_as_the_first_would(st
         ("gas_temperature", np.nan, "gas_temperature"),
         ("run_duration", np.inf, "run_duration"),
         ("run_output_interval", 1.0e-4, "run_step"),
+        ("controller_period", 1.0e-4, "run_step"),
         ("friction_dynamic_torque", 1.0e3, "friction_dynamic_torque"),
     ],
 )

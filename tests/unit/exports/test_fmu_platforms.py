@@ -81,7 +81,7 @@ def test_what_no_test_here_runs_is_marked_in_the_unit(monkeypatch: pytest.Monkey
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         assert b"Not run: darwin64." in archive.read("modelDescription.xml")
         assert b"<td>darwin64</td><td>not run</td>" in archive.read("documentation/index.html")
-    assert {name for name, item in PLATFORMS.items() if item.tried == "not run"} == PLATFORMS.keys() - RUNNERS.keys()
+    assert {name for name, item in PLATFORMS.items() if item.tried == "not run"} == {"darwin64", "darwin-aarch64"}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the compilers that fail are shell scripts")

@@ -95,7 +95,7 @@ def test_a_name_that_is_no_compiler_is_refused_in_one_line(
     monkeypatch.setenv("PPAFO_BACKEND", "gc")
     assert main(["simulate", "torque-task-proportional", "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert said == "ppafo: PPAFO_BACKEND: 'gc' is none of numba, c, gcc, clang, zig, did you mean 'gcc'?\n"
+    assert said == "ppafo: PPAFO_BACKEND: 'gc' is none of numba, c, gcc, clang, zig, warp, did you mean 'gcc'?\n"
     assert not (tmp_path / "out").exists()
 
 
@@ -152,4 +152,4 @@ def test_a_compiler_that_fails_halfway_is_said_in_one_line_and_leaves_nothing(
 def test_what_has_no_c_is_refused_with_the_way_to_run_it() -> None:
     source = "import math\n@njit('void(float64[:, ::1])')\ndef advance(x):\n    x[0, 0] = math.exp(x[0, 0])\n"
     with pytest.raises(ProgramError, match="cannot be translated; PPAFO_BACKEND=numba can run it"):
-        native._translated(source)
+        native.translated_text(source)

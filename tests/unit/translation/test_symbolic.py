@@ -11,6 +11,7 @@ import pytest
 import ppafo
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuild, rebuilt
 from ppafo.engine.scheme.pneumatics import GAMMA, linearise
+from ppafo.engine.scheme.stage_flows import SlopedFlows, sloped_flows
 from ppafo.engine.scheme.thermal_flows import transport
 from ppafo.errors import ProgramError
 from ppafo.model import sensors
@@ -18,7 +19,6 @@ from ppafo.model.orifice import FlowCurve, fitted_flow_function, isentropic_flow
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
-    PlantState,
     ThermalParameters,
     blended_ports,
     pressures_per_mass,
@@ -194,12 +194,13 @@ def test_the_jacobian_of_a_step_of_the_lanes_is_that_of_its_own_flows(ratios: tu
     """The lanes have their Jacobian written by hand; here the flows beside it are differentiated."""
     openings = Openings(source_1=0.6, vent_1=0.1, source_2=0.2, vent_2=0.5)
     first, second = casadi.SX.sym("first"), casadi.SX.sym("second")
-    types = (PlantParameters, PlantState, BlendedPort, BlendedPort, float, blended_port_flow_slopes)
     per_mass = pressures_per_mass(PLANT, 1.2)
     masses = [ratio * PLANT.supply_pressure / each for ratio, each in zip(ratios, per_mass, strict=True)]
-    state = PlantState(1.2, 0.0, first, second, 0.0, 0.0, 0.0)
+    pressures = (first * per_mass[0], second * per_mass[1])
     ports, step = blended_ports(PLANT, openings), 1e-3
-    linear, flows = symbolic(linearise, *types)(PLANT, state, *ports, step, blended_port_flow_slopes)
+    types = (PlantParameters, float, float, BlendedPort, BlendedPort, blended_port_flow_slopes)
+    flowing = symbolic(sloped_flows, *types)(PLANT, *pressures, *ports, blended_port_flow_slopes)
+    linear, flows = symbolic(linearise, float, float, SlopedFlows, float)(*per_mass, flowing, step)
     into = casadi.vertcat(flows.mass_1, flows.mass_2)
     found = casadi.jacobian(into, casadi.vertcat(first, second))
     matrix = casadi.vertcat(casadi.horzcat(linear.a, linear.b), casadi.horzcat(linear.c, linear.d))

@@ -123,7 +123,8 @@ def test_a_walk_without_a_course_is_composed_without_one() -> None:
     assert "scuff" not in text
     with_course = lane_source(plan_walk(plan_of(load_walk("solenoid", course="stairs"), 60.0)).program)
     assert "course_gait_on_course" in with_course
-    assert "model_gait_gait_at" not in with_course
+    assert "model_gait_measured_at" in text
+    assert "model_gait_measured_at" not in with_course
 
 
 LENIENT = (

@@ -8,6 +8,7 @@ import pytest
 from ppafo.gait import load_gait
 from ppafo.walking.comparison import compare_walks
 from ppafo.walking.loading import load_walk
+from ppafo.walking.population import walk_population
 from ppafo.walking.walk import walk
 
 MINUTES = 0.25
@@ -36,12 +37,14 @@ def test_a_wearer_with_any_part_of_the_healthy_moment_is_helped_without_alarm(va
 
 
 @pytest.mark.parametrize("valve", ["solenoid", "proportional"])
-def test_a_slow_walk_is_helped_without_alarm(valve: str) -> None:
+@pytest.mark.parametrize("sensors", SENSORS)
+def test_a_slow_walk_is_helped_without_alarm(valve: str, sensors: str) -> None:
     gait = load_gait("falisse2019-subject1")
     assert gait.walking_speed is not None
     slow = replace(gait, stride_time=gait.stride_time * math.sqrt(gait.walking_speed / SLOW), walking_speed=SLOW)
     for fraction in (0.0, 0.8, 1.0):
-        configuration = replace(load_walk(valve, [f"wearer.residual_share={fraction}"]), gait=slow)
+        overrides = [f"wearer.residual_share={fraction}", *SENSORS[sensors]]
+        configuration = replace(load_walk(valve, overrides), gait=slow)
         result = walk(configuration, MINUTES)
         assert "safe_state_time" not in result.metrics
         assert result.metrics["push_off_work"].value > 1.0
@@ -56,6 +59,19 @@ def test_a_nondisabled_wearer_keeps_the_gait_and_the_device_takes_over_part_of_l
     moments = [metrics["dorsiflexor_moment"].value for metrics in (worn.metrics, bare.metrics, comparison.healthy)]
     # The plate's weight has to be lifted too where the device is off.
     assert 0.0 < moments[0] < moments[2] < moments[1]
+
+
+@pytest.mark.parametrize("valve", ["solenoid", "proportional"])
+def test_a_nondisabled_wearer_stops_without_a_pause(valve: str) -> None:
+    """The last foot comes down slowly: its toes carried nothing until it was flat to the last degree, and it paused."""
+    result = walk(load_walk(valve, ["wearer.keeps_gait=1"], course="corridor"), 0.35)
+    assert result.recording.time[-1] > 19.0
+    assert not result.events
+
+
+def test_nondisabled_wearers_whose_feet_roll_slowly_are_helped_without_a_pause() -> None:
+    people = walk_population(load_walk("solenoid", ["wearer.keeps_gait=1"]), 0.12, 24)
+    assert (people.vented, people.paused) == (0, 0)
 
 
 def test_an_impaired_wearer_has_no_moment_of_dorsiflexors_to_speak_of() -> None:

@@ -9,6 +9,7 @@ import pytest
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
+from ppafo.parameters.bottles.bottle import FILE as BOTTLES
 from ppafo.questions.league.walking.task import walking_task
 from ppafo.questions.timing.solve import event_timing
 from ppafo.walking import load_walk, on_bottle, walk, walk_population
@@ -188,6 +189,26 @@ def test_a_mistake_is_named_in_one_line(override: str) -> None:
     with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[override]) as caught:
         load_walk(WALK, ["bottle.name=paper-co2-9oz", override])
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_sets_its_regulator_to_another_pressure_is_refused(tmp_path: Path) -> None:
+    """The walk would have gone at the pressure of the supply, and said nothing."""
+    shipped = (Path(str(BOTTLES.shipped)) / f"{BOTTLE}.toml").read_text(encoding="utf-8")
+    file = tmp_path / "own.toml"
+    file.write_text(shipped.replace('50.0\nunit = "psi_g"', '30.0\nunit = "psi_g"'), encoding="utf-8")
+    words = r"own\.toml sets regulator\.set_pressure to 30 psi_g, and supply\.pressure is 50 psi_g: give both the same"
+    with pytest.raises(ScenarioError, match=words):
+        load_walk(WALK, bottle=file)
+    lower = ["supply.pressure=30 psi_g", "supply.dorsiflexion_pressure=25 psi_g"]
+    assert load_walk(WALK, lower, bottle=file).bottle is not None
+
+
+def test_a_bottle_of_the_package_is_set_to_the_pressure_of_the_walk_and_says_so() -> None:
+    supply = load_walk(WALK, ["supply.pressure=60 psi_g"], bottle=BOTTLE).bottle
+    assert supply is not None
+    told = supply.to_dict()["values"]["regulator.set_pressure"]
+    assert told["value"] == pytest.approx(supply.bottle.regulator.set_pressure)
+    assert told["source"] == "supply.pressure of the walk"
 
 
 @pytest.mark.parametrize(

@@ -226,7 +226,7 @@ def remembered(
         ventings=state.ventings,
         finding=state.finding,
         readings=seen,
-        landing=readings.next_landing(state.landing, seen, before, phase, steady),
+        landing=readings.next_landing(state.landing, seen, before, phase, steady, period),
         stance=next_stance(state.stance, before, phase, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from ppafo.model import contact as ground
 from ppafo.model.gait import GaitNow
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
-from ppafo.model.turns import TURN, sine_and_cosine
+from ppafo.model.turns import TURNS_OF_RADIAN, sine_and_cosine
 
 
 class DeviceShare(NamedTuple):
@@ -30,7 +30,7 @@ class Direction(NamedTuple):
 
 def foot_direction(shank: float, angle: float) -> Direction:
     """Direction of the foot at a shank angle and an ankle angle [rad]."""
-    sine, cosine = sine_and_cosine(ground.foot_angle(shank, angle) / TURN)
+    sine, cosine = sine_and_cosine(ground.foot_angle(shank, angle) * TURNS_OF_RADIAN)
     return Direction(sine, cosine)
 
 

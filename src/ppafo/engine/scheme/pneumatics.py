@@ -3,14 +3,13 @@
 The method is ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), gamma = 1 - 1/sqrt(2), with
 the exact Jacobian and the time derivative that comes from the moving volumes, which run linearly through the step.
 Gas totals are integrated by the same method as further unknowns, so that mass is conserved to rounding. A step is two
-functions, one for each stage, because the lanes take each stage in a loop of its own. The first stage alone is a step
-of first order, and what the second adds to it is the estimate of the error.
+functions, one for each stage, because the lanes take each stage in a loop of its own, and its flows in one before it.
+The first stage alone is a step of first order, and what the second adds to it is the estimate of the error.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
+from ppafo.engine.scheme.stage_flows import SlopedFlows, StageFlows
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, pressures_per_mass
 from ppafo.model.ports import admitted_flow
 
@@ -64,6 +63,24 @@ class StillGas(NamedTuple):
     end_2: float
 
 
+class HeldChambers(NamedTuple):
+    """Pressures over masses [Pa/kg] of both chambers of a vane that never moves."""
+
+    per_mass_1: float
+    per_mass_2: float
+
+
+def held_chambers(plant: PlantParameters, angle: float) -> HeldChambers:
+    """Both chambers of a vane that is held at an angle [rad]. Equation (3)."""
+    per_mass_1, per_mass_2 = pressures_per_mass(plant, angle)
+    return HeldChambers(per_mass_1, per_mass_2)
+
+
+def held_pressures(held: HeldChambers, state: PlantState) -> tuple[float, float]:
+    """Absolute pressures [Pa], as ``chamber_pressures`` has them."""
+    return state.mass_1 * held.per_mass_1, state.mass_2 * held.per_mass_2
+
+
 class MovingGas(NamedTuple):
     """First stage with moving volumes: as ``StillGas``, and gamma h times the change of all flows in time [kg/s]."""
 
@@ -93,21 +110,13 @@ def solve_stage(linear: Linearisation, flow_1: float, flow_2: float, supplied: f
     )
 
 
-def linearise(
-    plant: PlantParameters,
-    state: PlantState,
-    port_1: Any,
-    port_2: Any,
-    step: float,
-    port_flow_slopes: Callable[..., Any],
-) -> tuple[Linearisation, Flows]:
-    """All flows at the beginning of a step [s], and their linearisation. Equations (3), (6) to (9)."""
-    per_mass_1, per_mass_2 = pressures_per_mass(plant, state.angle)
-    pressure_1 = state.mass_1 * per_mass_1
-    pressure_2 = state.mass_2 * per_mass_2
-    in_1 = port_flow_slopes(pressure_1, port_1, plant.valve_curve)
-    in_2 = port_flow_slopes(pressure_2, port_2, plant.valve_curve)
-    leak, leak_by_1, leak_by_2 = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
+def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: float) -> tuple[Linearisation, Flows]:
+    """Linearisation of the flows at the beginning of a step [s], and what they add up to. Equations (3), (6) to (9).
+
+    ``per_mass_1`` and ``per_mass_2`` are pressures over masses [Pa/kg].
+    """
+    in_1, in_2 = flowing.in_1, flowing.in_2
+    leak, leak_by_1, leak_by_2 = flowing.leak.flow, flowing.leak.by_1, flowing.leak.by_2
     weight_1 = GAMMA * step * per_mass_1
     weight_2 = GAMMA * step * per_mass_2
     a = 1.0 - (in_1.total_slope - leak_by_1) * weight_1
@@ -129,34 +138,24 @@ def linearise(
     )
 
 
-def begin_still_gas(
-    plant: PlantParameters,
-    state: PlantState,
-    port_1: Any,
-    port_2: Any,
-    step: float,
-    port_flow_slopes: Callable[..., Any],
-) -> StillGas:
+def begin_still_gas(state: PlantState, held: HeldChambers, flowing: SlopedFlows, step: float) -> StillGas:
     """First stage of one step [s] in which the vane stands still."""
-    linear, flows = linearise(plant, state, port_1, port_2, step, port_flow_slopes)
+    linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
     first = solve_stage(linear, flows.mass_1, flows.mass_2, flows.supplied, flows.leaked)
-    end_1, end_2 = chamber_pressures(
-        plant, state.angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
+    return StillGas(
+        linear=linear,
+        first=first,
+        end_1=(state.mass_1 + step * first.mass_1) * held.per_mass_1,
+        end_2=(state.mass_2 + step * first.mass_2) * held.per_mass_2,
     )
-    return StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2)
 
 
 def begin_moving_gas(
-    plant: PlantParameters,
-    state: PlantState,
-    next_angle: float,
-    port_1: Any,
-    port_2: Any,
-    step: float,
-    port_flow_slopes: Callable[..., Any],
+    plant: PlantParameters, state: PlantState, next_angle: float, flowing: SlopedFlows, step: float
 ) -> MovingGas:
     """First stage of one step [s] in which the volumes run linearly to those of ``next_angle`` [rad]."""
-    linear, flows = linearise(plant, state, port_1, port_2, step, port_flow_slopes)
+    per_mass_1, per_mass_2 = pressures_per_mass(plant, state.angle)
+    linear, flows = linearise(per_mass_1, per_mass_2, flowing, step)
     return begin_moving_stage(plant, state, next_angle, linear, flows, step)
 
 
@@ -192,14 +191,9 @@ def begin_moving_stage(
     return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
 
 
-def second_right_sides(
-    plant: PlantParameters, begun: StillGas, port_1: Any, port_2: Any, port_flow: Callable[..., Any]
-) -> Flows:
-    """Right-hand sides of the second stage [kg/s] with fixed volumes. Equations (6) to (9)."""
-    flow_1 = port_flow(begun.end_1, port_1, plant.valve_curve)
-    flow_2 = port_flow(begun.end_2, port_2, plant.valve_curve)
-    leak = orifice_flow(begun.end_1, begun.end_2, plant.leak_conductance, plant.leak_curve)
-    first = begun.first
+def second_right_sides(first: Flows, flowing: StageFlows) -> Flows:
+    """Right-hand sides of the second stage [kg/s] with fixed volumes, from the flows it begins with. Equation (9)."""
+    flow_1, flow_2, leak = flowing.in_1, flowing.in_2, flowing.leak
     return Flows(
         mass_1=flow_1.total - leak - 2.0 * first.mass_1,
         mass_2=flow_2.total + leak - 2.0 * first.mass_2,
@@ -218,19 +212,15 @@ def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
     )
 
 
-def second_still_stage(
-    plant: PlantParameters, begun: StillGas, port_1: Any, port_2: Any, port_flow: Callable[..., Any]
-) -> Flows:
+def second_still_stage(begun: StillGas, flowing: StageFlows) -> Flows:
     """Second stage [kg/s] of a step in which the vane stands still."""
-    right = second_right_sides(plant, begun, port_1, port_2, port_flow)
+    right = second_right_sides(begun.first, flowing)
     return solve_stage(begun.linear, right.mass_1, right.mass_2, right.supplied, right.leaked)
 
 
-def second_moving_stage(
-    plant: PlantParameters, begun: MovingGas, port_1: Any, port_2: Any, port_flow: Callable[..., Any]
-) -> Flows:
+def second_moving_stage(begun: MovingGas, flowing: StageFlows) -> Flows:
     """Second stage [kg/s] of a step with moving volumes."""
-    right = second_right_sides(plant, begun.still, port_1, port_2, port_flow)
+    right = second_right_sides(begun.still.first, flowing)
     drift = begun.drift
     return solve_stage(
         begun.still.linear,

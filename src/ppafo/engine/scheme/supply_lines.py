@@ -7,8 +7,7 @@ with an energy balance of the chambers too: what a warm chamber pushes back give
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import (
     ALLOWED_OF_PRESSURE,
@@ -20,16 +19,17 @@ from ppafo.engine.scheme.pneumatics import (
     linearise,
     pressure_that_matters,
 )
+from ppafo.engine.scheme.stage_flows import SlopedFlows
 from ppafo.engine.scheme.thermal_flows import ThermalFlows, transport
-from ppafo.engine.scheme.thermal_gas import ThermalGas, begin_thermal_stage, thermal_pressures
+from ppafo.engine.scheme.thermal_gas import ThermalGas, begin_thermal_stage, volumes_at_begin
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
     ThermalParameters,
     ThermalState,
-    chamber_pressures,
     chamber_volumes,
     plant_with,
+    pressures_per_mass,
 )
 from ppafo.model.ports import PortFlowSlopes
 from ppafo.model.regulator import LineState, LineStep, SupplyLines, line_pressures, step_lines
@@ -86,23 +86,20 @@ def begin_fed_gas(
     line_state: LineState,
     state: PlantState,
     next_angle: float,
-    port_1: Any,
-    port_2: Any,
+    flowing: SlopedFlows,
     step: float,
-    port_flow_slopes: Callable[..., Any],
 ) -> FedGas:
     """First stage of one step [s] with volumes that run to those of ``next_angle`` [rad]; ports at line pressures."""
-    linear, flows = linearise(plant, state, port_1, port_2, step, port_flow_slopes)
+    per_mass_1, per_mass_2 = pressures_per_mass(plant, state.angle)
+    linear, flows = linearise(per_mass_1, per_mass_2, flowing, step)
     volumes = chamber_volumes(plant, state.angle)
     linear = with_lines(linear, volumes[0] / lines.volume_1, volumes[1] / lines.volume_2)
     chambers = begin_moving_stage(plant, state, next_angle, linear, flows, step)
     first = chambers.still.first
     # What of the sums is line 2's: the same stage once more, for one number.
-    pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)[1]
     growth = (volumes[1] - chamber_volumes(plant, next_angle)[1]) / (volumes[1] * max(step, SHORTEST))
     drift_2 = linear.supplied_by_2 * state.mass_2 * growth
-    from_2 = port_flow_slopes(pressure_2, port_2, plant.valve_curve).from_source
-    taken_2 = from_2 + drift_2 + linear.supplied_by_2 * first.mass_2
+    taken_2 = flowing.in_2.from_source + drift_2 + linear.supplied_by_2 * first.mass_2
     stepped = lines_after(plant, lines, line_state, step * (first.supplied - taken_2), step * taken_2, 0.0, step)
     return FedGas(chambers=chambers, taken_2=taken_2, drift_2=drift_2, lines=stepped)
 
@@ -113,13 +110,14 @@ def end_lines(
     line_state: LineState,
     begun: FedGas,
     change: GasChange,
-    port_2: Any,
+    from_2: float,
     step: float,
-    port_flow: Callable[..., Any],
 ) -> LineState:
-    """Both lines at the end of the step [s]; ``change`` is what the chambers and totals gained in it."""
+    """Both lines at the end of the step [s]; ``change`` is what the chambers and totals gained in it.
+
+    ``from_2`` is the flow [kg/s] out of line 2 in the second stage.
+    """
     still = begun.chambers.still
-    from_2 = port_flow(still.end_2, port_2, plant.valve_curve).from_source
     second = from_2 - 2.0 * begun.taken_2 - begun.drift_2
     # Half the second stage's rate of chamber 2 is what the change has beside the first stage.
     responded = still.linear.supplied_by_2 * (change.mass_2 - 1.5 * step * still.first.mass_2)
@@ -174,19 +172,17 @@ def begin_fed_thermal_gas(
     state: PlantState,
     masses: ThermalState,
     next_angle: float,
-    port_1: Any,
-    port_2: Any,
+    flowing: SlopedFlows,
     step: float,
-    port_flow_slopes: Callable[..., Any],
 ) -> FedThermalGas:
     """First stage of one step [s] as ``begin_fed_gas``, of gas with an energy balance."""
-    at_begin = thermal_pressures(plant, state, next_angle, step)
+    at_begin = volumes_at_begin(plant, state, next_angle, step)
     share_1, share_2 = at_begin.volume_1 / lines.volume_1, at_begin.volume_2 / lines.volume_2
     # What comes from a line brings more energy than mass, by the ratio of heat capacities.
     per_line = 1.0 / thermal.heat_capacity_ratio
-    in_1 = with_line(port_flow_slopes(at_begin.pressure_1, port_1, plant.valve_curve), per_line * share_1)
-    in_2 = with_line(port_flow_slopes(at_begin.pressure_2, port_2, plant.valve_curve), per_line * share_2)
-    chambers = begin_thermal_stage(plant, thermal, state, masses, at_begin, in_1, in_2, step)
+    in_1 = with_line(flowing.in_1, per_line * share_1)
+    in_2 = with_line(flowing.in_2, per_line * share_2)
+    chambers = begin_thermal_stage(thermal, state, masses, at_begin, SlopedFlows(in_1, in_2, flowing.leak), step)
     first, by_2 = chambers.first, chambers.matrix.slopes.supplied_by_2
     drift_2 = by_2 * state.mass_2 * chambers.growth / at_begin.volume_2
     taken_2 = mass_from_source(thermal, in_2.from_source, state, masses) + drift_2 + by_2 * first.content_2
@@ -201,14 +197,11 @@ def end_thermal_lines(
     line_state: LineState,
     begun: FedThermalGas,
     second: ThermalFlows,
-    port_2: Any,
+    flow_2: float,
     step: float,
-    port_flow: Callable[..., Any],
 ) -> LineState:
-    """Both lines at the end of the step [s], from the second stage of the chambers [kg/s]."""
+    """Both lines at the end of the step [s], from the second stage of the gas and its flow out of line 2 [kg/s]."""
     gas = begun.chambers
-    pressure_2 = gas.end.mass_2 * plant.gas_product / gas.volume_2
-    flow_2 = port_flow(pressure_2, port_2, plant.valve_curve).from_source
     from_2 = mass_from_source(thermal, flow_2, gas.end, gas.end_masses)
     second_2 = from_2 - 2.0 * begun.taken_2 - begun.drift_2 + gas.matrix.slopes.supplied_by_2 * second.content_2
     taken_2 = step * (1.5 * begun.taken_2 + 0.5 * second_2)

@@ -6,10 +6,11 @@ the reference temperature. Content over true mass is ``T / T_0``. Gas comes from
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from ppafo.engine.scheme.stage_flows import LeakSlopes
 from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
-from ppafo.model.ports import PortFlow
+from ppafo.model.ports import PortFlow, PortFlowSlopes
 from ppafo.model.thermal import enthalpy_flow_ratio, mass_flow_ratio
 
 
@@ -118,20 +119,20 @@ def flow_slopes(
     root_2: float,
     weight_1: float,
     weight_2: float,
-    in_1: Any,
-    in_2: Any,
-    leak: Any,
+    in_1: PortFlowSlopes,
+    in_2: PortFlowSlopes,
+    leak: LeakSlopes,
 ) -> FlowSlopes:
     """How all flows answer to both contents; weights are gamma h times pressure over content [Pa s/kg]."""
-    leak_carries = transport(thermal, leak[0], root_1, root_2)
+    leak_carries = transport(thermal, leak.flow, root_1, root_2)
     source_1 = transport(thermal, in_1.from_source, 1.0, root_1)
     source_2 = transport(thermal, in_2.from_source, 1.0, root_2)
     vent_1 = transport(thermal, in_1.total - in_1.from_source, 1.0, root_1)
     vent_2 = transport(thermal, in_2.total - in_2.from_source, 1.0, root_2)
     vent_slope_1 = in_1.total_slope - in_1.source_slope
     vent_slope_2 = in_2.total_slope - in_2.source_slope
-    by_1 = leak[1] * weight_1
-    by_2 = leak[2] * weight_2
+    by_1 = leak.by_1 * weight_1
+    by_2 = leak.by_2 * weight_2
     return FlowSlopes(
         content_1_by_1=(in_1.source_slope * source_1.content + vent_slope_1 * vent_1.content) * weight_1
         - by_1 * leak_carries.content,

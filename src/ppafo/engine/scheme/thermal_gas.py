@@ -7,10 +7,10 @@ matrix.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import ALLOWED_OF_PRESSURE, GAMMA, SHORTEST, pressure_that_matters
+from ppafo.engine.scheme.stage_flows import SlopedFlows, StageFlows
 from ppafo.engine.scheme.thermal_flows import (
     FlowSlopes,
     ThermalFlows,
@@ -19,7 +19,6 @@ from ppafo.engine.scheme.thermal_flows import (
     flow_slopes,
     thermal_flows,
 )
-from ppafo.model.orifice import orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
@@ -27,6 +26,7 @@ from ppafo.model.plant import (
     ThermalState,
     chamber_pressures,
     chamber_volumes,
+    pressures_per_mass,
 )
 from ppafo.model.ports import PortFlow, admitted_flow
 from ppafo.model.thermal import enthalpy_flow_ratio
@@ -50,7 +50,7 @@ class ThermalMatrix(NamedTuple):
 class ThermalBegin(NamedTuple):
     """Both chambers at the begin of a step: volumes then and at its end [m^3], rate at which chamber 1 grows [m^3/s].
 
-    Then pressures [Pa], absolute, over contents [kg], and the pressures.
+    Then absolute pressures over contents [Pa/kg].
     """
 
     volume_1: float
@@ -60,8 +60,6 @@ class ThermalBegin(NamedTuple):
     growth: float
     per_content_1: float
     per_content_2: float
-    pressure_1: float
-    pressure_2: float
 
 
 class ThermalGas(NamedTuple):
@@ -144,25 +142,20 @@ def begin_thermal_gas(
     state: PlantState,
     masses: ThermalState,
     next_angle: float,
-    port_1: Any,
-    port_2: Any,
+    flowing: SlopedFlows,
     step: float,
-    port_flow_slopes: Callable[..., Any],
 ) -> ThermalGas:
     """First stage of one step [s] in which the volumes run linearly to those of ``next_angle`` [rad]."""
-    at_begin = thermal_pressures(plant, state, next_angle, step)
-    in_1 = port_flow_slopes(at_begin.pressure_1, port_1, plant.valve_curve)
-    in_2 = port_flow_slopes(at_begin.pressure_2, port_2, plant.valve_curve)
-    return begin_thermal_stage(plant, thermal, state, masses, at_begin, in_1, in_2, step)
+    at_begin = volumes_at_begin(plant, state, next_angle, step)
+    return begin_thermal_stage(thermal, state, masses, at_begin, flowing, step)
 
 
-def thermal_pressures(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
+def volumes_at_begin(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
     """Both chambers at the begin of a step [s] whose volumes run to those of ``next_angle`` [rad]. Equation (3)."""
     volume_1, volume_2 = chamber_volumes(plant, state.angle)
     next_1, next_2 = chamber_volumes(plant, next_angle)
     growth = (next_1 - volume_1) / max(step, SHORTEST)
-    per_content_1 = plant.gas_product / volume_1
-    per_content_2 = plant.gas_product / volume_2
+    per_content_1, per_content_2 = pressures_per_mass(plant, state.angle)
     return ThermalBegin(
         volume_1=volume_1,
         volume_2=volume_2,
@@ -171,28 +164,24 @@ def thermal_pressures(plant: PlantParameters, state: PlantState, next_angle: flo
         growth=growth,
         per_content_1=per_content_1,
         per_content_2=per_content_2,
-        pressure_1=state.mass_1 * per_content_1,
-        pressure_2=state.mass_2 * per_content_2,
     )
 
 
 def begin_thermal_stage(
-    plant: PlantParameters,
     thermal: ThermalParameters,
     state: PlantState,
     masses: ThermalState,
     at_begin: ThermalBegin,
-    in_1: Any,
-    in_2: Any,
+    flowing: SlopedFlows,
     step: float,
 ) -> ThermalGas:
-    """First stage of one step [s] with moving volumes, from the flows through both ports and their slopes."""
+    """First stage of one step [s] with moving volumes, from all flows and their slopes."""
+    in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
     volume_1, volume_2, growth = at_begin.volume_1, at_begin.volume_2, at_begin.growth
     per_content_1, per_content_2 = at_begin.per_content_1, at_begin.per_content_2
-    leak = orifice_flow_slopes(at_begin.pressure_1, at_begin.pressure_2, plant.leak_conductance, plant.leak_curve)
     flow_1 = PortFlow(in_1.total, in_1.from_source)
     flow_2 = PortFlow(in_2.total, in_2.from_source)
-    flows = thermal_flows(thermal, state, masses, volume_1, volume_2, growth, flow_1, flow_2, leak[0])
+    flows = thermal_flows(thermal, state, masses, volume_1, volume_2, growth, flow_1, flow_2, leak.flow)
     weight = GAMMA * step
     root_1 = math.sqrt(state.mass_1 / masses.mass_1)
     root_2 = math.sqrt(state.mass_2 / masses.mass_2)
@@ -215,22 +204,26 @@ def begin_thermal_stage(
     )
 
 
-def second_thermal_stage(
-    plant: PlantParameters,
-    thermal: ThermalParameters,
-    begun: ThermalGas,
-    port_1: Any,
-    port_2: Any,
-    port_flow: Callable[..., Any],
-) -> ThermalFlows:
+def end_pressures(plant: PlantParameters, begun: ThermalGas) -> tuple[float, float]:
+    """Absolute pressures [Pa] to which the first stage leads. Equation (3)."""
+    return (
+        begun.end.mass_1 * plant.gas_product / begun.volume_1,
+        begun.end.mass_2 * plant.gas_product / begun.volume_2,
+    )
+
+
+def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing: StageFlows) -> ThermalFlows:
     """Second stage [kg/s] of a step."""
-    pressure_1 = begun.end.mass_1 * plant.gas_product / begun.volume_1
-    pressure_2 = begun.end.mass_2 * plant.gas_product / begun.volume_2
-    in_1 = port_flow(pressure_1, port_1, plant.valve_curve)
-    in_2 = port_flow(pressure_2, port_2, plant.valve_curve)
-    leak = orifice_flow(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
     flows = thermal_flows(
-        thermal, begun.end, begun.end_masses, begun.volume_1, begun.volume_2, begun.growth, in_1, in_2, leak
+        thermal,
+        begun.end,
+        begun.end_masses,
+        begun.volume_1,
+        begun.volume_2,
+        begun.growth,
+        flowing.in_1,
+        flowing.in_2,
+        flowing.leak,
     )
     right = combine_flows(combine_flows(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
     return solve_thermal_stage(begun.matrix, right)

@@ -67,7 +67,7 @@ def begin_walk(
     torque = leg_torque(leg, share, walk.contact, walk.now, timing.ground_angle, state.angle, walk.foot)
     free = begin_free(plant, state, torque, step)
     offset = walk.offset / (1.0 + step / ground.FADING_TIME)
-    prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle)
+    prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle, leg.keeps_gait)
     led = ground.Ankle(
         clamp_angle(plant, prescribed.angle + offset),
         prescribed.rate - offset / ground.FADING_TIME,
@@ -135,7 +135,7 @@ def end_walk(
     acceleration = (after.angular_velocity - state.angular_velocity) / max(step, 1.0e-30)
     plate = plate_torque(leg, share, now, foot)
     given = external_torque(plant, leg, share, after, torque, plate, begun.led, acceleration, free)
-    landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset)
+    landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset, leg.keeps_gait)
     height = leg.toe_lever * (foot.sine - now.sine_healthy_foot)
     turned = after.angle - state.angle
     return after, advance_walk(timing, walk, after, now, foot, landed, given, height, follow_rate, turned, step)

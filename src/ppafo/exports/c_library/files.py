@@ -30,6 +30,18 @@ OUTPUTS = {
     "supplied_mass": ("kg", "gas from the supply so far"),
     "vented_mass": ("kg", "gas to the atmosphere so far"),
     "leaked_mass": ("kg", "gas past the vane so far"),
+    "strides": ("-", "heel strikes so far"),
+    "phase": ("-", "time in the stride, 0 at its heel strike, in turns"),
+    "contact": ("-", "where the foot stands: 0 swing, 1 heel, 2 flat, 3 toes"),
+    "shank_angle": ("rad", "shank from the vertical, above 0 with the ankle before the knee"),
+    "healthy_angle": ("rad", "angle of the healthy ankle of this gait"),
+    "external_torque": ("N m", "torque T_ex of the device on the wearer"),
+    "heel_force": ("N", "force under the heel, as the sensor shows it without faults"),
+    "toe_force": ("N", "force under the toes, likewise"),
+    "push_off_work": ("J", "work of T_ex while the foot rolls over the toes, so far"),
+    "controller_phase": ("-", "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off"),
+    "safe_state": ("-", "0 the controller helps, 1 lifts only, 2 pauses, 3 has stopped"),
+    "gait_fraction": ("-", "time in the stride that the controller goes by, in turns"),
 }
 """Unit and meaning of what can be read at each sample."""
 _ALONE = """#if !defined(PPAFO_ENTRY)
@@ -40,8 +52,8 @@ _ALONE = """#if !defined(PPAFO_ENTRY)
 
 """
 """What the functions are told that stand in the file of a library."""
-UNITS = {"Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
-_SIGNS = {"below": "<", "at most": "<=", "at least": ">="}
+UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
+_SIGNS = {"below": "<", "at most": "<=", "at least": ">=", "above": ">"}
 _MARK = re.compile(r"@(\w+)@")
 _FILES = {
     "interface.h": "{name}.h",
@@ -73,12 +85,24 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """A setting that must be ``below``, ``at most`` or ``at least`` another, but for ``tolerance`` in its unit."""
+    """A setting that must be ``below``, ``at most``, ``at least`` or ``above`` another, but for a ``tolerance``.
+
+    The tolerance is in the unit of both, or a share of the other where it ``is_share``.
+    """
 
     name: str
     relation: str
     other: str
     tolerance: float = 0.0
+    is_share: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """Settings of which any ``is_above`` 0, or none: the other case is another program."""
+
+    names: tuple[str, ...]
+    is_above: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +110,8 @@ class Library:
     """What is to be written.
 
     ``further`` adds the function that makes the numbers of a run from the settings, ``preparation`` has the lines of C
-    around it, ``other_program`` conditions in C under which another program would be needed. ``words`` fill the page.
+    around it. ``switches`` choose the program, ``other_program`` has further conditions in C under which another would
+    be needed. ``words`` fill the page.
     """
 
     title: str
@@ -95,6 +120,7 @@ class Library:
     settings: tuple[Setting, ...]
     relations: tuple[Relation, ...]
     preparation: tuple[str, ...]
+    switches: tuple[Switch, ...]
     other_program: tuple[str, ...]
     words: Mapping[str, str]
     further: Further | None = None
@@ -126,38 +152,51 @@ def library_files(library: Library) -> dict[str, bytes]:
 
 
 def _filled(file: str, words: Mapping[str, str]) -> str:
-    """A template with its marks replaced."""
-    text = files("ppafo.exports.c_library").joinpath("templates", file).read_text(encoding="utf-8")
+    """A template of the library with its marks replaced."""
+    return filled(files("ppafo.exports.c_library").joinpath("templates", file).read_text(encoding="utf-8"), words)
+
+
+def filled(text: str, words: Mapping[str, str]) -> str:
+    """A text with its marks, as ``@name@``, replaced."""
     return _MARK.sub(lambda found: words[found[1]], text)
+
+
+def run_words(library: Library) -> dict[str, str]:
+    """Marks of every template in which a run of a library is made of its settings."""
+    program = library.program
+    return {
+        "never": repr(NEVER_FAILED),
+        "same_moment": repr(SAME_MOMENT),
+        "signal_rows": str(SIGNAL_ROWS),
+        "state_count": str(len(program.state_places)),
+        "parameter_count": str(len(program.parameter_places)),
+        "count_count": str(len(COUNTS)),
+        "output_count": str(len(program.outputs)),
+        "metric_count": str(len(program.metrics)),
+        "setting_count": str(len(library.settings)),
+        "prepare": "\n".join(f"    {line}" for line in library.preparation),
+        "other_program": other_program_of(library),
+    }
 
 
 def _words(library: Library, name: str) -> dict[str, str]:
     program = library.program
     outputs = ["time", *program.outputs]
-    states, parameters = program.state_places, program.parameter_places
     return {
+        **run_words(library),
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
         "description": "\n * ".join(textwrap.wrap(_in_comment(library.description), 110)),
         "version": __version__,
-        "never": repr(NEVER_FAILED),
-        "same_moment": repr(SAME_MOMENT),
         "advance": f"(run->needs_parts == 1 ? {IN_PARTS} : {WHOLE})" if program.chooses_parts else WHOLE,
-        "signal_rows": str(SIGNAL_ROWS),
-        "state_count": str(len(states)),
-        "parameter_count": str(len(parameters)),
-        "count_count": str(len(COUNTS)),
-        "output_count": str(len(program.outputs)),
-        "metric_count": str(len(program.metrics)),
         "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),
         "outputs": _members((("time", "s", "since the start"), *((item, *OUTPUTS[item]) for item in program.outputs))),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
-        "prepare": "\n".join(f"    {line}" for line in library.preparation),
         "defaults": "\n".join(f"    settings->{item.name} = {item.value!r};" for item in library.settings),
-        "setting_count": str(len(library.settings)),
-        "other_program": "".join(f"\n        || {item}" for item in library.other_program),
-        "ranges": "\n".join([*map(_range, library.settings), *map(_related, library.relations)]),
+        "ranges": "\n".join(
+            f'    if (!({holds})) {{\n        return "{name}";\n    }}' for holds, name in conditions_of(library)
+        ),
         "read_outputs": "\n".join(
             f"    outputs->{item} = values[{place}];" for place, item in enumerate(program.outputs)
         ),
@@ -201,22 +240,32 @@ def _said(quantity: Quantity) -> str:
     return f"{quantity.summary or quantity.name}{'; ' if limits else ''}{limits}"
 
 
-def _refused(holds: str, name: str) -> str:
-    """Lines of C that name a setting unless something holds, which it does not for what is no number."""
-    return f'    if (!({holds})) {{\n        return "{name}";\n    }}'
+def other_program_of(library: Library) -> str:
+    """Conditions in C, each behind an ``or``, under which the settings ask for another program than this one."""
+    switched = [
+        f"({' || '.join(f'settings->{name} > 0.0' for name in item.names)}) != {'true' if item.is_above else 'false'}"
+        for item in library.switches
+    ]
+    return "".join(f"\n        || {item}" for item in (*switched, *library.other_program))
 
 
-def _related(item: Relation) -> str:
-    """Lines of C that refuse a setting that contradicts another."""
-    slack = f" {'-' if item.relation == 'at least' else '+'} {item.tolerance!r}" if item.tolerance else ""
-    holds = f"settings->{item.name} {_SIGNS[item.relation]} settings->{item.other}{slack}"
-    return _refused(holds, item.name)
+def conditions_of(library: Library) -> list[tuple[str, str]]:
+    """What settings must keep, as text in C, with the setting that is named where it is not kept, as by no number."""
+    return [*map(_range, library.settings), *map(_related, library.relations)]
 
 
-def _range(item: Setting) -> str:
-    """Lines of C that refuse a value that the declaration does not allow, or that is no number."""
+def _related(item: Relation) -> tuple[str, str]:
+    """That a setting does not contradict another."""
+    other, sign = f"settings->{item.other}", "-" if item.relation == "at least" else "+"
+    if item.tolerance:
+        other = f"{other} * (1.0 {sign} {item.tolerance!r})" if item.is_share else f"{other} {sign} {item.tolerance!r}"
+    return f"settings->{item.name} {_SIGNS[item.relation]} {other}", item.name
+
+
+def _range(item: Setting) -> tuple[str, str]:
+    """That a setting is a number that the declaration allows."""
     quantity, value = item.quantity, f"settings->{item.name}"
     sign = ">=" if quantity.minimum_allowed else ">"
     low = max(quantity.minimum, -sys.float_info.max)
     high = min(quantity.maximum, sys.float_info.max)
-    return _refused(f"{value} {sign} {low!r} && {value} <= {high!r}", item.name)
+    return f"{value} {sign} {low!r} && {value} <= {high!r}", item.name

@@ -3,19 +3,22 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
-from ppafo.engine.lane_meters import TRACED
+from ppafo.engine.lane_meters import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_rows import indent
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics.catalog import METRICS
-from ppafo.metrics.metric import MetricKind, Readings
+from ppafo.metrics.metric import Floats, Readings
+from ppafo.signals.meter import MeterKind
 from ppafo.simulation.ensemble.running import ThermalTotals, Totals, has_channels, thermal_totals, totals
 from ppafo.translation.c99 import c_source, documents_of
 from ppafo.translation.one_run import one_run_collector
 from ppafo.translation.walk import walk_module
+from ppafo.walking.stride_meters import stride_metrics_of
 
 COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
 """Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.
@@ -26,8 +29,34 @@ Further = Callable[[SourceCollector], str]
 """Writes a further composed function, once it has gathered what that calls."""
 WHOLE, IN_PARTS = "advance", "advance_in_parts"
 """Names of the lane loops in C: of whole steps or of the one there is, and of steps in parts where there are both."""
+TOGETHER = "_together"
+"""Stands behind the name of a lane loop of several runs at once."""
 _STEPS = {WHOLE: "AT_STEP", IN_PARTS: "AT_PARTED"}
 METRICS_ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], int64, float64[::1])")'
+
+
+class MeteredMetric(Protocol):
+    """A metric that is read from meters alone: a ``MetricKind`` of no trace, or a ``StrideMetric``."""
+
+    @property
+    def name(self) -> str:
+        """Its name, also in C."""
+
+    @property
+    def unit(self) -> str:
+        """Its SI unit."""
+
+    @property
+    def summary(self) -> str:
+        """What it is."""
+
+    @property
+    def read(self) -> Callable[[Readings], Floats]:
+        """The function from meters to the value."""
+
+    @property
+    def meters(self) -> tuple[MeterKind, ...]:
+        """What goes through the samples for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +64,7 @@ class ExportedProgram:
     """A program with meters for all its metrics, and traces of all its outputs."""
 
     program: Program
-    metrics: tuple[MetricKind, ...]
+    metrics: tuple[MeteredMetric, ...]
 
     @property
     def loops(self) -> dict[str, Program]:
@@ -70,12 +99,24 @@ class ExportedProgram:
 
 def exported(program: Program) -> ExportedProgram:
     """The program as it is exported; a metric that needs the whole course of a channel is left out."""
-    metrics = tuple(kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
+    missing = _missing(program)
+    metrics: tuple[MeteredMetric, ...]
+    if program.walks:
+        metrics = stride_metrics_of(program.takes_course, "reference" not in missing)
+    else:
+        metrics = tuple(kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
     meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
-    missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
-    missing |= set() if program.has_reference else {"reference"}
-    outputs = tuple(name for name in TRACED if name not in missing)
+    outputs = (*(name for name in TRACED if name not in missing), *walk_traces(program))
     return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
+
+
+def _missing(program: Program) -> set[str]:
+    """Channels that a program does not have."""
+    missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
+    if program.walks:
+        states = (path for name, row in program.state_rows().items() for path in leaf_paths(row, name))
+        return missing if REQUEST in states else missing | {"reference"}
+    return missing if program.has_reference else missing | {"reference"}
 
 
 def places_of(groups: Mapping[str, type]) -> dict[str, str]:
@@ -84,17 +125,28 @@ def places_of(groups: Mapping[str, type]) -> dict[str, str]:
     return {path: f"AT_{re.sub(r'[^A-Za-z0-9]+', '_', path).strip('_').upper()}" for path in paths}
 
 
-def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: Further | None = None) -> str:
-    """All functions of an exported program in C; ``further`` may add one that takes ``settings``, which are named."""
+def c_text(
+    item: ExportedProgram, title: str, settings: Sequence[str], further: Further | None = None, together: int = 0
+) -> str:
+    """All functions of an exported program in C; ``further`` may add one that takes ``settings``, which are named.
+
+    With ``together`` each lane loop stands there once more, with ``TOGETHER`` after its name, for so many runs at once.
+    """
     collector = one_run_collector(INLINE)
     entries = [metrics_entry(item, collector), *([] if further is None else [further(collector)])]
     loops = [lane_loop(program, collector, name, lanes=1) for name, program in item.loops.items()]
+    if together:
+        loops += [lane_loop(program, collector, name + TOGETHER, together) for name, program in item.loops.items()]
     composed = "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
     state, parameter = list(item.state_places.values()), list(item.parameter_places.values())
     alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
     steps = {name: _stepping(program, _STEPS[name]) for name, program in item.loops.items()}
     places = {
-        **{f"{name}.x": [*state, *parameter, *stepping] for name, stepping in steps.items()},
+        **{
+            f"{name}{ending}.x": [*state, *parameter, *stepping]
+            for name, stepping in steps.items()
+            for ending in ("", TOGETHER)
+        },
         "states": state,
         "first": state,
         "parameters": alone,

@@ -1,4 +1,4 @@
-"""A scenario as a functional mock-up unit for co-simulation: sources inside, no Python at run time."""
+"""A scenario or a walk as a functional mock-up unit for co-simulation: sources inside, no Python at run time."""
 
 import hashlib
 import html
@@ -9,13 +9,15 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 
 from ppafo.errors import ScenarioError, nearest_name
-from ppafo.exports.c_library import scenario_library
+from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
+from ppafo.exports.fmu import component
 from ppafo.exports.fmu.binaries import FLAGS, PLATFORMS, Platform, build
 from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
 from ppafo.exports.fmu.variables import Interface, change_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
+from ppafo.walking.configuration import Configuration
 
 _MARK = re.compile(r"@(\w+)@")
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
@@ -56,23 +58,26 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     }
     if fmi == 3:
         contents["sources/buildDescription.xml"] = build_description_of_fmi3(identifier, " ".join(FLAGS[1:]))
+    if "wasm32" in chosen:
+        contents[f"{component.FOLDER}/manifest.xml"] = component.MANIFEST
     for name, item in chosen.items():
         folder = item.folder_2 if fmi == 2 else item.folder_3
         contents[f"binaries/{folder}/{identifier}{item.suffix}"] = build(name, sources, main)
     return {f"{identifier}.fmu": _archive(contents)}
 
 
-def closed_loop(scenario: Scenario) -> Interface:
-    """The whole scenario, its controller within: no inputs."""
-    library = scenario_library(scenario)
+def closed_loop(item: Scenario | Configuration) -> Interface:
+    """The whole scenario or walk, its controller within: no inputs."""
+    library = library_of(item)
+    times = {setting.path: setting.value for setting in library.settings}
     return Interface(
-        name=scenario.name,
+        name=item.name,
         library=library,
         template="closed_loop.c",
         time=_LOOP_TIME,
         tuning=_LOOP_TUNING,
-        step=scenario.output_interval,
-        duration=scenario.duration,
+        step=times["run.output_interval"],
+        duration=times["run.duration"],
         outputs=library.program.outputs,
         shows_metrics=True,
         is_step_fixed=False,

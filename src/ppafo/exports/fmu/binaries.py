@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ppafo.errors import ProgramError
+from ppafo.exports.fmu import component
 from ppafo.translation.native import asked, complaint
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
@@ -37,6 +38,7 @@ PLATFORMS = {
     "linux-aarch64": Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "run under qemu"),
     "darwin64": Platform("darwin64", "x86_64-darwin", "x86_64-macos", ".dylib", "not run"),
     "darwin-aarch64": Platform(None, "aarch64-darwin", "aarch64-macos", ".dylib", "not run"),
+    "wasm32": Platform(None, "wasm32-wasip2", "wasm32-wasi", ".wasm", "after a draft, fmi-ls-wasm; run under wasmtime"),
 }
 """Platforms by the name under which they are asked for."""
 
@@ -53,12 +55,19 @@ def host_platform() -> str | None:
 
 def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
     """The library of a unit for a platform. ProgramError where no compiler is there for it, or it refuses."""
-    command = [*compiler_for(name), *FLAGS, *HIDDEN]
+    if name == "wasm32":
+        around = component.sources_of_component(sources, main)
+        return component.component_of(_built(name, around, component.SOURCE, component.FLAGS))
+    return _built(name, sources, main, HIDDEN)
+
+
+def _built(name: str, sources: Mapping[str, bytes], main: str, flags: Sequence[str]) -> bytes:
+    command = [*compiler_for(name), *FLAGS, *flags]
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
         library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
-        mathematics = [] if name == "win64" else ["-lm"]
+        mathematics = [] if name in ("win64", "wasm32") else ["-lm"]
         done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder)
         if done.returncode != 0:
             raise ProgramError(f"{command[0]} does not build the unit for {name}: {complaint(done)}")

@@ -3,19 +3,32 @@
 from dataclasses import replace
 
 from ppafo.control.catalog import PROFILES
+from ppafo.control.controllers import constant
 from ppafo.engine.lanes import SIGNAL_ROWS
-from ppafo.exports.c_library import scenario_library
+from ppafo.exports.c_library import scenario_library, walk_library
+from ppafo.exports.c_library.files import Library
+from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.exports.fmu.variables import Input, Interface
+from ppafo.model.command import VENT
+from ppafo.model.sensors import SensorParameters
 from ppafo.simulation.preparation import step_counts
 from ppafo.simulation.scenario import Control, FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Sensors
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.declaration import WALK_SENSORS
+from ppafo.walking.sensor_settings import FaultSettings, SensorSettings, sensors_of
+from ppafo.walking.walk import walk_duration
 
 COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0)
+WALKING_COMMAND = Input(
+    "command", "-", "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both", VENT
+)
 TIME = (
     "Inputs are taken at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
     "divides it further where its error asks for that. {motion} There is no end."
 )
 LED = "From there on the angle goes on with the angular velocity that is given; the next step begins at the next angle."
 FREE = "The external torque is constant until the next one."
+ON_LEG = "The leg walks on by its gait."
 TUNING = "They are taken at the next communication step."
 
 _FOLLOW_ANGLE = """\
@@ -30,14 +43,47 @@ _LEAD_ANGLE = """\
     rows[PARAMETER_PATH_RAMP_TIME] = 2.0 * length;"""
 
 
-def plant_alone(scenario: Scenario) -> Interface:
-    """The plant; a free vane takes an external torque, one whose angle is prescribed takes angle and rate."""
+def plant_alone(item: Scenario | Configuration) -> Interface:
+    """The plant; a free vane takes an external torque, one whose angle is prescribed takes angle and rate.
+
+    That of a walk is the device on its walking leg, which takes the command alone.
+    """
+    return _walking_plant(item) if isinstance(item, Configuration) else _plant(item)
+
+
+def _walking_plant(configuration: Configuration) -> Interface:
+    check_can_leave(configuration)
+    chosen = _walk_of_plant(configuration)
+    library = walk_library(chosen)
+    return Interface(
+        name=chosen.name,
+        library=library,
+        template="plant.c",
+        time=TIME.format(motion=ON_LEG),
+        tuning=TUNING,
+        step=chosen.step,
+        duration=walk_duration(configuration),
+        outputs=tuple(name for name in library.program.outputs if name not in ("command", "reference")),
+        shows_metrics=False,
+        is_step_fixed=True,
+        clock=None,
+        hidden=_hidden(library),
+        inputs=(WALKING_COMMAND,),
+        words={"signal_rows": str(SIGNAL_ROWS), "highest": repr(VENT), "follow": "", "lead": ""},
+    )
+
+
+def _hidden(library: Library) -> frozenset[str]:
+    """Settings that are none of the unit's variables."""
+    hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
+    unused = ("sensors.", "motion.profile.", "motion.external_torque")
+    return frozenset(hidden | {item.path for item in library.settings if item.path.startswith(unused)})
+
+
+def _plant(scenario: Scenario) -> Interface:
     chosen = _scenario_of_plant(scenario)
     library = scenario_library(chosen)
     is_led = isinstance(chosen.motion, PrescribedMotion)
-    hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
-    hidden |= {item.path for item in library.settings if item.path.startswith(("sensors.", "motion.profile."))}
-    hidden |= {"motion.external_torque"}
     unseen = {"command", *(("angle", "angular_velocity") if is_led else ())}
     return Interface(
         name=chosen.name,
@@ -51,10 +97,11 @@ def plant_alone(scenario: Scenario) -> Interface:
         shows_metrics=False,
         is_step_fixed=True,
         clock=None,
-        hidden=frozenset(hidden),
+        hidden=_hidden(library),
         inputs=_inputs(chosen),
         words={
             "signal_rows": str(SIGNAL_ROWS),
+            "highest": "1.0",
             "follow": _FOLLOW_ANGLE if is_led else "    settings->motion_external_torque = inputs[1];",
             "lead": _LEAD_ANGLE if is_led else "    rows[PARAMETER_PLANT_EXTERNAL_TORQUE] = inputs[1];",
         },
@@ -78,6 +125,31 @@ def _scenario_of_plant(scenario: Scenario) -> Scenario:
         control=Control("constant", {"command": 0.0}, step),
         sensors=Sensors(),
         motion=motion,
+    )
+
+
+def _walk_of_plant(configuration: Configuration) -> Configuration:
+    """The walk with a command that is handed in at every step, and sensors that nobody looks at."""
+    step = step_counts(1.0, configuration.step, 1.0, configuration.period).step
+    given = configuration.sensor_settings
+    assert given is not None, "checked before"
+    numbers = {item.name: item.default or 0.0 for item in WALK_SENSORS}
+    # The forces under the foot are among the outputs.
+    numbers["force_bandwidth"] = given.numbers["force_bandwidth"]
+    sensors = SensorSettings(numbers, {sensor: FaultSettings() for sensor in given.faults})
+    return replace(
+        configuration,
+        name=f"{configuration.name}-plant",
+        description=f"The plant alone of this walk, on its leg: {configuration.description}",
+        controller=constant.KIND,
+        settings={"command": 0.0},
+        period=step,
+        step=step,
+        sensors=SensorParameters(
+            angle_noise=0.0, pressure_noise=0.0, angle_quantum=0.0, pressure_quantum=0.0, seed=1.0
+        ),
+        sensor_settings=sensors,
+        gait_sensors=sensors_of(sensors, step),
     )
 
 

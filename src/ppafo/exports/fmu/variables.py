@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting
 
-FIXED_SECTIONS = ("run", "initial", "gas", "actuator", "foot_plate", "motion", "motion.profile")
+FIXED_SECTIONS = ("run", "initial", "gas", "actuator", "foot_plate", "wearer", "motion", "motion.profile")
 """Settings that the start of a run is made of: they cannot change under way."""
 FIXED_NAMES = ("period", "delay", "seed")
 """So cannot these, which count steps or begin the noise."""
-STEPPED = ("command", "reference")
+TUNABLE_OF_WEARER = ("residual_share", "ankle_stiffness", "ankle_rest_angle", "ankle_damping")
+"""Of the wearer these may: what a leg weighs stays."""
+STEPPED = ("command", "reference", "strides", "contact", "controller_phase", "safe_state")
 """Outputs that jump from sample to sample."""
 
 
@@ -70,6 +72,8 @@ def change_of(interface: Interface, setting: Setting) -> str:
     if setting.path in interface.hidden:
         return "h"
     section, _, name = setting.path.rpartition(".")
+    if section == "wearer" and name in TUNABLE_OF_WEARER:
+        return "t"
     return "f" if section in FIXED_SECTIONS or name in FIXED_NAMES else "t"
 
 

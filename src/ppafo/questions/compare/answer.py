@@ -7,6 +7,7 @@ from typing import Any
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_difference, display_unit
 from ppafo.answers.shown_metrics import metric_column, metric_quantity
+from ppafo.live.workbench import live_part
 from ppafo.questions.compare.figure import change_figure, has_changes, has_errors, pareto_figure
 from ppafo.questions.compare.paired import Paired, pareto_front
 from ppafo.questions.compare.solve import COMPARED, Case, Comparison
@@ -50,6 +51,7 @@ def answer_of(comparison: Comparison) -> Answer:
         ),
         data=_data(comparison),
         passed=all(case.status.is_completed for case in comparison.cases),
+        live=lambda: live_part([case.scenario for case in comparison.cases]),
     )
 
 

@@ -85,7 +85,7 @@ def _point_table(model: LinearModel) -> Table:
     kinds = (("state", model.states), ("input", model.inputs))
     rows = [(kind, item.name, item.unit, _shown(item)) for kind, items in kinds for item in items]
     rows += [("output", item.name, item.unit, _shown(item)) for item in model.outputs if item.name not in states]
-    return Table((Column(""), Column("name"), Column("unit"), Column("value")), tuple(rows), left=3)
+    return Table((Column(""), Column("name"), Column("unit in the model"), Column("at the point")), tuple(rows), left=3)
 
 
 def _edges(model: LinearModel) -> tuple[str, ...]:

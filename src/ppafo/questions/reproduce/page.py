@@ -1,4 +1,4 @@
-"""The page that tells a reader of the paper what came of running it again; one file, no scripts, nothing to fetch."""
+"""The page that tells a reader of the paper what came of running it again; one file, nothing to fetch."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -8,6 +8,7 @@ from ppafo.answers.page import inline_figure, render_page
 from ppafo.answers.shown_metrics import metric_level
 from ppafo.answers.typesetting import format_printed_quantity, quantity, sentence
 from ppafo.identification.estimate import Estimate
+from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding
@@ -20,6 +21,7 @@ from ppafo.questions.reproduce.synthetic import STEP_PRESET, TASK_PRESET, NoEvid
 from ppafo.questions.unreported.answer import ERRORS, conclusion_rows, setting_rows
 from ppafo.questions.unreported.implications import conclusions
 from ppafo.simulation.result import Result
+from ppafo.simulation.scenario import Scenario
 
 TEMPLATE = "reproduction.html.jinja"
 
@@ -66,9 +68,15 @@ def reproduction_page(
         "assumed_groups": _assumed_groups(reproduction.assumed),
         "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
         "steps": _steps((reproduction.step, reproduction.solenoid, reproduction.proportional)),
+        "live": live_part(_live_scenarios(reproduction)),
         "command": shlex.join(_command(reproduction.overrides)),
     }
     return render_page(TEMPLATE, values, "ppafo.questions.reproduce")
+
+
+def _live_scenarios(reproduction: Reproduction) -> list[Scenario]:
+    """The scenarios that the page simulates again: as they were run, with what was changed."""
+    return [result.scenario for result in (reproduction.solenoid, reproduction.proportional, reproduction.step)]
 
 
 def holding_torque(result: Result) -> float:

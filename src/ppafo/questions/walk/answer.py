@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, title_with_unit
+from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.endurance.solve import Endurance
@@ -52,6 +53,9 @@ _ROWS = (
 )
 """Metric, title, kind of quantity and digits behind the point of each row."""
 
+_SAME_RATE = 0.1
+"""Rates of a foot [rad/s] that differ by less are alike."""
+
 _EXPLAINED = (
     "'Without' is the same wearer with the same device and both chambers vented. 'Healthy' is the gait itself. The "
     "first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "
@@ -90,7 +94,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
     configuration = worn.configuration
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     bottles = (bottle_remark(worn), _bottle(pair.life))
-    remarks = [*person_remarks(configuration), *bottles, *_safety(worn), trust_remark(configuration)]
+    remarks = [*person_remarks(configuration), *bottles, *_safety(worn), _slap(comparison), trust_remark(configuration)]
     remarks += [
         f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
     ]
@@ -125,6 +129,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
             **course_files(comparison),
             **bottle_files(worn),
         },
+        live=lambda: live_part([configuration, bare.configuration]),
     )
 
 
@@ -163,6 +168,17 @@ def _cell(metric: Metric | None, quantity: str, digits: int) -> str | None:
         return None
     text = f"{display_value(metric.value, quantity):.{digits}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _slap(comparison: Comparison) -> str:
+    """Return what is to be known of a slap that is worse with the device, "" where it is not."""
+    worn, bare = (side.metrics.get("slap_rate") for side in (comparison.with_device, comparison.without_device))
+    if worn is None or bare is None or worn.value > bare.value - _SAME_RATE:
+        return ""
+    return (
+        "remark: the foot comes down faster than without the device: it is lifted, and falls further; 'ppafo timing' "
+        "says what it comes from"
+    )
 
 
 def _along(configuration: Configuration) -> str:

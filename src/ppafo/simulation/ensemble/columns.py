@@ -22,6 +22,7 @@ _TEXTS = (
     "supply.relieving",
     "motion.kind",
     "controller.kind",
+    declaration.ARITHMETIC,
     "reference.kind",
     "motion.profile.kind",
 )
@@ -85,7 +86,7 @@ def _check_together(base: Scenario, values: Mapping[str, Floats]) -> None:
     if {"controller.rate", "controller.period"} <= set(values):
         raise ScenarioError(f"{base.name}: vary either controller.rate or controller.period, not both")
     for section in ("valve", "actuator.leak"):
-        form = other_form(base, section)
+        form = other_form(base.device, section)
         given = [name for name in form if f"{section}.{name}" in values]
         own = [
             name

@@ -11,12 +11,13 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch, Floats
 from ppafo.engine.run import Members, batches_of
 from ppafo.errors import ScenarioError
+from ppafo.model.columns import Problem
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.ensemble.columns import Columns, TimeTexts, clock_of, clock_with, time_texts, varied_scenario
 from ppafo.simulation.ensemble.rules import RULES, Rule
 from ppafo.simulation.numbers import TIMES
-from ppafo.simulation.plan import Problem, plan_runs
+from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.reading import limits
 from ppafo.simulation.scenario import Scenario
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.lanes import Floats
-from ppafo.model.columns import at
+from ppafo.model.columns import Problem, at
 from ppafo.parameters.building import consistency
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY
 from ppafo.simulation.motion import TOLERANCE, profile_problem
 from ppafo.simulation.numbers import HELD_ANGLE
-from ppafo.simulation.plan import Problem, profile_bounds
+from ppafo.simulation.plan import profile_bounds
 from ppafo.simulation.reading import quantity_text
 from ppafo.simulation.scenario import FreeMotion, ProfileChoice, Scenario
 

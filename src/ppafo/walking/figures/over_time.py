@@ -10,7 +10,8 @@ from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.signals.recording import Floats
-from ppafo.walking.configuration import NEVER, Configuration
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.sensor_settings import NEVER
 from ppafo.walking.walk import WalkResult
 
 if TYPE_CHECKING:

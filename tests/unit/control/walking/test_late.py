@@ -86,6 +86,13 @@ def test_a_foot_that_slaps_after_it_was_lifted_through_its_strike_is_no_sign() -
     assert watched([0.0] * 7, ankle, shares, toes=0.085)[-1].ventings == 0.0
 
 
+def test_a_foot_that_turns_up_slowly_before_it_lands_nearly_flat_is_no_sign() -> None:
+    """One of a thousand wearers: 2 deg up in the air, and 2 more on a heel whose force rises slowly."""
+    shares = (0.0, 0.025, 0.085, 0.40, 0.46, 0.63, 0.75, 0.945, 1.0)
+    ankle = (1.767, 1.726, 1.613, 1.35, 1.33, 1.92, 1.478, 1.799, 1.767)
+    assert watched([0.0] * 7, ankle, shares)[-1].ventings == 0.0
+
+
 FED, FILLS, EMPTIES = 0.06, 4.0e6, 0.05
 IN_THE_AIR = PhaseState(SWING, Switch(0.0, 0.0), Switch(0.0, 0.0), 0.1, 0.7, 1.0, 5.0)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.engine.lanes import BatchResult
+from ppafo.engine.lanes import BatchResult, run_batch
 from ppafo.errors import SimulationError
 from ppafo.questions.bits import runs, solve
 from ppafo.simulation.loading import list_scenarios
@@ -28,12 +28,23 @@ def test_every_scenario_and_walk_has_golden_hashes_and_the_quick_ones_are_among_
     assert len({hashes["draws"] for hashes in golden.values()}) == len(golden)
 
 
-def test_numba_finds_the_golden_bits_of_the_torque_task_on_this_computer(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bits", CHEAP, "--json"]) == 0
+@pytest.mark.parametrize("name", [CHEAP, "solenoid", "proportional"])
+def test_numba_finds_the_golden_bits_on_this_computer(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bits", name, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["differs"] == {}
-    assert document["hashes"][CHEAP] == solve.golden_hashes()[CHEAP]
+    assert document["hashes"][name] == solve.golden_hashes()[name]
     assert document["compiler"].startswith("Numba ")
+
+
+@pytest.mark.parametrize("name", [CHEAP, "solenoid"])
+def test_a_draw_has_the_same_bits_in_a_block_and_alone(name: str) -> None:
+    batch = runs.drawn_batch(runs.plain_batch(name), 100)
+    together = run_batch(batch).states
+    for run in range(100):
+        column = slice(run, run + 1)
+        alone = replace(batch, parameters=batch.parameters[:, column].copy(), states=batch.states[:, column].copy())
+        assert np.array_equal(run_batch(alone).states[:, 0], together[:, run], equal_nan=True), run
 
 
 @needs_gcc

@@ -2,7 +2,7 @@
  *
  * @description@
  *
- * Written by ppafo @version@. Everything is in SI units; angles are those of the scenario, pressures absolute.
+ * Written by ppafo @version@. Everything is in SI units; angles as in ppafo, pressures absolute.
  *
  *     @name@_settings settings;
  *     @name@_defaults(&settings);

@@ -19,7 +19,7 @@ static void lead(unit *item, double time, double length)
     const double command = inputs[0] < -1.0 ? -1.0 : inputs[0];
     (void)time;
     (void)length;
-    rows[PARAMETER_CONTROLLER_COMMAND] = command > 1.0 ? 1.0 : command;
+    rows[PARAMETER_CONTROLLER_COMMAND] = command > @highest@ ? @highest@ : command;
 @lead@
 }
 
@@ -71,12 +71,13 @@ static bool take_first_sample(unit *item)
     return do_steps(item, 0);
 }
 
-/* Go on to a time since the start that is a whole number of steps of the engine, to a thousandth. */
+/* Go on to a time since the start that is a whole number of run.step, to a thousandth; the engine may divide these. */
 static bool go_to(unit *item, double time)
 {
-    const double step = item->run->parameters[PARAMETER_TIMING_STEP];
+    const double step = item->run->parameters[PARAMETER_TIMING_PERIOD];
+    const int64_t parts = item->run->steps_per_sample;
     const double wanted = time / step;
-    const double done = (double)item->run->steps_done;
+    const double done = (double)(item->run->steps_done / parts);
     int64_t until;
     if (!(wanted >= done - 1.0e-3 && wanted < 1.0e15)) {
         return refuse(item, "time %g s cannot be reached from %g s", time, item->now.time);
@@ -89,9 +90,9 @@ static bool go_to(unit *item, double time)
     if (!are_inputs_numbers(item) || (item->now.is_stale && !renew(item))) {
         return false;
     }
-    if (until > item->run->steps_done) {
+    if (until * parts > item->run->steps_done) {
         lead(item, done * step, ((double)until - done) * step);
-        if (!do_steps(item, until - item->run->steps_done)) {
+        if (!do_steps(item, until * parts - item->run->steps_done)) {
             return false;
         }
     }

@@ -140,12 +140,23 @@ static bool begin(unit *item)
     return !item->now.is_stale;
 }
 
+/* True where the steps of a run, and delays in them, stay as they are. */
+static bool keeps_steps(const @name@_run *run, const prepared_run *prepared)
+{
+    return run->steps_per_sample == (int64_t)prepared->counts[COUNT_STEPS_PER_SAMPLE]
+        && run->signal_delay == (int64_t)prepared->counts[COUNT_SIGNAL_DELAY]
+        && run->command_delay == (int64_t)prepared->counts[COUNT_COMMAND_DELAY];
+}
+
 /* Let the run know of parameters that were changed under way. */
 static bool renew(unit *item)
 {
     prepared_run prepared;
     if (!prepare_unit(item, &prepared)) {
         return false;
+    }
+    if (!keeps_steps(item->run, &prepared)) {
+        return refuse(item, "these parameters ask for other steps of the engine: set them before the start");
     }
     memcpy(item->run->parameters, prepared.parameters, sizeof(prepared.parameters));
     item->run->needs_parts = prepared.counts[COUNT_NEEDS_PARTS] != 0.0 ? 1 : 0;

@@ -19,7 +19,8 @@ from ppafo.questions.league.walking.task import WalkingTask
 from ppafo.studies.noise import other_noise
 from ppafo.walking.anthropometry import Build, draw_builds
 from ppafo.walking.configuration import Configuration
-from ppafo.walking.planning import plan_walk, vented_state, with_leg
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.preparation import vented_state, with_leg
 from ppafo.walking.varied_gait import VariedGaits, draw_gaits
 from ppafo.walking.walk import plan_of
 from ppafo.walking.wearers_rows import batch_of_many

@@ -167,7 +167,7 @@ def _accelerations(
 
 def _flat_angle(walk: Walk, now: GaitNow) -> float:
     """Ankle angle [rad] with which the foot is flat."""
-    return prescribed_ankle(FLAT, now, walk.timing.ground_angle).angle
+    return prescribed_ankle(FLAT, now, walk.timing.ground_angle, keeps_gait=0.0).angle
 
 
 def _toe_height(path: AnklePath, stride: Stride, place: int, angle: Any) -> Any:

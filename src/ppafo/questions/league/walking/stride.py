@@ -150,11 +150,11 @@ def _contact(timing: GaitTiming, landing: float, phase: float) -> float:
 def _prescribed_ankle(walk: Walk, contact: float, phase: float) -> ground.Ankle:
     """Where the ground leads the ankle: after the heel's rise what is left of the difference to the measured ankle."""
     timing = walk.timing
-    ankle = ground.prescribed_ankle(contact, _at(walk, phase), timing.ground_angle)
+    ankle = ground.prescribed_ankle(contact, _at(walk, phase), timing.ground_angle, keeps_gait=0.0)
     if contact != ground.TOE:
         return ankle
     rise = _at(walk, timing.heel_off)
-    flat = ground.prescribed_ankle(ground.FLAT, rise, timing.ground_angle)
+    flat = ground.prescribed_ankle(ground.FLAT, rise, timing.ground_angle, keeps_gait=0.0)
     since = (phase - 1.0 - timing.heel_off) / timing.frequency
     offset = (flat.angle - rise.ankle) * float(np.exp(-since / ground.FADING_TIME))
     return ground.Ankle(ankle.angle + offset, ankle.rate - offset / ground.FADING_TIME, ankle.acceleration)

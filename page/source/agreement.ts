@@ -1,0 +1,156 @@
+/** How far a run is from a recording, by the rules of `ppafo validate`: common delay, weights by time, full ranges. */
+
+/** One channel of both: measured values at their times, the model's at its own, and the full range. */
+export interface Curve {
+  readonly times: Float64Array;
+  readonly values: Float64Array;
+  readonly modelTimes: Float64Array;
+  readonly modelValues: Float64Array;
+  readonly fullRange: number;
+}
+
+export interface Delay {
+  readonly value: number;
+  readonly isAtLimit: boolean;
+}
+
+export interface ChannelAgreement {
+  readonly rms: number;
+  readonly bias: number;
+  readonly largest: number;
+  readonly fraction: number;
+}
+
+export const LONGEST_DELAY = 0.02;
+export const ACCEPTABLE_FRACTION = 0.1;
+const SHIFTS = 81;
+const MOST_SAMPLES = 4000;
+const LEAST_GAIN = 25;
+const SMALLEST_GAIN = 1e-12;
+const RESOLUTION = 0.02;
+const GOLDEN = 0.6180339887498949;
+const REFINEMENTS = 30;
+const AT_LIMIT = 0.99;
+const LONGEST_WEIGHT = 3;
+
+/** Errors with the model shifted by a delay [s]. */
+export function channelAgreement(curve: Curve, delay: number): ChannelAgreement {
+  const weights = sampleWeights(curve.times);
+  const model = shifted(curve, delay);
+  let [squares, bias, largest] = [0, 0, 0];
+  for (let place = 0; place < model.length; place += 1) {
+    const error = (model[place] ?? 0) - (curve.values[place] ?? 0);
+    squares += (weights[place] ?? 0) * error * error;
+    bias += (weights[place] ?? 0) * error;
+    if (Math.abs(error) > Math.abs(largest)) largest = error;
+  }
+  const rms = Math.sqrt(squares);
+  return { rms, bias, largest, fraction: rms / curve.fullRange };
+}
+
+/** The delay [s] that brings the channels together best; 0 where none can be seen. */
+export function estimateDelay(curves: readonly Curve[], limit = LONGEST_DELAY): Delay {
+  const first = curves[0];
+  if (limit <= 0 || first === undefined) return { value: 0, isAtLimit: false };
+  const thinned = curves.map(thin);
+  const shifts = Array.from({ length: SHIFTS }, (_, place) => -limit + (2 * limit * place) / (SHIFTS - 1));
+  const costs = shifts.map((shift) => cost(thinned, shift));
+  const best = costs.indexOf(Math.min(...costs));
+  const value = minimum(thinned, shifts[Math.max(0, best - 1)] ?? 0, shifts[Math.min(SHIFTS - 1, best + 1)] ?? 0);
+  if (Math.abs(value) < RESOLUTION * median(differences(first.times)) || !isSignificant(thinned, value)) {
+    return { value: 0, isAtLimit: false };
+  }
+  return { value, isAtLimit: Math.abs(value) > AT_LIMIT * limit };
+}
+
+function isSignificant(curves: readonly Curve[], delay: number): boolean {
+  const later = cost(curves, delay);
+  const gain = cost(curves, 0) - later;
+  const samples = curves.reduce((sum, curve) => sum + curve.times.length, 0);
+  return gain > SMALLEST_GAIN && gain * samples > LEAST_GAIN * later;
+}
+
+function minimum(curves: readonly Curve[], from: number, to: number): number {
+  let [low, high] = [from, to];
+  let [left, right] = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+  let [costLeft, costRight] = [cost(curves, left), cost(curves, right)];
+  for (let round = 0; round < REFINEMENTS; round += 1) {
+    if (costLeft <= costRight) {
+      [high, right, costRight] = [right, left, costLeft];
+      left = high - GOLDEN * (high - low);
+      costLeft = cost(curves, left);
+    } else {
+      [low, left, costLeft] = [left, right, costRight];
+      right = low + GOLDEN * (high - low);
+      costRight = cost(curves, right);
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+function cost(curves: readonly Curve[], delay: number): number {
+  let sum = 0;
+  for (const curve of curves) {
+    const model = shifted(curve, delay);
+    let squares = 0;
+    for (let place = 0; place < model.length; place += 1) {
+      const error = ((model[place] ?? 0) - (curve.values[place] ?? 0)) / curve.fullRange;
+      squares += error * error;
+    }
+    sum += squares / model.length;
+  }
+  return sum / curves.length;
+}
+
+function thin(curve: Curve): Curve {
+  const step = Math.ceil(curve.times.length / MOST_SAMPLES);
+  const kept = (values: Float64Array) => values.filter((_, place) => place % step === 0);
+  return { ...curve, times: kept(curve.times), values: kept(curve.values) };
+}
+
+/** The model, a delay [s] later, at the times of the measurement; before and after its own it stands still. */
+function shifted(curve: Curve, delay: number): Float64Array {
+  return interpolated(curve.times, delay, curve.modelTimes, curve.modelValues);
+}
+
+/** Values of a curve at `times - delay`, which grow, by straight lines. */
+export function interpolated(times: Float64Array, delay: number, knots: Float64Array, values: Float64Array): Float64Array {
+  const found = new Float64Array(times.length);
+  const last = knots.length - 1;
+  let below = 0;
+  for (let place = 0; place < times.length; place += 1) {
+    const time = (times[place] ?? 0) - delay;
+    while (below < last - 1 && (knots[below + 1] ?? 0) <= time) below += 1;
+    const [x0, x1] = [knots[below] ?? 0, knots[below + 1] ?? 0];
+    const [y0, y1] = [values[below] ?? 0, values[below + 1] ?? 0];
+    if (time <= (knots[0] ?? 0)) found[place] = values[0] ?? 0;
+    else if (time >= (knots[last] ?? 0)) found[place] = values[last] ?? 0;
+    else found[place] = ((y1 - y0) / (x1 - x0)) * (time - x0) + y0;
+  }
+  return found;
+}
+
+/** Fraction of the time for which each sample speaks, by the trapezoidal rule; gaps are not counted. */
+function sampleWeights(times: Float64Array): Float64Array {
+  const intervals = differences(times);
+  const most = LONGEST_WEIGHT * median(intervals);
+  const weights = new Float64Array(times.length);
+  let sum = 0;
+  intervals.forEach((interval, place) => {
+    const counted = Math.min(interval, most);
+    weights[place] = (weights[place] ?? 0) + 0.5 * counted;
+    weights[place + 1] = (weights[place + 1] ?? 0) + 0.5 * counted;
+    sum += counted;
+  });
+  return weights.map((weight) => weight / sum);
+}
+
+function differences(times: Float64Array): Float64Array {
+  return Float64Array.from({ length: times.length - 1 }, (_, place) => (times[place + 1] ?? 0) - (times[place] ?? 0));
+}
+
+export function median(values: Float64Array): number {
+  const sorted = values.slice().sort();
+  const middle = sorted.length >> 1;
+  return sorted.length % 2 === 1 ? (sorted[middle] ?? 0) : 0.5 * ((sorted[middle - 1] ?? 0) + (sorted[middle] ?? 0));
+}

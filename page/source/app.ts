@@ -1,0 +1,301 @@
+/** The page as a whole: its state, what is simulated again when it changes, and what shows it. */
+
+import { type Content, programNamed, type Program, type Tab } from "./content";
+import { Controls } from "./controls";
+import { say, whenQuiet } from "./dom";
+import { Engine, failedRun, type Run } from "./engine";
+import { Extras } from "./extras";
+import { Workers } from "./jobs";
+import { OutcomeTable } from "./outcome";
+import { type Overlay, Panels } from "./panels";
+import { changed, type Configuration, contradiction, normalText, settingsByKey, valuesOf } from "./settings";
+import { Stage } from "./stage";
+import { addressOf, firstState, History, MOST_CONFIGURATIONS, type State, stateOfAddress } from "./state";
+import { InputError } from "./units";
+import { unpacked } from "./unpacking";
+import { makeFrame, type PageFrame } from "./frame";
+import { bandOf } from "./variation";
+import type { Band } from "./panels";
+
+export interface Named {
+  readonly name: string;
+  readonly place: number;
+  readonly configuration: Configuration;
+}
+
+export class App {
+  state: State;
+  overlay: Overlay | null = null;
+  readonly workers: Workers;
+  private readonly history = new History();
+  private readonly engines = new Map<string, Engine>();
+  private readonly bytes = new Map<string, Promise<ArrayBuffer>>();
+  private readonly runs = new WeakMap<Configuration, Run>();
+  private readonly bands = new WeakMap<Configuration, ReadonlyMap<string, Band>>();
+  private readonly frame: PageFrame;
+  private readonly controls: Controls;
+  readonly panels: Panels;
+  private readonly outcome: OutcomeTable;
+  private readonly stage: Stage;
+  readonly extras: Extras;
+  private target: number | null = null;
+  private isBeside = false;
+  private hasBand = false;
+  private isDue = false;
+  private dragged: State | null = null;
+  private readonly settle = whenQuiet(250, () => this.settled());
+
+  constructor(
+    host: HTMLElement,
+    readonly content: Content,
+  ) {
+    this.state = firstState(content);
+    this.workers = new Workers((program) => this.bytesOf(program));
+    this.frame = makeFrame(host, content, this);
+    this.controls = new Controls(this.frame.controls, content, { change: (key, text, isDragging) => this.change(key, text, isDragging) });
+    const atmosphere = () => valuesOf(content, this.bench[0]!).get("supply.atmospheric_pressure") ?? 101325;
+    this.panels = new Panels(this.frame.panels, content, atmosphere, (time) => time !== null && this.stage.goTo(time, false));
+    this.stage = new Stage(this.frame.stage, (time) => this.panels.point(time));
+    this.outcome = new OutcomeTable(this.frame.outcome, content);
+    this.extras = new Extras(this.frame, this);
+    this.readAddress();
+    addEventListener("hashchange", () => this.readAddress());
+  }
+
+  get tab(): Tab {
+    return this.content.tabs[this.state.tab]!;
+  }
+
+  get bench(): readonly Configuration[] {
+    return this.state.benches[this.state.tab] ?? [];
+  }
+
+  /** The configurations of the tab with names that tell them apart. */
+  get named(): readonly Named[] {
+    const labels = this.bench.map(({ program }) => programNamed(this.content, program).label);
+    return this.bench.map((configuration, place) => {
+      const label = labels[place] ?? "";
+      const earlier = labels.slice(0, place).filter((other) => other === label).length;
+      return { name: earlier > 0 ? `${label} ${earlier + 1}` : label, place, configuration };
+    });
+  }
+
+  /** The run of a configuration, simulated where it was not before; null while its module is not there yet. */
+  runOf(configuration: Configuration): Run | null {
+    const known = this.runs.get(configuration);
+    if (known !== undefined) return known;
+    const program = programNamed(this.content, configuration.program);
+    const engine = this.engines.get(program.name);
+    if (engine === undefined) {
+      void this.load(program);
+      return null;
+    }
+    const values = valuesOf(this.content, configuration);
+    const wrong = contradiction(program, values);
+    const run = wrong === "" ? engine.run(values) : failedRun("refused", wrong);
+    this.runs.set(configuration, run);
+    return run;
+  }
+
+  private bytesOf(program: Program): Promise<ArrayBuffer> {
+    const known = this.bytes.get(program.module) ?? unpacked(document.getElementById(program.module)?.textContent ?? "");
+    this.bytes.set(program.module, known);
+    return known;
+  }
+
+  private async load(program: Program): Promise<void> {
+    const bytes = await this.bytesOf(program);
+    if (this.engines.has(program.name)) return;
+    this.engines.set(program.name, await Engine.of(program, bytes));
+    this.schedule();
+  }
+
+  /** Make a state the present one. What was before can be come back to, but for what is on the way. */
+  become(state: State, isOnTheWay = false): void {
+    if (!isOnTheWay) this.history.keep(this.dragged ?? this.state);
+    else this.dragged ??= this.state;
+    if (!isOnTheWay) this.dragged = null;
+    this.state = state;
+    this.schedule();
+    this.settle();
+  }
+
+  /** Change a setting of all configurations of the tab, or of the chosen one. Returns what is wrong, or an empty text. */
+  private change(key: string, text: string | null, isDragging: boolean): string {
+    try {
+      const bench = this.bench.map((configuration, place) => {
+        if (this.target !== null && place !== this.target) return configuration;
+        const setting = settingsByKey(programNamed(this.content, configuration.program)).get(key);
+        if (setting === undefined) return configuration;
+        const next = changed(configuration, key, text === null ? null : normalText(setting, text));
+        valuesOf(this.content, next);
+        return next;
+      });
+      this.becomeBench(bench, isDragging);
+      return "";
+    } catch (error) {
+      if (error instanceof InputError) return error.message;
+      throw error;
+    }
+  }
+
+  becomeBench(bench: readonly Configuration[], isOnTheWay = false): void {
+    const benches = this.state.benches.map((other, place) => (place === this.state.tab ? bench : other));
+    this.become({ ...this.state, benches }, isOnTheWay);
+  }
+
+  /** Change some settings of one configuration. */
+  changeOne(place: number, texts: readonly (readonly [string, string])[]): void {
+    this.becomeBench(
+      this.bench.map((configuration, number) => (number === place ? texts.reduce((next, [key, text]) => changed(next, key, text), configuration) : configuration)),
+    );
+  }
+
+  addConfiguration(program: string): void {
+    if (this.bench.length < MOST_CONFIGURATIONS) this.becomeBench([...this.bench, { program, changes: {} }]);
+  }
+
+  removeConfiguration(place: number): void {
+    if (this.bench.length < 2) return;
+    this.target = null;
+    this.becomeBench(this.bench.filter((_, number) => number !== place));
+  }
+
+  choose(target: number | null): void {
+    this.target = target;
+    this.schedule();
+  }
+
+  openTab(tab: number): void {
+    this.target = null;
+    this.become({ ...this.state, tab });
+  }
+
+  arrange(isBeside: boolean): void {
+    this.isBeside = isBeside;
+    this.schedule();
+  }
+
+  band(isWanted: boolean): void {
+    this.hasBand = isWanted;
+    this.schedule();
+    this.settle();
+  }
+
+  undo(): void {
+    const state = this.history.undo(this.state);
+    if (state !== null) this.restore(state);
+  }
+
+  redo(): void {
+    const state = this.history.redo(this.state);
+    if (state !== null) this.restore(state);
+  }
+
+  resetAll(): void {
+    const benches = firstState(this.content).benches;
+    this.become({ ...this.state, benches: this.state.benches.map((bench, place) => (place === this.state.tab ? (benches[place] ?? bench) : bench)) });
+  }
+
+  private restore(state: State): void {
+    this.target = null;
+    this.state = state;
+    this.schedule();
+    this.settle();
+  }
+
+  overlayWith(overlay: Overlay | null): void {
+    this.overlay = overlay;
+    this.schedule();
+    this.settle();
+  }
+
+  /** One line for the person; empty to take it away. */
+  tell(text: string): void {
+    say(this.frame.notice, text);
+    this.frame.notice.hidden = text === "";
+  }
+
+  get told(): string {
+    return this.frame.notice.textContent ?? "";
+  }
+
+  private readAddress(): void {
+    const address = location.hash;
+    if (this.content.form === "page" && address.length > 1 && address.slice(1) !== addressOf(this.content, this.state)) {
+      try {
+        this.state = stateOfAddress(this.content, address);
+        this.tell("");
+      } catch (error) {
+        if (!(error instanceof InputError)) throw error;
+        this.state = firstState(this.content);
+        this.tell(`The address holds no state of this page: ${error.message}. It begins as usual.`);
+      }
+    }
+    this.schedule();
+    this.settle();
+  }
+
+  /** Draw with the next frame. */
+  schedule(): void {
+    if (this.isDue) return;
+    this.isDue = true;
+    requestAnimationFrame(() => {
+      this.isDue = false;
+      this.draw();
+    });
+  }
+
+  private draw(): void {
+    const { named } = this;
+    const began = performance.now();
+    const runs = named.map(({ configuration }) => this.runOf(configuration));
+    const taken = performance.now() - began;
+    const done = named.flatMap((item, place) => {
+      const run = runs[place];
+      return run === null || run === undefined ? [] : [{ ...item, run, program: item.configuration.program, values: valuesOf(this.content, item.configuration) }];
+    });
+    const programs = [...new Set(this.bench.map(({ program }) => program))].map((name) => programNamed(this.content, name));
+    this.frame.follow(this.state, named, this.target, this.isBeside, this.history.canUndo, this.history.canRedo);
+    this.controls.show(programs, this.tab.first, this.target === null ? this.bench : this.bench.filter((_, place) => place === this.target));
+    if (done.length < named.length) return;
+    const faults = done.filter(({ run }) => run.fault !== "").map(({ name, run }) => `${name}: ${run.fault}.`);
+    say(this.frame.fault, faults.join(" "));
+    this.frame.fault.hidden = faults.length === 0;
+    const shown = done.filter(({ run }) => run.time.length > 1);
+    if (shown.length > 0) {
+      this.panels.show(shown.map((item) => ({ ...item, band: this.hasBand ? (this.bands.get(item.configuration) ?? this.lastBand(item.place)) : null })), this.isBeside, this.overlay);
+      this.stage.show(shown);
+    }
+    this.outcome.show(done);
+    this.extras.follow(named);
+    this.frame.root.dataset["milliseconds"] = taken.toFixed(2);
+    this.frame.root.dataset["ready"] = "true";
+  }
+
+  private readonly latest = new Map<number, ReadonlyMap<string, Band>>();
+
+  private lastBand(place: number): ReadonlyMap<string, Band> | null {
+    return this.latest.get(place) ?? null;
+  }
+
+  /** What waits until a drag is over: the address, bands, errors against a recording. */
+  private settled(): void {
+    if (this.content.form === "page") {
+      const address = addressOf(this.content, this.state);
+      if (address !== location.hash.slice(1)) history.replaceState(null, "", `#${address}`);
+    }
+    this.extras.settle();
+    if (this.hasBand) for (const { configuration, place } of this.named) void this.drawBand(configuration, place);
+    else this.latest.clear();
+  }
+
+  private async drawBand(configuration: Configuration, place: number): Promise<void> {
+    const run = this.runOf(configuration);
+    if (run === null || run.time.length < 2 || this.bands.has(configuration)) return;
+    const band = await bandOf(this.content, this.workers, configuration, run);
+    this.bands.set(configuration, band);
+    this.latest.set(place, band);
+    this.schedule();
+  }
+}

@@ -1,0 +1,34 @@
+/** Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008), on light and on dark. */
+
+export const DASHES: readonly number[][] = [[], [7, 4], [2, 3], [9, 3, 2, 3]];
+
+/** The value of a custom property of the page's style. */
+export function colour(name: string): string {
+  return getComputedStyle(document.querySelector(".workbench") ?? document.body).getPropertyValue(`--${name}`).trim();
+}
+
+/** The colour of a configuration by its place. */
+export function colourOf(place: number): string {
+  return colour(`run-${place + 1}`);
+}
+
+/** From pale to deep: lightness alone says how much. Ends of a map of one metric, and of the pressure in a chamber. */
+const RAMP: readonly (readonly [number, number, number])[] = [
+  [253, 231, 37],
+  [159, 218, 58],
+  [74, 193, 109],
+  [31, 161, 135],
+  [39, 127, 142],
+  [54, 92, 141],
+  [70, 50, 127],
+  [68, 1, 84],
+];
+
+/** The colour of a share from 0 (pale) to 1 (deep): the scale viridis, from its light end. */
+export function shade(share: number): readonly [number, number, number] {
+  const place = Math.min(1, Math.max(0, share)) * (RAMP.length - 1);
+  const below = Math.min(RAMP.length - 2, Math.floor(place));
+  const [from, to] = [RAMP[below] ?? [0, 0, 0], RAMP[below + 1] ?? [0, 0, 0]];
+  const rest = place - below;
+  return [0, 1, 2].map((band) => Math.round((from[band] ?? 0) + ((to[band] ?? 0) - (from[band] ?? 0)) * rest)) as [number, number, number];
+}

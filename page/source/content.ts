@@ -1,0 +1,106 @@
+/** What `ppafo workbench` puts into a page: programs with their settings, channels and metrics, and how they are grouped. */
+
+export interface UnitScale {
+  readonly unit: string;
+  /** SI = number * scale + offset, in decimals; a gauge pressure counts from the atmosphere. */
+  readonly scale: string;
+  readonly offset: string;
+  readonly isGauge: boolean;
+}
+
+export interface Setting {
+  readonly key: string;
+  readonly label: string;
+  readonly unit: string;
+  readonly shown: string;
+  readonly low: number | null;
+  readonly high: number | null;
+  readonly isLowAllowed: boolean;
+  /** The value in SI that a run starts from. */
+  readonly value: number;
+  /** How the value is written where it counts from the atmosphere, as `50 psi_g`; else empty. */
+  readonly text: string;
+  /** The setting whose value this one has until somebody changes it; else empty. */
+  readonly follows: string;
+  /** Words that may stand for the value of another setting. */
+  readonly words: Readonly<Record<string, string>>;
+  /** Why this one cannot be changed here: it has to stay `zero`, or `above zero`; else empty. */
+  readonly kept: string;
+  readonly slider: readonly [number, number];
+  readonly summary: string;
+  readonly origin: string;
+  readonly source: string;
+  readonly note: string;
+  /** Ends of a 95 % interval in SI, where something is known of it. */
+  readonly interval: readonly [number, number] | null;
+}
+
+export interface Channel {
+  readonly name: string;
+  readonly unit: string;
+  readonly shown: string;
+  readonly label: string;
+}
+
+export interface Metric {
+  readonly name: string;
+  readonly unit: string;
+  readonly shown: string;
+  readonly label: string;
+}
+
+export type Json = string | number | boolean | null | readonly Json[] | { readonly [key: string]: Json };
+export type Table = { readonly [key: string]: Json };
+
+export interface Relation {
+  readonly key: string;
+  readonly relation: string;
+  readonly other: string;
+  readonly slack: number;
+}
+
+export interface Program {
+  readonly name: string;
+  readonly kind: "scenario" | "walk";
+  readonly label: string;
+  readonly description: string;
+  readonly document: Table;
+  readonly deviceSections: readonly string[];
+  readonly settings: readonly Setting[];
+  readonly relations: readonly Relation[];
+  readonly channels: readonly Channel[];
+  readonly metrics: readonly Metric[];
+  /** Which of the modules of the page it is. */
+  readonly module: string;
+}
+
+export interface Tab {
+  readonly title: string;
+  readonly summary: string;
+  readonly programs: readonly string[];
+  /** Configurations that it opens with, each a program and changes of it. */
+  readonly start: readonly { readonly program: string; readonly changes: Readonly<Record<string, string>> }[];
+  /** Keys of the settings that matter most. */
+  readonly first: readonly string[];
+  /** Metrics that claims are about. */
+  readonly claims: readonly string[];
+}
+
+export interface Content {
+  readonly version: string;
+  readonly title: string;
+  readonly form: "page" | "block";
+  readonly tabs: readonly Tab[];
+  readonly programs: readonly Program[];
+  readonly units: Readonly<Record<string, readonly UnitScale[]>>;
+}
+
+export function programNamed(content: Content, name: string): Program {
+  const found = content.programs.find((program) => program.name === name);
+  if (found === undefined) throw new RangeError(`there is no scenario '${name}'`);
+  return found;
+}
+
+export function scalesOf(content: Content, unit: string): readonly UnitScale[] {
+  return content.units[unit] ?? [{ unit, scale: "1", offset: "0", isGauge: false }];
+}

@@ -1,0 +1,193 @@
+/** A control for every number: a slider, a value with its unit, where it comes from, and the way back. */
+
+import type { Content, Program, Setting } from "./content";
+import { element, say } from "./dom";
+import { ATMOSPHERE, type Configuration, rangeText, settingsByKey, shownNumber, valuesOf } from "./settings";
+import { readableUnit } from "./units";
+
+const GROUPS: Readonly<Record<string, string>> = {
+  supply: "Supply",
+  supply_line: "Regulators and lines",
+  valve: "Valve",
+  wearer: "Wearer",
+  reference: "Task",
+  motion: "Motion",
+  controller: "Controller",
+  actuator: "Actuator",
+  friction: "Friction",
+  foot_plate: "Foot plate",
+  gas: "Gas",
+  gas_model: "Gas model",
+  flow: "Flow",
+  sensors: "Sensors",
+  faults: "Faults",
+  initial: "Start",
+  run: "Run",
+};
+const STEPS = 400;
+
+interface Control {
+  readonly setting: Setting;
+  readonly row: HTMLElement;
+  readonly slider: HTMLInputElement;
+  readonly value: HTMLInputElement;
+  readonly back: HTMLButtonElement;
+}
+
+/** What the controls tell the page. */
+export interface Wishes {
+  /** A text for a key, in all configurations that are changed; null puts it back. `isDragging` while more will follow. */
+  readonly change: (key: string, text: string | null, isDragging: boolean) => string;
+}
+
+export class Controls {
+  private controls: Control[] = [];
+  private programs = "";
+
+  constructor(
+    private readonly host: HTMLElement,
+    private readonly content: Content,
+    private readonly wishes: Wishes,
+  ) {}
+
+  /** Controls of the settings of some configurations, those that matter most first. */
+  show(programs: readonly Program[], first: readonly string[], configurations: readonly Configuration[]): void {
+    const names = JSON.stringify([programs.map((program) => program.name), first]);
+    if (names !== this.programs) {
+      this.programs = names;
+      this.build(programs, first);
+    }
+    this.update(configurations);
+  }
+
+  private build(programs: readonly Program[], first: readonly string[]): void {
+    const all = new Map(programs.flatMap((program) => [...settingsByKey(program)]));
+    this.controls = [];
+    const leading = first.filter((key) => all.has(key));
+    const groups = new Map<string, Setting[]>();
+    for (const setting of all.values()) {
+      if (leading.includes(setting.key) || setting.kept === "zero") continue;
+      const group = setting.key.split(".")[0] ?? "";
+      groups.set(group, [...(groups.get(group) ?? []), setting]);
+    }
+    const order = [...groups.keys()].sort((a, b) => rank(a) - rank(b));
+    const rows = (settings: readonly Setting[]) => settings.map((setting) => this.made(setting));
+    const open = element("div", { class: "group first" }, ...rows(leading.map((key) => all.get(key)).filter((setting) => setting !== undefined)));
+    const closed = order.map((group) =>
+      element(
+        "details",
+        { class: "group" },
+        element("summary", {}, GROUPS[group] ?? group, element("span", { class: "count" }, ` ${groups.get(group)?.length ?? 0}`)),
+        ...rows(groups.get(group) ?? []),
+      ),
+    );
+    this.host.replaceChildren(open, ...(this.content.form === "block" ? [] : closed));
+  }
+
+  private made(setting: Setting): Control["row"] {
+    const { key, label } = setting;
+    const about = element("p", { class: "about", id: `about-${key}`, hidden: true });
+    const name = element(
+      "button",
+      {
+        type: "button",
+        class: "name",
+        "aria-expanded": "false",
+        "aria-controls": `about-${key}`,
+        title: this.words(setting).join("\n"),
+        onclick: () => {
+          about.hidden = !about.hidden;
+          name.setAttribute("aria-expanded", String(!about.hidden));
+          about.replaceChildren(...this.words(setting).map((line) => element("span", {}, line)));
+        },
+      },
+      label,
+      element("span", { class: `origin ${setting.origin}`, "aria-hidden": "true" }),
+    );
+    const slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${label}, slider` });
+    const value = element("input", { type: "text", inputmode: "text", autocomplete: "off", spellcheck: "false", "aria-label": label });
+    const back = element("button", { type: "button", class: "back", title: "Put back", "aria-label": `Put ${label} back` }, "↺");
+    const fault = element("p", { class: "fault", role: "alert", hidden: true });
+    const wish = (text: string | null, isDragging: boolean) => {
+      const wrong = this.wishes.change(key, text, isDragging);
+      say(fault, wrong);
+      fault.hidden = wrong === "";
+      value.setAttribute("aria-invalid", String(wrong !== ""));
+    };
+    slider.addEventListener("input", () => wish(this.textAt(setting, Number(slider.value)), true));
+    slider.addEventListener("change", () => wish(this.textAt(setting, Number(slider.value)), false));
+    value.addEventListener("change", () => wish(value.value.trim() === "" ? null : value.value, false));
+    value.addEventListener("keydown", (event) => {
+      if (event.key === "Escape") wish(null, false);
+    });
+    back.addEventListener("click", () => wish(null, false));
+    const row = element("div", { class: "control", "data-key": key }, name, value, slider, back, fault, about);
+    this.controls.push({ setting, row, slider, value, back });
+    return row;
+  }
+
+  /** What is known of a setting, line by line. */
+  private words(setting: Setting): string[] {
+    const origin = setting.origin === "" ? [] : [`${capital(setting.origin)}${setting.source === "" ? "." : `: ${setting.source}.`}`];
+    return [
+      `${capital(setting.summary)}.`,
+      `${capital(rangeText(this.content, setting, 101325))}. ${setting.key}`,
+      ...origin,
+      ...(setting.note === "" ? [] : [setting.note]),
+    ];
+  }
+
+  private update(configurations: readonly Configuration[]): void {
+    const values = configurations.map((configuration) => valuesOf(this.content, configuration));
+    for (const { setting, row, slider, value, back } of this.controls) {
+      const { key } = setting;
+      const having = configurations.map((_, place) => place).filter((place) => values[place]?.has(key));
+      row.hidden = having.length === 0;
+      if (row.hidden) continue;
+      const texts = having.map((place) => shownNumber(this.content, setting, values[place]?.get(key) ?? 0, values[place]?.get(ATMOSPHERE) ?? 101325));
+      const different = [...new Set(texts)];
+      const unit = readableUnit(setting.shown);
+      if (document.activeElement !== value || different.length === 1) {
+        value.value = `${different.join(" | ")}${unit === "" || unit === "-" || different.length > 2 ? "" : ` ${unit}`}`;
+      }
+      if (document.activeElement !== slider) slider.value = String(placeOf(setting, Number(texts[0])));
+      slider.setAttribute("aria-valuetext", value.value);
+      const isChanged = having.some((place) => configurations[place]?.changes[key] !== undefined);
+      row.classList.toggle("changed", isChanged);
+      back.disabled = !isChanged;
+    }
+  }
+
+  /** The text that a place of a slider stands for: round decimals, so that no arithmetic of the browser is in it. */
+  private textAt(setting: Setting, place: number): string {
+    const [from, to] = setting.slider;
+    const decimals = decimalsOf((to - from) / STEPS);
+    return `${plainFixed(from + ((to - from) * place) / STEPS, decimals)} ${setting.shown}`.trim();
+  }
+}
+
+function rank(group: string): number {
+  const place = Object.keys(GROUPS).indexOf(group);
+  return place < 0 ? 99 : place;
+}
+
+function placeOf(setting: Setting, shown: number): number {
+  const [from, to] = setting.slider;
+  return Math.round(((shown - from) / (to - from)) * STEPS);
+}
+
+/** Decimals that tell two neighbouring places of a slider apart. */
+export function decimalsOf(step: number): number {
+  let decimals = 0;
+  for (let edge = 1; step < edge && decimals < 12; edge /= 10) decimals += 1;
+  return decimals;
+}
+
+export function plainFixed(value: number, decimals: number): string {
+  const text = value.toFixed(decimals);
+  return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
+}
+
+function capital(text: string): string {
+  return text.slice(0, 1).toUpperCase() + text.slice(1);
+}

@@ -1,0 +1,144 @@
+/** A moving drawing of the device: vane, chambers coloured by pressure, valve, and the leg with its foot. */
+
+import { colour, shade } from "./colours";
+import { say, shape } from "./dom";
+import type { Run } from "./engine";
+import { plain } from "./units";
+
+const PSI = 6894.757293168361;
+const RADIUS = 62;
+const CENTRE = [92, 92] as const;
+const ANKLE = [292, 118] as const;
+const SHANK = 84;
+
+/** What does not move: stops of the vane [rad], and pressures [Pa absolute]. */
+export interface Frame {
+  readonly lowest: number;
+  readonly highest: number;
+  readonly atmosphere: number;
+  readonly supply: number;
+}
+
+export class Drawing {
+  readonly root: SVGSVGElement;
+  private readonly chambers = [shape("path", { class: "chamber" }), shape("path", { class: "chamber" })];
+  private readonly vane = shape("line", { class: "vane" });
+  private readonly texts = [shape("text", { class: "pressure" }), shape("text", { class: "pressure" })];
+  private readonly spool = shape("rect", { class: "spool", y: 167, width: 26, height: 14, rx: 2 });
+  private readonly ways = [shape("path", { class: "way" }), shape("path", { class: "way" })];
+  private readonly leg = shape("g");
+  private readonly foot = shape("g");
+  private readonly arc = shape("path", { class: "effort" });
+  private readonly words = shape("text", { class: "words", x: ANKLE[0], y: 196, "text-anchor": "middle" });
+
+  constructor(name: string) {
+    const marks = [shape("text", { class: "chamber-name", x: 36, y: 34 }, "1"), shape("text", { class: "chamber-name", x: 142, y: 34 }, "2")];
+    this.root = shape(
+      "svg",
+      { viewBox: "0 0 384 204", role: "img", class: "drawing" },
+      shape("title", {}, `${name}: vane, chambers, valve, leg and foot`),
+      ...this.chambers,
+      ...this.ways,
+      this.vane,
+      shape("circle", { class: "hub", cx: CENTRE[0], cy: CENTRE[1], r: 7 }),
+      ...this.texts,
+      ...marks,
+      shape("rect", { class: "valve", x: 46, y: 164, width: 92, height: 20, rx: 4 }),
+      this.spool,
+      shape("text", { class: "words", x: 92, y: 198, "text-anchor": "middle" }, "valve"),
+      this.leg,
+      this.arc,
+      this.words,
+    );
+    this.leg.append(
+      shape("path", { class: "limb", d: `M0 0V${-SHANK}` }),
+      shape("circle", { class: "joint", cy: -SHANK, r: 5 }),
+      this.foot,
+      shape("circle", { class: "joint", r: 6 }),
+    );
+    this.foot.append(shape("path", { class: "limb", d: "M-16 22Q-20 24 -14 25L52 25Q58 24 52 20L8 2L-8 2Z" }));
+  }
+
+  /** Show a run as it is at a sample. */
+  show(run: Run, frame: Frame, at: number): void {
+    const value = (name: string, other = 0) => run.channels.get(name)?.[at] ?? other;
+    const angle = value("angle", Math.PI / 2);
+    const pressures = [value("pressure_1", frame.atmosphere), value("pressure_2", frame.atmosphere)];
+    this.showChambers(angle, pressures, frame);
+    this.showValve(value("command"));
+    this.showLeg(angle, value("shank_angle"), value("torque"), run.channels.has("shank_angle"));
+  }
+
+  private showChambers(angle: number, pressures: readonly number[], frame: Frame): void {
+    const middle = (frame.lowest + frame.highest) / 2;
+    const edge = 0.17;
+    const at = (given: number) => given - middle - Math.PI / 2;
+    const ends: readonly (readonly [number, number])[] = [
+      [at(frame.lowest - edge), at(angle)],
+      [at(angle), at(frame.highest + edge)],
+    ];
+    ends.forEach(([from, to], place) => {
+      const pressure = pressures[place] ?? 0;
+      const share = (pressure - frame.atmosphere) / Math.max(1, frame.supply - frame.atmosphere);
+      this.chambers[place]?.setAttribute("d", sector(from, to));
+      this.chambers[place]?.setAttribute("fill", `rgb(${shade(0.12 + 0.8 * share).join()})`);
+      const text = this.texts[place];
+      const [x, y] = onCircle((from + to) / 2, RADIUS * 0.66);
+      text?.setAttribute("x", x.toFixed(1));
+      text?.setAttribute("y", (y + 4).toFixed(1));
+      text?.setAttribute("fill", share > 0.3 ? "#fff" : "#1a1a1a");
+      text?.setAttribute("visibility", to - from > 0.45 ? "visible" : "hidden");
+      if (text !== undefined) say(text, plain((pressure - frame.atmosphere) / PSI, 2));
+    });
+    const [x, y] = onCircle(at(angle), RADIUS + 3);
+    for (const [name, given] of [["x1", CENTRE[0]], ["y1", CENTRE[1]], ["x2", x], ["y2", y]] as const) {
+      this.vane.setAttribute(name, given.toFixed(1));
+    }
+  }
+
+  /** The spool goes with the command; the way to a chamber is open to the supply, or to the outside. */
+  private showValve(command: number): void {
+    const isVenting = command > 1.5;
+    const share = isVenting ? 0 : Math.min(1, Math.max(-1, command));
+    this.spool.setAttribute("x", (79 + 30 * share).toFixed(1));
+    ["M62 164C62 138 10 150 10 112S22 76 34 72", "M122 164C122 138 174 150 174 112S162 76 150 72"].forEach((line, place) => {
+      const towards = place === 0 ? share : -share;
+      const way = this.ways[place];
+      way?.setAttribute("d", line);
+      way?.setAttribute("stroke", isVenting || towards < 0 ? colour("soft") : towards > 0 ? colour("run-1") : colour("line"));
+      way?.setAttribute("stroke-dasharray", isVenting || towards < 0 ? "4 4" : "none");
+      way?.setAttribute("stroke-width", (1.5 + 3.5 * Math.abs(isVenting ? 1 : towards)).toFixed(2));
+    });
+  }
+
+  private showLeg(angle: number, shank: number, torque: number, isWalking: boolean): void {
+    const tilt = isWalking ? degrees(shank) : -degrees(angle - Math.PI / 2);
+    const turn = isWalking ? degrees(angle - Math.PI / 2) : 0;
+    this.leg.setAttribute("transform", `translate(${ANKLE[0]} ${ANKLE[1]}) rotate(${(isWalking ? -tilt : tilt).toFixed(2)})`);
+    this.foot.setAttribute("transform", `rotate(${(isWalking ? turn : -tilt).toFixed(2)})`);
+    const size = Math.min(1.4, Math.abs(torque) / 8);
+    const [x, y] = [ANKLE[0] + 44 * Math.cos(0.5), ANKLE[1] + 44 * Math.sin(0.5)];
+    const end = 0.5 + size * Math.sign(torque);
+    this.arc.setAttribute(
+      "d",
+      `M${x.toFixed(1)} ${y.toFixed(1)}A44 44 0 0 ${torque > 0 ? 1 : 0} ${(ANKLE[0] + 44 * Math.cos(end)).toFixed(1)} ${(ANKLE[1] + 44 * Math.sin(end)).toFixed(1)}`,
+    );
+    say(this.words, `${plain(degrees(angle), 3)}° · ${plain(torque, 3)} N\u00a0m`);
+  }
+}
+
+function onCircle(angle: number, radius: number): readonly [number, number] {
+  return [CENTRE[0] + radius * Math.cos(angle), CENTRE[1] + radius * Math.sin(angle)];
+}
+
+function sector(from: number, to: number): string {
+  const [x0, y0] = onCircle(from, RADIUS);
+  const [x1, y1] = onCircle(to, RADIUS);
+  const isLarge = to - from > Math.PI ? 1 : 0;
+  const ends = [x0, y0, x1, y1].map((number) => number.toFixed(1));
+  return `M${CENTRE[0]} ${CENTRE[1]}L${ends[0]} ${ends[1]}A${RADIUS} ${RADIUS} 0 ${isLarge} 1 ${ends[2]} ${ends[3]}Z`;
+}
+
+function degrees(angle: number): number {
+  return (angle * 180) / Math.PI;
+}

@@ -1,0 +1,161 @@
+/** The WebAssembly module of a program: from settings in SI to samples and metrics. */
+
+import type { Program } from "./content";
+import type { Values } from "./settings";
+
+/** What a module exports: see `ppafo.exports.wasm`. */
+interface Exports extends WebAssembly.Exports {
+  readonly memory: WebAssembly.Memory;
+  readonly reserve: (bytes: number) => number;
+  readonly release: (from: number) => void;
+  readonly check: (settings: number) => number;
+  readonly samples: (settings: number) => number;
+  readonly run: (settings: number, columns: number, metrics: number, good: number) => number;
+  readonly ensemble: (
+    settings: number,
+    runs: number,
+    metrics: number,
+    ended: number,
+    channel: number,
+    every: number,
+    places: number,
+    traces: number,
+  ) => number;
+}
+
+export type Ending = "completed" | "diverged" | "too many parts" | "refused" | "no memory";
+const ENDINGS: readonly Ending[] = ["completed", "diverged", "too many parts", "refused", "no memory"];
+
+export interface Run {
+  readonly ending: Ending;
+  /** Time [s] and channels of the program in SI, as long as the run went. */
+  readonly time: Float64Array;
+  readonly channels: ReadonlyMap<string, Float64Array>;
+  readonly metrics: ReadonlyMap<string, number>;
+  /** What is wrong with the settings, in one line; empty where nothing is. */
+  readonly fault: string;
+}
+
+export interface Ensemble {
+  /** Metrics of the program, run after run. */
+  readonly metrics: Float64Array;
+  /** 0 where a run was completed. */
+  readonly ended: Int32Array;
+  /** Samples of one channel, run after run; empty where none was wanted. */
+  readonly traces: Float64Array;
+}
+
+const NUMBER = 8;
+
+/** Whether the browser has the 128-bit vectors that the modules are made of. */
+export function hasVectors(): boolean {
+  return (
+    typeof WebAssembly === "object" &&
+    WebAssembly.validate(new Uint8Array([0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11]))
+  );
+}
+
+export class Engine {
+  private constructor(
+    private readonly program: Program,
+    private readonly exports: Exports,
+  ) {}
+
+  static async of(program: Program, bytes: ArrayBuffer): Promise<Engine> {
+    const { instance } = await WebAssembly.instantiate(bytes, {});
+    return new Engine(program, instance.exports as Exports);
+  }
+
+  /** One run with all its samples. */
+  run(values: Values): Run {
+    return this.aside(() => {
+      const settings = this.written([this.row(values)]);
+      const fault = this.faultOf(settings);
+      if (fault !== "") return failedRun("refused", fault);
+      const { exports, program } = this;
+      const count = exports.samples(settings);
+      const rows = program.channels.length + 1;
+      const columns = exports.reserve(count * rows * NUMBER);
+      const metrics = exports.reserve(program.metrics.length * NUMBER);
+      const good = exports.reserve(NUMBER);
+      if (columns === 0 || metrics === 0 || good === 0) return failedRun("no memory", "the run has too many samples for this page");
+      const ending = ENDINGS[exports.run(settings, columns, metrics, good)] ?? "refused";
+      const { buffer } = exports.memory;
+      const length = new Int32Array(buffer, good, 1)[0] ?? 0;
+      const column = (place: number) => new Float64Array(buffer, columns + place * count * NUMBER, length).slice();
+      const found = new Float64Array(buffer, metrics, program.metrics.length);
+      return {
+        ending,
+        time: column(0),
+        channels: new Map(program.channels.map((channel, place) => [channel.name, column(place + 1)])),
+        metrics: new Map(program.metrics.map((metric, place) => [metric.name, found[place] ?? NaN])),
+        fault: ENDING_TEXTS[ending],
+      };
+    });
+  }
+
+  /** Many runs, with their metrics, and samples of one channel where one is named. */
+  runMany(rows: readonly Float64Array[], channel: string | null, every: number, places: number): Ensemble {
+    return this.aside(() => {
+      const { exports, program } = this;
+      const settings = this.written(rows);
+      const wanted = channel === null ? 0 : places;
+      const metrics = exports.reserve(rows.length * program.metrics.length * NUMBER);
+      const ended = exports.reserve(rows.length * 4);
+      const traces = exports.reserve(Math.max(1, rows.length * wanted) * NUMBER);
+      const place = channel === null ? -1 : program.channels.findIndex((item) => item.name === channel);
+      const isDone = traces !== 0 && exports.ensemble(settings, rows.length, metrics, ended, place, every, wanted, traces) === 0;
+      if (!isDone) throw new RangeError("these runs need more memory than this page has");
+      const { buffer } = exports.memory;
+      return {
+        metrics: new Float64Array(buffer, metrics, rows.length * program.metrics.length).slice(),
+        ended: new Int32Array(buffer, ended, rows.length).slice(),
+        traces: new Float64Array(buffer, traces, rows.length * wanted).slice(),
+      };
+    });
+  }
+
+  /** The numbers of a configuration as the module takes them. */
+  row(values: Values): Float64Array {
+    return Float64Array.from(this.program.settings, (setting) => values.get(setting.key) ?? setting.value);
+  }
+
+  private written(rows: readonly Float64Array[]): number {
+    const width = this.program.settings.length;
+    const place = this.exports.reserve(rows.length * width * NUMBER);
+    const numbers = new Float64Array(this.exports.memory.buffer, place, rows.length * width);
+    rows.forEach((row, number) => numbers.set(row, number * width));
+    return place;
+  }
+
+  private faultOf(settings: number): string {
+    const found = this.exports.check(settings);
+    if (found < 0) return "";
+    const setting = this.program.settings[found];
+    if (setting !== undefined) return `${setting.key} is out of range, or contradicts another setting`;
+    return "a setting that is 0 in this scenario, or is not, asks for another program; this one is in the page as it began";
+  }
+
+  /** Memory that is taken meanwhile is given back. */
+  private aside<T>(work: () => T): T {
+    const before = this.exports.reserve(0);
+    try {
+      return work();
+    } finally {
+      this.exports.release(before);
+    }
+  }
+}
+
+const ENDING_TEXTS: Readonly<Record<Ending, string>> = {
+  completed: "",
+  diverged: "the run left what is possible: try a smaller step; check inertia, volumes and areas",
+  "too many parts": "a step was cut into 100,000 parts and was still not done: check inertia, volumes and areas",
+  refused: "the settings were refused",
+  "no memory": "the run has too many samples for this page",
+};
+
+/** A run that did not come about, and why. */
+export function failedRun(ending: Ending, fault: string): Run {
+  return { ending, time: new Float64Array(), channels: new Map(), metrics: new Map(), fault };
+}

@@ -1,0 +1,237 @@
+/** What the page offers beside the plots: sharing, the map, a recording of one's own, and what each assumption does. */
+
+import type { App, Named } from "./app";
+import { programNamed } from "./content";
+import { element, say } from "./dom";
+import type { PageFrame } from "./frame";
+import { MapView } from "./map";
+import { shownMetric } from "./outcome";
+import { agreementTable, askForColumns, type ColumnMap, compare, mapOfHeader, recordingOf } from "./recording";
+import { scenarioFile } from "./scenario_file";
+import { shownNumber, valuesOf } from "./settings";
+import { samplesText, savePicture, saveState, saveText } from "./sharing";
+import { addressOf, stateOfFile } from "./state";
+import type { RecordedTable } from "./table";
+import { InputError, plain, readableUnit } from "./units";
+import { type Effect, effectsOf } from "./variation";
+
+const TOLD_METRICS = 3;
+const TOLD_EFFECTS = 12;
+
+export class Extras {
+  private readonly map: MapView;
+  private readonly errors = element("div");
+  private readonly asked = element("div");
+  private readonly effects = element("div");
+  private readonly files = element("div", { class: "buttons files" });
+
+  constructor(
+    private readonly frame: PageFrame,
+    private readonly app: App,
+  ) {
+    this.map = new MapView(frame.map, app.content, app.workers, (place, texts) => app.changeOne(place, texts));
+    frame.map.closest("details")?.addEventListener("toggle", () => this.follow(app.named));
+    this.makeShare();
+    this.makeRecording();
+    this.makeAssumptions();
+  }
+
+  /** Follow the configurations, frame by frame. */
+  follow(named: readonly Named[]): void {
+    if (this.map.isOpen && this.app.content.form === "page") this.map.refresh(named.map(({ configuration }) => configuration), named.map(({ name }) => name));
+    const layout = JSON.stringify(named.map(({ name }) => name));
+    if (this.files.dataset["layout"] === layout) return;
+    this.files.dataset["layout"] = layout;
+    this.files.replaceChildren(
+      ...named.flatMap(({ name, place }) => [
+        element("button", { type: "button", onclick: () => this.saveScenario(place) }, `Scenario of ${name} (TOML)`),
+        element("button", { type: "button", onclick: () => this.saveSamples(place) }, `Samples of ${name} (CSV)`),
+      ]),
+    );
+  }
+
+  /** What waits until a drag is over. */
+  settle(): void {
+    if (this.app.overlay !== null) this.showErrors();
+  }
+
+  private makeShare(): void {
+    const { app } = this;
+    const chooser = element("input", { type: "file", accept: ".json,application/json", class: "unseen", tabindex: -1, "aria-hidden": "true", "aria-label": "State to load" });
+    chooser.addEventListener("change", () => {
+      const file = chooser.files?.[0];
+      chooser.value = "";
+      if (file !== undefined) void this.loadState(file);
+    });
+    const link = element("input", { type: "text", readonly: true, hidden: true, "aria-label": "Address of this state" });
+    const copy = () => {
+      const address = `${location.href.split("#")[0]}#${addressOf(app.content, app.state)}`;
+      link.value = address;
+      link.hidden = false;
+      link.select();
+      navigator.clipboard?.writeText(address).then(
+        () => app.tell("The address is in the clipboard."),
+        () => app.tell("Copy the address from the field."),
+      );
+    };
+    const button = (words: string, work: () => void) => element("button", { type: "button", onclick: work }, words);
+    const own =
+      app.content.form === "page"
+        ? [button("Copy address", copy), button("Save state", () => saveState(app.content, app.state)), button("Load state", () => chooser.click()), chooser, link]
+        : [];
+    const menu = element(
+      "details",
+      { class: "menu" },
+      element("summary", {}, "Share and export"),
+      element("div", { class: "menu-body" }, element("div", { class: "buttons" }, ...own, button("Picture of the plots (PNG)", () => savePicture(app.panels, app.named))), this.files),
+    );
+    this.frame.share.append(menu);
+    addEventListener("keydown", (event) => {
+      if (event.key === "Escape") menu.open = false;
+    });
+  }
+
+  private async loadState(file: Blob): Promise<void> {
+    try {
+      this.app.become(stateOfFile(this.app.content, await file.text()));
+      this.app.tell("");
+    } catch (error) {
+      if (!(error instanceof InputError)) throw error;
+      this.app.tell(`The file could not be loaded: ${error.message}.`);
+    }
+  }
+
+  private saveScenario(place: number): void {
+    const configuration = this.app.bench[place];
+    if (configuration !== undefined) saveText(`${configuration.program}.toml`, scenarioFile(this.app.content, configuration));
+  }
+
+  private saveSamples(place: number): void {
+    const configuration = this.app.bench[place];
+    const run = configuration === undefined ? null : this.app.runOf(configuration);
+    if (configuration === undefined || run === null) return;
+    saveText(`${configuration.program}.csv`, samplesText(programNamed(this.app.content, configuration.program), run));
+  }
+
+  private makeRecording(): void {
+    const chooser = element("input", { type: "file", accept: ".csv,text/csv,.txt", "aria-label": "Recording as CSV" });
+    const clear = element("button", { type: "button", onclick: () => this.clear() }, "Take it away");
+    chooser.addEventListener("change", () => {
+      const file = chooser.files?.[0];
+      chooser.value = "";
+      if (file !== undefined) void this.read(file);
+    });
+    this.frame.recording.append(
+      element("p", {}, "Drop a CSV file anywhere on this page, or choose one: a header such as ", element("code", {}, "time [s],torque [N m],pressure_1 [psi_g]"), ", then one line a sample. It stays in this page."),
+      element("div", { class: "buttons" }, chooser, clear),
+      this.asked,
+      this.errors,
+    );
+    addEventListener("dragover", (event) => event.preventDefault());
+    addEventListener("drop", (event) => {
+      event.preventDefault();
+      const file = event.dataTransfer?.files[0];
+      if (file === undefined) return;
+      void (file.name.endsWith(".json") ? this.loadState(file) : this.read(file));
+    });
+  }
+
+  private clear(): void {
+    this.asked.replaceChildren();
+    this.errors.replaceChildren();
+    this.app.tell("");
+    this.app.overlayWith(null);
+  }
+
+  /** Read a file in a worker, so that the page goes on, and show it. */
+  async read(file: File): Promise<void> {
+    this.app.tell(`Reading ${file.name} ...`);
+    try {
+      const table = await this.app.workers.readTable(file);
+      const map = mapOfHeader(table);
+      if (map !== null) this.take(file.name, table, map);
+      else {
+        this.app.tell(`${file.name}: say below what its columns are.`);
+        const details = this.frame.recording.closest("details");
+        if (details !== null) details.open = true;
+        this.asked.replaceChildren(askForColumns(table, (given) => this.take(file.name, table, given)));
+      }
+    } catch (error) {
+      if (!(error instanceof InputError)) throw error;
+      this.app.tell(`${file.name}: ${error.message}.`);
+    }
+  }
+
+  private take(name: string, table: RecordedTable, map: readonly ColumnMap[]): void {
+    try {
+      const atmosphere = valuesOf(this.app.content, this.app.bench[0]!).get("supply.atmospheric_pressure") ?? 101325;
+      this.app.overlayWith(recordingOf(this.app.content, table, map, atmosphere));
+      this.asked.replaceChildren();
+      this.app.tell(`${name} is drawn over the runs; below it is said how far they are from it.`);
+      const details = this.frame.recording.closest("details");
+      if (details !== null) details.open = true;
+    } catch (error) {
+      if (!(error instanceof InputError)) throw error;
+      this.app.tell(`${name}: ${error.message}.`);
+    }
+  }
+
+  private showErrors(): void {
+    const { app } = this;
+    if (app.overlay === null) return;
+    const found = app.named.map(({ name, configuration }) => {
+      const run = app.runOf(configuration);
+      const isHeld = JSON.stringify(programNamed(app.content, configuration.program).document["motion"] ?? "").includes('"held"');
+      return { name, errors: run === null || app.overlay === null ? [] : compare(app.overlay, run, valuesOf(app.content, configuration), isHeld) };
+    });
+    this.errors.replaceChildren(agreementTable(found));
+  }
+
+  private makeAssumptions(): void {
+    const run = element("button", { type: "button", onclick: () => void this.showEffects() }, "Move each assumption");
+    this.frame.assumptions.append(
+      element("p", {}, "Nobody printed some of the numbers. Each of these is moved alone, over its interval where one is known, else by a fifth down and up; the others stay."),
+      element("div", { class: "buttons" }, run),
+      this.effects,
+    );
+  }
+
+  private async showEffects(): Promise<void> {
+    const found = await Promise.all(this.app.named.map(async (item) => ({ item, effects: await effectsOf(this.app.content, this.app.workers, item.configuration) })));
+    this.effects.replaceChildren(...found.flatMap(({ item, effects }) => this.effectsTable(item, effects)));
+  }
+
+  private effectsTable({ name, configuration }: Named, effects: readonly Effect[]): HTMLElement[] {
+    const { content } = this.app;
+    const program = programNamed(content, configuration.program);
+    const run = this.app.runOf(configuration);
+    const wanted = this.app.tab.claims.length > 0 ? this.app.tab.claims : program.metrics.slice(0, TOLD_METRICS).map((metric) => metric.name);
+    const metrics = program.metrics.filter((metric) => wanted.includes(metric.name));
+    const change = (effect: Effect, metric: string, end: 0 | 1) => {
+      const [usual, moved] = [run?.metrics.get(metric) ?? NaN, effect.metrics[end].get(metric) ?? NaN];
+      return usual === 0 ? NaN : ((moved - usual) / Math.abs(usual)) * 100;
+    };
+    const size = (effect: Effect) => Math.max(...metrics.flatMap((metric) => ([0, 1] as const).map((end) => Math.abs(change(effect, metric.name, end)) || 0)));
+    const ranked = [...effects].sort((a, b) => size(b) - size(a)).slice(0, TOLD_EFFECTS);
+    const signed = (percent: number) => (Number.isFinite(percent) ? `${percent < 0 ? "−" : "+"}${plain(Math.abs(percent), 2)} %` : "–");
+    const rows = ranked.map((effect) => {
+      const text = (value: number) => plain(Number(shownNumber(content, effect.setting, value, 101325)), 3);
+      const words = `${effect.setting.label}: ${text(effect.ends[0])} to ${text(effect.ends[1])} ${readableUnit(effect.setting.shown)}`;
+      return element(
+        "tr",
+        {},
+        element("th", { scope: "row" }, words),
+        ...metrics.map((metric) => element("td", { class: "number" }, `${signed(change(effect, metric.name, 0))} / ${signed(change(effect, metric.name, 1))}`)),
+      );
+    });
+    const heads = metrics.map((metric) => {
+      const value = run?.metrics.get(metric.name);
+      const now = value === undefined ? "" : ` (${`${plain(shownMetric(content, metric, value), 3)} ${readableUnit(metric.shown)}`.trim()})`;
+      return element("th", { scope: "col", class: "number" }, `${metric.label}${now}`);
+    });
+    const title = element("h3");
+    say(title, name);
+    const table = element("table", { class: "outcome" }, element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Assumption"), ...heads)), element("tbody", {}, ...rows));
+    return [title, element("div", { class: "wide", tabindex: 0, role: "region", "aria-label": `Effects of assumptions, ${name}` }, table)];
+  }
+}

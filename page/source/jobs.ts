@@ -1,0 +1,118 @@
+/** What page and workers say to each other, and the workers of a page. */
+
+import type { Program } from "./content";
+import type { Ensemble } from "./engine";
+import type { RecordedTable } from "./table";
+import { InputError } from "./units";
+
+declare const WORKER_SCRIPT: string;
+
+export interface RunsJob {
+  readonly kind: "runs";
+  readonly number: number;
+  readonly program: string;
+  readonly rows: readonly Float64Array[];
+  readonly channel: string | null;
+  readonly every: number;
+  readonly places: number;
+}
+
+export type Job =
+  | { readonly kind: "program"; readonly program: Program; readonly bytes: ArrayBuffer }
+  | { readonly kind: "table"; readonly number: number; readonly file: Blob }
+  | RunsJob;
+
+export interface Reply {
+  readonly number: number;
+  readonly runs?: Ensemble;
+  readonly table?: RecordedTable;
+  readonly fault?: string;
+}
+
+const MOST_WORKERS = 4;
+
+/** A few workers that share work; they start when they are first wanted. */
+export class Workers {
+  private readonly crew: { worker: Worker; known: Set<string> }[] = [];
+  private readonly waiting = new Map<number, (reply: Reply) => void>();
+  private next = 0;
+
+  constructor(private readonly bytesOf: (program: Program) => Promise<ArrayBuffer>) {}
+
+  get count(): number {
+    this.start();
+    return this.crew.length;
+  }
+
+  /** Many runs of a program, in as many parts as there are workers. */
+  async runMany(program: Program, rows: readonly Float64Array[], channel: string | null = null, every = 1, places = 0): Promise<Ensemble> {
+    this.start();
+    const bytes = await this.bytesOf(program);
+    const size = Math.ceil(rows.length / this.crew.length / 8) * 8;
+    const parts = this.crew.map((_, place) => rows.slice(place * size, (place + 1) * size)).filter((part) => part.length > 0);
+    const replies = await Promise.all(
+      parts.map((part, place) => {
+        this.introduce(place, program, bytes);
+        return this.ask(place, (number) => ({ kind: "runs", number, program: program.name, rows: part, channel, every, places }));
+      }),
+    );
+    const found = replies.map((reply) => reply.runs).filter((runs) => runs !== undefined);
+    return {
+      metrics: joined(found.map((runs) => runs.metrics)),
+      ended: Int32Array.from(found.flatMap((runs) => [...runs.ended])),
+      traces: joined(found.map((runs) => runs.traces)),
+    };
+  }
+
+  /** The table in a file. */
+  async readTable(file: Blob): Promise<RecordedTable> {
+    this.start();
+    const { table } = await this.ask(this.crew.length - 1, (number) => ({ kind: "table", number, file }));
+    if (table === undefined) throw new InputError("the file could not be read");
+    return table;
+  }
+
+  private start(): void {
+    if (this.crew.length > 0) return;
+    const address = URL.createObjectURL(new Blob([WORKER_SCRIPT], { type: "text/javascript" }));
+    const count = Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 2));
+    for (let place = 0; place < count; place += 1) {
+      const worker = new Worker(address);
+      worker.onmessage = (event: MessageEvent<Reply>) => {
+        this.waiting.get(event.data.number)?.(event.data);
+        this.waiting.delete(event.data.number);
+      };
+      this.crew.push({ worker, known: new Set() });
+    }
+  }
+
+  private introduce(place: number, program: Program, bytes: ArrayBuffer): void {
+    const member = this.crew[place];
+    if (member === undefined || member.known.has(program.name)) return;
+    member.known.add(program.name);
+    const job: Job = { kind: "program", program: { ...program, module: "" }, bytes };
+    member.worker.postMessage(job);
+  }
+
+  private ask(place: number, job: (number: number) => Job): Promise<Reply> {
+    const number = this.next;
+    this.next += 1;
+    return new Promise((resolve, reject) => {
+      this.waiting.set(number, (reply) => {
+        if (reply.fault === undefined) resolve(reply);
+        else reject(new InputError(reply.fault));
+      });
+      this.crew[place]?.worker.postMessage(job(number));
+    });
+  }
+}
+
+function joined(parts: readonly Float64Array[]): Float64Array {
+  const all = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0));
+  let place = 0;
+  for (const part of parts) {
+    all.set(part, place);
+    place += part.length;
+  }
+  return all;
+}

@@ -1,0 +1,108 @@
+/** The table of metrics: one column a configuration, differences from the first one, told to a screen reader too. */
+
+import { type Content, type Metric, programNamed, scalesOf } from "./content";
+import { element, say, whenQuiet } from "./dom";
+import type { Run } from "./engine";
+import { fromSi, plain, readableUnit, scaleOf } from "./units";
+
+export interface Column {
+  readonly name: string;
+  readonly place: number;
+  readonly program: string;
+  readonly run: Run;
+}
+
+interface Row {
+  readonly metric: Metric;
+  readonly cells: readonly HTMLElement[];
+  readonly changes: readonly HTMLElement[];
+}
+
+const TOLD = ["rms_error", "gas_supplied", "switchings"];
+
+export class OutcomeTable {
+  private rows: Row[] = [];
+  private layout = "";
+  private columns: readonly Column[] = [];
+  private readonly told = element("p", { class: "told", "aria-live": "polite", role: "status" });
+  private readonly table = element("table", { class: "outcome" });
+  private readonly tell = whenQuiet(700, () => say(this.told, this.summary()));
+
+  constructor(
+    host: HTMLElement,
+    private readonly content: Content,
+  ) {
+    host.append(element("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Metrics" }, this.table), this.told);
+  }
+
+  show(columns: readonly Column[]): void {
+    this.columns = columns;
+    const layout = JSON.stringify(columns.map(({ name, program }) => [name, program]));
+    if (layout !== this.layout) {
+      this.layout = layout;
+      this.build();
+    }
+    for (const { metric, cells, changes } of this.rows) {
+      const values = columns.map(({ run }) => run.metrics.get(metric.name));
+      cells.forEach((cell, place) => say(cell, this.text(metric, values[place])));
+      changes.forEach((cell, place) => say(cell, changeText(values[0], values[place + 1])));
+    }
+    this.tell();
+  }
+
+  private build(): void {
+    const metrics = new Map<string, Metric>();
+    for (const { program } of this.columns) for (const metric of programNamed(this.content, program).metrics) metrics.set(metric.name, metric);
+    const others = this.columns.slice(1);
+    const head = element(
+      "tr",
+      {},
+      element("th", { scope: "col" }, "Metric"),
+      ...this.columns.map(({ name, place }) => element("th", { scope: "col", class: `number run-${place + 1}` }, name)),
+      ...others.map(({ name }) => element("th", { scope: "col", class: "number change" }, `${others.length > 1 ? `${name} ` : ""}less first`)),
+    );
+    this.rows = [...metrics.values()].map((metric) => ({
+      metric,
+      cells: this.columns.map(() => element("td", { class: "number" })),
+      changes: others.map(() => element("td", { class: "number change" })),
+    }));
+    const body = this.rows.map(({ metric, cells, changes }) => {
+      const unit = readableUnit(metric.shown);
+      const words = unit === "" || unit === "-" ? metric.label : `${metric.label} (${unit})`;
+      return element("tr", {}, element("th", { scope: "row" }, words), ...cells, ...changes);
+    });
+    this.table.replaceChildren(
+      element("caption", { class: "unseen" }, "What came of each configuration"),
+      element("thead", {}, head),
+      element("tbody", {}, ...body),
+    );
+  }
+
+  private text(metric: Metric, value: number | undefined): string {
+    if (value === undefined || !Number.isFinite(value)) return "–";
+    return plain(shownMetric(this.content, metric, value));
+  }
+
+  private summary(): string {
+    return this.columns
+      .map(({ name, program, run }) => {
+        if (run.fault !== "") return `${name}: ${run.fault}.`;
+        const metrics = programNamed(this.content, program).metrics.filter((metric) => TOLD.includes(metric.name));
+        const texts = metrics.map((metric) => `${metric.label} ${this.text(metric, run.metrics.get(metric.name))} ${readableUnit(metric.shown)}`.trim());
+        return `${name}: ${texts.join(", ")}.`;
+      })
+      .join(" ");
+  }
+}
+
+export function shownMetric(content: Content, metric: Metric, value: number): number {
+  return fromSi(value, scaleOf(metric.shown, scalesOf(content, metric.unit)), 101325);
+}
+
+function changeText(first: number | undefined, other: number | undefined): string {
+  if (first === undefined || other === undefined || !Number.isFinite(first - other)) return "–";
+  if (first === other) return "0";
+  if (first === 0) return "–";
+  const percent = ((other - first) / Math.abs(first)) * 100;
+  return `${percent > 0 ? "+" : "−"}${plain(Math.abs(percent), 3)}\u00a0%`;
+}

@@ -1,0 +1,355 @@
+/** Plots over time with one cursor: torque, pressures, command, angle, gas, with bands and recordings behind the curves. */
+
+import uPlot from "../vendor/uplot/uPlot.esm.js";
+import { interpolated } from "./agreement";
+import { colour, colourOf, DASHES } from "./colours";
+import { type Content, scalesOf } from "./content";
+import { element } from "./dom";
+import type { Run } from "./engine";
+import { fromSi, plain, readableUnit, scaleOf } from "./units";
+
+export interface Panel {
+  readonly title: string;
+  readonly channels: readonly string[];
+  /** A channel that is drawn once, in ink: what was asked for. */
+  readonly wanted?: string;
+}
+
+export const PANELS: readonly Panel[] = [
+  { title: "Torque", channels: ["torque"], wanted: "reference" },
+  { title: "Pressures, chamber 2 dashed", channels: ["pressure_1", "pressure_2"] },
+  { title: "Command to the valve", channels: ["command"] },
+  { title: "Gas taken from the supply", channels: ["supplied_mass"] },
+  { title: "Angle of the ankle", channels: ["angle"], wanted: "healthy_angle" },
+  { title: "Torque on the wearer", channels: ["external_torque"] },
+  { title: "0 helps, 1 lifts only, 2 pauses, 3 stopped", channels: ["safe_state"] },
+];
+
+/** What a run is called, and what came of it. */
+export interface Shown {
+  readonly name: string;
+  readonly place: number;
+  readonly run: Run;
+  readonly band: ReadonlyMap<string, Band> | null;
+}
+
+export interface Band {
+  readonly time: Float64Array;
+  readonly low: Float64Array;
+  readonly high: Float64Array;
+}
+
+export interface Overlay {
+  readonly time: Float64Array;
+  readonly channels: ReadonlyMap<string, Float64Array>;
+}
+
+interface Drawn {
+  readonly panel: Panel;
+  readonly plot: uPlot;
+  readonly readout: HTMLElement;
+  readonly shown: readonly number[];
+  /** A table for those who do not see the curves. */
+  readonly figure: HTMLElement;
+}
+
+interface Line {
+  readonly place: number;
+  readonly channel: string;
+  readonly isWanted: boolean;
+}
+
+const AXIS_SIZE = 52;
+/** Channels that keep a value until the next sample. */
+const HELD = new Set(["command", "safe_state"]);
+
+export class Panels {
+  private drawn: Drawn[] = [];
+  private shown: readonly Shown[] = [];
+  private overlay: Overlay | null = null;
+  private layout = "";
+  private first: Panel | null = null;
+  private ranges = new Map<Panel, readonly [number, number]>();
+  private readonly watcher = new ResizeObserver(() => this.fit());
+
+  constructor(
+    private readonly host: HTMLElement,
+    private readonly content: Content,
+    private readonly atmosphere: () => number,
+    private readonly pointed: (time: number | null) => void,
+  ) {
+    this.watcher.observe(host);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.rebuild());
+  }
+
+  /** Draw runs, over each other or beside each other. */
+  show(shown: readonly Shown[], isBeside: boolean, overlay: Overlay | null): void {
+    this.shown = shown;
+    this.overlay = overlay;
+    const layout = JSON.stringify([isBeside, shown.map((item) => [item.name, item.place, [...item.run.channels.keys()].length > 0])]);
+    const present = PANELS.filter((panel) => shown.some(({ run }) => panel.channels.some((name) => run.channels.has(name))));
+    // What is asked for comes first: a torque, else how the vane moves.
+    const leads = (panel: Panel) => panel.channels[0] === (shown.some(({ run }) => run.channels.has("reference")) ? "torque" : "angle");
+    const panels = [...present.filter(leads), ...present.filter((panel) => !leads(panel))];
+    this.ranges = new Map(panels.map((panel) => [panel, this.rangeOf(panel)]));
+    if (layout !== this.layout || this.drawn.length === 0) {
+      this.layout = layout;
+      this.build(panels, isBeside);
+    } else {
+      for (const item of this.drawn) item.plot.setData(this.dataOf(item.panel, item.shown));
+    }
+  }
+
+  /** Put the cursor of all plots to a time [s], or take it away. */
+  point(time: number | null): void {
+    for (const { plot } of this.drawn) {
+      const left = time === null ? -10 : plot.valToPos(time, "x");
+      plot.setCursor({ left, top: time === null ? -10 : 10 }, false);
+    }
+    this.read(time);
+  }
+
+  /** Names and canvases, from top to bottom, for a picture. */
+  pictures(): { title: string; canvas: HTMLCanvasElement; box: DOMRect }[] {
+    return this.drawn.map(({ panel, plot, figure }) => ({
+      title: this.titleOf(panel),
+      canvas: plot.ctx.canvas,
+      box: figure.getBoundingClientRect(),
+    }));
+  }
+
+  private rebuild(): void {
+    const isBeside = this.host.classList.contains("beside");
+    this.layout = "";
+    this.show(this.shown, isBeside, this.overlay);
+  }
+
+  private build(panels: readonly Panel[], isBeside: boolean): void {
+    for (const { plot } of this.drawn) plot.destroy();
+    this.first = panels[0] ?? null;
+    this.host.classList.toggle("beside", isBeside);
+    this.host.style.setProperty("--columns", String(isBeside ? this.shown.length : 2));
+    const groups = isBeside ? this.shown.map((_, place) => [place]) : [this.shown.map((_, place) => place)];
+    const places = panels.flatMap((panel) => groups.map((shown) => ({ panel, shown })));
+    const figures = places.map(({ panel, shown }) => {
+      const readout = element("span", { class: "readout" });
+      const name = isBeside ? `${this.shown[shown[0] ?? 0]?.name ?? ""}: ` : "";
+      const title = element("figcaption", {}, element("span", { class: "title" }, `${name}${this.titleOf(panel)}`), readout);
+      return { panel, shown, readout, figure: element("figure", { class: "panel" }, title, element("div", { class: "plot", role: "img", "aria-label": `${name}${this.titleOf(panel)} over time; the table of metrics says it in numbers` })) };
+    });
+    this.host.replaceChildren(...figures.map(({ figure }) => figure));
+    this.drawn = figures.map((item) => ({ ...item, plot: this.plotOf(item.panel, item.shown, item.figure.lastElementChild as HTMLElement) }));
+    this.read(null);
+  }
+
+  private titleOf(panel: Panel): string {
+    const unit = readableUnit(this.unitOf(panel.channels[0] ?? "").shown);
+    return unit === "" || unit === "-" ? panel.title : `${panel.title} (${unit})`;
+  }
+
+  private plotOf(panel: Panel, shown: readonly number[], host: HTMLElement): uPlot {
+    const lines = this.linesOf(panel, shown);
+    const ink = colour("ink");
+    const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
+    const series: uPlot.Series[] = lines.map((line) => ({
+      stroke: line.isWanted ? ink : colourOf(this.shown[line.place]?.place ?? 0),
+      width: line.isWanted ? 1.5 : 2,
+      dash: line.isWanted ? [6, 4] : (DASHES[panel.channels.indexOf(line.channel)] ?? []),
+      points: { show: false },
+      ...(HELD.has(line.channel) ? { paths: uPlot.paths.stepped!({ align: 1 }) } : {}),
+    }));
+    const options: uPlot.Options = {
+      ...this.sizeOf(host, panel === this.first),
+      legend: { show: false },
+      cursor: { sync: { key: "time" }, drag: { x: false, y: false }, points: { size: 7 } },
+      scales: { x: { time: false }, y: { range: () => [...(this.ranges.get(panel) ?? [0, 1])] as [number, number] } },
+      axes: [{ ...axis, size: 28, values: (_, ticks) => ticks.map((tick) => `${plain(tick)}`) }, { ...axis, size: AXIS_SIZE, values: (_, ticks) => ticks.map((tick) => plain(tick)) }],
+      series: [{}, ...series],
+      hooks: {
+        drawAxes: [(plot) => this.drawBehind(plot, panel, shown)],
+        setCursor: [(plot) => this.moved(plot)],
+      },
+    };
+    return new uPlot(options, this.dataOf(panel, shown), host);
+  }
+
+  private moved(plot: uPlot): void {
+    if (plot.cursor.event === undefined || plot.cursor.event === null) return;
+    const left = plot.cursor.left ?? -1;
+    const time = left < 0 ? null : plot.posToVal(left, "x");
+    this.read(time);
+    this.pointed(time);
+  }
+
+  private read(time: number | null): void {
+    for (const { panel, shown, readout } of this.drawn) {
+      const values = this.linesOf(panel, shown).map((line) => {
+        const run = this.shown[line.place]?.run;
+        const values = run?.channels.get(line.channel);
+        if (run === undefined || values === undefined || time === null) return null;
+        const at = Math.min(values.length - 1, Math.max(0, firstAfter(run.time, time) - 1));
+        return { line, text: plain(this.display(line.channel, values[at] ?? NaN), 3) };
+      });
+      readout.replaceChildren(
+        ...values
+          .filter((value) => value !== null)
+          .map(({ line, text }) => element("b", { class: line.isWanted ? "wanted" : `run-${(this.shown[line.place]?.place ?? 0) + 1}` }, text)),
+      );
+    }
+  }
+
+  private linesOf(panel: Panel, shown: readonly number[]): Line[] {
+    const wanted = shown.find((place) => panel.wanted !== undefined && this.shown[place]?.run.channels.has(panel.wanted));
+    const lines = shown.flatMap((place) =>
+      panel.channels.filter((name) => this.shown[place]?.run.channels.has(name)).map((channel) => ({ place, channel, isWanted: false })),
+    );
+    return wanted === undefined ? lines : [{ place: wanted, channel: panel.wanted ?? "", isWanted: true }, ...lines];
+  }
+
+  private dataOf(panel: Panel, shown: readonly number[]): uPlot.AlignedData {
+    const longest = shown.map((place) => this.shown[place]?.run.time ?? new Float64Array()).reduce((a, b) => (b.length > a.length ? b : a));
+    const columns = this.linesOf(panel, shown).map(({ place, channel }) => {
+      const run = this.shown[place]?.run;
+      const values = run?.channels.get(channel) ?? new Float64Array();
+      if (run === undefined || values.length === 0) return new Float64Array(longest.length).fill(NaN);
+      const onClock = sameClock(run.time, longest) ? values : this.moveTo(longest, run.time, values);
+      return this.displayed(channel, onClock);
+    });
+    return [longest, ...columns];
+  }
+
+  private moveTo(clock: Float64Array, time: Float64Array, values: Float64Array): Float64Array {
+    const found = interpolated(clock, 0, time, values);
+    const end = time.at(-1) ?? 0;
+    return found.map((value, place) => ((clock[place] ?? 0) > end + 1e-9 ? NaN : value));
+  }
+
+  private unitOf(channel: string): { unit: string; shown: string } {
+    for (const program of this.content.programs) {
+      const found = program.channels.find((item) => item.name === channel);
+      if (found !== undefined) return found;
+    }
+    return { unit: "", shown: "" };
+  }
+
+  /** Factor and offset from SI to what is shown. */
+  private lineOf(channel: string): readonly [number, number] {
+    const { unit, shown } = this.unitOf(channel);
+    if (unit === shown) return [1, 0];
+    const scale = scaleOf(shown, scalesOf(this.content, unit));
+    const zero = fromSi(0, scale, this.atmosphere());
+    return [1 / Number(scale.scale), zero];
+  }
+
+  private display(channel: string, value: number): number {
+    const [factor, offset] = this.lineOf(channel);
+    return value * factor + offset;
+  }
+
+  private displayed(channel: string, values: Float64Array): Float64Array {
+    const [factor, offset] = this.lineOf(channel);
+    if (factor === 1 && offset === 0) return values;
+    const found = new Float64Array(values.length);
+    for (let place = 0; place < values.length; place += 1) found[place] = (values[place] ?? 0) * factor + offset;
+    return found;
+  }
+
+  /** From least to largest of a panel over all that is shown in it, so that plots beside each other can be compared. */
+  private rangeOf(panel: Panel): readonly [number, number] {
+    let [low, high] = [Infinity, -Infinity];
+    const include = (channel: string, values: Float64Array | undefined) => {
+      if (values === undefined) return;
+      const [factor, offset] = this.lineOf(channel);
+      let [least, most] = [Infinity, -Infinity];
+      for (let place = 0; place < values.length; place += 1) {
+        const value = values[place] ?? 0;
+        if (value < least) least = value;
+        if (value > most) most = value;
+      }
+      low = Math.min(low, least * factor + offset);
+      high = Math.max(high, most * factor + offset);
+    };
+    for (const channel of [...panel.channels, ...(panel.wanted === undefined ? [] : [panel.wanted])]) {
+      for (const { run, band } of this.shown) {
+        include(channel, run.channels.get(channel));
+        include(channel, band?.get(channel)?.low);
+        include(channel, band?.get(channel)?.high);
+      }
+      include(channel, this.overlay?.channels.get(channel));
+    }
+    if (!(high >= low)) return [0, 1];
+    if (high - low < 1e-9 * Math.max(1, Math.abs(high))) return [low - 1, high + 1];
+    const margin = 0.06 * (high - low);
+    return [low === 0 ? 0 : low - margin, high + margin];
+  }
+
+  /** Bands and recordings, behind the curves. */
+  private drawBehind(plot: uPlot, panel: Panel, shown: readonly number[]): void {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    for (const channel of panel.channels) {
+      for (const place of shown) {
+        const item = this.shown[place];
+        const band = item?.band?.get(channel);
+        if (item !== undefined && band !== undefined) this.drawBand(plot, channel, band, colourOf(item.place));
+      }
+      const recorded = this.overlay?.channels.get(channel);
+      if (this.overlay !== null && recorded !== undefined) this.drawRecorded(plot, channel, this.overlay.time, recorded);
+    }
+    ctx.restore();
+  }
+
+  private drawBand(plot: uPlot, channel: string, band: Band, fill: string): void {
+    const { ctx } = plot;
+    ctx.beginPath();
+    const put = (place: number, value: number) =>
+      ctx.lineTo(plot.valToPos(band.time[place] ?? 0, "x", true), plot.valToPos(this.display(channel, value), "y", true));
+    for (let place = 0; place < band.time.length; place += 1) put(place, band.low[place] ?? 0);
+    for (let place = band.time.length - 1; place >= 0; place -= 1) put(place, band.high[place] ?? 0);
+    ctx.globalAlpha = 0.22;
+    ctx.fillStyle = fill;
+    ctx.fill();
+    ctx.globalAlpha = 1;
+  }
+
+  private drawRecorded(plot: uPlot, channel: string, time: Float64Array, values: Float64Array): void {
+    const { ctx } = plot;
+    const step = Math.max(1, Math.floor(time.length / 8000));
+    ctx.beginPath();
+    for (let place = 0; place < time.length; place += step) {
+      ctx.lineTo(plot.valToPos(time[place] ?? 0, "x", true), plot.valToPos(this.display(channel, values[place] ?? 0), "y", true));
+    }
+    ctx.strokeStyle = colour("recorded");
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    ctx.stroke();
+  }
+
+  private sizeOf(host: HTMLElement, isFirst: boolean): { width: number; height: number } {
+    const width = Math.max(200, host.clientWidth);
+    return { width, height: isFirst ? Math.min(300, Math.max(190, width * 0.42)) : 170 };
+  }
+
+  private fit(): void {
+    for (const { plot, panel, figure } of this.drawn) {
+      const size = this.sizeOf(figure.lastElementChild as HTMLElement, panel === this.first);
+      if (size.width !== plot.width || size.height !== plot.height) plot.setSize(size);
+    }
+  }
+}
+
+function sameClock(a: Float64Array, b: Float64Array): boolean {
+  return a === b || (a.length === b.length && a[1] === b[1] && a.at(-1) === b.at(-1));
+}
+
+function firstAfter(times: Float64Array, time: number): number {
+  let [low, high] = [0, times.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if ((times[middle] ?? 0) <= time) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}

@@ -1,0 +1,131 @@
+/** From what is typed to the numbers that the engine is given: one configuration at a time. */
+
+import { type Content, programNamed, type Program, type Relation, scalesOf, type Setting } from "./content";
+import { fromSi, InputError, plain, readableUnit, scaleOf, short, splitQuantity, toSi } from "./units";
+
+export const ATMOSPHERE = "supply.atmospheric_pressure";
+const STANDARD_ATMOSPHERE = 101325;
+const RELATIVE = 1e-9;
+
+export interface Configuration {
+  readonly program: string;
+  /** Texts by key, of what is not as the scenario has it. */
+  readonly changes: Readonly<Record<string, string>>;
+}
+
+export type Values = ReadonlyMap<string, number>;
+
+const indices = new WeakMap<Program, ReadonlyMap<string, Setting>>();
+
+export function settingsByKey(program: Program): ReadonlyMap<string, Setting> {
+  let found = indices.get(program);
+  if (found === undefined) {
+    found = new Map(program.settings.map((setting) => [setting.key, setting]));
+    indices.set(program, found);
+  }
+  return found;
+}
+
+/** All numbers of a configuration in SI, in the order of the program. Throws InputError for a text that is no such number. */
+export function valuesOf(content: Content, configuration: Configuration): Values {
+  const program = programNamed(content, configuration.program);
+  const { changes } = configuration;
+  const settings = settingsByKey(program);
+  const values = new Map(program.settings.map((setting) => [setting.key, setting.value]));
+  const first = settings.get(ATMOSPHERE);
+  const other = changes[ATMOSPHERE];
+  if (first !== undefined && other !== undefined) values.set(ATMOSPHERE, numberFrom(content, first, other, STANDARD_ATMOSPHERE));
+  const atmosphere = values.get(ATMOSPHERE) ?? STANDARD_ATMOSPHERE;
+  const followers: Setting[] = [];
+  for (const setting of program.settings) {
+    const typed = changes[setting.key];
+    if (setting.key === ATMOSPHERE) continue;
+    if (typed === undefined ? setting.follows !== "" : typed in setting.words) followers.push(setting);
+    else if (typed !== undefined) values.set(setting.key, numberFrom(content, setting, typed, atmosphere));
+    else if (setting.text !== "" && other !== undefined) values.set(setting.key, numberFrom(content, setting, setting.text, atmosphere));
+  }
+  for (const setting of [...followers, ...followers]) {
+    const followed = setting.words[changes[setting.key] ?? ""] ?? setting.follows;
+    values.set(setting.key, values.get(followed) ?? setting.value);
+  }
+  return values;
+}
+
+/** A typed number with its unit in SI, within its range. A bare number has the unit that is shown. */
+export function numberFrom(content: Content, setting: Setting, text: string, atmosphere: number): number {
+  const { number, unit } = splitQuantity(text);
+  // The controller of a walk knows no weather: what it is told in gauge counts from the standard atmosphere.
+  const zero = setting.key.startsWith("controller.") ? STANDARD_ATMOSPHERE : atmosphere;
+  const value = toSi(number, scaleOf(unit === "" ? setting.shown : unit, scalesOf(content, setting.unit)), zero);
+  if (!isInside(setting, value)) {
+    throw new InputError(`${setting.key}: '${short(text)}' is outside of its range, ${rangeText(content, setting, atmosphere)}`);
+  }
+  if (setting.kept !== "" && (setting.kept === "zero") !== (value === 0)) {
+    throw new InputError(`${setting.key}: must stay ${setting.kept === "zero" ? "0" : "above 0"} on this page; another value is another program`);
+  }
+  if (setting.key.endsWith(".seed") && !Number.isInteger(value)) throw new InputError(`${setting.key}: must be a whole number`);
+  return value;
+}
+
+/** Whether a value in SI is within the range of a setting. */
+export function isInside(setting: Setting, value: number): boolean {
+  const { low, high, isLowAllowed } = setting;
+  const isBelow = low !== null && (isLowAllowed ? value < low : value <= low);
+  return Number.isFinite(value) && !isBelow && !(high !== null && value > high);
+}
+
+/** What is typed, in the spelling that files have: a number with its unit, or a word. */
+export function normalText(setting: Setting, text: string): string {
+  const trimmed = text.trim().replace(/\s+/g, " ");
+  if (trimmed in setting.words) return trimmed;
+  const { number, unit } = splitQuantity(trimmed);
+  return `${String(number)} ${unit === "" ? setting.shown : unit}`.trim();
+}
+
+export function rangeText(content: Content, setting: Setting, atmosphere: number): string {
+  const { low, high, isLowAllowed } = setting;
+  const scale = scaleOf(setting.shown, scalesOf(content, setting.unit));
+  const text = (end: number) => plain(fromSi(end, scale, atmosphere), 6);
+  const begin = low === null ? "" : `${isLowAllowed ? "from" : "above"} ${text(low)}`;
+  const end = high === null ? "" : `up to ${text(high)}`;
+  const both = [begin, end].filter(Boolean).join(" ") || "any number";
+  return `${both} ${readableUnit(setting.shown)}`.trim();
+}
+
+/** A value as a control shows it, without its unit. */
+export function shownNumber(content: Content, setting: Setting, value: number, atmosphere: number): string {
+  return plain(fromSi(value, scaleOf(setting.shown, scalesOf(content, setting.unit)), atmosphere), 6);
+}
+
+/** The first pair of settings that contradict each other, as one line; empty where there is none. */
+export function contradiction(program: Program, values: Values): string {
+  for (const { key, relation, other, slack } of program.relations) {
+    const [left, right] = [values.get(key), values.get(other)];
+    if (left === undefined || right === undefined) continue;
+    if (!holds(relation, left, right, slack)) return `${key} must be ${relation} ${other}`;
+  }
+  return program.kind === "walk" ? "" : contradictionOfTimes(values);
+}
+
+/** What a scenario file may not have either: samples that do not divide the run, a step longer than a sample of the controller. */
+function contradictionOfTimes(values: Values): string {
+  const [duration, interval, step, period] = ["run.duration", "run.output_interval", "run.step", "controller.period"].map((key) => values.get(key));
+  if (duration !== undefined && interval !== undefined) {
+    const count = duration / interval;
+    if (Math.abs(count - Math.round(count)) > RELATIVE * count) return `run.output_interval must divide run.duration; it fits ${plain(count, 6)} times`;
+  }
+  if (step !== undefined && period !== undefined && step > period * (1 + RELATIVE)) return "run.step must be at most controller.period";
+  return "";
+}
+
+function holds(relation: Relation["relation"], left: number, right: number, slack: number): boolean {
+  if (relation === "at least") return left >= right - slack;
+  if (relation === "at most") return left <= right + slack;
+  return relation === "below" ? left < right + slack : left > right - slack;
+}
+
+/** The configuration with a key changed, or put back where the text is null. */
+export function changed(configuration: Configuration, key: string, text: string | null): Configuration {
+  const { [key]: _, ...others } = configuration.changes;
+  return { program: configuration.program, changes: text === null ? others : { ...others, [key]: text } };
+}

@@ -1,0 +1,101 @@
+/** Texts with a unit into SI and back, by the arithmetic of `ppafo.units`. */
+
+import type { UnitScale } from "./content";
+import { add, decimalOf, multiply, numberOf, parseDecimal } from "./decimals";
+
+const QUANTITY = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)$/;
+const SPELLINGS: ReadonlyArray<readonly [RegExp, string]> = [
+  [/²/g, "^2"],
+  [/³/g, "^3"],
+  [/\*\*/g, "^"],
+  [/[·*]/g, " "],
+  [/°/g, "deg"],
+  [/[μu](?=[A-Za-z])/g, "µ"],
+  [/%/g, "percent"],
+  [/ *([/()^]) */g, "$1"],
+  [/ +/g, " "],
+];
+
+/** What can be wrong with what somebody typed: one line for them to read. */
+export class InputError extends Error {}
+
+/** A unit as the tables spell it. */
+export function normalUnit(unit: string): string {
+  return SPELLINGS.reduce((text, [pattern, other]) => text.replace(pattern, other), unit.trim());
+}
+
+export interface Quantity {
+  readonly number: number;
+  readonly unit: string;
+}
+
+/** Number and unit of a text such as `12.6mm^2`; the unit may be empty. */
+export function splitQuantity(text: string): Quantity {
+  const match = QUANTITY.exec(text.trim());
+  if (match === null) throw new InputError(`'${short(text)}' does not start with a number`);
+  const number = Number(match[1]);
+  if (!Number.isFinite(number)) throw new InputError(`'${short(text)}' is not a finite number`);
+  return { number, unit: match[2] ?? "" };
+}
+
+/** The scale of a unit among those that fit, or an error that names them. */
+export function scaleOf(unit: string, scales: readonly UnitScale[]): UnitScale {
+  const wanted = normalUnit(unit);
+  const found = scales.find((scale) => normalUnit(scale.unit) === wanted);
+  if (found !== undefined) return found;
+  const known = scales.map((scale) => scale.unit || "a plain number").join(", ");
+  throw new InputError(`unit '${short(unit)}' does not fit here; known: ${known}`);
+}
+
+/** A number of some unit in SI; gauge pressure counts from the atmosphere (Pa absolute). */
+export function toSi(value: number, scale: UnitScale, atmosphere: number): number {
+  const factor = parseDecimal(scale.scale);
+  const offset = parseDecimal(scale.offset);
+  if (factor === null || offset === null) throw new InputError(`unit '${scale.unit}' has no scale`);
+  return numberOf(add(multiply(decimalOf(value), factor), offset)) + (scale.isGauge ? atmosphere : 0);
+}
+
+/** A number in SI in some unit, to show it: right to some 14 digits. */
+export function fromSi(value: number, scale: UnitScale, atmosphere: number): number {
+  return (value - (scale.isGauge ? atmosphere : 0) - Number(scale.offset)) / Number(scale.scale);
+}
+
+/** A number with a few significant digits, without an exponent where that is readable. */
+export function plain(value: number, digits = 4): string {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size < 1e-4 || size >= 1e6) return trimmed(value.toExponential(digits - 1));
+  return trimmed(Number(value.toPrecision(digits)).toFixed(decimalsFor(size, digits)));
+}
+
+function decimalsFor(size: number, digits: number): number {
+  let decimals = digits - 1;
+  for (let edge = 10; size >= edge && decimals > 0; edge *= 10) decimals -= 1;
+  for (let edge = 1; size < edge && decimals < 12; edge /= 10) decimals += 1;
+  return decimals;
+}
+
+function trimmed(text: string): string {
+  const [number = "", power] = text.split("e");
+  const short = number.includes(".") ? number.replace(/\.?0+$/, "") : number;
+  return power === undefined ? short : `${short}e${power.replace("+", "")}`;
+}
+
+/** A unit as a person reads it. */
+export function readableUnit(unit: string): string {
+  return unit
+    .replace(/_g$/, " gauge")
+    .replace(/_[ad]$/, (kind) => (kind === "_a" ? " abs" : ""))
+    .replace(/\^2/g, "²")
+    .replace(/\^3/g, "³")
+    .replace(/degC/, "°C")
+    .replace(/^percent$/, "%")
+    .replace(/ /g, "\u00a0");
+}
+
+/** What somebody typed, short enough for a line. */
+export function short(text: string): string {
+  const line = text.replace(/\s+/g, " ");
+  return line.length <= 40 ? line : `${line.slice(0, 36)} ...`;
+}

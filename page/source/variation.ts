@@ -1,0 +1,137 @@
+/** Many runs around a configuration: a map of two settings, a band over what is uncertain, and what each assumption does. */
+
+import type { Content, Metric, Program, Setting } from "./content";
+import { programNamed, scalesOf } from "./content";
+import type { Run } from "./engine";
+import type { Workers } from "./jobs";
+import type { Band } from "./panels";
+import { ATMOSPHERE, changed, type Configuration, isInside, settingsByKey, type Values, valuesOf } from "./settings";
+import { scaleOf, toSi } from "./units";
+
+export const SIDE = 32;
+const DRAWS = 200;
+const BAND_PLACES = 300;
+const OUTSIDE = 5;
+const BANDED = ["torque", "pressure_1", "pressure_2", "supplied_mass", "angle"];
+
+/** A metric over two settings, row by row from the lowest of the second; NaN where a run failed. */
+export interface Landscape {
+  readonly across: Setting;
+  readonly up: Setting;
+  readonly metric: Metric;
+  readonly values: Float64Array;
+}
+
+export async function landscapeOf(
+  content: Content,
+  workers: Workers,
+  configuration: Configuration,
+  across: Setting,
+  up: Setting,
+  metric: Metric,
+): Promise<Landscape> {
+  const program = programNamed(content, configuration.program);
+  const base = valuesOf(content, configuration);
+  const [columns, lines] = [across, up].map((setting) => placesOf(setting).map((place) => differences(content, configuration, base, setting, place)));
+  const rows = (lines ?? []).flatMap((line) => (columns ?? []).map((column) => rowOf(program, base, [...column, ...line])));
+  const runs = await workers.runMany(program, rows);
+  const width = program.metrics.length;
+  const at = program.metrics.indexOf(metric);
+  const values = Float64Array.from(rows, (_, place) => (runs.ended[place] === 0 ? (runs.metrics[place * width + at] ?? NaN) : NaN));
+  return { across, up, metric, values };
+}
+
+/** The numbers of a slider's range in the unit that is shown, from left to right. */
+export function placesOf(setting: Setting): number[] {
+  const [from, to] = setting.slider;
+  return Array.from({ length: SIDE }, (_, place) => from + ((to - from) * place) / (SIDE - 1));
+}
+
+/** What changes with a setting, that which follows it included. */
+function differences(content: Content, configuration: Configuration, base: Values, setting: Setting, shown: number): [string, number][] {
+  const value = toSi(shown, scaleOf(setting.shown, scalesOf(content, setting.unit)), base.get(ATMOSPHERE) ?? 101325);
+  if (!isInside(setting, value)) return [[setting.key, NaN]];
+  const other = valuesOf(content, changed(configuration, setting.key, `${String(shown)} ${setting.shown}`.trim()));
+  return [...other].filter(([key, number]) => number !== base.get(key));
+}
+
+function rowOf(program: Program, base: Values, differing: readonly (readonly [string, number])[]): Float64Array {
+  const values = new Map([...base, ...differing]);
+  return Float64Array.from(program.settings, (setting) => values.get(setting.key) ?? setting.value);
+}
+
+/** Settings of a program of which the set says how well they are known. */
+export function uncertainSettings(program: Program): Setting[] {
+  return program.settings.filter((setting) => setting.interval !== null);
+}
+
+/** Between which values 95 % of 200 draws lie, channel by channel; each number is drawn evenly from its interval. */
+export async function bandOf(content: Content, workers: Workers, configuration: Configuration, run: Run): Promise<ReadonlyMap<string, Band>> {
+  const program = programNamed(content, configuration.program);
+  const base = valuesOf(content, configuration);
+  const draw = evenly();
+  const free = uncertainSettings(program).filter((setting) => configuration.changes[setting.key] === undefined);
+  const rows = Array.from({ length: DRAWS }, () => {
+    const drawn = free.map(({ key, interval }): [string, number] => [key, (interval?.[0] ?? 0) + ((interval?.[1] ?? 0) - (interval?.[0] ?? 0)) * draw()]);
+    return rowOf(program, base, drawn);
+  });
+  const every = Math.max(1, Math.floor(run.time.length / BAND_PLACES));
+  const places = Math.floor((run.time.length - 1) / every) + 1;
+  const time = Float64Array.from({ length: places }, (_, place) => run.time[place * every] ?? 0);
+  const channels = BANDED.filter((name) => run.channels.has(name));
+  const found = await Promise.all(channels.map((channel) => workers.runMany(program, rows, channel, every, places)));
+  return new Map(found.map(({ traces, ended }, place) => [channels[place] ?? "", { time, ...ends(traces, ended, places) }]));
+}
+
+function ends(traces: Float64Array, ended: Int32Array, places: number): { low: Float64Array; high: Float64Array } {
+  const [low, high] = [new Float64Array(places), new Float64Array(places)];
+  const good = [...ended.keys()].filter((run) => ended[run] === 0);
+  for (let place = 0; place < places; place += 1) {
+    const column = Float64Array.from(good, (run) => traces[run * places + place] ?? 0).sort();
+    low[place] = column[OUTSIDE] ?? 0;
+    high[place] = column[column.length - 1 - OUTSIDE] ?? 0;
+  }
+  return { low, high };
+}
+
+/** Numbers from 0 to 1, the same at every start: by whole numbers, a product and a sum. */
+function evenly(): () => number {
+  let state = 2011n;
+  return () => {
+    state = (state * 6364136223846793005n + 1442695040888963407n) & 0xffffffffffffffffn;
+    return Number(state >> 11n) / 9007199254740992;
+  };
+}
+
+/** What a metric becomes where one setting that nobody printed goes to either end. */
+export interface Effect {
+  readonly setting: Setting;
+  readonly ends: readonly [number, number];
+  readonly metrics: readonly [ReadonlyMap<string, number>, ReadonlyMap<string, number>];
+}
+
+/** The interval of a setting, else a fifth less and more; of a pressure what it is above the atmosphere. */
+function endsOf({ key, unit, interval }: Setting, base: Values): readonly [number, number] {
+  if (interval !== null) return interval;
+  const value = base.get(key) ?? 0;
+  const size = 0.2 * (unit === "Pa_a" ? value - (base.get(ATMOSPHERE) ?? 0) : value);
+  return [value - size, value + size];
+}
+
+/** Effects of all settings of a program that are assumed: over their ends. */
+export async function effectsOf(content: Content, workers: Workers, configuration: Configuration): Promise<Effect[]> {
+  const program = programNamed(content, configuration.program);
+  const base = valuesOf(content, configuration);
+  const found = [...settingsByKey(program).values()].map((setting): [Setting, readonly [number, number]] => [setting, endsOf(setting, base)]);
+  const isMoved = ([setting, ends]: (typeof found)[number]) => setting.origin === "assumed" && ends[0] !== ends[1] && ends.every((end) => isInside(setting, end));
+  const moved = found.filter(isMoved);
+  const assumed = moved.map(([setting]) => setting);
+  const ends = moved.map(([, both]) => both);
+  const rows = assumed.flatMap(({ key }, place) => (ends[place] ?? [0, 0]).map((end) => rowOf(program, base, [[key, end]])));
+  if (rows.length === 0) return [];
+  const runs = await workers.runMany(program, rows);
+  const width = program.metrics.length;
+  const metricsOf = (row: number) =>
+    new Map(program.metrics.map((metric, place) => [metric.name, runs.ended[row] === 0 ? (runs.metrics[row * width + place] ?? NaN) : NaN]));
+  return assumed.map((setting, place) => ({ setting, ends: ends[place] ?? [0, 0], metrics: [metricsOf(2 * place), metricsOf(2 * place + 1)] }));
+}

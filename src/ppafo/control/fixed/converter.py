@@ -1,0 +1,98 @@
+"""What a converter shows of pressures and reference, whether that can be true, and the error that is left."""
+
+from typing import NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+
+FEWEST_BITS, MOST_BITS = 8, 14
+COMMAND_STEPS = 1000
+"""Steps from a command of 0 to one of 1: half the ticks of the pulse that drives a proportional valve."""
+LARGEST_READING: int = 2**MOST_BITS - 1
+
+SETTINGS = (
+    Quantity("converter_bits", "", "bits of the converter, a whole number", 12.0, float(FEWEST_BITS), float(MOST_BITS)),
+    Quantity(
+        "converter_range", "Pa_a", "pressure at which the converter shows its largest number", 1.0e6, 1.0e4, 1.0e8
+    ),
+)
+"""What a scenario says of the converter of an integer controller."""
+
+
+class Converter(NamedTuple):
+    """Pressure and torque of one count [Pa], [N m]; the largest reading, and the one that stands for a torque of 0."""
+
+    pressure_step: float
+    torque_step: float
+    top: float
+    middle: float
+
+
+class Limits(NamedTuple):
+    """The largest reading of a converter, and the one that stands for a reference of 0 N m."""
+
+    top: int
+    middle: int
+
+
+class Readings(NamedTuple):
+    """What the converter shows, from 0 to its largest reading: reference, pressure in chamber 1 and in chamber 2."""
+
+    reference: int
+    pressure_1: int
+    pressure_2: int
+
+
+OF_CONVERTER = (
+    Quantity("pressure_step", "Pa_d", "pressure of one count", None, 0.0),
+    Quantity("torque_step", "N m", "torque of one count", None, 0.0),
+    Quantity("top", "", "largest reading of the converter", None, 0.0, float(LARGEST_READING)),
+    Quantity("middle", "", "reading that stands for a reference of 0 N m", None, 0.0, float(2 ** (MOST_BITS - 1))),
+)
+"""The numbers of ``Converter``, in order."""
+
+
+def converter_of(bits: float, pressure_range: float, torque_constant: float) -> Converter:
+    """The converter with some bits that shows ``pressure_range`` [Pa] as its largest number.
+
+    The reference has its 0 N m in the middle, and a count of it is the torque of a count of pressure.
+    """
+    top = float(2 ** int(bits) - 1)
+    step = pressure_range / top
+    return Converter(
+        pressure_step=step, torque_step=torque_constant * step, top=top, middle=float(2 ** (int(bits) - 1))
+    )
+
+
+def count_of(value: float, step: float, top: float) -> int:
+    """Count that a converter shows for a value in the unit of its ``step``: rounded, and within 0 and ``top``."""
+    return int(max(0.0, min(top, value / step + 0.5)))
+
+
+def read(converter: Converter, reference: float, measurement: Measurement) -> Readings:
+    """What a converter shows of a reference [N m] and of the measured pressures [Pa]."""
+    return Readings(
+        reference=count_of(reference + converter.middle * converter.torque_step, converter.torque_step, converter.top),
+        pressure_1=count_of(measurement.pressure_1, converter.pressure_step, converter.top),
+        pressure_2=count_of(measurement.pressure_2, converter.pressure_step, converter.top),
+    )
+
+
+def is_inside(reading: int, top: int) -> bool:
+    """False for a reading at an end of its range, where a broken wire or a short circuit puts it."""
+    return reading > 0 and reading < top
+
+
+def still_sound(sound: int, readings: Readings, limits: Limits) -> int:
+    """1 as long as no reading was ever at an end of its range, else 0, for good."""
+    inside = (
+        is_inside(readings.reference, limits.top)
+        and is_inside(readings.pressure_1, limits.top)
+        and is_inside(readings.pressure_2, limits.top)
+    )
+    return sound if inside else 0
+
+
+def error_of(readings: Readings, limits: Limits) -> int:
+    """Reference less torque, in counts of pressure."""
+    return readings.reference - limits.middle - (readings.pressure_1 - readings.pressure_2)

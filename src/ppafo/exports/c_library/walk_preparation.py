@@ -1,0 +1,255 @@
+"""From the settings of a walk to the numbers of a run: one composed function, which calls those of the planning.
+
+What a gait comes to (series, events, how its heel rolls) and a course in time are numbers written out.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from ppafo.control.walking.catalog import walking_controllers
+from ppafo.engine.program import Program
+from ppafo.engine.source_text import SourceCollector
+from ppafo.errors import ScenarioError
+from ppafo.exports.c_library.files import Relation, Setting, c_identifier
+from ppafo.exports.c_library.preparation import SAID, used_numbers
+from ppafo.exports.c_library.writing import FLAWS, Writing
+from ppafo.model.declaration import Quantity
+from ppafo.model.gait import gait_at
+from ppafo.model.gait_sensors import NOTHING_SEEN
+from ppafo.parameters.building import consistency
+from ppafo.simulation.declaration import PERIOD, RUN, THERMAL_GAS
+from ppafo.simulation.numbers import device_number_at, device_numbers
+from ppafo.simulation.plan import profile_parameters
+from ppafo.simulation.supply_line import LINES, paths
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.course_planning import flat_foot
+from ppafo.walking.declaration import SEED, STEP, WALK_SENSORS, fault_numbers
+from ppafo.walking.gait_series import gait_series, gait_timing
+from ppafo.walking.heel_rocker import fit_rocker
+from ppafo.walking.planning import NO_REFERENCE, planned_course
+from ppafo.walking.preparation import (
+    device_share,
+    distorting_fault,
+    fixed_fault,
+    gait_sensors,
+    longest_delay,
+    rocker_on_heel,
+    smallest_chamber,
+    standing_on,
+    vented_state,
+    walk_from_standing,
+    walk_from_strike,
+    walk_step_counts,
+    with_leg,
+)
+from ppafo.walking.sensor_settings import DISTORTED, FROZEN, NEVER, FaultSettings, SensorSettings, sensors_of
+from ppafo.walking.walk import record_interval, walk_duration
+from ppafo.walking.wearer import WEARER, leg_parameters
+
+_FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
+_OTHERS = ("angle_bandwidth", "pressure_bandwidth", "angle_lost_share", "pressure_lost_share")
+_DISTORTING = ("time", "period", "gain", "offset", "drift", "crosstalk", "lag", "lost_share", "delay")
+_RELATIONS = (
+    ("wearer.shank_mass_centre", "at most", "wearer.shank_length"),
+    ("wearer.foot_mass_centre", "at most", "wearer.toe_lever"),
+    ("controller.unload_threshold", "below", "controller.load_threshold"),
+    ("controller.largest_force", "above", "controller.load_threshold"),
+    ("controller.flat_from", "below", "controller.flat_to"),
+    ("controller.lowest_angle", "below", "controller.highest_angle"),
+    ("controller.swing_angle", "above", "controller.lowest_angle"),
+    ("controller.swing_angle", "below", "controller.highest_angle"),
+    ("controller.swing_angle", "above", "actuator.angle_min"),
+    ("controller.swing_angle", "below", "actuator.angle_max"),
+    ("controller.lowest_pressure", "below", "supply.atmospheric_pressure"),
+    ("controller.filled_pressure", "above", "supply.atmospheric_pressure"),
+    ("controller.filled_pressure", "below", "supply.pressure"),
+    ("controller.filled_pressure", "below", "supply.dorsiflexion_pressure"),
+    ("controller.push_off_end", "above", "controller.push_off_start"),
+    ("controller.rise_time", "at most", "controller.peak_time"),
+    ("controller.peak_time", "at least", "controller.push_off_start"),
+)
+"""Contradictions of a walk file between two numbers; those with a third, or with the gait, are left to the caller."""
+
+
+def check_can_leave(configuration: Configuration) -> None:
+    """Raise ScenarioError for a walk that has no exported form."""
+    if configuration.bottle is not None:
+        raise ScenarioError(
+            f"{configuration.name}: a walk on a bottle cannot be exported: bottle and device take turns in Python; "
+            "leave the bottle out, or give it lines with [supply_line]"
+        )
+    settings = configuration.sensor_settings
+    is_known = settings is not None and sensors_of(settings, configuration.period) == configuration.gait_sensors
+    if settings is None or not is_known or configuration.sensors[:4] != tuple(settings.numbers[name] for name in FLAWS):
+        raise ScenarioError(
+            f"{configuration.name}: its sensors are not those of its file: load it anew with load_walk to export it"
+        )
+
+
+def settings_of_walk(configuration: Configuration) -> tuple[Setting, ...]:
+    """Every number of a walk in SI units, under the path that overrides know it by."""
+    return tuple(
+        Setting(c_identifier(path), path, replace(item, summary=SAID.get(path, item.summary)), value)
+        for path, (item, value) in _numbers(configuration).items()
+    )
+
+
+def _numbers(configuration: Configuration) -> dict[str, tuple[Quantity, float]]:
+    """Declaration and value of every number of a walk, by path."""
+    device, sensors = configuration.device, _sensors(configuration)
+    of_device = used_numbers(device, device_numbers(device))
+    found = {path: (item, device_number_at(device, path)) for path, item in of_device.items()}
+    duration = walk_duration(configuration)
+    clock = {"duration": duration, "step": configuration.step, "output_interval": record_interval(duration)}
+    items = {item.name: item for item in (*RUN, STEP)}
+    found |= {f"run.{name}": (items[name], value) for name, value in clock.items()}
+    found |= {f"wearer.{item.name}": (item, getattr(configuration.wearer, item.name)) for item in WEARER}
+    found["controller.period"] = (PERIOD, configuration.period)
+    for path, item in _control(configuration).items():
+        found[path] = (item, configuration.settings[item.name])
+    found |= {f"sensors.{item.name}": (item, sensors.numbers[item.name]) for item in WALK_SENSORS}
+    found["sensors.seed"] = (SEED, float(configuration.sensors.seed))
+    for sensor, fault in sensors.faults.items():
+        for item in fault_numbers(sensor, fault.kind):
+            found[f"faults.{sensor}.{item.name}"] = (item, fault.numbers[item.name])
+    return found | _gas_numbers(configuration)
+
+
+def _gas_numbers(configuration: Configuration) -> dict[str, tuple[Quantity, float]]:
+    """Declaration and value of what the gas model and the lines of the supply have."""
+    walls, lines = configuration.thermal, configuration.supply_lines
+    found = {}
+    if walls is not None:
+        given = walls.heat_transfer_coefficient, walls.area_per_volume
+        found = {f"gas_model.{item.name}": (item, value) for item, value in zip(THERMAL_GAS, given, strict=True)}
+    if lines is not None:
+        for path, item in paths().items():
+            _, line, name = path.split(".")
+            found[path] = (item, getattr(lines, f"{name}_{1 + LINES.index(line)}"))
+    return found
+
+
+def _sensors(configuration: Configuration) -> SensorSettings:
+    assert configuration.sensor_settings is not None, "checked before"
+    return configuration.sensor_settings
+
+
+def sensors_that_fail(configuration: Configuration) -> dict[str, FaultSettings]:
+    """Faults of a walk by the name of the sensor, without those that have none."""
+    return {sensor: item for sensor, item in _sensors(configuration).faults.items() if item.kind}
+
+
+def _control(configuration: Configuration) -> dict[str, Quantity]:
+    """Settings of controller and timing by path, in the order of the controller's parameters."""
+    control = configuration.controller
+    law = walking_controllers().get(control.name, control)
+    own = {item.name for item in law.quantities}
+    return {f"{'controller' if item.name in own else 'timing'}.{item.name}": item for item in control.quantities}
+
+
+def relations_of_walk(configuration: Configuration) -> tuple[Relation, ...]:
+    """Settings that contradict each other, as they would in a file."""
+    rules = [(path, relation, other) for path, relation, other, _ in consistency(configuration.device)]
+    if configuration.supply_lines is not None:
+        rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
+    if "load_threshold" in configuration.settings:
+        rules += _RELATIONS
+    else:
+        rules += _RELATIONS[:2]
+    known = _numbers(configuration)
+    return tuple(
+        Relation(c_identifier(path), relation, c_identifier(other))
+        for path, relation, other in rules
+        if path in known and other in known
+    )
+
+
+def preparation_of_walk(configuration: Configuration, program: Program, collector: SourceCollector) -> str:
+    """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
+    writing = Writing(configuration.device, configuration.supply_lines, program, collector)
+    lines = [
+        *writing.plant("bare", "0.0"),
+        *_leg(configuration, writing),
+        *_gait_sensors(configuration, writing),
+        *_steps(configuration, writing),
+        *writing.timing("signal_delay"),
+        *_pieces(configuration, writing),
+        *_start(configuration, writing),
+    ]
+    return writing.text(settings_of_walk(configuration), lines)
+
+
+def _leg(configuration: Configuration, writing: Writing) -> Iterator[str]:
+    """Lines that make the leg, the gait on it, and the plant with both."""
+    add, fit = writing.add, fit_rocker(configuration.gait)
+    yield f"wearer = {writing.row('Wearer', writing.section('wearer', [item.name for item in WEARER]))}"
+    fitted = ", ".join(map(repr, fit))
+    yield f"rocker = {add(rocker_on_heel)}({fitted}, wearer_heel_lever)"
+    yield f"leg = {add(leg_parameters)}(wearer, rocker)"
+    yield f"share = {add(device_share)}(bare, leg)"
+    yield f"plant = {add(with_leg)}(bare, leg)"
+    yield f"gait = {writing.constant(gait_series(configuration.gait), 'gait')}"
+    yield f"gait_timing = {writing.constant(gait_timing(configuration.gait), 'gait_timing')}"
+
+
+def _gait_sensors(configuration: Configuration, writing: Writing) -> Iterator[str]:
+    """Lines that make the sensors with their faults, and the longest time by which one is late."""
+    add, settings = writing.add, _sensors(configuration)
+    for sensor, fault in settings.faults.items():
+        names = writing.section(f"faults.{sensor}", [item.name for item in fault_numbers(sensor, fault.kind)])
+        yield f"{sensor}_fault = {_fault(writing, fault.kind, names)}"
+    row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
+    faults = ", ".join(f"{sensor}_fault" for sensor in settings.faults)
+    yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {faults})"
+    yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
+
+
+def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
+    """A fault of a sensor from its settings, or none."""
+    if not kind:
+        return f"{writing.add(fixed_fault)}({NEVER!r}, 0.0, 0.0, 0.0)"
+    if kind != DISTORTED:
+        holds = 1.0 if kind == FROZEN else 0.0
+        reading = names.get("reading", "0.0")
+        return f"{writing.add(fixed_fault)}({names['time']}, {holds!r}, {reading}, {names['period']})"
+    given = ", ".join(names.get(name, "0.0") for name in _DISTORTING)
+    return f"{writing.add(distorting_fault)}({given}, controller_period)"
+
+
+def _steps(configuration: Configuration, writing: Writing) -> Iterator[str]:
+    """Lines that make the steps."""
+    yield f"volume = {writing.add(smallest_chamber)}(plant)"
+    if configuration.supply_lines is not None:
+        volumes = (c_identifier(f"supply_line.{line}.volume") for line in LINES)
+        yield f"volume = min(volume, {', '.join(volumes)})"
+    stiffness = "1.0" if configuration.thermal is None else "gas_heat_capacity_ratio"
+    given = "run_duration, run_step, run_output_interval, controller_period"
+    yield f"counts_of_steps = {writing.add(walk_step_counts)}({given}, plant, volume, {stiffness})"
+    yield "needs_parts = False"
+
+
+def _pieces(configuration: Configuration, writing: Writing) -> Iterator[str]:
+    """Lines that make the parameters of the controller, its noise, gas, lines and course."""
+    control = configuration.controller
+    given = [c_identifier(path) for path in _control(configuration)]
+    yield f"controller = {writing.kind('controller', control, given)}"
+    yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
+    yield from writing.gas()
+    if configuration.course is not None:
+        course = planned_course(configuration.course, configuration.gait).course
+        yield f"walk_course = {writing.constant(course, 'walk_course')}"
+
+
+def _start(configuration: Configuration, writing: Writing) -> Iterator[str]:
+    """Lines that make the states at the start: at a heel strike, or standing where there is a course."""
+    add = writing.add
+    if configuration.course is None:
+        yield f"walk = {add(walk_from_strike)}({add(gait_at)}(gait, gait_timing, leg, 0.0))"
+    else:
+        first = planned_course(configuration.course, configuration.gait).course.parts[0]
+        sine, cosine = map(float, flat_foot(gait_timing(configuration.gait)))
+        given = f"leg, gait_timing.ground_angle, {sine!r}, {cosine!r}, {first.turns!r}, {first.load!r}"
+        yield f"walk = {add(walk_from_standing)}({add(standing_on)}({given}))"
+    yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
+    yield f"state = {add(vented_state)}(plant, walk.now.ankle, walk.now.ankle_rate)"
+    yield from writing.start()

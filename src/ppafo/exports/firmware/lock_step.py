@@ -1,0 +1,167 @@
+"""A controller on the chip's simulator beside the same in Python: drawn samples, or a run with the lanes as plant."""
+
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ppafo.control.fixed.converter import COMMAND_STEPS, Converter, Limits, Readings, read
+from ppafo.errors import SimulationError
+from ppafo.exports.firmware import ChipController, chip_controller, firmware
+from ppafo.exports.firmware.controller import state_type
+from ppafo.exports.firmware.simulator import ChipSimulator, Decision, Sizes
+from ppafo.model.sensors import Measurement
+from ppafo.simulation.result import Result
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate
+
+EPISODE = 200
+"""Drawn samples from one reset to the next."""
+
+
+class PythonChip:
+    """The integer controller of a scenario in Python, as the chip computes it."""
+
+    def __init__(self, chip: ChipController) -> None:
+        self.law = chip.law
+        names = [item.name for item in chip.law.number_quantities]
+        top, middle, *others = (int(chip.numbers[name]) for name in names)
+        self.numbers = chip.law.numbers(Limits(top, middle), *others)
+        self.state: Any = None
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget everything."""
+        self.state = state_type(self.law)(*map(int, self.law.kind.initial))
+
+    def sample(self, readings: Readings) -> tuple[int, int]:
+        """Command in steps, and 1 while all readings have been sound."""
+        command, self.state = self.law.sample(self.numbers, self.state, readings)
+        return command, self.state.sound
+
+
+class ChipLaw:
+    """The simulated chip as a controller of a scenario; it keeps what each sample took and told."""
+
+    def __init__(self, simulator: ChipSimulator, converter: Converter) -> None:
+        self.simulator = simulator
+        self.converter = converter
+        self.decisions: list[Decision] = []
+
+    def reset(self) -> None:
+        """Reset the processor."""
+        self.simulator.begin()
+        self.decisions.clear()
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+        """Command from -1 to 1, from what the converter shows; the chip needs no time [s], it counts samples."""
+        del time
+        self.decisions.append(self.simulator.sample(read(self.converter, reference, measurement)))
+        return self.decisions[-1].command / COMMAND_STEPS
+
+
+class Cost(NamedTuple):
+    """Sizes of the image and depth of the stack [bytes], worst and mean cycles of a sample."""
+
+    sizes: Sizes
+    stack: int
+    worst_cycles: int
+    mean_cycles: float
+
+
+@dataclass(frozen=True, slots=True)
+class ChipRun:
+    """A scenario with the chip's simulator in charge, the same with the integer controller in the lanes, and the cost.
+
+    ``differences`` are samples at which the commands differ; ``same_bits`` is true where every channel is the same.
+    """
+
+    scenario: Scenario
+    chip: Result
+    lanes: Result
+    cost: Cost
+    samples: int
+    differences: int
+    same_bits: bool
+
+
+def run_on_chip(scenario: Scenario) -> ChipRun:
+    """Run a scenario with its controller on the chip's simulator, in virtual time, and once more in the lanes.
+
+    ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
+    """
+    chip = chip_controller(scenario)
+    with ChipSimulator(firmware(scenario)) as simulator:
+        law = ChipLaw(simulator, chip.converter)
+        on_chip = simulate(scenario.controlled_by(law))
+        cost = _cost(simulator, law.decisions)
+    in_lanes = simulate(scenario)
+    mine, theirs = on_chip.recording.channels, in_lanes.recording.channels
+    same = all(np.array_equal(mine[name].values, theirs[name].values) for name in theirs)
+    differ = int(np.count_nonzero(mine["command"].values != theirs["command"].values))
+    return ChipRun(scenario, on_chip, in_lanes, cost, len(law.decisions), differ, same)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Drawn samples on the chip's simulator and in Python: how many, how many decisions differ, and the cost."""
+
+    samples: int
+    differences: int
+    first_difference: str
+    cost: Cost
+
+
+def compare_drawn(scenario: Scenario, samples: int, seed: int = 1) -> Comparison:
+    """Give drawn readings to the chip's simulator and to Python, with a reset after every ``EPISODE`` of them."""
+    chip = chip_controller(scenario)
+    reference, decisions = PythonChip(chip), []
+    differences, first = 0, ""
+    with ChipSimulator(firmware(scenario)) as simulator:
+        for number, readings in enumerate(drawn_readings(int(chip.converter.top), samples, seed)):
+            if number % EPISODE == 0 and number:
+                reference.begin()
+                simulator.begin()
+            wanted, found = reference.sample(readings), simulator.sample(readings)
+            decisions.append(found)
+            if wanted != found[:2]:
+                differences += 1
+                first = first or f"sample {number}, {tuple(readings)}: {found[:2]} on the chip, {wanted} in Python"
+        cost = _cost(simulator, decisions)
+    return Comparison(samples, differences, first, cost)
+
+
+def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
+    """Readings of a converter with some largest one: courses that wander, jump, rest at an edge, or break.
+
+    Each episode has a manner of its own; in two of five a reading comes to an end of its range at some time.
+    """
+    draw = random.Random(seed)
+    edges = (1, 2, top // 2, top // 2 + 1, top - 2, top - 1)
+    for start in range(0, samples, EPISODE):
+        step = draw.choice((1, 3, 30, 300, top))
+        at = [draw.choice((*edges, draw.randint(1, top - 1))) for _ in Readings._fields]
+        breaks = draw.randrange(EPISODE) if draw.random() < 0.4 else EPISODE
+        for place in range(min(EPISODE, samples - start)):
+            if draw.random() < 0.02:
+                at[draw.randrange(3)] = draw.choice(edges)
+            if draw.random() < 0.7:
+                at = [min(top - 1, max(1, value + draw.randint(-step, step))) for value in at]
+            shown = list(at)
+            if place == breaks:
+                shown[draw.randrange(3)] = draw.choice((0, top))
+            yield Readings(*shown)
+
+
+def _cost(simulator: ChipSimulator, decisions: list[Decision]) -> Cost:
+    if not decisions:
+        raise SimulationError("no sample was taken on the chip")
+    cycles = [item.cycles for item in decisions]
+    return Cost(
+        sizes=simulator.sizes,
+        stack=simulator.stack(),
+        worst_cycles=max(cycles),
+        mean_cycles=sum(cycles) / len(cycles),
+    )

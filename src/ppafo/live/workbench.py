@@ -1,0 +1,155 @@
+"""A workbench of scenarios and walks: which of them share a tab, what they are called there, and the page of them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ppafo.answers import LivePart
+from ppafo.errors import PpafoError, ScenarioError
+from ppafo.exports.loading import load_exportable
+from ppafo.exports.wasm import module_of
+from ppafo.live.content import Interval, Simulated, page_content, program_content, words
+from ppafo.live.page import block_of, packed, page_of, policy_of_block
+from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.studies.loading import load_study
+from ppafo.walking.configuration import Configuration
+
+Simulable = Scenario | Configuration
+
+TITLE = "The powered ankle-foot orthosis, live"
+DEFAULT = ("torque-task-solenoid", "torque-task-proportional", "step-response", "solenoid")
+MOST_SCENARIOS = 24
+_WALKED = "6 s"
+"""How long a walk is in a page, unless somebody wants more: five strides."""
+_OPEN = 2
+"""Configurations that a tab opens with."""
+_STUDY = "torque-task-uncertainty"
+_ENDS = (0.025, 0.975)
+_LABELS = {
+    "torque-task-solenoid": "Solenoid pair",
+    "torque-task-proportional": "Proportional valve",
+    "torque-task-slow-valve": "Slow valve",
+    "torque-task-anti-windup": "Anti-windup",
+    "torque-task-moving-ankle": "Moving ankle",
+    "step-response": "Step response",
+    "solenoid": "Solenoid pair",
+    "proportional": "Proportional valve",
+    "off": "Without help",
+}
+_WALK = "Walk"
+_TASKS = {"held": "Torque task", "prescribed": "Moving ankle", "free": "Free vane"}
+_STEP = "Step response"
+
+
+def workbench(
+    scenarios: Iterable[str] = DEFAULT,
+    overrides: Sequence[str] = (),
+    title: str = TITLE,
+    start: Sequence[Mapping[str, Any]] = (),
+    summary: str = "",
+) -> bytes:
+    """Return a page, one file of HTML, in which scenarios are simulated again while their numbers are changed.
+
+    ``scenarios`` are names or files of scenarios and walks; those with the same kind of motion share a tab.
+    ``overrides`` change all of them.
+    ``start`` are the configurations that the page opens with, at most four for a tab: a ``program`` (the name of a
+    scenario) and ``changes``, texts by key. Without it each tab opens with its first two scenarios. ``summary`` is
+    what a page of one tab says of it.
+    ScenarioError for none, too many, or two of one name; ProgramError where a program has to be built and cannot be.
+    """
+    content, modules = _content(list(scenarios), overrides, title, "page")
+    for tab in content["tabs"]:
+        own = [dict(item) for item in start if item["program"] in tab["programs"]]
+        tab["start"] = own or tab["start"]
+        tab["summary"] = summary if summary and len(content["tabs"]) == 1 else tab["summary"]
+    return page_of(title, content, modules)
+
+
+def live_part(scenarios: Sequence[str | Simulable]) -> LivePart | None:
+    """Return a part of a page with the controls that matter most; None where one of the programs cannot be had.
+
+    Of scenarios with one name only the first is in it.
+    """
+    named = {item if isinstance(item, str) else item.name: item for item in reversed(scenarios)}
+    try:
+        content, modules = _content(list(reversed(named.values())), (), TITLE, "block")
+    except PpafoError:
+        return None
+    return LivePart(policy_of_block(), block_of(content, modules))
+
+
+def _content(
+    scenarios: Sequence[str | Simulable], overrides: Sequence[str], title: str, form: str
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Content of a page, and its modules by name; programs that are the same are there once."""
+    simulated = _simulated(scenarios, overrides)
+    intervals = known_intervals()
+    names: dict[str, str] = {}
+    programs = []
+    for item in simulated:
+        name = names.setdefault(packed(item.module.wasm), f"module-{len(names) + 1}")
+        programs.append(program_content(item, name, intervals))
+    content = page_content(title, form, _tabs(simulated), programs)
+    return content, {name: text for text, name in names.items()}
+
+
+@cache
+def known_intervals() -> Mapping[str, Interval]:
+    """Return 95 % intervals in SI, by key, of numbers of which the set does not say how well they are known."""
+    ends = np.array(_ENDS)
+    drawn = {item.path: item.distribution.values(ends) for item in load_study(_STUDY).drawn}
+    return {path: (float(low), float(high)) for path, (low, high) in drawn.items()}
+
+
+def _simulated(given: Sequence[str | Simulable], overrides: Sequence[str]) -> list[Simulated]:
+    if not 1 <= len(given) <= MOST_SCENARIOS:
+        raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(given)}")
+    loaded = [load_exportable(item, overrides) if isinstance(item, str) else item for item in given]
+    found: dict[str, Simulable] = {}
+    for scenario in loaded:
+        if scenario.name in found:
+            raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench tells them apart by name")
+        found[scenario.name] = scenario
+    return [Simulated(scenario, module_of(scenario), _label(scenario)) for scenario in loaded]
+
+
+def _label(scenario: Simulable) -> str:
+    words_of_name = scenario.name.replace("-", " ").replace("_", " ")
+    return _LABELS.get(scenario.name, words_of_name[:1].upper() + words_of_name[1:])
+
+
+def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:
+    groups: dict[str, list[Simulated]] = {}
+    for item in simulated:
+        groups.setdefault(_task(item.scenario), []).append(item)
+    return [_tab(title, group) for title, group in groups.items()]
+
+
+def _task(scenario: Simulable) -> str:
+    if isinstance(scenario, Configuration):
+        return _WALK
+    motion = scenario.motion
+    if isinstance(motion, FreeMotion):
+        return _STEP if scenario.control.kind == "constant" else _TASKS["free"]
+    return _TASKS["held" if motion.profile.kind == "constant" else "prescribed"]
+
+
+def _tab(title: str, group: Sequence[Simulated]) -> dict[str, Any]:
+    alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
+    changes = {"run.duration": _WALKED} if title == _WALK else {}
+    return {
+        "title": title,
+        "summary": alone or _SUMMARIES.get(title, ""),
+        "programs": [item.scenario.name for item in group],
+        "start": [{"program": item.scenario.name, "changes": changes} for item in group[:_OPEN]],
+        "first": words()["first_of_walks" if title == _WALK else "first"],
+        "claims": words()["claims_of_walks" if title == _WALK else "claims"],
+    }
+
+
+_SUMMARIES = {
+    "Torque task": "The foot stays flat on the ground while the actuator follows a torque that ramps up and is held.",
+    "Walk": "A leg that walks with the device; the dashed line is what a healthy ankle would do.",
+}

@@ -1,0 +1,331 @@
+"""Whole numbers in 16 and 32 bits where their ranges allow it, which interval arithmetic over declared inputs proves.
+
+Every function of a module is gone through with the ranges of what it is called with. What a name, a field or an item of
+a tuple ever holds decides its width; a value beyond 32 bits is refused, so that what is left cannot overflow.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, TypeAlias
+
+from ppafo.errors import ProgramError
+from ppafo.translation import typed
+from ppafo.translation.typed import BOOL, INT, INT16, INT32, Function, Items, Module, Row, Statement, Term, Type
+
+MOST_TURNS = 64
+
+
+class Interval(NamedTuple):
+    """Lowest and highest whole number."""
+
+    low: int
+    high: int
+
+
+Range: TypeAlias = "Interval | tuple[Range, ...]"
+"""That of a number, or those of the fields of a row or the items of a tuple."""
+Names: TypeAlias = "dict[str, Range]"
+
+TRUTH = Interval(0, 1)
+_WIDTHS = ((INT16, Interval(-(2**15), 2**15 - 1)), (INT32, Interval(-(2**31), 2**31 - 1)))
+
+
+class Narrowed(NamedTuple):
+    """A module whose whole numbers have widths, and the range of what its entry returns."""
+
+    module: Module
+    returned: Range
+
+
+def narrowed(module: Module, given: Mapping[str, Range]) -> Narrowed:
+    """The module with widths, for ranges of the parameters of its last function, by name.
+
+    ProgramError for what may leave 32 bits, and for what is no sum, shift, choice or product with a power of two.
+    """
+    ranges = _Ranges({item.name: item for item in module.functions})
+    entry = module.functions[-1]
+    returned = ranges.call(entry, tuple(given[name] for name, _ in entry.parameters))
+    called = [item for item in module.functions if item.name in ranges.returned]
+    return Narrowed(Module([_Narrowing(ranges, item).function() for item in called]), returned)
+
+
+def hull(one: Range, other: Range) -> Range:
+    """The smallest range that holds both."""
+    if isinstance(one, Interval) and isinstance(other, Interval):
+        return Interval(min(one.low, other.low), max(one.high, other.high))
+    assert not isinstance(one, Interval)
+    assert not isinstance(other, Interval)
+    return tuple(hull(*pair) for pair in zip(one, other, strict=True))
+
+
+def _corners(sign: Callable[[int, int], int], one: Interval, other: Interval) -> Interval:
+    found = [sign(left, right) for left in one for right in other]
+    return Interval(min(found), max(found))
+
+
+_SIGNS: dict[str, Callable[[int, int], int]] = {
+    "+": int.__add__,
+    "-": int.__sub__,
+    "*": int.__mul__,
+    ">>": int.__rshift__,
+    "min": min,
+    "max": max,
+}
+_COMPARISONS = frozenset({"<", "<=", ">", ">=", "==", "!=", "and", "or", "not"})
+
+
+@dataclass(slots=True)
+class _Ranges:
+    """What every name, term, field and result ever holds; terms are known by their identity."""
+
+    functions: Mapping[str, Function]
+    names: dict[tuple[str, str], Range] = field(default_factory=dict)
+    terms: dict[int, Interval] = field(default_factory=dict)
+    parts: dict[Type, Range] = field(default_factory=dict)
+    returned: dict[str, Range] = field(default_factory=dict)
+
+    def call(self, item: Function, given: tuple[Range, ...]) -> Range:
+        """What a function returns for some ranges of its parameters."""
+        names: Names = {}
+        for (name, kind), value in zip(item.parameters, given, strict=True):
+            self.keep(item, names, name, kind, value)
+        found: list[Range] = []
+        self.run(item, item.body, names, found)
+        result = found[0]
+        for other in found[1:]:
+            result = hull(result, other)
+        self.returned[item.name] = hull(self.returned.get(item.name, result), result)
+        return result
+
+    def keep(self, item: Function, names: Names, name: str, kind: Type, value: Range) -> None:
+        """A name holds a value from here on."""
+        names[name] = value
+        self.names[item.name, name] = hull(self.names.get((item.name, name), value), value)
+        self.note(kind, value)
+
+    def note(self, kind: Type, value: Range) -> None:
+        """All rows of one name, and all tuples of one form, are one type in the end."""
+        if isinstance(kind, Row | Items):
+            assert not isinstance(value, Interval)
+            self.parts[kind] = hull(self.parts.get(kind, value), value)
+            inner = [inner for _, inner in kind.fields] if isinstance(kind, Row) else kind.types
+            for part, own in zip(inner, value, strict=True):
+                self.note(part, own)
+
+    def run(self, item: Function, body: tuple[Statement, ...], names: Names, found: list[Range]) -> None:
+        """Some statements: change what names hold, and add what is returned."""
+        for statement in body:
+            if isinstance(statement, typed.Assign):
+                self.keep(item, names, statement.name, statement.value.type, self.value(item, statement.value, names))
+            elif isinstance(statement, typed.Return):
+                found.append(self.value(item, statement.value, names))
+            elif isinstance(statement, typed.If):
+                self.value(item, statement.test, names)
+                other = dict(names)
+                self.run(item, statement.body, names, found)
+                self.run(item, statement.otherwise, other, found)
+                _join(names, other)
+            elif isinstance(statement, typed.Count) and statement.step == 1:
+                self.count(item, statement, names, found)
+            else:
+                raise _refused(item, f"'{type(statement).__name__.lower()}'")
+
+    def count(self, item: Function, loop: typed.Count, names: Names, found: list[Range]) -> None:
+        """A loop, turn by turn: after it names hold what they may hold after any number of turns that it can take."""
+        start, stop = (self.number(item, part, names) for part in (loop.start, loop.stop))
+        if start.low != start.high or stop.high - start.low > MOST_TURNS:
+            raise _refused(item, f"a loop of more than {MOST_TURNS} turns, or whose beginning is not written out")
+        # A loop without a turn leaves the counter as it was; it has a width all the same.
+        self.keep(item, dict(names), loop.name, INT, Interval(start.low, max(start.low, stop.high)))
+        after = dict(names) if stop.low <= start.low else None
+        for turn in range(start.low, stop.high):
+            names[loop.name] = Interval(turn, turn)
+            self.run(item, loop.body, names, found)
+            if turn + 1 >= stop.low:
+                if after is None:
+                    after = dict(names)
+                _join(after, names)
+        names.update(after or {})
+
+    def value(self, item: Function, term: Term, names: Names) -> Range:
+        """The range of a term, which is kept as that of all times that it is worked out."""
+        found = self.found(item, term, names)
+        self.note(term.type, found)
+        if isinstance(found, Interval):
+            known = self.terms.get(id(term), found)
+            self.terms[id(term)] = whole = Interval(min(known.low, found.low), max(known.high, found.high))
+            if term.type == INT and _width(whole) is None:
+                raise _refused(item, f"a value from {whole.low} to {whole.high}, beyond 32 bits")
+        return found
+
+    def number(self, item: Function, term: Term, names: Names) -> Interval:
+        found = self.value(item, term, names)
+        assert isinstance(found, Interval)
+        return found
+
+    def found(self, item: Function, term: Term, names: Names) -> Range:
+        """What a term of each kind comes to."""
+        parts = tuple(self.value(item, part, names) for part in term.parts)
+        if term.kind == "name":
+            found = names[term.detail]
+        elif term.kind in ("field", "item") and len(parts) == 1:
+            found = _part(term, parts[0])
+        elif term.kind == "build":
+            found = parts
+        elif term.kind == "call":
+            found = self.call(self.functions[term.detail], parts)
+        elif term.kind == "choice":
+            found = hull(parts[1], parts[2])
+        else:
+            found = _calculated(item, term, [part for part in parts if isinstance(part, Interval)])
+        return found
+
+
+def _part(term: Term, whole: Range) -> Range:
+    """That of one field or item."""
+    assert not isinstance(whole, Interval)
+    kind = term.parts[0].type
+    place = [name for name, _ in kind.fields].index(term.detail) if isinstance(kind, Row) else int(term.detail)
+    return whole[place]
+
+
+def _calculated(item: Function, term: Term, parts: list[Interval]) -> Interval:
+    """That of a sum, a product with a power of two, a shift, a choice of the smaller or larger."""
+    if term.kind == "number":
+        return Interval(int(term.detail), int(term.detail))
+    if term.kind in _COMPARISONS:
+        return TRUTH
+    if term.kind == "negative":
+        return Interval(-parts[0].high, -parts[0].low)
+    if term.kind == "convert" and term.parts[0].type == BOOL:
+        return parts[0]
+    if term.kind == "&" and parts[1].low == parts[1].high and parts[1].low >= 0:
+        return Interval(0, parts[1].high)
+    if term.kind == "*" and not any(part.low == part.high and part.low.bit_count() == 1 for part in parts):
+        raise _refused(item, "a product that is not with a power of two, for which there may be no multiplier")
+    if term.kind not in _SIGNS:
+        raise _refused(item, f"'{term.kind}'")
+    return _corners(_SIGNS[term.kind], *parts)
+
+
+def _join(names: Names, other: Names) -> None:
+    """What names hold where two ways meet; one that only one way has is not read after it."""
+    for name, value in other.items():
+        names[name] = hull(names.get(name, value), value)
+
+
+def _refused(item: Function, what: str) -> ProgramError:
+    return ProgramError(f"{item.source}: {what}, which cannot be taken to whole numbers of 16 and 32 bits")
+
+
+def _width(found: Interval) -> typed.Scalar | None:
+    """The narrowest type that holds a range; None where none does."""
+    return next((kind for kind, own in _WIDTHS if own.low <= found.low and found.high <= own.high), None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Narrowing:
+    """Writes one function with widths."""
+
+    ranges: _Ranges
+    item: Function
+
+    def function(self) -> Function:
+        """The function with its parameters, result and body in widths."""
+        assert self.item.returns is not None
+        parameters = tuple((name, self.of_name(name, kind)) for name, kind in self.item.parameters)
+        returns = self.type_of(self.item.returns, self.ranges.returned[self.item.name])
+        return replace(self.item, parameters=parameters, returns=returns, body=self.block(self.item.body, returns))
+
+    def type_of(self, kind: Type, found: Range) -> Type:
+        """A type with widths for what is held."""
+        if isinstance(kind, Row | Items):
+            every = self.ranges.parts[kind]
+            assert not isinstance(every, Interval)
+            if isinstance(kind, Row):
+                pairs = zip(kind.fields, every, strict=True)
+                return Row(kind.name, tuple((name, self.type_of(inner, own)) for (name, inner), own in pairs))
+            return Items(tuple(self.type_of(*pair) for pair in zip(kind.types, every, strict=True)))
+        assert isinstance(found, Interval)
+        width = _width(found)
+        if kind == INT and width is None:
+            raise _refused(self.item, f"a value from {found.low} to {found.high}, beyond 32 bits")
+        return width if kind == INT and width is not None else kind
+
+    def of_name(self, name: str, kind: Type) -> Type:
+        return self.type_of(kind, self.ranges.names[self.item.name, name])
+
+    def block(self, body: tuple[Statement, ...], returns: Type) -> tuple[Statement, ...]:
+        """Some statements; what was never gone through cannot happen and is left out."""
+        return tuple(self.statement(item, returns) for item in body)
+
+    def statement(self, item: Statement, returns: Type) -> Statement:
+        if isinstance(item, typed.Assign):
+            return typed.Assign(item.name, converted(self.term(item.value), self.of_name(item.name, item.value.type)))
+        if isinstance(item, typed.Return):
+            return typed.Return(converted(self.term(item.value), returns))
+        if isinstance(item, typed.If):
+            bodies = (self.block(body, returns) for body in (item.body, item.otherwise))
+            return typed.If(self.term(item.test), *bodies)
+        assert isinstance(item, typed.Count)
+        kind = self.of_name(item.name, INT)
+        start, stop = (converted(self.term(part), kind) for part in (item.start, item.stop))
+        return typed.Count(item.name, start, stop, item.step, self.block(item.body, returns))
+
+    def term(self, term: Term) -> Term:
+        """A term with a width that holds its value and all that it is worked out from."""
+        if term.kind == "call":
+            wanted = [kind for _, kind in _Narrowing(self.ranges, self.ranges.functions[term.detail]).parameters()]
+            parts = tuple(converted(self.term(part), kind) for part, kind in zip(term.parts, wanted, strict=True))
+            found = self.ranges.returned[term.detail]
+            return replace(term, type=self.type_of(term.type, found), parts=parts)
+        if term.kind == "name":
+            return replace(term, type=self.of_name(term.detail, term.type))
+        parts = tuple(map(self.term, term.parts))
+        if term.kind in ("field", "item"):
+            owner = parts[0].type
+            kind = dict(owner.fields)[term.detail] if isinstance(owner, Row) else None
+            return replace(term, type=kind or _item_type(owner, term.detail), parts=parts)
+        if term.kind == "build":
+            whole = self.type_of(term.type, self.ranges.parts[term.type])
+            inner = [own for _, own in whole.fields] if isinstance(whole, Row) else _types(whole)
+            return replace(term, type=whole, parts=tuple(map(converted, parts, inner)))
+        return self.calculated(term, parts)
+
+    def parameters(self) -> list[tuple[str, Type]]:
+        """Parameters with widths."""
+        return [(name, self.of_name(name, kind)) for name, kind in self.item.parameters]
+
+    def calculated(self, term: Term, parts: tuple[Term, ...]) -> Term:
+        """A term that works something out, in the widest type of its parts and its value."""
+        own = self.type_of(term.type, self.ranges.terms[id(term)]) if isinstance(term.type, typed.Scalar) else term.type
+        if term.kind == "number" or (term.kind == "convert" and parts[0].type == BOOL):
+            return replace(term, type=own, parts=parts)
+        if term.kind == ">>":
+            own = parts[0].type
+            return replace(term, type=own, parts=parts)
+        whole = parts[1:] if term.kind == "choice" else parts
+        if any(part.type in (INT16, INT32) for part in whole):
+            kinds = {part.type for part in whole} | ({own} if term.type == INT else set())
+            widest: Type = INT32 if INT32 in kinds else INT16
+            whole = tuple(converted(part, widest) for part in whole)
+            own = widest if term.type == INT else own
+        elif term.kind == "choice" and not isinstance(term.type, typed.Scalar):
+            own = whole[0].type
+        return replace(term, type=own, parts=(*parts[: len(parts) - len(whole)], *whole))
+
+
+def _types(kind: Type) -> tuple[Type, ...]:
+    assert isinstance(kind, Items)
+    return kind.types
+
+
+def _item_type(kind: Type, place: int) -> Type:
+    return _types(kind)[place]
+
+
+def converted(term: Term, kind: Type) -> Term:
+    """A value in another width that holds it, as is proved."""
+    if term.type == kind:
+        return term
+    return replace(term, type=kind) if term.kind == "number" else Term("convert", kind, (term,))

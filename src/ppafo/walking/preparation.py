@@ -1,0 +1,264 @@
+"""From the settings of a walk in SI units to the numbers that it begins with.
+
+Pure functions of one run, as in ``simulation/preparation.py``: Python plans with them, and an exported library has them
+in C. What a gait comes to (series, events, the fit of the heel) is data.
+"""
+
+import math
+from collections.abc import Mapping
+
+from ppafo.engine.refinement import filling_time
+from ppafo.engine.scheme.ankle_torque import DeviceShare, foot_direction
+from ppafo.engine.scheme.walking import NO_CLEARANCE, WalkState
+from ppafo.model.columns import larger, rounded_up, truncated
+from ppafo.model.contact import FLAT, HEEL
+from ppafo.model.elementary import exponential
+from ppafo.model.gait import GaitNow
+from ppafo.model.gait_sensors import Fault, GaitSensors
+from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
+from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
+from ppafo.simulation.preparation import WHOLE, StepCounts, state_at_start
+from ppafo.walking.wearer import HeelRocker
+
+LOWEST_ANGLE, HIGHEST_ANGLE = math.radians(60.0), math.radians(115.0)
+"""Angles that the ankle keeps to in walking; the step is made for the chambers between them."""
+
+STEPS_PER_FILLING = 15.0
+"""Steps while the fastest of these chambers fills: at 1 kHz metrics then are good to 1 % (docs/decisions/0008)."""
+
+_TURN = 2.0 * math.pi
+
+
+def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> HeelRocker:
+    """What was fitted to a gait, on a heel with a lever [m], which bounds it.
+
+    ``flat`` and ``rise`` [m] are the lever nearly flat and how much longer it is far up, ``half`` [rad] as there.
+    """
+    bounded = min(max(flat, 0.0), heel_lever)
+    return HeelRocker(flat=bounded, raised=min(max(bounded + rise, bounded), heel_lever), half=half)
+
+
+def device_share(plant: PlantParameters, leg: LegParameters) -> DeviceShare:
+    """What a device, of which ``plant`` is the bare one, adds to a leg."""
+    return DeviceShare(
+        inertia=plant.inertia,
+        viscous_damping=plant.viscous_damping,
+        mass_moment=plant.gravity_torque / leg.gravity,
+    )
+
+
+def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
+    """The plant with the foot's inertia and the ankle's damping; its own gravity is accounted for in the leg."""
+    return PlantParameters(
+        gas_product=plant.gas_product,
+        torque_constant=plant.torque_constant,
+        volume_per_angle=plant.volume_per_angle,
+        angle_min=plant.angle_min,
+        angle_max=plant.angle_max,
+        dead_volume_1=plant.dead_volume_1,
+        dead_volume_2=plant.dead_volume_2,
+        restitution=plant.restitution,
+        static_torque=plant.static_torque,
+        dynamic_torque=plant.dynamic_torque,
+        viscous_damping=plant.viscous_damping + leg.ankle_damping,
+        inertia=plant.inertia + foot_inertia_about_ankle(leg),
+        gravity_torque=0.0,
+        external_torque=0.0,
+        supply_pressure=plant.supply_pressure,
+        dorsiflexion_pressure=plant.dorsiflexion_pressure,
+        atmospheric_pressure=plant.atmospheric_pressure,
+        valve_conductance=plant.valve_conductance,
+        leak_conductance=plant.leak_conductance,
+        valve_curve=plant.valve_curve,
+        leak_curve=plant.leak_curve,
+        relieving=plant.relieving,
+    )
+
+
+def smallest_chamber(plant: PlantParameters) -> float:
+    """Smallest volume [m^3] of either chamber at the angles of walking."""
+    volume_1, _ = chamber_volumes(plant, LOWEST_ANGLE)
+    _, volume_2 = chamber_volumes(plant, HIGHEST_ANGLE)
+    return min(volume_1, volume_2)
+
+
+def walk_step_counts(
+    duration: float,
+    time_step: float,
+    output_interval: float,
+    period: float,
+    plant: PlantParameters,
+    volume: float,
+    stiffness: float,
+) -> StepCounts:
+    """Whole steps that follow the gas, as many to a sample of the controller as that asks for; times in [s].
+
+    ``volume`` [m^3] is the smallest behind the valve. ``stiffness`` [-] is the ratio of heat capacities for gas with an
+    energy balance, whose chambers fill faster by it, else 1.
+    """
+    coarse = larger(1.0, rounded_up(period / time_step - WHOLE))
+    filling = filling_time(plant, volume)
+    parts = larger(1.0, rounded_up(period / coarse * STEPS_PER_FILLING * stiffness / filling - WHOLE))
+    steps = coarse * parts
+    step = period / steps
+    record_every = larger(1.0, truncated(output_interval / step + 0.5))
+    return StepCounts(
+        step=step,
+        step_count=rounded_up(duration / (step * record_every) - WHOLE) * record_every,
+        steps_per_sample=steps,
+        record_every=record_every,
+    )
+
+
+def vented_state(plant: PlantParameters, angle: float, angular_velocity: float) -> PlantState:
+    """State at an angle [rad] and its rate [rad/s] with both chambers at atmospheric pressure."""
+    room = plant.atmospheric_pressure
+    return state_at_start(plant, angle, angular_velocity, room, room)
+
+
+def walk_from_strike(now: GaitNow) -> WalkState:
+    """A leg that begins at a heel strike."""
+    return walk_from(now, HEEL, 0.0)
+
+
+def walk_from_standing(now: GaitNow) -> WalkState:
+    """A leg that begins standing, its weight on heel and toes alike."""
+    return walk_from(now, FLAT, 0.5 * now.force)
+
+
+def walk_from(now: GaitNow, contact: float, shown_force: float) -> WalkState:
+    """A leg at its start, with the force [N] that the sensors under heel and toes show."""
+    return WalkState(
+        contact=contact,
+        offset=0.0,
+        now=now,
+        foot=foot_direction(now.shank, now.ankle),
+        external_torque=0.0,
+        heel_force=shown_force,
+        toe_force=shown_force,
+        toes_first=0.0,
+        slap_rate=0.0,
+        clearance=NO_CLEARANCE,
+        strides=0.0,
+        landings=0.0,
+        toe_landings=0.0,
+        slap_rates=0.0,
+        clearances=0.0,
+        push_off_work=0.0,
+    )
+
+
+def standing_on(
+    leg: LegParameters, ground_angle: float, sine_foot: float, cosine_foot: float, phase: float, load: float
+) -> GaitNow:
+    """Shank vertical, foot flat, both at rest: where a course begins, at a phase [turns] and a load [body weights].
+
+    Sine and cosine are those of the flat foot's angle [rad]. Numbers may be arrays (wearers,).
+    """
+    upright = 0.0 * ground_angle
+    return GaitNow(
+        phase=phase,
+        shank=upright,
+        shank_rate=upright,
+        shank_acceleration=upright,
+        ankle=0.5 * math.pi - ground_angle,
+        ankle_rate=upright,
+        ankle_acceleration=upright,
+        moment=upright,
+        force=leg.body_mass * leg.gravity * load,
+        knee_forward=upright,
+        knee_up=upright,
+        sine_shank=upright,
+        cosine_shank=1.0 + upright,
+        sine_healthy_foot=sine_foot,
+        healthy_torque=torque_of_shank(leg, 0.0, 1.0, sine_foot, cosine_foot, 0.0, 0.0, 0.0, 0.0),
+    )
+
+
+def memory_of(bandwidth: float, period: float) -> float:
+    """What is left of a sensor's last value after a sample [s]; at a ``bandwidth`` [Hz] of 0 it follows at once."""
+    return exponential(-_TURN * bandwidth * period) if bandwidth > 0.0 else 0.0
+
+
+def gait_sensors(
+    settings: Mapping[str, float],
+    period: float,
+    heel_fault: Fault,
+    toe_fault: Fault,
+    angle_fault: Fault,
+    pressure_1_fault: Fault,
+    pressure_2_fault: Fault,
+) -> GaitSensors:
+    """Sensors by their settings [SI], at a sample period [s]."""
+    return GaitSensors(
+        follow_rate=_TURN * settings["force_bandwidth"],
+        force_noise=settings["force_noise"],
+        force_quantum=settings["force_resolution"],
+        lost_share=settings["lost_share"],
+        angle_memory=memory_of(settings["angle_bandwidth"], period),
+        pressure_memory=memory_of(settings["pressure_bandwidth"], period),
+        angle_lost_share=settings["angle_lost_share"],
+        pressure_lost_share=settings["pressure_lost_share"],
+        heel_fault=heel_fault,
+        toe_fault=toe_fault,
+        angle_fault=angle_fault,
+        pressure_1_fault=pressure_1_fault,
+        pressure_2_fault=pressure_2_fault,
+    )
+
+
+def fixed_fault(time: float, holds: float, reading: float, fault_period: float) -> Fault:
+    """A sensor that keeps its last value from ``time`` [s] on (``holds`` 1), or gives a fixed reading."""
+    return Fault(
+        time=time,
+        holds=holds,
+        reading=reading,
+        distorts=0.0,
+        gain=1.0,
+        offset=0.0,
+        drift=0.0,
+        crosstalk=0.0,
+        memory=0.0,
+        lost_fraction=0.0,
+        period=fault_period,
+        late_samples=0.0,
+    )
+
+
+def distorting_fault(
+    time: float,
+    fault_period: float,
+    gain: float,
+    offset: float,
+    drift: float,
+    crosstalk: float,
+    lag: float,
+    lost_share: float,
+    delay: float,
+    period: float,
+) -> Fault:
+    """A sensor that gives a wrong reading from ``time`` [s] on, at a sample period [s] of the controller.
+
+    ``lag`` and ``delay`` in [s], the latter taken to the nearest whole sample; the others as in ``Fault``.
+    """
+    return Fault(
+        time=time,
+        holds=0.0,
+        reading=0.0,
+        distorts=1.0,
+        gain=gain,
+        offset=offset,
+        drift=drift,
+        crosstalk=crosstalk,
+        memory=exponential(-period / lag) if lag > 0.0 else 0.0,
+        lost_fraction=lost_share,
+        period=fault_period,
+        late_samples=truncated(delay / period + 0.5),
+    )
+
+
+def longest_delay(sensors: GaitSensors) -> float:
+    """Most samples by which a fault makes a sensor late."""
+    forces = max(sensors.heel_fault.late_samples, sensors.toe_fault.late_samples)
+    pressures = max(sensors.pressure_1_fault.late_samples, sensors.pressure_2_fault.late_samples)
+    return max(forces, pressures, sensors.angle_fault.late_samples)

@@ -1,0 +1,267 @@
+"""Metrics of a walk stride by stride, without a recording: one meter that goes through the samples once.
+
+What is counted is that of ``walking/strides.py`` and ``walking/walk_metrics.py``; tests hold both together.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ppafo.control.walking.phases import PUSH_OFF
+from ppafo.control.walking.signs import HELPS
+from ppafo.metrics.metric import Floats, Readings
+from ppafo.model.columns import choose, larger, root
+from ppafo.signals.meter import Course, MeterKind, WalkSample
+from ppafo.walking.strides import PER_STRIDE, SETTLING
+
+NOT_YET = -1.0
+"""Time of what has not happened."""
+
+
+class StrideTotals(NamedTuple):
+    """Totals since the start, or what a stride adds to them: gas [kg], work [J], rate [rad/s], height [m], landings."""
+
+    gas: float
+    push_off_work: float
+    slap_rate: float
+    toe_clearance: float
+    toe_landing: float
+
+
+class StrideNow(NamedTuple):
+    """The stride under way: totals at its strike, 1 where it lacked help; error in push-off [(N m)^2], samples of it.
+
+    ``is_whole`` is 1 of one that began with a strike, which the walk itself does not.
+    """
+
+    is_whole: float
+    begun: StrideTotals
+    was_vented: float
+    squares: float
+    samples: float
+
+
+class Counted(NamedTuple):
+    """Whole strides: how many there are, had help, count for means, and slapped of these; their sums and errors."""
+
+    whole: float
+    helped: float
+    counted: float
+    slaps: float
+    sums: StrideTotals
+    squares: float
+    samples: float
+
+
+class Strides(NamedTuple):
+    """A walk up to a sample: ``strikes``, gas [kg] from the supply at the first sample and now, its strides.
+
+    ``safe_time`` [s] is that of the first sample with less help, below 0 without one.
+    """
+
+    strikes: float
+    first_gas: float
+    gas: float
+    stride: StrideNow
+    counted: Counted
+    safe_time: float
+
+
+def totals_at(sample: WalkSample) -> StrideTotals:
+    """Totals since the start."""
+    return StrideTotals(
+        gas=sample.supplied_mass,
+        push_off_work=sample.push_off_work,
+        slap_rate=sample.slap_rates,
+        toe_clearance=sample.clearances,
+        toe_landing=sample.toe_landings,
+    )
+
+
+def sum_with(sums: StrideTotals, now: StrideTotals, begun: StrideTotals) -> StrideTotals:
+    """Sums with those of a stride that went from one to the other."""
+    return StrideTotals(
+        gas=sums.gas + (now.gas - begun.gas),
+        push_off_work=sums.push_off_work + (now.push_off_work - begun.push_off_work),
+        slap_rate=sums.slap_rate + (now.slap_rate - begun.slap_rate),
+        toe_clearance=sums.toe_clearance + (now.toe_clearance - begun.toe_clearance),
+        toe_landing=sums.toe_landing + (now.toe_landing - begun.toe_landing),
+    )
+
+
+def _start(_course: Course, sample: WalkSample) -> Strides:
+    nothing = StrideTotals(gas=0.0, push_off_work=0.0, slap_rate=0.0, toe_clearance=0.0, toe_landing=0.0)
+    return Strides(
+        strikes=sample.strides,
+        first_gas=sample.supplied_mass,
+        gas=sample.supplied_mass,
+        stride=StrideNow(is_whole=0.0, begun=nothing, was_vented=0.0, squares=0.0, samples=0.0),
+        counted=Counted(whole=0.0, helped=0.0, counted=0.0, slaps=0.0, sums=nothing, squares=0.0, samples=0.0),
+        safe_time=sample.time if sample.level > HELPS else NOT_YET,
+    )
+
+
+def _update(strides: Strides, _course: Course, sample: WalkSample) -> Strides:
+    strikes = sample.strides - strides.strikes > 0.5
+    begun = StrideNow(is_whole=1.0, begun=totals_at(sample), was_vented=0.0, squares=0.0, samples=0.0)
+    stride = begun if strikes else strides.stride
+    is_first = sample.level > HELPS and strides.safe_time < 0.0
+    return Strides(
+        strikes=sample.strides,
+        first_gas=strides.first_gas,
+        gas=sample.supplied_mass,
+        stride=go_on(stride, sample),
+        counted=count(strides.counted, strides.stride, sample) if strikes else strides.counted,
+        safe_time=sample.time if is_first else strides.safe_time,
+    )
+
+
+def go_on(stride: StrideNow, sample: WalkSample) -> StrideNow:
+    """The stride under way with one sample more."""
+    error = sample.reference - sample.torque
+    pushes = sample.phase == PUSH_OFF
+    return StrideNow(
+        is_whole=stride.is_whole,
+        begun=stride.begun,
+        was_vented=1.0 if sample.level > HELPS else stride.was_vented,
+        squares=stride.squares + (error * error if pushes else 0.0),
+        samples=stride.samples + (1.0 if pushes else 0.0),
+    )
+
+
+def count(counted: Counted, stride: StrideNow, sample: WalkSample) -> Counted:
+    """The strides with the one that ends at the first sample after a heel strike."""
+    now = totals_at(sample)
+    helps = stride.is_whole > 0.5 and stride.was_vented < 0.5
+    counts = helps and counted.whole >= float(SETTLING)
+    slaps = counts and now.slap_rate - stride.begun.slap_rate < 0.0
+    return Counted(
+        whole=counted.whole + stride.is_whole,
+        helped=counted.helped + (1.0 if helps else 0.0),
+        counted=counted.counted + (1.0 if counts else 0.0),
+        slaps=counted.slaps + (1.0 if slaps else 0.0),
+        sums=sum_with(counted.sums, now, stride.begun) if counts else counted.sums,
+        squares=counted.squares + (stride.squares if counts else 0.0),
+        samples=counted.samples + (stride.samples if counts else 0.0),
+    )
+
+
+METER = MeterKind("strides", Strides, _start, _update)
+
+
+@dataclass(frozen=True, slots=True)
+class StrideMetric:
+    """A metric of a walk: ``read`` takes it from the meters, nan where there is none, plain arithmetic alone."""
+
+    name: str
+    unit: str
+    summary: str
+    read: Callable[[Readings], Floats]
+    meters: tuple[MeterKind, ...] = (METER,)
+
+
+def mean_of(total: Floats, count: Floats) -> Floats:
+    """A sum over how many there are, in its unit; nan for none."""
+    found: Floats = choose(count > 0.0, total / larger(count, 1.0), math.nan)
+    return found
+
+
+def _gas(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.gas, counted.counted)
+
+
+def _work(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.push_off_work, counted.counted)
+
+
+def _slap_rate(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.slap_rate, counted.slaps)
+
+
+def _clearance(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.toe_clearance, counted.counted)
+
+
+def _landing(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.toe_landing, counted.counted)
+
+
+def _counted(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    found: Floats = counted.counted
+    return found
+
+
+def _whole(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    found: Floats = counted.whole
+    return found
+
+
+def _helped(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    found: Floats = counted.helped
+    return found
+
+
+def _vented(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    found: Floats = counted.whole - counted.helped
+    return found
+
+
+def _total_gas(readings: Readings) -> Floats:
+    strides = readings.meters["strides"]
+    found: Floats = strides.gas - strides.first_gas
+    return found
+
+
+def _push_off_error(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    found: Floats = root(mean_of(counted.squares, counted.samples))
+    return found
+
+
+def _safe_time(readings: Readings) -> Floats:
+    time = readings.meters["strides"].safe_time
+    found: Floats = choose(time >= 0.0, time, math.nan)
+    return found
+
+
+def _mean(name: str, read: Callable[[Readings], Floats]) -> StrideMetric:
+    item = PER_STRIDE[name]
+    return StrideMetric(name, item.unit, f"{item.summary}, mean", read)
+
+
+MEANS = (
+    _mean("gas", _gas),
+    _mean("push_off_work", _work),
+    _mean("slap_rate", _slap_rate),
+    _mean("toe_clearance", _clearance),
+    _mean("toe_landing", _landing),
+    StrideMetric("counted_strides", "-", "strides over which the means are taken", _counted),
+)
+"""Over the strides with help, without the first ones; on a course they would be over other strides than these."""
+TRACKING = (
+    StrideMetric("push_off_error", "N m", "RMS of requested torque less actuator torque in push-off", _push_off_error),
+)
+"""Over the same strides, of a controller that wants a torque."""
+COUNTS = (
+    StrideMetric("strides", "-", "whole strides of the walk", _whole),
+    StrideMetric("helped_strides", "-", "whole strides with help from strike to strike", _helped),
+    StrideMetric("vented_strides", "-", "whole strides with the chambers vented in at least a part of them", _vented),
+    StrideMetric("total_gas", "kg", "gas taken from the supply in the whole walk", _total_gas),
+    StrideMetric("safe_state_time", "s", "time at which the controller first paused or stopped", _safe_time),
+)
+
+
+def stride_metrics_of(takes_course: bool, has_request: bool) -> tuple[StrideMetric, ...]:
+    """Metrics of ``walk_metrics`` that need neither a mean curve nor the healthy gait, of a walk of some kind."""
+    over_strides = () if takes_course else MEANS + (TRACKING if has_request else ())
+    return over_strides + COUNTS

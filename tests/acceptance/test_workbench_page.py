@@ -1,0 +1,42 @@
+"""What the page on workbenches shows runs as it stands there, and the gallery's page names what the gallery has."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.live.gallery import declared_workbenches
+from ppafo.live.page import is_page
+
+DOCS = Path(__file__).parents[2] / "docs"
+TEXT = (DOCS / "how-to" / "workbench.md").read_text(encoding="utf-8")
+
+
+def test_the_commands_of_the_page_write_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"^```sh\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
+    commands = [shlex.split(line)[1:] for block in blocks for line in block.splitlines()]
+    assert [main(words) for words in commands] == [0, 0]
+    assert is_page(tmp_path / "out" / "workbench.html")
+    assert is_page(tmp_path / "out" / "valves.html")
+
+
+def test_a_page_is_written_anew_and_the_file_of_somebody_else_is_not(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page, other = tmp_path / "page.html", tmp_path / "other.html"
+    other.write_text("<p>mine</p>", encoding="utf-8")
+    assert main(["workbench", "step-response", "--out", str(page)]) == 0
+    before = page.read_bytes()
+    assert main(["workbench", "step-response", "--set", "valve.area=14mm^2", "--out", str(page)]) == 0
+    assert page.read_bytes() != before
+    assert main(["workbench", "step-response", "--out", str(other)]) == 2
+    assert "already exists" in capsys.readouterr().err
+    assert other.read_text(encoding="utf-8") == "<p>mine</p>"
+
+
+def test_the_page_of_the_gallery_names_every_workbench() -> None:
+    named = re.findall(r"^\| `([\w-]+)\.html`", (DOCS / "gallery.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert named == list(declared_workbenches())

@@ -1,0 +1,283 @@
+"""A walk as a library in C: from settings to the numbers of a run, and every sample of it, with the bits of Python."""
+
+import ctypes
+import itertools
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.engine.compilers import BACKEND_VARIABLE
+from ppafo.engine.lane_meters import walk_traces
+from ppafo.engine.lanes import Batch, run_batch
+from ppafo.engine.rows import row_numbers
+from ppafo.engine.run import batch_of
+from ppafo.errors import ScenarioError
+from ppafo.exports.c_library import c_library, walk_library
+from ppafo.exports.c_library.files import Setting, c_identifier
+from ppafo.exports.loading import load_exportable
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking import list_walks, load_walk
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.loading import FILE
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.walk import plan_of, walk
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
+DRAWS, RUNS = 40, 4
+SPREAD = (0.9, 1.1)
+"""Smallest and largest factor on a setting of a draw; one that is 0 stays 0, as another program would be needed."""
+Values = dict[str, float]
+Samples = np.ndarray[Any, np.dtype[np.float64]]
+SEEN = ("sensors.force_noise=5 N", "sensors.angle_bandwidth=40 Hz", "sensors.pressure_noise=0.1 psi_d")
+FAULTY = (
+    *("faults.heel.kind=distorted", "faults.heel.time=2 s", "faults.heel.lag=30 ms", "faults.heel.delay=7.3 ms"),
+    *("faults.toe.kind=frozen", "faults.toe.time=4 s", "faults.toe.period=0.5 s"),
+    *("faults.angle.kind=distorted", "faults.angle.time=1 s", "faults.angle.offset=2 deg"),
+    *("faults.pressure_1.kind=stuck", "faults.pressure_1.time=3 s", "faults.pressure_1.reading=3 psi_g"),
+)
+THERMAL = (
+    *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"),
+    "gas_model.wall_area_per_volume=100 1/m",
+)
+SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
+EVERYTHING = (*SEEN, *FAULTY, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
+VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
+    *((name, ()) for name in list_walks()),
+    ("proportional-regulators", EVERYTHING),
+    ("proportional", ("course=first-steps",)),
+)
+"""Every shipped walk, one with every further feature (sensors with faults, thermal gas, slow valve), and a course."""
+
+BY_NUMBA = {("solenoid", ()), ("proportional", ()), ("proportional-regulators", EVERYTHING)}
+"""Walks that Numba compiles for the comparison; zig, where it is here, takes the others in a fourth of the time."""
+
+
+def choose_compiler(name: str, overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let zig compile the lanes of a walk that is none of ``BY_NUMBA``."""
+    if (name, overrides) not in BY_NUMBA and find_spec("ziglang") and BACKEND_VARIABLE not in os.environ:
+        monkeypatch.setenv(BACKEND_VARIABLE, "zig")
+
+
+def written(walked: Configuration, folder: Path) -> str:
+    """Write the library of a walk; its name in C."""
+    for name, content in c_library(walked).items():
+        (folder / name).write_bytes(content)
+    return c_identifier(walked.name)
+
+
+def built(walked: Configuration, folder: Path, *further: str) -> ctypes.CDLL:
+    """The library of a walk, to be called from here."""
+    source, library = folder / f"{written(walked, folder)}.c", folder / "library.so"
+    flags = ["-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-w", *further]
+    subprocess.run(["gcc", *flags, str(source), "-o", str(library), "-lm"], check=True)
+    return ctypes.CDLL(str(library))
+
+
+class Handed(ctypes.Structure):
+    _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
+
+
+def handed(values: Any) -> Handed:
+    return Handed(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), (ctypes.c_int64 * 3)(values.size, 0, 0))
+
+
+def drawn(settings: tuple[Setting, ...], draw: np.random.Generator) -> Values:
+    """Settings of one draw, by path."""
+    values = {
+        item.path: float(np.clip(item.value * draw.uniform(*SPREAD), item.quantity.minimum, item.quantity.maximum))
+        for item in settings
+    }
+    values["sensors.seed"] = float(draw.integers(1, 1000))
+    values["run.duration"] = float(draw.uniform(0.5, 2.0))
+    values["run.output_interval"] = float(draw.choice([0.1, 1.0, 2.6]) * values["run.output_interval"])
+    values["run.step"] = float(np.clip(draw.choice([0.3, 1.0, 1.4]) * values["run.step"], 1e-6, 0.01))
+    return values
+
+
+def as_overrides(settings: tuple[Setting, ...], values: Values) -> list[str]:
+    """The same as overrides of a walk file; what a walk file has no word for is left out."""
+    unwritten = {"run.duration", "run.output_interval"}
+    given = {item.path: (item.quantity.unit, values[item.path]) for item in settings if item.path not in unwritten}
+    return [
+        f"{path}={int(value) if path == 'sensors.seed' else repr(value)} {unit}".strip()
+        for path, (unit, value) in given.items()
+        if not (path.endswith(("angle_bandwidth", "pressure_bandwidth")) and value == 0.0)
+    ]
+
+
+def numbers_in_c(library: ctypes.CDLL, values: Values, rows: tuple[int, int]) -> tuple[Any, Any, Any]:
+    """Parameters, states and counts that the library makes of settings."""
+    settings = np.array(list(values.values()))
+    parameters, states, counts = np.zeros(rows[0]), np.zeros(rows[1]), np.zeros(6)
+    library.prepare(*map(handed, (settings, parameters, states, counts)))
+    return parameters, states, counts
+
+
+def batches(name: str, overrides: tuple[str, ...], settings: tuple[Setting, ...]) -> Iterator[tuple[Values, Batch]]:
+    """Settings as they are, then drawn ones, each with what Python plans of them."""
+    draw = np.random.default_rng(15)
+    kinds = [text for text in overrides if "kind=" in text or text.startswith("course")]
+    values = {item.path: item.value for item in settings}
+    while True:
+        try:
+            walked = load_walk(name, [*kinds, *as_overrides(settings, values)])
+        except ScenarioError:
+            pass  # settings that contradict each other
+        else:
+            plan = replace(plan_of(walked, values["run.duration"]), record_interval=values["run.output_interval"])
+            yield values, batch_of(plan_walk(plan))
+        values = drawn(settings, draw)
+
+
+@pytest.mark.parametrize(("name", "overrides"), VARIED)
+def test_c_makes_the_numbers_of_a_walk_that_python_makes(name: str, overrides: tuple[str, ...], tmp_path: Path) -> None:
+    settings = walk_library(load_walk(name, overrides)).settings
+    # The function from settings to numbers is called from outside.
+    library = built(load_walk(name, overrides), tmp_path, "-DPPAFO_ENTRY=extern")
+    for values, batch in itertools.islice(batches(name, overrides, settings), DRAWS):
+        parameters, states, counts = numbers_in_c(library, values, (len(batch.parameters), len(batch.states)))
+        assert parameters.tobytes() == batch.parameters[:, 0].tobytes()
+        assert states.tobytes() == batch.states[:, 0].tobytes()
+        clock = batch.clock
+        delays = clock.signal_delay, clock.command_delay
+        assert counts.tolist() == [clock.record_every, clock.step_count, clock.steps_per_sample, *delays, 0.0]
+
+
+def samples_in_c(library: ctypes.CDLL, name: str, values: Values, outputs: int) -> Samples:
+    """Every sample of a walk with some settings, the time first."""
+    settings = np.array(list(values.values()))
+    size = library[f"{name}_size"]
+    size.restype = ctypes.c_size_t
+    memory = (ctypes.c_double * (size(ctypes.c_void_p(settings.ctypes.data)) // 8 + 1))()
+    assert library[f"{name}_initialise"](memory, ctypes.c_void_p(settings.ctypes.data)) == 0
+    found, sample = [], np.zeros(1 + outputs)
+    while library[f"{name}_step"](memory) == 0:
+        library[f"{name}_read_outputs"](memory, ctypes.c_void_p(sample.ctypes.data))
+        found.append(sample.copy())
+    return np.array(found)
+
+
+@pytest.mark.parametrize(("name", "overrides"), VARIED)
+def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
+    name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    choose_compiler(name, overrides, monkeypatch)
+    item = walk_library(load_walk(name, overrides))
+    library = built(load_walk(name, overrides), tmp_path)
+    paths = {"angle": "state.angle", "angular_velocity": "state.angular_velocity", "command": "result.command"}
+    paths |= {"supplied_mass": "state.supplied_mass", "leaked_mass": "state.leaked_mass"}
+    paths |= walk_traces(item.program.program)
+    for values, batch in itertools.islice(batches(name, overrides, item.settings), 1, 1 + RUNS):
+        found = samples_in_c(library, item.name, values, len(item.program.outputs))
+        record = run_batch(batch, 1).record[:, :, 0]
+        rows = row_numbers(batch.program.state_rows())
+        for output, path in paths.items():
+            column = found[:, 1 + item.program.outputs.index(output)]
+            assert column.tobytes() == record[:, rows[path]].tobytes(), output
+
+
+def shown(folder: Path, name: str, *command: str) -> tuple[list[str], Samples, dict[str, float]]:
+    """Names, samples and metrics that the example prints, built by a compiler with flags."""
+    target = folder / "example"
+    sources = [str(folder / f"{name}.c"), str(folder / "main.c")]
+    subprocess.run([*command, *WARNINGS, "-ffp-contract=off", *sources, "-o", str(target), "-lm"], check=True)
+    done = subprocess.run([str(target)], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    found = dict(re.findall(r"^# (\w+)(?: = (\S+)|: none here)", done.stdout, re.MULTILINE))
+    samples = np.array([list(map(float, line.split(","))) for line in lines[1:] if not line.startswith("#")])
+    return lines[0].split(","), samples, {key: float(value or "nan") for key, value in found.items()}
+
+
+def shortened(walked: Configuration, folder: Path, seconds: float) -> str:
+    """Write the library of a walk with an example that lasts some seconds; its name in C."""
+    name = written(walked, folder)
+    main = folder / "main.c"
+    text, changes = re.subn(
+        r"(_defaults\(&settings\);\n)", rf"\1    settings.run_duration = {seconds!r};\n", main.read_text()
+    )
+    assert changes == 1
+    main.write_text(text)
+    return name
+
+
+@pytest.mark.parametrize(("name", "overrides"), VARIED)
+def test_every_sample_of_a_walk_has_the_bits_of_python(
+    name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    choose_compiler(name, overrides, monkeypatch)
+    walked = load_walk(name, overrides)
+    heads, samples, metrics = shown(tmp_path, shortened(walked, tmp_path, 8.0), "gcc", "-std=c99", "-O1")
+    result = walk(walked, 8.0 / 60.0)
+    recording = result.recording
+    compared = [head for head in heads if head in recording.names]
+    assert {"angle", "pressure_1", "torque", "command", "external_torque", "heel_force", "contact"} <= set(compared)
+    assert samples[:, 0].tobytes() == recording.time.tobytes()
+    for head in compared:
+        assert samples[:, heads.index(head)].tobytes() == recording[head].tobytes(), head
+    known = {head: value for head, value in metrics.items() if not np.isnan(value)}
+    assert {"strides", "helped_strides", "total_gas"} <= set(known)
+    assert known == pytest.approx({head: result.metrics[head].value for head in known}, rel=1e-12, abs=1e-15)
+    assert ("push_off_work" in known) == (walked.course is None and result.metrics["counted_strides"].value > 0.0)
+
+
+def test_a_walk_of_every_feature_is_clean_under_the_sanitizers_and_the_same_in_c_plus_plus(tmp_path: Path) -> None:
+    name = shortened(load_walk("proportional-regulators", EVERYTHING), tmp_path, 1.0)
+    checked = ("gcc", "-std=c99", "-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    first = shown(tmp_path, name, *checked)
+    assert len(first[1]) > 300
+    if shutil.which("g++"):
+        again = shown(tmp_path, name, "g++", "-O0")
+        assert (again[0], again[1].tobytes()) == (first[0], first[1].tobytes())
+
+
+def test_what_cannot_leave_is_refused_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="a walk on a bottle cannot be exported"):
+        c_library(load_walk("solenoid", bottle="paper-co2-9oz"))
+    quiet = load_walk("solenoid")
+    others = {"gait_sensors": quiet.gait_sensors._replace(force_noise=1.0)}, {"sensor_settings": None}
+    for other in (*others, {"sensors": quiet.sensors._replace(angle_noise=0.1)}):
+        with pytest.raises(ScenarioError, match="load it anew"):
+            c_library(replace(quiet, **other))
+    with pytest.raises(ScenarioError, match="did you mean 'solenoid'"):
+        load_exportable("solenoide")
+
+
+def test_a_file_is_a_scenario_or_a_walk_by_its_sections(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_bytes(FILE.read("solenoid"))
+    assert isinstance(load_exportable(file), Configuration)
+    file.write_bytes((resources.files("ppafo") / "scenarios" / "step-response.toml").read_bytes())
+    assert isinstance(load_exportable(file), Scenario)
+
+
+def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_other_functions(tmp_path: Path) -> None:
+    library = built(load_walk("proportional"), tmp_path)
+    names = [item.name for item in walk_library(load_walk("proportional")).settings]
+    settings = (ctypes.c_double * len(names))()
+    library.proportional_defaults(settings)
+    library.proportional_bad_setting.restype = ctypes.c_char_p
+    library.proportional_size.restype = ctypes.c_size_t
+    assert library.proportional_size(settings) > 0
+    for name, value, said in (
+        ("wearer_body_mass", 1.0, b"wearer_body_mass"),
+        ("controller_unload_threshold", 70.0, b"controller_unload_threshold"),
+        ("controller_peak_time", 0.39, b"controller_peak_time"),
+        ("sensors_force_noise", 5.0, None),
+    ):
+        changed = (ctypes.c_double * len(names))(*settings)
+        changed[names.index(name)] = value
+        assert library.proportional_bad_setting(changed) == said
+        assert library.proportional_size(changed) == 0

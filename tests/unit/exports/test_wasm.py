@@ -1,0 +1,143 @@
+"""A WebAssembly module under node gives what Python gives: every sample of every channel to the last bit."""
+
+import json
+import math
+import shutil
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from ppafo.errors import ProgramError
+from ppafo.exports.c_library import library_of
+from ppafo.exports.loading import load_exportable
+from ppafo.exports.wasm import building, module_of
+from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.simulate import simulate
+from ppafo.walking import list_walks, load_walk
+from scripts.wasm_programs import FOLDER, shipped_programs
+from tests.modules_under_node import DIVERGED, REFUSED, assert_alike, assert_same, compared, drawn, drawn_walks, driven
+
+DRAWS, WALKS = 50, 10
+MOVED = (
+    *("valve.area=20 mm^2", "run.step=0.5 ms", "run.duration=2 s", "controller.period=2 ms", "motion.angle=80 deg"),
+    "sensors.seed=3",
+)
+needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
+
+
+@needs_node
+@pytest.mark.parametrize("name", list_scenarios())
+def test_a_module_gives_the_bits_of_python(name: str) -> None:
+    module = module_of(load_scenario(name))
+    ended = Counter(compared(name, module, drawn(module, DRAWS)))
+    assert ended["completed"] >= 0.8 * DRAWS
+
+
+@needs_node
+@pytest.mark.parametrize("name", list_walks())
+def test_a_module_gives_the_bits_of_a_walk_in_python(name: str) -> None:
+    module = module_of(load_walk(name))
+    ended = Counter(compared(name, module, drawn_walks(module, WALKS)))
+    assert ended["completed"] >= 0.5 * WALKS
+
+
+@needs_node
+def test_a_run_that_diverges_is_kept_up_to_there() -> None:
+    scenario = load_scenario("torque-task-moving-ankle")
+    module = module_of(scenario)
+    settings = drawn(module, 1)
+    column = [item["key"] for item in module.description["settings"]].index("motion.profile.amplitude")
+    settings[0, column] *= 20.0
+    given = driven(module, settings)
+    assert_alike(given)
+    result = simulate(with_numbers(scenario, {"motion.profile.amplitude": float(settings[0, column])}))
+    assert not result.status.is_completed
+    assert given.runs[0].status == DIVERGED
+    assert_same(module, given.runs[0], result)
+
+
+@needs_node
+def test_a_bad_setting_is_named_by_its_place() -> None:
+    module = module_of(load_scenario("torque-task-solenoid"))
+    keys = [item["key"] for item in module.description["settings"]]
+    good = drawn(module, 1)[0]
+    bad = {
+        "valve.area": -1.0,
+        "actuator.angle_min": 3.0,
+        "run.step": 0.2,
+        "run.output_interval": 0.7,
+        "run.duration": math.nan,
+        "motion.angle": 0.1,
+    }
+    settings = np.tile(good, (len(bad), 1))
+    for row, (key, value) in zip(settings, bad.items(), strict=True):
+        row[keys.index(key)] = value
+    given = driven(module, settings)
+    assert [keys[ran.checked] for ran in given.runs] == list(bad)
+    assert {ran.status for ran in given.runs} == {REFUSED}
+
+
+@needs_node
+def test_what_would_need_another_program_is_said_and_refused() -> None:
+    module = module_of(load_scenario("torque-task-solenoid"))
+    kept = {item["key"]: item["kept"] for item in module.description["settings"] if item["kept"]}
+    assert kept["valve.switching_interval"] == "above zero"
+    assert kept["sensors.pressure_noise"] == "zero"
+    keys = [item["key"] for item in module.description["settings"]]
+    settings = np.tile(drawn(module, 1)[0], (len(kept), 1))
+    for row, (key, how) in zip(settings, kept.items(), strict=True):
+        row[keys.index(key)] = 0.01 if how == "zero" else 0.0
+    assert [ran.checked for ran in driven(module, settings).runs] == [len(keys)] * len(kept)
+
+
+def test_the_programs_of_the_package_are_those_of_its_physics() -> None:
+    """The texts are compared everywhere, the bytes where the compiler is the one that made them."""
+    index = json.loads((FOLDER / building.INDEX).read_text())
+    shipped = (*list_scenarios(), *list_walks())
+    texts = {name: building.source_of(library_of(load_exportable(name))) for name in shipped}
+    missing = [name for name, text in texts.items() if building.digest_of(text) not in index["programs"]]
+    assert missing == [], "python scripts/wasm_programs.py builds them anew"
+    if building.compiler_version() != index["ziglang"]:
+        pytest.skip(f"ziglang {index['ziglang']} is not here: the bytes are not compared")
+    assert shipped_programs() == {path.name: path.read_bytes() for path in FOLDER.iterdir()}
+
+
+def test_other_numbers_need_no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(building, "build", lambda _text: pytest.fail("it was built"))
+    plain = module_of(load_scenario("torque-task-proportional"))
+    changed = module_of(load_scenario("torque-task-proportional", MOVED))
+    assert changed.wasm == plain.wasm
+    assert {item["key"] for item in changed.description["settings"] if item["origin"] == "changed"} == {
+        "valve.area",
+        "run.step",
+        "run.duration",
+        "controller.period",
+        "motion.angle",
+        "sensors.seed",
+    }
+
+
+def test_without_a_compiler_it_is_said_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(building.importlib.util, "find_spec", lambda _name: None)
+    with pytest.raises(ProgramError, match=r"pip install 'ppafo\[workbench\]'"):
+        module_of(load_scenario("torque-task-proportional", ["sensors.delay=2 ms"]))
+
+
+def test_a_description_says_of_each_setting_where_it_comes_from() -> None:
+    description = module_of(load_scenario("step-response")).description
+    assert json.loads(json.dumps(description)) == description
+    settings = {item["key"]: item for item in description["settings"]}
+    assert settings["valve.area"]["origin"] == "published"
+    assert settings["valve.area"]["source"]
+    assert settings["supply.pressure"]["origin"] == "task"
+    assert settings["supply.pressure"]["display"] == {"unit": "psi_g", "factor": 6894.757293168361, "zero": 101325.0}
+    assert settings["supply.dorsiflexion_pressure"]["follows"] == "supply.pressure"
+    assert settings["initial.pressure_2"]["follows"] == "supply.dorsiflexion_pressure"
+    assert settings["run.duration"]["origin"] == "assumed"
+    assert "figure 7" in settings["run.duration"]["note"]
+    assert settings["sensors.delay"]["origin"] == "default"
+    units = {item["name"]: item["display"]["unit"] for item in description["channels"]}
+    assert units["angle"] == "deg"
+    assert units["mass_1"] == "g"
