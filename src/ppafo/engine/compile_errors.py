@@ -1,6 +1,5 @@
 """The compiler's many lines about a generated program, as one line about the file that a user wrote."""
 
-import ast
 import linecache
 import re
 from collections.abc import Callable
@@ -115,8 +114,7 @@ def _attribute(report: Report) -> str:
 
 def _fields(source: str, kind: str) -> list[str]:
     rows = {name: fields for name, fields in _ROW.findall(source)}
-    text = rows.get(kind.partition("(")[0])
-    return [] if text is None else list(ast.literal_eval(text))
+    return re.findall(r"\w+", rows.get(kind.partition("(")[0], ""))
 
 
 def _returns(report: Report) -> str:

@@ -1,11 +1,13 @@
 """The part of Python that the engine compiles, and the line that tells a user of anything else."""
 
 import ast
+import threading
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ppafo.errors import ProgramError, one_line
 
+_PARSING = threading.RLock()
 _PLAIN = {
     *(ast.Return, ast.Assign, ast.AugAssign, ast.AnnAssign, ast.For, ast.While, ast.If, ast.Break, ast.Continue),
     *(ast.Pass, ast.Expr, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.IfExp, ast.Compare, ast.Call, ast.keyword),
@@ -55,6 +57,16 @@ def place(file: str, line: int) -> str:
     except (ValueError, OSError):
         path = Path(path.name)
     return f"{one_line(path)}:{line}"
+
+
+def parse_module(text: str, path: str = "<unknown>") -> ast.Module:
+    """Return the syntax tree of a text, one thread at a time; SyntaxError as Python says it.
+
+    Python 3.11 keeps one depth for the trees of all threads, and ends with a SystemError where the garbage collector
+    lets a second thread parse before the first is done (CPython issue 106905).
+    """
+    with _PARSING:
+        return ast.parse(text, path)
 
 
 def check_grammar(tree: ast.FunctionDef, file: str) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ppafo.engine.plain_python import parse_module
 from ppafo.engine.source_text import without_origins
 
 _LENGTH = 24
@@ -50,7 +51,7 @@ def _run_with_shared(source: str, path: str, module: ModuleType) -> None:
     names = module.__dict__
     lines = source.split("\n")
     keys: dict[str, str] = {}
-    body = ast.parse(source, path).body
+    body = parse_module(source, path).body
     imports = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
     for node in body:
         name = _shared_name(node)

@@ -16,7 +16,7 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any, Generic, NamedTuple
 
 from ppafo.engine.composed_names import Composer, is_row
-from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
+from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.errors import ProgramError, one_line
 
 ORIGIN = "# origin"
@@ -183,7 +183,7 @@ def parse_definition(function: FunctionType, adapt: Adaptation = as_it_is) -> as
         reason = f"its source text is not available ({error})"
         raise ProgramError(f"cannot compile {name}: {reason}") from error
     try:
-        tree = ast.parse("\n" * (code.co_firstlineno - 1) + text).body[0]
+        tree = parse_module("\n" * (code.co_firstlineno - 1) + text).body[0]
     except SyntaxError as error:
         raise refusal(file, code.co_firstlineno, f"the source text of '{name}' cannot be read alone") from error
     if not isinstance(tree, ast.FunctionDef) or tree.name != code.co_name:
@@ -203,7 +203,7 @@ def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType
     """The code that Python makes of a definition: it calls what is in a module otherwise where it sees the import."""
     names = function.__code__.co_names
     modules = [name for name in names if isinstance(function.__globals__.get(name), ModuleType)]
-    imports = [ast.parse(f"import {name}").body[0] for name in modules]
+    imports = [parse_module(f"import {name}").body[0] for name in modules]
     for before in (imports, []):
         module = compile(ast.Module([*before, tree], []), "<source>", "exec", dont_inherit=True)
         yield next(item for item in module.co_consts if isinstance(item, CodeType) and item.co_name == tree.name)

@@ -7,11 +7,12 @@ type, so that it is bound here. What is outside the subset is refused with the f
 import ast
 import re
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.engine.compile_errors import place_in
-from ppafo.engine.plain_python import refusal
+from ppafo.engine.plain_python import parse_module, refusal
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
 from ppafo.translation.expressions import Expressions
@@ -44,7 +45,7 @@ def walk_module(source: str, entries: Mapping[str, tuple[Type, ...]] | None = No
     Entries are functions with types of their parameters, by name; without any those that state them in a decorator.
     """
     walk = _ModuleWalk(source.split("\n"))
-    for node in ast.parse(source).body:
+    for node in parse_module(source).body:
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and isinstance(node.targets[0], ast.Name):
             walk.rows[node.targets[0].id] = ast.literal_eval(node.value.args[1])
         elif isinstance(node, ast.FunctionDef):
@@ -256,7 +257,8 @@ class _FunctionWalk:
         return made
 
     def do_augassign(self, node: ast.AugAssign) -> list[Statement]:
-        left = ast.copy_location(ast.parse(ast.unparse(node.target), mode="eval").body, node)
+        left = copy(node.target)
+        left.ctx = ast.Load()
         value = ast.copy_location(ast.BinOp(left, node.op, node.value), node)
         return self.do_assign(ast.copy_location(ast.Assign([node.target], value), node))
 

@@ -1,19 +1,23 @@
 """The composer compiles what Python runs, or refuses it by file and line."""
 
 import functools
+import gc
 import importlib.util
 import math
 import re
 import struct
 import sys
+import time
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from ppafo.engine.cache import load_generated
+from ppafo.engine.plain_python import parse_module
 from ppafo.engine.source_text import SourceCollector, without_origins
 from ppafo.errors import PpafoError, ProgramError
 
@@ -429,3 +433,28 @@ def test_the_commonest_mistakes_in_a_law_are_one_line_about_its_file(write: Writ
     with pytest.raises(PpafoError) as caught:
         compiled_law(write(MEASUREMENT + law))
     assert str(caught.value) == message
+
+
+@pytest.fixture
+def collected_at_every_step() -> Iterator[None]:
+    """Collects garbage all the time, and gives other threads a turn whenever it does."""
+
+    def give_way(phase: str, found: dict[str, int]) -> None:
+        time.sleep(1e-4)
+
+    before = gc.get_threshold()
+    gc.callbacks.append(give_way)
+    gc.set_threshold(50)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+        gc.callbacks.remove(give_way)
+
+
+@pytest.mark.usefixtures("collected_at_every_step")
+def test_threads_parse_although_python_counts_the_depth_of_all_trees_in_one_place() -> None:
+    flat, deep = "x = [1, (2, 3)]\n" * 200, ("x = " + "-" * 50 + "1\n") * 20
+    with ThreadPoolExecutor(4) as pool:
+        trees = list(pool.map(parse_module, [flat, deep] * 10))
+    assert [len(tree.body) for tree in trees] == [200, 20] * 10
