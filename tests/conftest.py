@@ -21,10 +21,10 @@ BY_NUMBA = (
     "unit/engine",
     "unit/questions/bits",
     "unit/cli/test_start_up.py",
-    "contract",
-    "convergence",
+    "contract/test_compiled_kinds.py",
     "judge",
-    "acceptance",
+    "acceptance/test_readme.py",
+    "acceptance/test_reproduce_command.py",
 )
 """Tests of the lanes as users have them. zig compiles for the others, with the same bits in a fraction of the time."""
 
