@@ -18,6 +18,7 @@ COMMANDS: dict[str, str] = {
     "league": QUESTIONS["league"],
     "timing": QUESTIONS["timing"],
     "validate": QUESTIONS["validate"],
+    "record": "record a bench that speaks the protocol of 'ppafo hil'",
     "rig": "record synthetic bench data on the virtual test rig",
     "identify": QUESTIONS["identify"],
     "gait": "list, show and import gaits; export recordings for OpenSim",
@@ -32,6 +33,7 @@ COMMANDS: dict[str, str] = {
     "export": "write a scenario or a walk for other tools: a library in C, an FMU",
     "firmware": "write a scenario's controller as firmware for a small processor",
     "chip": "run a scenario with its controller on the simulator of a small processor",
+    "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",
     "bits": QUESTIONS["bits"],
     "cache": "show, compile or remove the compiled models of this computer",
     "schema": "print the JSON Schema of a file format",
@@ -40,7 +42,7 @@ COMMANDS: dict[str, str] = {
 GROUPS: dict[str, tuple[str, ...]] = {
     "the paper": ("reproduce", "unreported"),
     "your device": ("new", "simulate", "workbench", "plot", "sets", "parts", "audit"),
-    "from bench to model": ("rig", "identify", "validate"),
+    "from bench to model": ("record", "rig", "identify", "validate"),
     "decide": (
         "sweep",
         "compare",
@@ -55,7 +57,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "league",
     ),
     "walk": ("walk", "gait", "timing"),
-    "tools": ("export", "firmware", "chip", "bits", "cache", "schema"),
+    "tools": ("export", "firmware", "chip", "hil", "bits", "cache", "schema"),
 }
 """The commands as the help shows them, by what somebody has come for."""
 

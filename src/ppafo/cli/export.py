@@ -16,12 +16,16 @@ from ppafo.cli.output import (
 
 _C = "write a scenario or a walk as a library in C: header, source, example, make files"
 _UNIT = "write a scenario or a walk as a functional mock-up unit (FMU) for co-simulation"
+_CONTROLLER = "write a scenario's integer controller in C behind the protocol of 'ppafo hil', to begin with on a board"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     library = actions.add_parser("c", help=_C, description=f"{_C[:1].upper()}{_C[1:]}.")
+    controller = actions.add_parser(
+        "controller", help=_CONTROLLER, description=f"{_CONTROLLER[:1].upper()}{_CONTROLLER[1:]}."
+    )
     unit = actions.add_parser("fmu", help=_UNIT, description=f"{_UNIT[:1].upper()}{_UNIT[1:]}.")
     unit.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI (default: 2)")
     unit.add_argument(
@@ -35,8 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="LIST",
         help="what it is to run on, separated by commas: linux64, win64, ... (default: this computer)",
     )
-    for parser_of_one in (library, unit):
-        parser_of_one.add_argument("scenario", metavar="SCENARIO", help="name of a scenario or a walk, or a .toml file")
+    either = "name of a scenario or a walk, or a .toml file"
+    for parser_of_one, said in ((library, either), (controller, "name of a scenario, or a .toml file"), (unit, either)):
+        parser_of_one.add_argument("scenario", metavar="SCENARIO", help=said)
         add_override_argument(parser_of_one)
         add_json_argument(parser_of_one)
         parser_of_one.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
@@ -45,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(parsed: argparse.Namespace) -> int:
     """Write the files of a scenario for another tool, and say what to do next."""
     check_output(parsed)
-    contents, following = {"c": _library, "fmu": _unit}[parsed.action](parsed)
+    contents, following = {"c": _library, "controller": _controller, "fmu": _unit}[parsed.action](parsed)
     write_files(parsed, contents)
     document = {"folder": str(parsed.out), "files": list(contents), "next": following}
     print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)
@@ -58,6 +63,14 @@ def _library(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 
     contents = c_library(load_exportable(parsed.scenario, parsed.overrides))
     return contents, f"make -C {shlex.quote(str(parsed.out))} check"
+
+
+def _controller(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
+    from ppafo.exports.hil.example import example_controller
+    from ppafo.simulation.loading import load_scenario
+
+    contents = example_controller(load_scenario(parsed.scenario, parsed.overrides))
+    return contents, f"make -C {shlex.quote(str(parsed.out))}"
 
 
 def _unit(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:

@@ -93,7 +93,11 @@ def load_program(program: Program) -> ModuleType:
 
     A program is written anew where a number or function that it was made from stands for something else by now.
     """
-    compiler = chosen_compiler()
+    return load_program_by(program, chosen_compiler())
+
+
+def load_program_by(program: Program, compiler: Compiler | None) -> ModuleType:
+    """The same by a compiler, None for Numba."""
     return load_source(_current_source(program, _lanes_for(compiler)), compiler)
 
 

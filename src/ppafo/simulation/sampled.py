@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
+from types import ModuleType
+from typing import Any, final
 
 import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.lane_control import SIGNALS
-from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, load_program
+from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, load_program, samples_in
 from ppafo.engine.metering import group_of
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run
@@ -18,22 +19,67 @@ from ppafo.model.sensors import Measurement, measure
 from ppafo.model.vane import actuator_torque
 
 
+@final
+class SampledRun:
+    """A batch of one in progress, whose command [-] somebody else gives sample by sample."""
+
+    def __init__(self, batch: Batch, module: ModuleType | None = None) -> None:
+        program, clock = batch.program, batch.clock
+        self.samples = math.ceil(clock.step_count / clock.steps_per_sample)
+        self.taken = 0
+        self._batch = batch
+        self._block = LaneBlock(
+            load_program(program) if module is None else module,
+            clock,
+            batch.parameters,
+            batch.states,
+            len(program.traced),
+        )
+        self._reference, self._step = _group(batch, "reference"), _group(batch, "timing").step
+        self._see = _measurement_source(batch, self._block)
+        self._command_row = row_numbers(program.state_rows())["result.command"]
+
+    @property
+    def time(self) -> float:
+        """Time of the present sample [s]."""
+        return self.taken * self._batch.clock.steps_per_sample * self._step
+
+    @property
+    def requested(self) -> float:
+        """The reference at the present sample [N m]."""
+        value: float = self._batch.program.reference.value(self._reference, self.time)[0]
+        return value
+
+    def measurement(self) -> Measurement:
+        """What the sensors show at the present sample."""
+        return self._see(self.taken)
+
+    def go_on(self, command: float) -> None:
+        """Go on to the next sample under a command."""
+        clock = self._batch.clock
+        done = self.taken * clock.steps_per_sample
+        self._block.states[self._command_row] = command
+        self._block.advance(min(clock.steps_per_sample, clock.step_count - done))
+        self.taken += 1
+
+    def result(self) -> BatchResult:
+        """States and record so far: of the samples that were taken, and the one that they led to."""
+        clock, found = self._batch.clock, self._block.result()
+        steps = min(self.taken * clock.steps_per_sample, clock.step_count)
+        kept = samples_in(steps, clock.record_every) if clock.record_every else None
+        # The record at the end of a step is taken when the next one begins, but for the last of the run.
+        late = 1 if kept is not None and steps < clock.step_count and (kept - 1) * clock.record_every >= steps else 0
+        return BatchResult(found.states, found.record[: None if kept is None else kept - late])
+
+
 def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     """Run a batch of one with a Python controller; SimulationError where it returns no finite number."""
-    program, clock = batch.program, batch.clock
-    block = LaneBlock(load_program(program), clock, batch.parameters, batch.states, len(program.traced))
-    reference, step = _group(batch, "reference"), _group(batch, "timing").step
-    see = _measurement_source(batch, block)
-    command_row = row_numbers(program.state_rows())["result.command"]
+    run = SampledRun(batch)
     controller.reset()
-    for sample in range(math.ceil(clock.step_count / clock.steps_per_sample)):
-        first_step = sample * clock.steps_per_sample
-        time = first_step * step
-        requested = program.reference.value(reference, time)[0]
-        command = controller.update(time, requested, see(sample))
-        block.states[command_row] = _clip_command(command, controller, time)
-        block.advance(min(clock.steps_per_sample, clock.step_count - first_step))
-    return block.result()
+    for _ in range(run.samples):
+        command = controller.update(run.time, run.requested, run.measurement())
+        run.go_on(_clip_command(command, controller, run.time))
+    return run.result()
 
 
 def run_in_turn(batch: Batch, controller: PythonController, take: Callable[[slice, BatchResult], None]) -> None:

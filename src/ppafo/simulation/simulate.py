@@ -47,7 +47,7 @@ def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
     """Results of runs of one scenario, as planned or with other numbers; a Python controller has them in turn."""
     custom = scenario.control.custom
     outcomes = run_together(runs) if custom is None else [run_sampled(batch_of(run), custom) for run in runs]
-    return [_result(scenario, run, outcome) for run, outcome in zip(runs, outcomes, strict=True)]
+    return [result_of(scenario, run, outcome) for run, outcome in zip(runs, outcomes, strict=True)]
 
 
 def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> list[Result]:
@@ -56,12 +56,13 @@ def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> 
     inside = [index for index, scenario in enumerate(scenarios) if scenario.control.custom is None]
     outcomes = dict(zip(inside, run_together([runs[index] for index in inside], threads), strict=True))
     return [
-        _result(scenario, run, outcomes[index]) if index in outcomes else simulate(scenario)
+        result_of(scenario, run, outcomes[index]) if index in outcomes else simulate(scenario)
         for index, (scenario, run) in enumerate(zip(scenarios, runs, strict=True))
     ]
 
 
-def _result(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
+def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
+    """The result of what a run came to; one that was stopped has the records up to there."""
     rows = state_row_numbers(run)
     times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     record = outcome.record[:, :, 0]

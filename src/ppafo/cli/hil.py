@@ -1,0 +1,160 @@
+"""``ppafo hil SCENARIO --port PORT``: a scenario's plant in real time against a controller at the other end of a wire."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ppafo.cli.output import (
+    EXIT_CHECK_FAILED,
+    EXIT_GOOD,
+    add_json_argument,
+    add_override_argument,
+    blame_out_option,
+    print_result,
+    tell,
+)
+from ppafo.cli.quick_imports import load_compiler, load_drawing
+from ppafo.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from ppafo.exports.hil.run import HardwareRun
+    from ppafo.simulation.scenario import Scenario
+
+EXIT_INTERRUPTED = 130
+_LONGEST_PATIENCE = 3600.0
+_DEFAULT_PATIENCE = 10.0
+_DEFAULT_RATE = 1000
+_DEFAULT_BAUD = 921_600
+PORT_HELP = "udp:HOST:PORT, or serial:DEVICE (extra 'hil')"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario, or a .toml file")
+    parser.add_argument("--port", metavar="PORT", required=True, help=f"where the controller is: {PORT_HELP}")
+    parser.add_argument(
+        "--rate",
+        metavar="HZ",
+        type=int,
+        default=_DEFAULT_RATE,
+        help=f"samples per second, 50 to 2000 (default: {_DEFAULT_RATE})",
+    )
+    add_baud_argument(parser)
+    parser.add_argument(
+        "--lock-step",
+        action="store_true",
+        help="wait for each answer instead of for the clock, at most a second: the same run every time",
+    )
+    parser.add_argument(
+        "--patience",
+        metavar="S",
+        type=float,
+        default=_DEFAULT_PATIENCE,
+        help=f"how long the controller is called, in seconds (default: {_DEFAULT_PATIENCE:g})",
+    )
+    add_override_argument(parser)
+    add_json_argument(parser)
+    parser.add_argument("--out", metavar="DIR", type=Path, help="result folder; default out/NAME-hil of the scenario")
+
+
+def add_baud_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the speed of a serial line."""
+    parser.add_argument(
+        "--baud",
+        metavar="N",
+        type=int,
+        default=_DEFAULT_BAUD,
+        help=f"bits per second of a serial line (default: {_DEFAULT_BAUD})",
+    )
+
+
+def check_patience(patience: float) -> None:
+    """Refuse a patience that is none."""
+    if not 0.0 < patience <= _LONGEST_PATIENCE:
+        raise ScenarioError(f"--patience {patience:g}: must be above 0, at most {_LONGEST_PATIENCE:g} s")
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Run the plant to its end; 1 where it was vented or diverged, 130 where Ctrl-C stopped it."""
+    check_patience(parsed.patience)
+    from ppafo.exports.hil.pace import stop_by_interrupt
+    from ppafo.simulation.loading import load_scenario
+    from ppafo.storage import check_result_folder
+
+    scenario = load_scenario(parsed.scenario, parsed.overrides)
+    folder = parsed.out if parsed.out is not None else Path("out") / f"{scenario.name}-hil"
+    with blame_out_option():
+        check_result_folder(folder)
+    with stop_by_interrupt() as is_stopped:
+        found = _run(parsed, scenario, is_stopped)
+        _save(found, folder)
+    print_result(_text(found, parsed.port, folder), _document(found, parsed.port, folder), parsed.json)
+    if found.exchange.is_stopped:
+        print(f"ppafo: stopped at {found.exchange.vented_at:.6g} s and vented; {folder} is whole", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    if not found.is_good:
+        said = found.exchange.vented or found.result.status.message
+        print(f"ppafo: {scenario.name}: {said}", file=sys.stderr)
+    return EXIT_GOOD if found.is_good else EXIT_CHECK_FAILED
+
+
+def _run(parsed: argparse.Namespace, scenario: "Scenario", is_stopped: Any) -> "HardwareRun":
+    load_compiler()
+    from ppafo.exports.hil.pace import LockStep, RealTime
+    from ppafo.exports.hil.ports import open_port
+    from ppafo.exports.hil.run import check_baud, plant_of, run_plant
+
+    port = open_port(parsed.port, parsed.baud)
+    try:
+        if port.is_stream:
+            check_baud(parsed.baud, parsed.rate)
+        plant = plant_of(scenario, parsed.rate)
+        tell(f"calling the controller at {parsed.port}")
+        return run_plant(
+            plant,
+            port,
+            lambda period: LockStep() if parsed.lock_step else RealTime(period),
+            parsed.patience,
+            is_stopped,
+        )
+    finally:
+        port.close()
+
+
+def _save(found: "HardwareRun", folder: Path) -> None:
+    load_drawing()
+    from ppafo.answers.recording_figure import figure_files
+
+    found.save(folder, figure_files(found.plot_signals()))
+
+
+def _text(found: "HardwareRun", port: str, folder: Path) -> str:
+    from ppafo.answers.shown_metrics import metrics_lines
+
+    result = found.result
+    ended = "stopped" if found.exchange.is_stopped else "vented" if found.exchange.vented else result.status.kind
+    return "\n".join(
+        [
+            f"{result.scenario.name} at {port}: {ended}",
+            "",
+            found.text(),
+            "",
+            *metrics_lines(result.metrics),
+            "",
+            f"written: {folder} (recording.nc, recording.csv, log.csv, link.json, run.json, figures)",
+        ]
+    )
+
+
+def _document(found: "HardwareRun", port: str, folder: Path) -> dict[str, Any]:
+    from ppafo.simulation.document import plain
+
+    return {
+        "scenario": found.result.scenario.name,
+        "port": port,
+        "status": plain(found.result.status),
+        "link": found.document(),
+        "metrics": {name: plain(metric) for name, metric in found.result.metrics.items()},
+        "folder": str(folder),
+    }

@@ -1,0 +1,108 @@
+"""``ppafo record --port PORT --out FILE.csv``: a recording from a bench that speaks the protocol."""
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ppafo.cli.hil import EXIT_INTERRUPTED, PORT_HELP, add_baud_argument, check_patience
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, add_json_argument, check_new_file, print_result, tell
+from ppafo.errors import DataError, UnitError
+
+if TYPE_CHECKING:
+    from ppafo.exports.hil.recording import Recorded
+
+_DEFAULT_PATIENCE = 5.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument(
+        "--port", metavar="PORT", required=True, help=f"where the bench sends: {PORT_HELP}; UDP listens at the address"
+    )
+    add_baud_argument(parser)
+    parser.add_argument("--duration", metavar="TIME", help="end after this time of the bench, for example '10 s'")
+    parser.add_argument(
+        "--patience",
+        metavar="S",
+        type=float,
+        default=_DEFAULT_PATIENCE,
+        help=f"end, or give up, after so many seconds without a sample (default: {_DEFAULT_PATIENCE:g})",
+    )
+    add_json_argument(parser)
+    parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .csv file to write")
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """Record until the bench or a person ends it; 1 where the port broke, 130 where Ctrl-C stopped it."""
+    check_patience(parsed.patience)
+    duration = _seconds(parsed.duration)
+    check_new_file(parsed.out)
+    if parsed.out.suffix != ".csv":
+        raise DataError(f"--out {parsed.out}: must end in .csv")
+    from ppafo.exports.hil.pace import stop_by_interrupt
+    from ppafo.exports.hil.ports import open_port
+    from ppafo.exports.hil.recording import record
+    from ppafo.storage.comma_separated import write_csv
+
+    port = open_port(parsed.port, parsed.baud, listens=True)
+    try:
+        tell(f"listening at {parsed.port}")
+        with stop_by_interrupt() as is_stopped:
+            found = record(port, parsed.out.stem, duration, parsed.patience, is_stopped)
+            write_csv(parsed.out, found.recording)
+        is_broken = bool(port.failure)
+    finally:
+        port.close()
+    print_result(_text(found, parsed.out), _document(found, parsed.out), parsed.json)
+    if found.is_stopped:
+        print(f"ppafo: stopped; {parsed.out} is whole", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    return EXIT_CHECK_FAILED if is_broken else EXIT_GOOD
+
+
+def _seconds(text: str | None) -> float | None:
+    if text is None:
+        return None
+    from ppafo.units import parse_quantity
+
+    try:
+        seconds = parse_quantity(text, "s")
+    except UnitError as error:
+        raise UnitError(f"--duration {text}: {error}") from error
+    if not (seconds > 0.0 and math.isfinite(seconds)):
+        raise UnitError(f"--duration {text}: must be above 0 s")
+    return seconds
+
+
+def _text(found: "Recorded", path: Path) -> str:
+    from ppafo.exports.hil.packets import described_refusals
+
+    recording = found.recording
+    others = [*found.ignored.items(), ("of somebody else", found.strangers)]
+    return "\n".join(
+        [
+            f"{len(recording)} samples of {', '.join(recording.names)} over {recording.duration:.6g} s, {recording.kind}",
+            f"lost     {found.lost} samples between the first and the last",
+            f"dropped  {described_refusals(found.refused, others)}",
+            f"ended    by {found.ended}",
+            f"written: {path}",
+        ]
+    )
+
+
+def _document(found: "Recorded", path: Path) -> dict[str, Any]:
+    recording = found.recording
+    return {
+        "file": str(path),
+        "samples": len(recording),
+        "duration": recording.duration,
+        "kind": recording.kind,
+        "channels": {name: recording.unit(name) for name in recording.names},
+        "lost": found.lost,
+        "refused": dict(found.refused),
+        "ignored": dict(found.ignored),
+        "strangers": found.strangers,
+        "ended": found.ended,
+    }

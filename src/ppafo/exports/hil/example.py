@@ -1,0 +1,40 @@
+"""A scenario's integer controller behind the protocol: C for this computer, to begin a board's own code with."""
+
+import re
+from importlib.resources import files
+
+from ppafo.errors import ScenarioError
+from ppafo.exports.firmware import chip_controller, firmware
+from ppafo.exports.hil.packets import MICROSECONDS
+from ppafo.simulation.scenario import Scenario
+from ppafo.version import __version__
+
+_MARK = re.compile(r"@(\w+)@")
+_OF_FIRMWARE = ("controller.c", "controller.h", "parameters.h", "LICENSE")
+_TEMPLATES = ("Makefile", "README.md", "host.c", "link.c", "link.h", "plant.h")
+
+
+def example_controller(scenario: Scenario) -> dict[str, bytes]:
+    """Files of a controller at the wire, by name. ScenarioError where it has no form on whole numbers."""
+    chip = chip_controller(scenario)
+    written = firmware(scenario)
+    period = round(scenario.control.period * MICROSECONDS)
+    if abs(period / MICROSECONDS - scenario.control.period) > 1.0e-9 * scenario.control.period:
+        raise ScenarioError(
+            f"{scenario.name}: controller.period = {scenario.control.period:.9g} s: must be a whole number of us"
+        )
+    words = {
+        "title": scenario.name,
+        "kind": chip.law.name,
+        "version": __version__,
+        "period": str(period),
+        "pressure_step": repr(chip.converter.pressure_step),
+        "torque_step": repr(chip.converter.torque_step),
+        "top": repr(chip.converter.top),
+        "middle": repr(chip.converter.middle),
+        "next": f"ppafo hil {scenario.name} --port udp:127.0.0.1:5000 --out out/hil",
+    }
+    folder = files("ppafo.exports.hil").joinpath("templates")
+    texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in _TEMPLATES}
+    filled = {name: _MARK.sub(lambda found: words[found[1]], text).encode() for name, text in texts.items()}
+    return dict(sorted({**filled, **{name: written[name] for name in _OF_FIRMWARE}}.items()))

@@ -1,0 +1,225 @@
+"""Packets between a plant and a controller: bytes of samples and answers, and what is found in bytes of anybody.
+
+The page ``docs/how-to/hardware-in-the-loop.md`` has the protocol as a table. Whatever comes in is judged here: a packet
+is good to its last bit, or it is counted and dropped.
+"""
+
+import math
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple, final
+
+MARK = b"\xa5\x5a"
+VERSION = 1
+SAMPLE, ANSWER = 1, 2
+"""Kinds of packet."""
+BEGIN, VENTED, OVER, COMPUTED = 1, 2, 4, 8
+"""Flags of a sample."""
+UNSOUND = 1
+"""Flag of an answer: both chambers are to be vented, for good."""
+FULL_COMMAND = 1_000_000
+"""Counts of a command of 1."""
+MICROSECONDS = 1_000_000
+WRAP = 2**32
+"""What a time stamp goes back to 0 at."""
+
+_HEADER = struct.Struct("<2sBBBBHII")
+_WORD = struct.Struct("<i")
+_MASK = struct.Struct("<I")
+_CHECKSUM = 4
+_SHORTEST = _HEADER.size + _WORD.size + _CHECKSUM
+_LARGEST_COUNT = 2**31 - 1
+
+
+class ChannelCode(NamedTuple):
+    """A channel on the wire: its name, and the SI value of a count."""
+
+    name: str
+    count: float
+
+
+CHANNELS = (
+    ChannelCode("reference", 1.0e-6),
+    ChannelCode("angle", 1.0e-6),
+    ChannelCode("pressure_1", 1.0),
+    ChannelCode("pressure_2", 1.0),
+    ChannelCode("torque", 1.0e-6),
+    ChannelCode("command", 1.0e-6),
+    ChannelCode("supply_pressure", 1.0),
+    ChannelCode("dorsiflexion_pressure", 1.0),
+    ChannelCode("pressure_difference", 1.0),
+    ChannelCode("external_torque", 1.0e-6),
+    ChannelCode("angular_velocity", 1.0e-6),
+    ChannelCode("upstream_pressure", 1.0),
+    ChannelCode("downstream_pressure", 1.0),
+    ChannelCode("mass_flow", 1.0e-9),
+    ChannelCode("direction", 1.0),
+    ChannelCode("repetition", 1.0),
+)
+"""By the number of their bit."""
+_NUMBERS = {channel.name: number for number, channel in enumerate(CHANNELS)}
+LONGEST = _SHORTEST + _WORD.size * len(CHANNELS)
+"""Bytes of the longest packet."""
+
+
+class Sample(NamedTuple):
+    """What a plant or a bench shows: flags, run, sequence number, time stamp [us], counts by channel."""
+
+    flags: int
+    run: int
+    sequence: int
+    time: int
+    counts: Mapping[str, int]
+
+
+class Answer(NamedTuple):
+    """What a controller answers: flags, run and sequence of the sample, its own time stamp [us], counts of command."""
+
+    flags: int
+    run: int
+    sequence: int
+    time: int
+    command: int
+
+
+Packet = Sample | Answer
+
+
+def count_of(name: str, value: float) -> int:
+    """Counts of a channel for a value in SI units, rounded; as far as they go where it is beyond them."""
+    counts = value / CHANNELS[_NUMBERS[name]].count
+    return int(max(-_LARGEST_COUNT, min(_LARGEST_COUNT, math.floor(counts + 0.5))))
+
+
+def value_of(name: str, counts: int) -> float:
+    """SI value of counts of a channel; the nearest float to the decimal fraction that they are."""
+    per_unit = round(1.0 / CHANNELS[_NUMBERS[name]].count)
+    return counts / per_unit
+
+
+def sample_bytes(sample: Sample) -> bytes:
+    """The packet of a sample."""
+    numbers = sorted(_NUMBERS[name] for name in sample.counts)
+    mask = sum(1 << number for number in numbers)
+    values = [sample.counts[CHANNELS[number].name] for number in numbers]
+    return _packet(SAMPLE, sample[:4], _MASK.pack(mask) + struct.pack(f"<{len(values)}i", *values))
+
+
+def answer_bytes(answer: Answer) -> bytes:
+    """The packet of an answer."""
+    return _packet(ANSWER, answer[:4], _WORD.pack(answer.command))
+
+
+def _packet(kind: int, head: tuple[int, int, int, int], payload: bytes) -> bytes:
+    flags, run, sequence, time = head
+    length = _HEADER.size + len(payload) + _CHECKSUM
+    body = _HEADER.pack(MARK, VERSION, kind, length, flags, run, sequence, time) + payload
+    return body + zlib.crc32(body).to_bytes(_CHECKSUM, "little")
+
+
+def sample_length(channels: int) -> int:
+    """Bytes of a sample with some channels."""
+    return _SHORTEST + _WORD.size * channels
+
+
+REFUSALS = ("stray bytes", "version", "kind", "length", "checksum", "content")
+"""Why bytes are dropped: outside any packet, or of a packet that is wrong in this."""
+
+
+@final
+class Reader:
+    """Finds packets in bytes; ``refused`` counts what was dropped, by ``REFUSALS``.
+
+    Bytes of a stream go on from one call to the next, those of datagrams do not.
+    """
+
+    def __init__(self, is_stream: bool) -> None:
+        self.is_stream = is_stream
+        self.refused: Counter[str] = Counter()
+        self._waiting = b""
+
+    def take(self, data: bytes) -> list[Packet]:
+        """The good packets in what came in, and in what was waiting for it."""
+        if not self.is_stream:
+            return self._datagram(data)
+        found: list[Packet] = []
+        waiting = self._waiting + data
+        while True:
+            at = waiting.find(MARK)
+            if at < 0:
+                at = len(waiting) - (1 if waiting.endswith(MARK[:1]) else 0)
+                self._drop("stray bytes", at)
+                break
+            self._drop("stray bytes", at)
+            waiting, at = waiting[at:], 0
+            why = _wrong_head(waiting)
+            if why is None and (len(waiting) < _HEADER.size or len(waiting) < waiting[4]):
+                break
+            packet = _read(waiting[: waiting[4]]) if why is None else why
+            if isinstance(packet, str):
+                self._drop(packet)
+                waiting = waiting[len(MARK) :]
+            else:
+                found.append(packet)
+                waiting = waiting[waiting[4] :]
+        self._waiting = waiting[at:]
+        return found
+
+    def _datagram(self, data: bytes) -> list[Packet]:
+        if not data.startswith(MARK):
+            self._drop("stray bytes", len(data))
+            return []
+        why = _wrong_head(data)
+        if why is None and (len(data) < _HEADER.size or len(data) != data[4]):
+            why = "length"
+        packet = _read(data) if why is None else why
+        if isinstance(packet, str):
+            self._drop(packet)
+            return []
+        return [packet]
+
+    def _drop(self, why: str, count: int = 1) -> None:
+        if count:
+            self.refused[why] += count
+
+
+def _wrong_head(data: bytes) -> str | None:
+    """What is wrong with the bytes after a mark, as far as they are here; None where nothing is."""
+    if len(data) > 2 and data[2] != VERSION:
+        return "version"
+    if len(data) > 3 and data[3] not in (SAMPLE, ANSWER):
+        return "kind"
+    if len(data) > 4 and not _is_length(data[3], data[4]):
+        return "length"
+    return None
+
+
+def _is_length(kind: int, length: int) -> bool:
+    if kind == ANSWER:
+        return length == _SHORTEST
+    return _SHORTEST <= length <= LONGEST and (length - _SHORTEST) % _WORD.size == 0
+
+
+def _read(data: bytes) -> Packet | str:
+    """The packet that some bytes are, which have the length that they say; or what is wrong with them."""
+    if zlib.crc32(data[:-_CHECKSUM]) != int.from_bytes(data[-_CHECKSUM:], "little"):
+        return "checksum"
+    _, _, kind, _, flags, run, sequence, time = _HEADER.unpack_from(data)
+    if kind == ANSWER:
+        (command,) = _WORD.unpack_from(data, _HEADER.size)
+        is_good = -FULL_COMMAND <= command <= FULL_COMMAND
+        return Answer(flags, run, sequence, time, command) if is_good else "content"
+    (mask,) = _MASK.unpack_from(data, _HEADER.size)
+    names = [channel.name for number, channel in enumerate(CHANNELS) if mask >> number & 1]
+    if mask >> len(CHANNELS) or len(data) != sample_length(len(names)):
+        return "content"
+    values = struct.unpack_from(f"<{len(names)}i", data, _HEADER.size + _MASK.size)
+    return Sample(flags, run, sequence, time, dict(zip(names, values, strict=True)))
+
+
+def described_refusals(refused: Mapping[str, int], others: Iterable[tuple[str, int]] = ()) -> str:
+    """What was dropped, in words; ``nothing`` where nothing was."""
+    counted = [*((why, refused.get(why, 0)) for why in REFUSALS), *others]
+    return ", ".join(f"{count} {why}" for why, count in counted if count) or "nothing"

@@ -1,0 +1,344 @@
+"""A scenario at the wire, from its settings to a folder: plan, run, result, log, and how the link did."""
+
+import csv
+import io
+import os
+import platform
+import random
+import statistics
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ppafo.answers.layout import Margins, figure_of_free_panels
+from ppafo.answers.recording_figure import recording_figure
+from ppafo.answers.style import ACTUAL, VERMILION, house_style, render_figure
+from ppafo.documents.json_text import json_text
+from ppafo.engine.compilers import Compiler, chosen_compiler
+from ppafo.engine.lanes import load_program_by
+from ppafo.engine.run import Run, batch_of
+from ppafo.errors import ScenarioError, SimulationError
+from ppafo.exports.hil.loop import Bench, Exchange, Row
+from ppafo.exports.hil.pace import Pace, without_collections
+from ppafo.exports.hil.packets import MICROSECONDS, described_refusals, sample_length
+from ppafo.exports.hil.ports import BITS_OF_A_BYTE, Port
+from ppafo.model.valves import dump
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.result import Result
+from ppafo.simulation.sampled import SampledRun
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
+from ppafo.simulation.simulate import result_of
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.translation.native import compiler
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+RATE = 1000
+"""Samples per second unless another rate is asked for [Hz]."""
+LOWEST_RATE, HIGHEST_RATE = 50, 2000
+CHANNELS_SENT = 5
+LOG_COLUMNS = (
+    *("sequence [-]", "due [s]", "sent_late [s]", "answered_after [s]"),
+    *("command [-]", "controller_time [s]", "vented [-]"),
+)
+_LARGEST_RUN = 2**16 - 1
+_PER_THOUSAND = 1.0e3
+_BINS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """A scenario without its controller: how it is run, and what compiled it."""
+
+    scenario: Scenario
+    run: Run
+    module: ModuleType
+    compiled_by: str
+    period: float
+
+    def begin(self) -> SampledRun:
+        """The plant at its start."""
+        return SampledRun(batch_of(self.run), self.module)
+
+
+def plant_of(scenario: Scenario, rate: int = RATE) -> Plant:
+    """The plant of a scenario, whose command is given ``rate`` times a second; a proportional valve can be dumped.
+
+    A compiler of C makes it where there is one and ``PPAFO_BACKEND`` asks for no other.
+    """
+    if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+        raise ScenarioError(f"--rate {rate}: must be {LOWEST_RATE} to {HIGHEST_RATE} samples per second")
+    period = 1.0 / rate
+    chosen = replace(
+        scenario,
+        time_step=min(scenario.time_step, period),
+        control=Control(PYTHON_CONTROLLER, {}, period),
+    )
+    run = plan_run(chosen)
+    valve = chosen.device.valve
+    if valve.kind == "proportional":
+        run = replace(run, program=replace(run.program, valve=dump.choose(valve.settings)))
+    made_by = _compiler()
+    module = load_program_by(batch_of(run).program, made_by)
+    return Plant(chosen, run, module, "Numba" if made_by is None else made_by.described(), period)
+
+
+def _compiler() -> Compiler | None:
+    chosen = chosen_compiler()
+    if chosen is not None or os.environ.get("PPAFO_BACKEND"):
+        return chosen
+    try:
+        return compiler("c")
+    except SimulationError:
+        return None
+
+
+def check_baud(baud: int, rate: int) -> None:
+    """Refuse a serial line that cannot carry the samples."""
+    needed = sample_length(CHANNELS_SENT) * BITS_OF_A_BYTE * rate
+    if baud < needed:
+        raise ScenarioError(
+            f"--baud {baud}: {rate} samples per second need {needed} baud; take a faster line or a lower --rate, "
+            f"here at most {baud // (sample_length(CHANNELS_SENT) * BITS_OF_A_BYTE)}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What the plant ran on: system, cores, Python, and the load (mean number of processes that run, 1 min) around it.
+
+    The load is None where the system does not tell it.
+    """
+
+    system: str
+    cores: int
+    python: str
+    load_before: float | None
+    load_after: float | None
+
+
+def load_now() -> float | None:
+    """Processes that run on this computer, on average over the last minute [-]."""
+    try:
+        return os.getloadavg()[0]
+    except (AttributeError, OSError):
+        return None
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class HardwareRun:
+    """A run at the wire: the result, what went over the wire, and the machine."""
+
+    plant: Plant
+    result: Result
+    exchange: Exchange
+    machine: Machine
+
+    @property
+    def is_good(self) -> bool:
+        """True where the run went to its end, and nothing vented the plant."""
+        return self.result.status.is_completed and not self.exchange.vented
+
+    @property
+    def sent_late(self) -> list[float]:
+        """How late each sample was sent [s]."""
+        return [row.sent_late for row in self._in_time]
+
+    @property
+    def answered_after(self) -> list[float]:
+        """After how long each sample was answered that was [s]."""
+        return [row.answered_after for row in self._in_time if row.answered_after is not None]
+
+    @property
+    def missed(self) -> int:
+        """Samples without an answer of their own."""
+        return sum(row.answered_after is None for row in self._in_time)
+
+    @property
+    def _in_time(self) -> Sequence[Row]:
+        """The samples that were sent: not those with which a stopped run was vented."""
+        count = next((place for place, row in enumerate(self.exchange.rows) if row.sent_late is None), None)
+        return self.exchange.rows[:count]
+
+    def document(self) -> dict[str, Any]:
+        """What ``link.json`` says, in SI units."""
+        exchange = self.exchange
+        return {
+            "rate": round(1.0 / self.plant.period),
+            "samples": len(self.sent_late),
+            "answered": len(self.answered_after),
+            "missed": self.missed,
+            "longest_silence": longest_silence(exchange.rows) * self.plant.period,
+            "sent_late": spread(self.sent_late),
+            "answered_after": spread(self.answered_after),
+            "stood_still": list(exchange.stood_still),
+            "taken": exchange.taken,
+            "refused": dict(exchange.refused),
+            "ignored": dict(exchange.ignored),
+            "strangers": exchange.strangers,
+            "vented": exchange.vented or None,
+            "vented_at": exchange.vented_at,
+            "is_stopped": exchange.is_stopped,
+            "failure": exchange.failure or None,
+            "plant": self.plant.compiled_by,
+            "machine": {name: getattr(self.machine, name) for name in Machine.__slots__},
+        }
+
+    def text(self) -> str:
+        """The run in words."""
+        exchange, machine = self.exchange, self.machine
+        others = [*exchange.ignored.items(), ("of somebody else", exchange.strangers)]
+        silence = longest_silence(exchange.rows) * self.plant.period
+        loads = "".join(
+            f", load {load:.2f} {when}"
+            for load, when in ((machine.load_before, "before"), (machine.load_after, "after"))
+            if load is not None
+        )
+        still = exchange.stood_still
+        stood = f"stood still {len(still)} times, {sum(still):.3g} s in all" if still else "never stood still"
+        lines = [
+            f"samples    {len(self.sent_late)} sent, {len(self.answered_after)} answered, {self.missed} missed; "
+            f"longest silence {silence * _PER_THOUSAND:.3g} ms",
+            f"answers    {described_spread(self.answered_after)}",
+            f"sent late  {described_spread(self.sent_late)}",
+            f"time       {stood}",
+            f"dropped    {described_refusals(exchange.refused, others)}",
+            f"machine    {machine.cores} cores{loads}; {machine.system}, Python {machine.python}",
+            f"plant      {self.plant.compiled_by}",
+        ]
+        if exchange.vented:
+            lines.append(f"VENTED     at {exchange.vented_at:.6g} s: {exchange.vented}")
+        return "\n".join([*lines, *([f"port       {exchange.failure}"] if exchange.failure else [])])
+
+    def files(self) -> dict[str, bytes]:
+        """The files beside those of a result, by name."""
+        found = {
+            "log.csv": log_bytes(self.exchange.rows),
+            "link.json": f"{json_text(self.document())}\n".encode(),
+            **{f"link.{form}": content for form, content in render_figure(self.plot(), ("png", "svg")).items()},
+        }
+        vented_at = self.exchange.vented_at
+        if vented_at is not None and len(before := self.result.recording.time[self.result.recording.time < vented_at]):
+            found["until-vented.csv"] = marked_csv_bytes(self.result.recording.between(0.0, float(before[-1])))
+        return found
+
+    def plot_signals(self) -> "Figure":
+        """The signals of the run; what vented it stands below."""
+        exchange, status = self.exchange, self.result.status
+        vented = "" if exchange.vented_at is None else f"vented from {exchange.vented_at:.6g} s on: {exchange.vented}"
+        remark = vented if status.is_completed else status.message
+        atmosphere = self.plant.scenario.device.supply.atmospheric_pressure
+        return recording_figure(self.result.recording, f"{self.plant.scenario.name}, at the wire", remark, atmosphere)
+
+    def plot(self) -> "Figure":
+        """Histograms of how late samples were sent, and after how long they were answered."""
+        with house_style():
+            figure, ((late, after),) = figure_of_free_panels((7.2, 3.0), Margins(0.75, 0.2, 0.8, 0.6, 0.5, 0.9), 1, 2)
+            figure.text(0.017, 0.96, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
+            _histogram(late, self.sent_late, "Samples sent after they were due")
+            missed = f" ({self.missed} missed)" if self.missed else ""
+            _histogram(after, self.answered_after, f"Answers after their sample{missed}")
+            late.set_ylabel("Samples")
+            for axes in (late, after):
+                axes.axvline(self.plant.period * _PER_THOUSAND, color=VERMILION, linewidth=1.0, linestyle="--")
+            return figure
+
+    def save(self, folder: Path, further: dict[str, bytes]) -> None:
+        """Write the result folder with log, figures of the link and what else there is."""
+        self.result.save(folder, {**self.files(), **further})
+
+
+def run_hardware(
+    scenario: Scenario,
+    port: Port,
+    pace: Callable[[float], Pace],
+    rate: int = RATE,
+    patience: float = 10.0,
+    is_stopped: Callable[[], bool] = lambda: False,
+    run: int | None = None,
+) -> HardwareRun:
+    """Run the plant of a scenario against the controller at a port; ``pace`` makes the pace for a period [s].
+
+    ``patience`` [s] is how long the controller is called; ``run`` its number, drawn where none is given.
+    ScenarioError where nobody answers.
+    """
+    return run_plant(plant_of(scenario, rate), port, pace, patience, is_stopped, run)
+
+
+def run_plant(
+    plant: Plant,
+    port: Port,
+    pace: Callable[[float], Pace],
+    patience: float = 10.0,
+    is_stopped: Callable[[], bool] = lambda: False,
+    run: int | None = None,
+) -> HardwareRun:
+    """The same of a plant that is made."""
+    number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
+    before = load_now()
+    begun = plant.begin()
+    with without_collections():
+        exchange = Bench(begun, plant.period, port, pace(plant.period), number).run(patience, is_stopped)
+    machine = Machine(platform.platform(), os.cpu_count() or 1, platform.python_version(), before, load_now())
+    return HardwareRun(plant, result_of(plant.scenario, plant.run, begun.result()), exchange, machine)
+
+
+def spread(values: Sequence[float]) -> dict[str, float] | None:
+    """Median, 99th percentile and largest of some times [s]; None where there are none."""
+    if not values:
+        return None
+    return {
+        "median": statistics.median(values),
+        "percentile_99": float(np.percentile(values, 99.0)),
+        "largest": max(values),
+    }
+
+
+def described_spread(values: Sequence[float]) -> str:
+    """The same in words."""
+    found = spread(values)
+    if found is None:
+        return "none"
+    shown = {name: f"{value * _PER_THOUSAND:.3g} ms" for name, value in found.items()}
+    return f"median {shown['median']}, 99 % within {shown['percentile_99']}, at most {shown['largest']}"
+
+
+def longest_silence(rows: Sequence[Row]) -> int:
+    """Most samples one after the other that were sent and not answered."""
+    longest = current = 0
+    for row in rows:
+        current = current + 1 if row.answered_after is None and row.sent_late is not None else 0
+        longest = max(longest, current)
+    return longest
+
+
+def log_bytes(rows: Sequence[Row]) -> bytes:
+    """The log as a table; an empty cell is something that was not there."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(LOG_COLUMNS)
+    for row in rows:
+        stamp = "" if row.controller_time is None else repr(row.controller_time / MICROSECONDS)
+        times = ("" if value is None else repr(value) for value in (row.sent_late, row.answered_after))
+        writer.writerow([row.sequence, repr(row.due), *times, repr(row.command), stamp, int(row.is_vented)])
+    return buffer.getvalue().encode()
+
+
+def _histogram(axes: "Axes", values: Sequence[float], title: str) -> None:
+    """Times in ms on a logarithmic axis, from what a clock tells at best."""
+    axes.set_title(title)
+    axes.set_xlabel("Time (ms)")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    if not values:
+        return
+    shown = np.maximum(np.asarray(values) * _PER_THOUSAND, 1.0e-3)
+    edges = np.geomspace(min(1.0e-2, shown.min()), max(1.0e1, 1.01 * shown.max()), _BINS)
+    axes.hist(shown, edges, color=ACTUAL)
