@@ -1,4 +1,4 @@
-"""``ppafo hil SCENARIO --port PORT``: a scenario's plant in real time against a controller at the other end of a wire."""
+"""``ppafo hil SCENARIO --port PORT``: a scenario's plant in real time against a controller at a wire."""
 
 import argparse
 import sys
@@ -102,8 +102,9 @@ def run(parsed: argparse.Namespace) -> int:
 def _run(parsed: argparse.Namespace, scenario: "Scenario", is_stopped: Any) -> "HardwareRun":
     load_compiler()
     from ppafo.exports.hil.pace import LockStep, RealTime
+    from ppafo.exports.hil.plant import check_baud, plant_of
     from ppafo.exports.hil.ports import open_port
-    from ppafo.exports.hil.run import check_baud, plant_of, run_plant
+    from ppafo.exports.hil.run import run_plant
 
     port = open_port(parsed.port, parsed.baud)
     try:

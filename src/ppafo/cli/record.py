@@ -83,7 +83,7 @@ def _text(found: "Recorded", path: Path) -> str:
     others = [*found.ignored.items(), ("of somebody else", found.strangers)]
     return "\n".join(
         [
-            f"{len(recording)} samples of {', '.join(recording.names)} over {recording.duration:.6g} s, {recording.kind}",
+            f"{len(recording)} samples over {recording.duration:.6g} s, {recording.kind}: {', '.join(recording.names)}",
             f"lost     {found.lost} samples between the first and the last",
             f"dropped  {described_refusals(found.refused, others)}",
             f"ended    by {found.ended}",

@@ -134,6 +134,7 @@ class Exchange:
     vented: str
     vented_at: float | None
     is_stopped: bool
+    is_real_time: bool
     failure: str
 
 
@@ -190,6 +191,7 @@ class Bench:
             vented=self.judge.vented,
             vented_at=vented,
             is_stopped=stopped,
+            is_real_time=self.pace.is_real,
             failure=self.port.failure,
         )
 

@@ -19,6 +19,10 @@ class Pace(Protocol):
 
     stood_still: list[float]
 
+    @property
+    def is_real(self) -> bool:
+        """True where times mean something."""
+
     def begin(self) -> None:
         """Let time begin."""
 
@@ -39,11 +43,17 @@ class Pace(Protocol):
 
 
 def _listen(seconds: float, clock: Callable[[], float], port: Port, take: Take) -> None:
-    """Hand over what comes in for some seconds of a clock, or until ``take`` has what it waits for."""
+    """Hand over what comes in for some seconds of a clock, or until ``take`` has what it waits for.
+
+    What has come in while the computer slept through the end is handed over too.
+    """
     end = clock() + seconds
     while (left := end - clock()) > 0.0:
         data = port.receive(left)
         if data and take(data):
+            return
+    while data := port.receive(0.0):
+        if take(data):
             return
 
 
@@ -53,6 +63,8 @@ class RealTime:
 
     ``clock`` tells seconds.
     """
+
+    is_real = True
 
     def __init__(self, period: float, clock: Callable[[], float] = time.perf_counter) -> None:
         self.stood_still: list[float] = []
@@ -95,6 +107,8 @@ class RealTime:
 @final
 class LockStep:
     """Time that stands still until the answer is there, or ``patience`` [s] of a clock have gone by."""
+
+    is_real = False
 
     def __init__(self, patience: float = 1.0, clock: Callable[[], float] = time.perf_counter) -> None:
         self.stood_still: list[float] = []

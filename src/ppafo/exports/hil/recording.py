@@ -33,7 +33,7 @@ _HALF = WRAP // 2
 class Recorded:
     """A recording of a bench, and what was counted beside it.
 
-    ``lost`` are samples whose numbers never came. ``ended`` says what ended it, ``is_stopped`` whether that was a person.
+    ``lost`` are samples whose numbers never came. ``ended`` says what ended it, ``is_stopped`` whether a person did.
     """
 
     recording: Recording

@@ -7,9 +7,8 @@ import platform
 import random
 import statistics
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -18,31 +17,20 @@ from ppafo.answers.layout import Margins, figure_of_free_panels
 from ppafo.answers.recording_figure import recording_figure
 from ppafo.answers.style import ACTUAL, VERMILION, house_style, render_figure
 from ppafo.documents.json_text import json_text
-from ppafo.engine.compilers import Compiler, chosen_compiler
-from ppafo.engine.lanes import load_program_by
-from ppafo.engine.run import Run, batch_of
-from ppafo.errors import ScenarioError, SimulationError
 from ppafo.exports.hil.loop import Bench, Exchange, Row
 from ppafo.exports.hil.pace import Pace, without_collections
-from ppafo.exports.hil.packets import MICROSECONDS, described_refusals, sample_length
-from ppafo.exports.hil.ports import BITS_OF_A_BYTE, Port
-from ppafo.model.valves import dump
-from ppafo.simulation.plan import plan_run
+from ppafo.exports.hil.packets import MICROSECONDS, described_refusals
+from ppafo.exports.hil.plant import RATE, Plant, plant_of
+from ppafo.exports.hil.ports import Port
 from ppafo.simulation.result import Result
-from ppafo.simulation.sampled import SampledRun
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import result_of
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.translation.native import compiler
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-RATE = 1000
-"""Samples per second unless another rate is asked for [Hz]."""
-LOWEST_RATE, HIGHEST_RATE = 50, 2000
-CHANNELS_SENT = 5
 LOG_COLUMNS = (
     *("sequence [-]", "due [s]", "sent_late [s]", "answered_after [s]"),
     *("command [-]", "controller_time [s]", "vented [-]"),
@@ -50,63 +38,8 @@ LOG_COLUMNS = (
 _LARGEST_RUN = 2**16 - 1
 _PER_THOUSAND = 1.0e3
 _BINS = 60
-
-
-@dataclass(frozen=True, slots=True)
-class Plant:
-    """A scenario without its controller: how it is run, and what compiled it."""
-
-    scenario: Scenario
-    run: Run
-    module: ModuleType
-    compiled_by: str
-    period: float
-
-    def begin(self) -> SampledRun:
-        """The plant at its start."""
-        return SampledRun(batch_of(self.run), self.module)
-
-
-def plant_of(scenario: Scenario, rate: int = RATE) -> Plant:
-    """The plant of a scenario, whose command is given ``rate`` times a second; a proportional valve can be dumped.
-
-    A compiler of C makes it where there is one and ``PPAFO_BACKEND`` asks for no other.
-    """
-    if not LOWEST_RATE <= rate <= HIGHEST_RATE:
-        raise ScenarioError(f"--rate {rate}: must be {LOWEST_RATE} to {HIGHEST_RATE} samples per second")
-    period = 1.0 / rate
-    chosen = replace(
-        scenario,
-        time_step=min(scenario.time_step, period),
-        control=Control(PYTHON_CONTROLLER, {}, period),
-    )
-    run = plan_run(chosen)
-    valve = chosen.device.valve
-    if valve.kind == "proportional":
-        run = replace(run, program=replace(run.program, valve=dump.choose(valve.settings)))
-    made_by = _compiler()
-    module = load_program_by(batch_of(run).program, made_by)
-    return Plant(chosen, run, module, "Numba" if made_by is None else made_by.described(), period)
-
-
-def _compiler() -> Compiler | None:
-    chosen = chosen_compiler()
-    if chosen is not None or os.environ.get("PPAFO_BACKEND"):
-        return chosen
-    try:
-        return compiler("c")
-    except SimulationError:
-        return None
-
-
-def check_baud(baud: int, rate: int) -> None:
-    """Refuse a serial line that cannot carry the samples."""
-    needed = sample_length(CHANNELS_SENT) * BITS_OF_A_BYTE * rate
-    if baud < needed:
-        raise ScenarioError(
-            f"--baud {baud}: {rate} samples per second need {needed} baud; take a faster line or a lower --rate, "
-            f"here at most {baud // (sample_length(CHANNELS_SENT) * BITS_OF_A_BYTE)}"
-        )
+_SHORTEST_SHOWN, _LONGEST_SHOWN = 1.0e-2, 1.0e1
+"""Ends of the axis of times [ms]; longer ones make it longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +116,7 @@ class HardwareRun:
             "refused": dict(exchange.refused),
             "ignored": dict(exchange.ignored),
             "strangers": exchange.strangers,
+            "is_real_time": exchange.is_real_time,
             "vented": exchange.vented or None,
             "vented_at": exchange.vented_at,
             "is_stopped": exchange.is_stopped,
@@ -206,9 +140,15 @@ class HardwareRun:
         lines = [
             f"samples    {len(self.sent_late)} sent, {len(self.answered_after)} answered, {self.missed} missed; "
             f"longest silence {silence * _PER_THOUSAND:.3g} ms",
-            f"answers    {described_spread(self.answered_after)}",
-            f"sent late  {described_spread(self.sent_late)}",
-            f"time       {stood}",
+            *(
+                (
+                    f"answers    {described_spread(self.answered_after)}",
+                    f"sent late  {described_spread(self.sent_late)}",
+                    f"time       {stood}",
+                )
+                if exchange.is_real_time
+                else ("time       in lock step with the answers",)
+            ),
             f"dropped    {described_refusals(exchange.refused, others)}",
             f"machine    {machine.cores} cores{loads}; {machine.system}, Python {machine.python}",
             f"plant      {self.plant.compiled_by}",
@@ -222,8 +162,10 @@ class HardwareRun:
         found = {
             "log.csv": log_bytes(self.exchange.rows),
             "link.json": f"{json_text(self.document())}\n".encode(),
-            **{f"link.{form}": content for form, content in render_figure(self.plot(), ("png", "svg")).items()},
         }
+        if self.exchange.is_real_time:
+            figure = render_figure(self.plot(), ("png", "svg"))
+            found |= {f"link.{form}": content for form, content in figure.items()}
         vented_at = self.exchange.vented_at
         if vented_at is not None and len(before := self.result.recording.time[self.result.recording.time < vented_at]):
             found["until-vented.csv"] = marked_csv_bytes(self.result.recording.between(0.0, float(before[-1])))
@@ -239,15 +181,18 @@ class HardwareRun:
 
     def plot(self) -> "Figure":
         """Histograms of how late samples were sent, and after how long they were answered."""
+        period, load = self.plant.period * _PER_THOUSAND, self.machine.load_after
+        beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
         with house_style():
-            figure, ((late, after),) = figure_of_free_panels((7.2, 3.0), Margins(0.75, 0.2, 0.8, 0.6, 0.5, 0.9), 1, 2)
-            figure.text(0.017, 0.96, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
-            _histogram(late, self.sent_late, "Samples sent after they were due")
-            missed = f" ({self.missed} missed)" if self.missed else ""
-            _histogram(after, self.answered_after, f"Answers after their sample{missed}")
+            figure, ((late, after),) = figure_of_free_panels((7.2, 3.3), Margins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2)
+            figure.text(0.017, 0.97, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
+            said = f"Dashed: one sample, {period:g} ms. {self.missed} of {len(self.sent_late)} samples missed{beside}"
+            figure.text(0.017, 0.03, said, va="bottom", fontsize=9)
+            _histogram(late, self.sent_late, "Samples, after they were due")
+            _histogram(after, self.answered_after, "Answers, after their sample")
             late.set_ylabel("Samples")
             for axes in (late, after):
-                axes.axvline(self.plant.period * _PER_THOUSAND, color=VERMILION, linewidth=1.0, linestyle="--")
+                axes.axvline(period, color=VERMILION, linewidth=1.0, linestyle="--")
             return figure
 
     def save(self, folder: Path, further: dict[str, bytes]) -> None:
@@ -332,13 +277,15 @@ def log_bytes(rows: Sequence[Row]) -> bytes:
 
 
 def _histogram(axes: "Axes", values: Sequence[float], title: str) -> None:
-    """Times in ms on a logarithmic axis, from what a clock tells at best."""
+    """Times in ms on a logarithmic axis; those below 0.01 ms are in its first bin."""
     axes.set_title(title)
     axes.set_xlabel("Time (ms)")
     axes.set_xscale("log")
     axes.set_yscale("log")
-    if not values:
-        return
-    shown = np.maximum(np.asarray(values) * _PER_THOUSAND, 1.0e-3)
-    edges = np.geomspace(min(1.0e-2, shown.min()), max(1.0e1, 1.01 * shown.max()), _BINS)
+    shown = np.maximum(np.asarray(values) * _PER_THOUSAND, _SHORTEST_SHOWN)
+    edges = np.geomspace(_SHORTEST_SHOWN, max(_LONGEST_SHOWN, 1.01 * shown.max(initial=0.0)), _BINS)
     axes.hist(shown, edges, color=ACTUAL)
+    axes.set_xlim(edges[0], edges[-1])
+    axes.set_ylim(0.5, None)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
