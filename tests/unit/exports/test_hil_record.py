@@ -1,0 +1,225 @@
+"""A recording from a bench that speaks the protocol, with all that a wire does to it."""
+
+import random
+import socket
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ppafo.cli.main import main
+from ppafo.errors import DataError
+from ppafo.exports.hil.packets import COMPUTED, OVER, WRAP, Answer, Sample, answer_bytes, count_of, sample_bytes
+from ppafo.exports.hil.recording import Recorded, record
+from ppafo.storage import read_recording
+from ppafo.storage.comma_separated import write_csv
+from tests.unit.exports.test_hil_ports import free_port
+
+START = WRAP - 50_000
+"""A time stamp [us] that goes on from 0 soon."""
+
+
+class Tape:
+    """A port that plays packets, a millisecond each, and is silent then."""
+
+    failure = ""
+    strangers = 0
+
+    def __init__(self, packets: list[bytes], is_stream: bool = False) -> None:
+        self.packets = list(packets)
+        self.is_stream = is_stream
+        self.time = 0.0
+
+    def clock(self) -> float:
+        return self.time
+
+    def send(self, data: bytes) -> None:
+        raise AssertionError
+
+    def receive(self, timeout: float) -> bytes:
+        self.time += 0.001 if self.packets else timeout
+        return self.packets.pop(0) if self.packets else b""
+
+    def close(self) -> None:
+        pass
+
+
+def packet(number: int, **changed: int) -> bytes:
+    counts = {"angle": 1000 * number, "pressure_1": 101_325 + number}
+    made = Sample(0, 7, (WRAP - 20 + number) % WRAP, (START + 1000 * number) % WRAP, counts)
+    return sample_bytes(made._replace(**changed))
+
+
+def played(packets: list[bytes], duration: float | None = None, is_stream: bool = False) -> Recorded:
+    tape = Tape(packets, is_stream)
+    return record(tape, "bench", duration, 1.0, clock=tape.clock)
+
+
+def test_samples_become_channels_over_the_time_of_the_bench() -> None:
+    found = played([packet(number) for number in range(100)])
+    recording = found.recording
+    assert recording.time == pytest.approx(0.001 * np.arange(100))
+    assert np.array_equal(recording["pressure_1"], 101_325.0 + np.arange(100))
+    assert np.array_equal(recording["angle"], np.arange(100) * 1000 / 1e6)
+    assert (recording.kind, found.lost, found.ended) == ("measured", 0, "silence of the bench")
+
+
+@settings(deadline=None)
+@given(st.randoms(use_true_random=False), st.booleans())
+def test_what_a_wire_does_is_mended_or_counted(draw: random.Random, is_stream: bool) -> None:
+    sent, lost, garbled = [packet(0)], set(), 0
+    for number in range(1, 80):
+        if draw.random() < 0.1 and number != 79:
+            lost.add(number)
+            if draw.random() < 0.5:
+                data = bytearray(packet(number))
+                data[draw.randrange(5, len(data))] ^= draw.randint(1, 255)
+                sent.append(bytes(data))
+                garbled += 1
+        else:
+            sent += [packet(number)] * draw.choice((1, 1, 1, 2))
+    for place in range(1, len(sent) - 2):
+        if draw.random() < 0.2:
+            sent[place], sent[place + 1] = sent[place + 1], sent[place]
+    found = played(sent, is_stream=is_stream)
+    kept = [number for number in range(80) if number not in lost]
+    assert found.recording.time == pytest.approx(0.001 * np.array(kept))
+    assert np.array_equal(found.recording["pressure_1"], 101_325.0 + np.array(kept))
+    assert found.lost == len(lost)
+    assert found.ignored["doubled"] == len(sent) - garbled - len(kept)
+    assert found.refused["checksum"] >= garbled
+
+
+def test_a_duration_is_that_of_the_bench() -> None:
+    found = played([packet(number) for number in range(100)], duration=0.025)
+    assert len(found.recording) == 26
+    assert found.ended == "its duration"
+
+
+def test_a_bench_that_says_it_is_over_ends_the_recording() -> None:
+    found = played([*(packet(number) for number in range(9)), packet(9, flags=OVER), packet(10)])
+    assert len(found.recording) == 10
+    assert found.ended == "the bench said that it is over"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        (packet(5, run=8), "of another run"),
+        (packet(30, time=START), "of a clock that went back"),
+        (sample_bytes(Sample(0, 7, WRAP - 15, START + 5000, {"angle": 1})), "with other channels"),
+        (answer_bytes(Answer(0, 7, 5, 5, 5)), "no sample"),
+    ],
+)
+def test_what_is_no_sample_of_this_recording_is_counted(wrong: bytes, why: str) -> None:
+    found = played([*(packet(number) for number in range(20)), wrong, *(packet(number) for number in range(31, 40))])
+    assert found.ignored[why] == 1
+    assert len(found.recording) == 29
+    assert np.isfinite(found.recording["angle"]).all()
+
+
+def test_computed_samples_make_no_measurement() -> None:
+    assert played([packet(0), packet(1, flags=COMPUTED), packet(2)]).recording.kind == "simulated"
+
+
+def test_where_no_sample_comes_one_line_says_what_came() -> None:
+    with pytest.raises(DataError, match=r"^no sample came within 1 s; what came in: 5 stray bytes$"):
+        played([b"hello"])
+    with pytest.raises(DataError, match=r"1 without a channel$"):
+        played([sample_bytes(Sample(0, 7, 0, 0, {}))])
+
+
+def static_test() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pressure difference [Pa], direction, and torque [N m] of a vane with K = 1.45e-5 m^3 and 0.3 N m of friction."""
+    noise = np.random.default_rng(3)
+    levels = np.repeat(np.linspace(5.0e4, 3.5e5, 12), 20)
+    difference = np.concatenate([levels, levels[::-1]]) + noise.normal(0.0, 200.0, 480)
+    direction = np.repeat([1.0, -1.0], 240)
+    torque = 1.45e-5 * difference - 0.3 * direction + noise.normal(0.0, 0.01, 480)
+    return difference, direction, torque
+
+
+def play_static_test(port: int, stop: threading.Event) -> None:
+    """Send the test as a bench does, again and again until somebody has heard it."""
+    difference, direction, torque = static_test()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
+        run = 0
+        while not stop.is_set():
+            run += 1
+            for number, values in enumerate(zip(difference, direction, torque, strict=True)):
+                named = dict(zip(("pressure_difference", "direction", "torque"), values, strict=True))
+                counts = {name: count_of(name, float(value)) for name, value in named.items()}
+                flags = OVER if number == len(torque) - 1 else 0
+                for _ in range(3 if flags else 1):
+                    data = sample_bytes(Sample(flags, run, number, 10_000 * number, counts))
+                    bench.sendto(data, ("127.0.0.1", port))
+                time.sleep(2.0e-4)
+
+
+PROBLEM = """schema_version = 1
+name = "wired"
+device.set = "ppafo2011"
+
+[[procedure]]
+kind = "static-torque"
+recordings = ["static.csv"]
+"""
+
+
+def test_a_recording_goes_straight_into_identify(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    stop, port = threading.Event(), free_port()
+    bench = threading.Thread(target=play_static_test, args=(port, stop))
+    bench.start()
+    try:
+        assert main(["record", "--port", f"udp:127.0.0.1:{port}", "--out", "static.csv"]) == 0
+    finally:
+        stop.set()
+        bench.join()
+    assert ", measured: torque, pressure_difference, direction\n" in capsys.readouterr().out
+    wired = read_recording(tmp_path / "static.csv")
+    difference, direction, torque = static_test()
+    numbers = 479 - np.rint((wired.time[-1] - wired.time) / 0.01).astype(int)  # it ends with the last sample
+    assert len(wired) > 100
+    assert np.abs(wired["torque"] - torque[numbers]).max() <= 0.51e-6
+    assert np.abs(wired["pressure_difference"] - difference[numbers]).max() <= 0.51
+    assert np.array_equal(wired["direction"], direction[numbers])
+    (tmp_path / "problem.toml").write_text(PROBLEM, encoding="utf-8")
+    main(["identify", "problem.toml", "--out", "identified"])
+    text = (tmp_path / "identified" / "identify.txt").read_text(encoding="utf-8")
+    found = float(next(line.split()[1] for line in text.splitlines() if line.startswith("actuator.torque_constant")))
+    assert found == pytest.approx(1.45e-5, rel=0.02)
+
+
+def test_a_file_that_is_there_is_not_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = played([packet(number) for number in range(3)]).recording
+    path = write_csv(tmp_path / "mine.csv", recording)
+    before = path.read_bytes()
+    assert main(["record", "--port", "udp:127.0.0.1:5000", "--out", str(path)]) == 2
+    assert "already exists" in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--duration", "10"], "--duration 10: "),
+        (["--duration", "-1 s"], "--duration -1 s: must be above 0 s"),
+        (["--patience", "0"], "--patience 0: must be above 0"),
+        (["--out", "bench.txt"], "--out bench.txt: must end in .csv"),
+    ],
+)
+def test_bad_words_are_one_line(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["record", "--port", "udp:127.0.0.1:5000", "--out", "bench.csv", *words]) == 2
+    line = capsys.readouterr().err
+    assert said in line
+    assert len(line.splitlines()) == 1
