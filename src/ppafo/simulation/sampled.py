@@ -42,13 +42,14 @@ class SampledRun:
     @property
     def time(self) -> float:
         """Time of the present sample [s]."""
-        return self.taken * self._batch.clock.steps_per_sample * self._step
+        time: float = self.taken * self._batch.clock.steps_per_sample * self._step
+        return time
 
     @property
     def requested(self) -> float:
         """The reference at the present sample [N m]."""
-        value: float = self._batch.program.reference.value(self._reference, self.time)[0]
-        return value
+        requested: float = self._batch.program.reference.value(self._reference, self.time)[0]
+        return requested
 
     def measurement(self) -> Measurement:
         """What the sensors show at the present sample."""

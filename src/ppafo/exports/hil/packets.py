@@ -37,7 +37,7 @@ class ChannelCode(NamedTuple):
     """A channel on the wire: its name, and the SI value of a count."""
 
     name: str
-    count: float
+    scale: float
 
 
 CHANNELS = (
@@ -89,13 +89,13 @@ Packet = Sample | Answer
 
 def count_of(name: str, value: float) -> int:
     """Counts of a channel for a value in SI units, rounded; as far as they go where it is beyond them."""
-    counts = value / CHANNELS[_NUMBERS[name]].count
+    counts = value / CHANNELS[_NUMBERS[name]].scale
     return int(max(-_LARGEST_COUNT, min(_LARGEST_COUNT, math.floor(counts + 0.5))))
 
 
 def value_of(name: str, counts: int) -> float:
     """SI value of counts of a channel; the nearest float to the decimal fraction that they are."""
-    per_unit = round(1.0 / CHANNELS[_NUMBERS[name]].count)
+    per_unit = round(1.0 / CHANNELS[_NUMBERS[name]].scale)
     return counts / per_unit
 
 
