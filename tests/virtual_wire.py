@@ -2,11 +2,14 @@
 
 import math
 import random
+import socket
 import struct
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from ppafo.exports.hil.packets import BEGIN, OVER, VENTED, Answer, Reader, Sample, answer_bytes, value_of
+from ppafo.exports.hil.packets import BEGIN, OVER, VENTED, Answer, Reader, Sample, answer_bytes, sample_bytes, value_of
 
 Fault = Callable[[random.Random, float, bytes], list[tuple[float, bytes]]]
 """What becomes of a packet that would arrive at a time [s]: packets with their times."""
@@ -120,6 +123,34 @@ def faults(lost: float, late: float, doubled: float, garbled: float) -> Fault:
         return found
 
     return apply
+
+
+def free_port() -> int:
+    """A port of UDP that nobody has."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+@contextmanager
+def sending_bench(port: int) -> Iterator[None]:
+    """A bench that sends five samples and says that it is over, again and again."""
+    stop = threading.Event()
+
+    def send() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
+            while not stop.wait(0.01):
+                for number in range(5):
+                    sample = Sample(OVER * (number == 4), 1, number, 1000 * number, {"angle": number, "command": 5})
+                    bench.sendto(sample_bytes(sample), ("127.0.0.1", port))
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
 
 
 def with_sequence(data: bytes, run: int, sequence: int) -> bytes:

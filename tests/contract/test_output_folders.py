@@ -8,6 +8,7 @@ import pytest
 from ppafo.cli.catalog import COMMANDS
 from ppafo.cli.main import main
 from ppafo.storage.owned_folder import MARK
+from tests.virtual_wire import free_port, sending_bench
 
 FOLDERS: dict[str, list[str]] = {
     "reproduce": [],
@@ -42,8 +43,10 @@ FOLDERS: dict[str, list[str]] = {
     "bits": ["off"],
     "export c": ["c", "step-response"],
     "export fmu": ["fmu", "step-response"],
+    "export controller": ["controller", "torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
     "firmware": ["torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
     "chip": ["torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
+    "hil": ["torque-task-solenoid", "--port", "udp:127.0.0.1:5000"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
 
@@ -53,10 +56,14 @@ FILES = {
     "gait record": (["falisse2019-subject1", "--strides", "1"], "walk.csv"),
     "gait export": (["{result}"], "walk.sto"),
     "workbench": (["step-response"], "page.html"),
+    "record": (["--port", "udp:127.0.0.1:{port}"], "bench.csv"),
 }
 """The words of every command that writes one file, and the file."""
 
-QUICK = ("sets", "sets show", "parts", "audit", "schema", "cache", "gait", "endurance", "export c", "firmware")
+QUICK = (
+    *("sets", "sets show", "parts", "audit", "schema", "cache", "gait", "endurance"),
+    *("export c", "export controller", "firmware"),
+)
 
 
 def words_of(name: str, out: Path) -> list[str]:
@@ -171,10 +178,12 @@ def test_file_that_is_there_is_not_replaced(name: str, tmp_path: Path, capsys: p
     if "{result}" in words:
         assert main(["simulate", "torque-task-proportional", "--set", "run.duration=0.1 s", "--out", str(result)]) == 0
     out.write_text("mine")
-    given = [word.format(result=result) for word in words]
+    port = free_port()
+    given = [word.format(result=result, port=port) for word in words]
     assert main([*name.split(), *given, "--out", str(out)]) == 2
     assert "already exists" in capsys.readouterr().err
     assert out.read_text() == "mine"
     out.unlink()
-    assert main([*name.split(), *given, "--out", str(out)]) == 0
+    with sending_bench(port):
+        assert main([*name.split(), *given, "--out", str(out)]) == 0
     assert out.stat().st_size > 100

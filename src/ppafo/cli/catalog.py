@@ -30,7 +30,7 @@ COMMANDS: dict[str, str] = {
     "sets": "list parameter sets, or show one with the source of every value",
     "parts": QUESTIONS["parts"],
     "audit": "check a parameter set for contradictions",
-    "export": "write a scenario or a walk for other tools: a library in C, an FMU",
+    "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",
     "firmware": "write a scenario's controller as firmware for a small processor",
     "chip": "run a scenario with its controller on the simulator of a small processor",
     "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",

@@ -16,7 +16,7 @@ from ppafo.cli.output import (
 
 _C = "write a scenario or a walk as a library in C: header, source, example, make files"
 _UNIT = "write a scenario or a walk as a functional mock-up unit (FMU) for co-simulation"
-_CONTROLLER = "write a scenario's integer controller in C behind the protocol of 'ppafo hil', to begin with on a board"
+_CONTROLLER = "write a scenario's integer controller in C behind the protocol of 'ppafo hil'"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

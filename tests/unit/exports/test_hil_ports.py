@@ -28,7 +28,7 @@ from ppafo.exports.hil.ports import open_port
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.storage import read_recording
-from tests.virtual_wire import ProportionalPartner
+from tests.virtual_wire import ProportionalPartner, free_port
 
 COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 WHOLE = ("controller.arithmetic=fixed", "sensors.pressure_resolution=1 Pa_d")
@@ -62,12 +62,6 @@ def running(*words: str) -> Iterator["subprocess.Popen[str]"]:
             yield process
         finally:
             process.kill()
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
-        found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
 
 
 @contextlib.contextmanager

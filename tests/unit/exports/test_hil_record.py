@@ -17,7 +17,7 @@ from ppafo.exports.hil.packets import COMPUTED, OVER, WRAP, Answer, Sample, answ
 from ppafo.exports.hil.recording import Recorded, record
 from ppafo.storage import read_recording
 from ppafo.storage.comma_separated import write_csv
-from tests.unit.exports.test_hil_ports import free_port
+from tests.virtual_wire import free_port
 
 START = WRAP - 50_000
 """A time stamp [us] that goes on from 0 soon."""
