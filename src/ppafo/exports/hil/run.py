@@ -231,7 +231,7 @@ def run_plant(
     begun = plant.begin()
     with without_collections():
         exchange = Bench(begun, plant.period, port, pace(plant.period), number).run(patience, is_stopped)
-    machine = Machine(platform.platform(), os.cpu_count() or 1, platform.python_version(), before, load_now())
+    machine = Machine(f"{platform.system()} {platform.machine()}", os.cpu_count() or 1, platform.python_version(), before, load_now())
     return HardwareRun(plant, result_of(plant.scenario, plant.run, begun.result()), exchange, machine)
 
 
