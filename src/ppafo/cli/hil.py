@@ -16,6 +16,8 @@ from ppafo.cli.output import (
 )
 from ppafo.cli.quick_imports import load_compiler, load_drawing
 from ppafo.errors import ScenarioError
+from ppafo.exports.hil.packets import HIGHEST_RATE, LOWEST_RATE, RATE
+from ppafo.exports.hil.ports import DEFAULT_BAUD, FORMS
 
 if TYPE_CHECKING:
     from ppafo.exports.hil.run import HardwareRun
@@ -24,9 +26,7 @@ if TYPE_CHECKING:
 EXIT_INTERRUPTED = 130
 _LONGEST_PATIENCE = 3600.0
 _DEFAULT_PATIENCE = 10.0
-_DEFAULT_RATE = 1000
-_DEFAULT_BAUD = 921_600
-PORT_HELP = "udp:HOST:PORT, or serial:DEVICE (extra 'hil')"
+PORT_HELP = f"{FORMS} (extra 'hil')"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,8 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rate",
         metavar="HZ",
         type=int,
-        default=_DEFAULT_RATE,
-        help=f"samples per second, 50 to 2000 (default: {_DEFAULT_RATE})",
+        default=RATE,
+        help=f"samples per second, {LOWEST_RATE} to {HIGHEST_RATE} (default: {RATE})",
     )
     add_baud_argument(parser)
     parser.add_argument(
@@ -64,8 +64,8 @@ def add_baud_argument(parser: argparse.ArgumentParser) -> None:
         "--baud",
         metavar="N",
         type=int,
-        default=_DEFAULT_BAUD,
-        help=f"bits per second of a serial line (default: {_DEFAULT_BAUD})",
+        default=DEFAULT_BAUD,
+        help=f"bits per second of a serial line (default: {DEFAULT_BAUD})",
     )
 
 

@@ -278,6 +278,23 @@ def test_in_lock_step_an_answer_may_take_any_time_below_the_patience() -> None:
     assert "link.png" not in found.files()
 
 
+class FloodedWire(VirtualWire):
+    """A wire on which something sends without end once the run has begun; a packet takes a microsecond to read."""
+
+    def receive(self, timeout: float) -> bytes:
+        if len(self.sent) < 30:
+            return super().receive(timeout)
+        self.time += 1.0e-6
+        return b"again and again"
+
+
+def test_a_flood_does_not_hold_the_plant() -> None:
+    found = run_on(FloodedWire(ProportionalPartner().answers), plant("run.duration=0.06 s", *AT_REST))
+    assert len(rows_of(found)) == 60
+    assert found.exchange.vented == SILENT
+    assert found.exchange.stood_still == ()
+
+
 class LeavingPlant:
     """A plant whose pressure is no number after some samples."""
 

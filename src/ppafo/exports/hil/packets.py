@@ -11,6 +11,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple, final
 
+RATE = 1000
+"""Samples per second unless another rate is asked for [Hz]."""
+LOWEST_RATE, HIGHEST_RATE = 50, 2000
 MARK = b"\xa5\x5a"
 VERSION = 1
 SAMPLE, ANSWER = 1, 2

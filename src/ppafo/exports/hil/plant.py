@@ -11,7 +11,7 @@ from ppafo.engine.compilers import BACKEND_VARIABLE, Compiler, chosen_compiler
 from ppafo.engine.lanes import load_program_by
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.exports.hil.packets import sample_length
+from ppafo.exports.hil.packets import HIGHEST_RATE, LOWEST_RATE, RATE, sample_length
 from ppafo.exports.hil.ports import BITS_OF_A_BYTE
 from ppafo.model.valves import dump
 from ppafo.simulation.plan import plan_run
@@ -19,9 +19,6 @@ from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
 from ppafo.translation.native import compiler
 
-RATE = 1000
-"""Samples per second unless another rate is asked for [Hz]."""
-LOWEST_RATE, HIGHEST_RATE = 50, 2000
 CHANNELS_SENT = 5
 
 

@@ -14,6 +14,8 @@ BITS_OF_A_BYTE = 10
 """On a serial line: a start bit, eight bits, a stop bit."""
 _LARGEST = 4096
 _HIGHEST_PORT = 65_535
+_AT_ONCE = 64
+"""Packets of strangers that are looked at in one call: a flood of them must not hold the plant."""
 _WRITE_TIMEOUT = 2.0e-4
 """Seconds that a serial line has to take a packet; with 0, pyserial tries for ever where nobody reads."""
 
@@ -67,10 +69,10 @@ class UdpPort:
     def receive(self, timeout: float) -> bytes:
         """The first packet of the other side within a time [s]."""
         until = time.perf_counter() + timeout
-        while True:
+        for _ in range(_AT_ONCE):
             ready, _, _ = select.select([self._socket], [], [], max(0.0, until - time.perf_counter()))
             if not ready:
-                return b""
+                break
             try:
                 data, sender = self._socket.recvfrom(_LARGEST)
             except OSError:
@@ -80,6 +82,7 @@ class UdpPort:
             if sender[:2] == self._other[:2]:
                 return data
             self.strangers += 1
+        return b""
 
     def close(self) -> None:
         """Give the socket back."""

@@ -19,8 +19,8 @@ from ppafo.answers.style import ACTUAL, VERMILION, house_style, render_figure
 from ppafo.documents.json_text import json_text
 from ppafo.exports.hil.loop import Bench, Exchange, Row
 from ppafo.exports.hil.pace import Pace, without_collections
-from ppafo.exports.hil.packets import MICROSECONDS, described_refusals
-from ppafo.exports.hil.plant import RATE, Plant, plant_of
+from ppafo.exports.hil.packets import MICROSECONDS, RATE, described_refusals
+from ppafo.exports.hil.plant import Plant, plant_of
 from ppafo.exports.hil.ports import Port
 from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
@@ -231,7 +231,9 @@ def run_plant(
     begun = plant.begin()
     with without_collections():
         exchange = Bench(begun, plant.period, port, pace(plant.period), number).run(patience, is_stopped)
-    machine = Machine(f"{platform.system()} {platform.machine()}", os.cpu_count() or 1, platform.python_version(), before, load_now())
+    machine = Machine(
+        f"{platform.system()} {platform.machine()}", os.cpu_count() or 1, platform.python_version(), before, load_now()
+    )
     return HardwareRun(plant, result_of(plant.scenario, plant.run, begun.result()), exchange, machine)
 
 
