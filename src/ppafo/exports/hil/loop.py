@@ -276,7 +276,17 @@ class Bench:
         until = min(self.plant.samples, self.plant.taken + math.ceil(AFTER_STOP / self.period))
         while self.plant.taken < until:
             sequence = self.plant.taken
-            self.rows.append(Row(sequence, sequence * self.period, None, None, VENT, self.judge.controller_time, True))
+            self.rows.append(
+                Row(
+                    sequence=sequence,
+                    due=sequence * self.period,
+                    sent_late=None,
+                    answered_after=None,
+                    command=VENT,
+                    controller_time=self.judge.controller_time,
+                    is_vented=True,
+                )
+            )
             self.plant.go_on(VENT)
 
     def _say_over(self) -> None:

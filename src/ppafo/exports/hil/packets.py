@@ -213,13 +213,15 @@ def _read(data: bytes) -> Packet | str:
     if kind == ANSWER:
         (command,) = _WORD.unpack_from(data, _HEADER.size)
         is_good = -FULL_COMMAND <= command <= FULL_COMMAND
-        return Answer(flags, run, sequence, time, command) if is_good else "content"
+        answer = Answer(flags=flags, run=run, sequence=sequence, time=time, command=command)
+        return answer if is_good else "content"
     (mask,) = _MASK.unpack_from(data, _HEADER.size)
     names = [channel.name for number, channel in enumerate(CHANNELS) if mask >> number & 1]
     if mask >> len(CHANNELS) or len(data) != sample_length(len(names)):
         return "content"
     values = struct.unpack_from(f"<{len(names)}i", data, _HEADER.size + _MASK.size)
-    return Sample(flags, run, sequence, time, dict(zip(names, values, strict=True)))
+    counts = dict(zip(names, values, strict=True))
+    return Sample(flags=flags, run=run, sequence=sequence, time=time, counts=counts)
 
 
 def described_refusals(refused: Mapping[str, int], others: Iterable[tuple[str, int]] = ()) -> str:
