@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.loop import NOT_SOUND, SILENT, STOPPED, Bench, Row
+from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, Row
 from ppafo.exports.hil.pace import LockStep, RealTime
 from ppafo.exports.hil.packets import OVER, VENTED, Answer, Sample, answer_bytes
 from ppafo.exports.hil.plant import Plant, check_baud, plant_of
@@ -276,6 +276,25 @@ def test_in_lock_step_an_answer_may_take_any_time_below_the_patience() -> None:
     assert [row.command for row in rows_of(found)] == [row.command for row in rows_of(calm)]
     assert not found.exchange.is_real_time
     assert "link.png" not in found.files()
+
+
+class BreakingWire(VirtualWire):
+    """A wire that is pulled out after some samples."""
+
+    def send(self, data: bytes) -> None:
+        super().send(data)
+        if len(self.sent) == 61:
+            self.failure = "the serial port broke: it is gone"
+            self.under_way.clear()
+
+
+def test_a_wire_that_is_pulled_out_vents_at_once_and_the_log_goes_on() -> None:
+    found = run_on(BreakingWire(ProportionalPartner().answers), plant(*SHORT, *AT_REST))
+    assert found.exchange.vented == BROKEN
+    assert found.exchange.vented_at == pytest.approx(0.060)
+    assert len(rows_of(found)) == 200
+    assert found.text().endswith("port       the serial port broke: it is gone")
+    assert replayed_is_same(found)
 
 
 class FloodedWire(VirtualWire):

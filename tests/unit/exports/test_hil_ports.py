@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -259,6 +260,77 @@ def test_ctrl_c_vents_writes_the_log_whole_and_ends_with_130(
     assert recording["pressure_1"][-1] < 0.75 * recording["pressure_1"][0]
     assert (out / "log.csv").read_text(encoding="utf-8").endswith("\n")
     assert partner.seen[-1].flags & 4
+
+
+def test_where_nobody_answers_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["hil", TASK, "--port", f"udp:127.0.0.1:{free_port()}", "--patience", "0.05", "--set", SHORT]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last == "ppafo: no controller answers within 0.05 s; came in: nothing"
+    assert not list(tmp_path.iterdir())
+
+
+class Plug:
+    """A plant's end of a wire to the example in C: a sample goes out, its answer comes back."""
+
+    def __init__(self, own: socket.socket, port: int) -> None:
+        self.own, self.port = own, port
+
+    def ask(self, sequence: int, flags: int = 0, run: int = 7, pressure: int | None = None) -> Answer:
+        shown = 150_000 + 700 * sequence * sequence if pressure is None else pressure
+        counts = dict(zip(SENT, (1_000_000, 0, shown, 150_000, 0), strict=True))
+        sample = Sample(flags, run, sequence, 1000 * sequence, counts)
+        self.own.sendto(sample_bytes(sample), ("127.0.0.1", self.port))
+        (answer,) = Reader(is_stream=False).take(self.own.recv(256))
+        assert isinstance(answer, Answer)
+        assert (answer.run, answer.sequence) == (run, sequence)
+        return answer
+
+
+@contextlib.contextmanager
+def plug(controller: Path, silence: str) -> Iterator[Plug]:
+    port = free_port()
+    with running(str(controller), "udp", str(port), silence), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+        own.settimeout(30.0)
+        yield Plug(own, port)
+
+
+@needs_compiler
+def test_the_example_takes_one_step_for_a_sample_however_it_comes(controllers: Callable[[str], Path]) -> None:
+    with plug(controllers(TASK), "0") as wire:
+        calm = [wire.ask(0, flags=1), *map(wire.ask, range(1, 6))]
+        again = [wire.ask(0, flags=1), *map(wire.ask, (1, 2, 2, 3, 1, 4, 5))]
+    commands = [answer.command for answer in calm]
+    # The error changes from sample to sample, so that a step too many would show in its slope.
+    assert len(set(commands)) == len(commands)
+    seen = [answer.command for answer in again]
+    assert seen == [*commands[:3], commands[2], commands[3], commands[3], *commands[4:]]
+    assert not any(answer.flags for answer in (*calm, *again))
+
+
+@needs_compiler
+@pytest.mark.parametrize("flags", [2, 4])
+def test_the_example_vents_once_the_plant_is_vented_or_over_until_it_begins_anew(
+    flags: int, controllers: Callable[[str], Path]
+) -> None:
+    with plug(controllers(TASK), "0") as wire:
+        assert wire.ask(3).flags == 1  # before any beginning
+        assert wire.ask(0, flags=1).flags == 0
+        assert wire.ask(1, run=8).flags == 1
+        wire.ask(2, flags=flags)
+        assert wire.ask(3).flags == 1
+        assert wire.ask(0, flags=1).flags == 0
+        bad = wire.ask(1, pressure=0)  # a broken wire of a sensor
+        assert (bad.flags, bad.command) == (1, 0)
+        assert wire.ask(2).flags == 1
+
+
+@needs_compiler
+def test_the_example_vents_when_the_samples_stop(controllers: Callable[[str], Path]) -> None:
+    with plug(controllers(TASK), "20") as wire:
+        wire.ask(0, flags=1)
+        time.sleep(0.3)
+        assert wire.ask(1).flags == 1
 
 
 def test_packets_of_somebody_else_are_counted_and_do_nothing() -> None:

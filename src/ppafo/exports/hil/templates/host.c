@@ -45,10 +45,11 @@ static void decide(const link_sample *sample)
     command = is_sound ? steps * 1000 : 0;
 }
 
-/* Answer a sample. A sample that comes twice or late is answered with the command that stands. */
+/* Answer a sample. One that comes twice or late is answered with the command that stands, one of another run with none. */
 static void answer(const link_sample *sample, uint32_t now, uint8_t bytes[LINK_ANSWER_BYTES])
 {
     const uint32_t period = sample->time / PLANT_PERIOD_US;
+    bool is_good;
     if ((sample->flags & LINK_BEGIN) != 0) {
         is_begun = true;
         is_sound = true;
@@ -67,7 +68,8 @@ static void answer(const link_sample *sample, uint32_t now, uint8_t bytes[LINK_A
     if ((sample->flags & (LINK_VENTED | LINK_OVER)) != 0) {
         is_begun = false;
     }
-    link_answer(sample, is_begun && is_sound ? command : 0, is_begun && is_sound ? 0 : LINK_UNSOUND, now, bytes);
+    is_good = is_begun && is_sound && sample->run == run;
+    link_answer(sample, is_good ? command : 0, is_good ? 0 : LINK_UNSOUND, now, bytes);
 }
 
 static uint32_t microseconds(void)
