@@ -66,7 +66,7 @@ def replayed_is_same(found: HardwareRun) -> bool:
     return all(np.array_equal(again[name][:count], first[name]) for name in first.names)
 
 
-@pytest.mark.parametrize("name", [TASK, "torque-task-solenoid"])
+@pytest.mark.parametrize("name", [TASK, "torque-task-slow-valve", "torque-task-solenoid"])
 def test_a_controller_that_answers_in_time_decides_as_in_a_simulation(name: str) -> None:
     wire = VirtualWire(ProportionalPartner().answers)
     scenario = load_scenario(name, (*SHORT, "controller.rate=1 kHz"))
