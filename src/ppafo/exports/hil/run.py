@@ -174,7 +174,11 @@ class HardwareRun:
     def plot_signals(self) -> "Figure":
         """The signals of the run; what vented it stands below."""
         exchange, status = self.exchange, self.result.status
-        vented = "" if exchange.vented_at is None else f"vented (command 2) from {exchange.vented_at:.6g} s on: {exchange.vented}"
+        vented = (
+            ""
+            if exchange.vented_at is None
+            else f"vented (command 2) from {exchange.vented_at:.6g} s on: {exchange.vented}"
+        )
         remark = vented if status.is_completed else status.message
         atmosphere = self.plant.scenario.device.supply.atmospheric_pressure
         return recording_figure(self.result.recording, f"{self.plant.scenario.name}, at the wire", remark, atmosphere)
