@@ -26,7 +26,7 @@ LARGEST = 3_000_000
 TRIED = (
     ("--version",),
     ("simulate", "step-response", "--out", "step"),
-    ("simulate", "torque-task-solenoid", "--set", "supply.pressure=80 psig", "--out", "task"),
+    ("simulate", "torque-task-solenoid", "--set", "supply.pressure=80 psi_g", "--out", "task"),
     ("workbench", "--out", "page.html"),
     ("new", "scenario", "mine"),
     ("simulate", "mine.toml", "--out", "mine"),
@@ -102,7 +102,7 @@ def _install(wheel: Path, folder: Path) -> Path:
     venv.create(folder, with_pip=True)
     python = folder / "bin" / "python"
     command = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", str(wheel)]
-    subprocess.run(command, check=True, cwd=folder)
+    subprocess.run(command, check=True, cwd=folder, stderr=subprocess.PIPE)
     return python
 
 
