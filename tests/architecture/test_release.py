@@ -1,0 +1,25 @@
+"""What a release says of itself: the code of others in it, with version and licence."""
+
+import json
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_bill_of_materials_has_what_is_vendored_in_its_version() -> None:
+    vendored = ROOT / "page" / "vendor"
+    bill = json.loads((vendored / "vendored.cdx.json").read_text(encoding="utf-8"))
+    stated = {item["name"]: item["version"] for item in bill["components"]}
+    assert sorted(stated) == sorted(folder.name.lower() for folder in vendored.iterdir() if folder.is_dir())
+    head = (vendored / "uplot" / "uPlot.esm.js").read_text(encoding="utf-8")[:500]
+    found = re.search(r"\(v([\d.]+)\)", head)
+    assert found is not None
+    assert found[1] == stated["uplot"]
+
+
+def test_the_licences_of_what_is_vendored_go_with_the_wheel_and_stand_in_the_page() -> None:
+    licence = (ROOT / "page" / "vendor" / "uplot" / "LICENSE").read_text(encoding="utf-8")
+    assert '"page/vendor/uplot/LICENSE"' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    bundle = (ROOT / "src" / "ppafo" / "live" / "bundle" / "page.js").read_text(encoding="utf-8")
+    assert " ".join(licence.split()) in " ".join(bundle[:3000].split())
