@@ -4,6 +4,9 @@ Every kind of fault begins at 20 instants of a stride, with four configurations.
 pauses or stops and no harm is done from half a second later on, or where no harm is done at all. Harm is: toes lower in
 mid-swing than without the device, or more than 1 N m against the foot's way (plantarflexion on a loaded heel or in
 mid-swing, dorsiflexion on the toes). It prints the table of docs/walking-faults.md.
+
+``python scripts/walking_faults.py fixed`` runs the controller ``event_on_off`` with floats and on whole numbers through
+the same faults instead, and prints those in which they differ: in the verdict, or in the time until found.
 """
 
 import sys
@@ -23,6 +26,7 @@ from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.plant import chamber_pressures
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking.comparison import with_device_off
+from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
@@ -36,6 +40,9 @@ FIRST, AFTER = 3.0, 6.0
 LANES, RECORD_EVERY = 32, 4
 TORQUE, CLEARANCE, SETTLED = 1.0, 0.002, 0.5
 """Torque against the foot's way [N m], room for the toes [m], time [s] in which chambers vent once a fault is found."""
+
+LATER = 0.05
+"""Strides by which two that find a fault may differ without a line."""
 
 PERIOD = 1.0e-3
 LATEST = 200.0
@@ -159,9 +166,8 @@ def failing(sensors: GaitSensors, faults: Kind) -> GaitSensors:
     return sensors._replace(**changed)
 
 
-def run(name: str, faults: list[Kind], begins: Floats) -> Runs:
+def run(configuration: Configuration, faults: list[Kind], begins: Floats) -> Runs:
     """Run a configuration with every fault from every instant [s]; ``faults`` may be one that is empty."""
-    configuration = load_walk(name)
     stride = configuration.gait.stride_time
     sound = configuration.gait_sensors
     sensors = [
@@ -231,6 +237,30 @@ def verdicts(kind_names: list[str], runs: dict[str, Runs], lowest: dict[str, flo
     return table
 
 
+def compare_arithmetics() -> None:
+    """Run ``event_on_off`` on either valve, with floats and on whole numbers, and print where they differ."""
+    stride = load_walk("solenoid").gait.stride_time
+    begins, every = (FIRST + np.arange(PHASES) / PHASES) * stride, kinds()
+    for valve in ("solenoid", "proportional"):
+        own = ("controller.kind=event_on_off", f"device.valve={valve}")
+        floats, whole = (
+            run(load_walk("solenoid", (*own, *further)), list(every.values()), begins)
+            for further in ((), ("controller.arithmetic=fixed",))
+        )
+        seen, found = np.isfinite(floats.found), np.isfinite(whole.found)
+        both = seen & found
+        later = np.where(both, whole.found - np.where(both, floats.found, 0.0), 0.0)
+        words = (
+            f"{seen.size} runs, {seen.sum()} found with floats, {found.sum()} on whole numbers, {both.sum()} by both"
+        )
+        print(f"{valve}: {words}; later by {later.max():.3f}, earlier by {-later.min():.3f} strides at most")
+        for row, what in enumerate(every):
+            ends = [np.nanmax(np.where(np.isfinite(one.found[row]), one.found[row], -1.0)) for one in (floats, whole)]
+            if (seen[row] != found[row]).any() or np.abs(later[row]).max() > LATER:
+                counts = f"{seen[row].sum()} and {found[row].sum()} of {PHASES} found"
+                print(f"  {what}: {counts}, within {ends[0]:.2f} and {ends[1]:.2f} strides")
+
+
 def main() -> None:
     """Run all and print the table."""
     stride = load_walk("solenoid").gait.stride_time
@@ -243,12 +273,12 @@ def main() -> None:
             replace(batch_of(bare), clock=replace(batch_of(bare).clock, record_every=RECORD_EVERY))
         ).record
         lowest[name] = float(judged(bare, record, state_row_numbers(bare), np.array([FIRST * stride]), stride)[2][0])
-        sound = run(name, [{}], begins[:1])
+        sound = run(load_walk(name), [{}], begins[:1])
         toes = f"toes {100.0 * sound.toes.min():.1f} cm against the healthy ones"
         bare_toes = f"without the device {100.0 * lowest[name]:.1f} cm"
         words = f"{name}: good sensors {sound.torque.max():.2f} N m against the foot's way, {toes}, {bare_toes}"
         print(words, file=sys.stderr)
-        runs[name] = run(name, list(every.values()), begins)
+        runs[name] = run(load_walk(name), list(every.values()), begins)
     table = verdicts(list(every), runs, lowest)
     head = ("What fails", "Verdict", "Found within (strides)", "Worst of the others")
     print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
@@ -260,4 +290,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    compare_arithmetics() if sys.argv[1:] == ["fixed"] else main()

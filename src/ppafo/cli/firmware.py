@@ -1,4 +1,4 @@
-"""``ppafo firmware``: a scenario's controller as firmware for a small processor."""
+"""``ppafo firmware``: the controller of a scenario or a walk as firmware for a small processor."""
 
 import argparse
 import shlex
@@ -12,27 +12,39 @@ from ppafo.cli.output import (
     print_result,
     write_files,
 )
-from ppafo.control.fixed.kind import TARGETS
+from ppafo.control.fixed.kind import TARGETS, WALK_TARGETS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario, or a .toml file")
-    parser.add_argument("--target", choices=TARGETS, default=TARGETS[0], help=f"the processor (default: {TARGETS[0]})")
+    parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario or a walk, or a .toml file")
+    parser.add_argument(
+        "--target",
+        choices=(*TARGETS, *WALK_TARGETS),
+        help=f"the processor (default: {TARGETS[0]}, of a walk {WALK_TARGETS[0]})",
+    )
     add_override_argument(parser)
     add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Write the firmware of a scenario's controller, and say what to do next."""
+    """Write the firmware of the controller of a scenario or a walk, and say what to do next."""
     check_output(parsed)
     from ppafo.exports.firmware import firmware
-    from ppafo.simulation.loading import load_scenario
+    from ppafo.exports.firmware.walking import walk_firmware
+    from ppafo.exports.loading import load_exportable
+    from ppafo.simulation.scenario import Scenario
 
-    contents = firmware(load_scenario(parsed.scenario, parsed.overrides), parsed.target)
+    chosen = load_exportable(parsed.scenario, parsed.overrides)
+    if isinstance(chosen, Scenario):
+        target = parsed.target or TARGETS[0]
+        contents = firmware(chosen, target)
+    else:
+        target = parsed.target or WALK_TARGETS[0]
+        contents = walk_firmware(chosen, target)
     write_files(parsed, contents)
     following = f"make -C {shlex.quote(str(parsed.out))}"
-    document = {"folder": str(parsed.out), "target": parsed.target, "files": list(contents), "next": following}
+    document = {"folder": str(parsed.out), "target": target, "files": list(contents), "next": following}
     print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)
     return EXIT_GOOD

@@ -62,7 +62,8 @@ def _check_ending(worn: WalkResult) -> None:
 def with_device_off(configuration: Configuration) -> Configuration:
     """The same wearer and device with both chambers vented; no gas flows, so no bottle and no lines are needed."""
     name = f"{configuration.name}-off"
-    return replace(configuration, name=name, controller=off.KIND, settings={}, supply_lines=None, bottle=None)
+    bare = replace(configuration, name=name, controller=off.KIND, settings={}, converter=None)
+    return replace(bare, supply_lines=None, bottle=None)
 
 
 def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:

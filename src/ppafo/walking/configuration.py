@@ -24,6 +24,7 @@ class Configuration:
     how the gas takes up heat, None where it keeps its temperature. ``course`` is what the wearer does one after the
     other, None where stride follows equal stride.
     ``bottle`` is the one that the device hangs on, None where its supply does not end.
+    ``converter`` has the settings of the converter of a controller on whole numbers, None where it has floats.
     ``sensor_settings`` are what ``gait_sensors`` were made from, None where they were not read from a file.
     ``wearer_origin`` says in words whose body mass it is.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
@@ -49,6 +50,7 @@ class Configuration:
     wearer_origin: str = "the paper's subject"
     bottle: BottleSupply | None = None
     sensor_settings: SensorSettings | None = None
+    converter: Mapping[str, float] | None = None
 
     @property
     def has_ideal_sensors(self) -> bool:

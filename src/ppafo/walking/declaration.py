@@ -1,5 +1,7 @@
 """Every value that a walk file can hold beside those of its controller and its wearer."""
 
+from ppafo.control.fixed.walking.lanes import FIXED_WALKS
+from ppafo.control.fixed.walking.readings import SETTINGS as CONVERTER
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import supply_line
@@ -9,6 +11,9 @@ from ppafo.walking.wearer import WEARER
 
 THRESHOLDS = next(iter(TIMINGS))
 """The way to know the time in the stride of a walk file that names none."""
+
+ARITHMETIC = "controller.arithmetic"
+"""Where a walk says whether its controller computes with floats or with whole numbers."""
 
 LARGEST_SEED = 2**32 - 1
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
@@ -83,6 +88,11 @@ def controller_settings(kind: str) -> tuple[Quantity, ...]:
     return known[kind].quantities if kind in known else ()
 
 
+def converter_settings(kind: str) -> tuple[Quantity, ...]:
+    """Return the settings of the converter of a walking controller on whole numbers, none where it has no form."""
+    return CONVERTER if kind in FIXED_WALKS else ()
+
+
 def timing_settings(kind: str) -> tuple[Quantity, ...]:
     """Return the settings of a way to know the time in the stride, none where it is unknown."""
     return TIMINGS[kind].quantities if kind in TIMINGS else ()
@@ -92,7 +102,7 @@ def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]
     """Return the declaration of every number that a walk file with this controller and timing can hold, by path."""
     sections = {
         "wearer": WEARER,
-        "controller": (RATE, PERIOD, *controller_settings(controller)),
+        "controller": (RATE, PERIOD, *controller_settings(controller), *converter_settings(controller)),
         "timing": timing_settings(timing),
         "sensors": (*WALK_SENSORS, *BANDWIDTHS, SEED),
         "run": (STEP,),

@@ -8,6 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from ppafo.control.fixed.kind import FIXED
+from ppafo.control.fixed.walking.lanes import FIXED_WALKS
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, load_walking_controller, walking_controllers, with_timing
 from ppafo.documents.models import validate
@@ -30,6 +32,7 @@ from ppafo.walking.configuration import Configuration
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.course import WalkingCourse, load_course
 from ppafo.walking.declaration import (
+    ARITHMETIC,
     BANDWIDTHS,
     FAULTY,
     PRESSURE_BANDWIDTH,
@@ -38,10 +41,12 @@ from ppafo.walking.declaration import (
     THRESHOLDS,
     WALK_SENSORS,
     controller_settings,
+    converter_settings,
     fault_numbers,
     quantities,
     timing_settings,
 )
+from ppafo.walking.fixed_point import check_fixed_walk
 from ppafo.walking.gait_subject import read_wearer, wearer_origin
 from ppafo.walking.planning import course_of_walk, walking_valve
 from ppafo.walking.schema import walk_file
@@ -123,8 +128,10 @@ def load_walk(
         course=_course(course or document.get("course"), folder, course is None),
         wearer_origin=wearer_origin(reading, walked, is_named),
         bottle=carried,
+        converter=_converter(reading, law),
     )
     check_walk(configuration, reading)
+    check_fixed_walk(configuration)
     course_of_walk(configuration)
     return configuration
 
@@ -148,7 +155,8 @@ def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file:
         path, text = split_override(override)
         load_walking_controller(text if path == "controller.kind" else kind_at(changed, "controller"))
         known = (*quantities(kind_at(changed, "controller"), _timing_kind(changed, path, text)), *_TEXTS)
-        if path in known:
+        is_arithmetic = path == ARITHMETIC and kind_at(changed, "controller") in FIXED_WALKS
+        if path in known or is_arithmetic:
             _set(changed, path, text)
         elif path in bottle_supply.OVERRIDES:
             own = changed.setdefault(bottle_supply.SECTION, {}).setdefault("overrides", [])
@@ -188,6 +196,19 @@ def _controller_settings(reading: Reading, law: ControllerKind, device: Device) 
         for item in law.quantities
     )
     return reading.section("controller", tuple(known))
+
+
+def _converter(reading: Reading, law: ControllerKind) -> dict[str, float] | None:
+    """Return the settings of the converter [SI] of a controller on whole numbers, None where it has floats."""
+    items = converter_settings(law.name)
+    if value_at(reading.document, ARITHMETIC) == FIXED:
+        if _timing_kind(dict(reading.document)) != THRESHOLDS:
+            raise reading.refusal(ARITHMETIC, f"whole numbers know the time in the stride by {THRESHOLDS} only")
+        return reading.section("controller", items)
+    for item in items:
+        if value_at(reading.document, f"controller.{item.name}") is not None:
+            raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
+    return None
 
 
 def _timing_settings(reading: Reading, device: Device, sensors: GaitSensors) -> dict[str, float]:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.fixed.walking.lanes import FIXED_WALKS
 from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS, walking_controllers
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.simulation import supply_line
@@ -25,11 +26,16 @@ from ppafo.walking.wearer import WEARER
 
 def _controller() -> Any:
     sampling = {item.name: optional(number_type(item), item.summary) for item in SAMPLING}
+    said = "floats, or fixed: whole numbers as a small processor has them; float unless given"
+    whole = {"arithmetic": optional(Literal["float", "fixed"], said)}
     return one_of(
         [
             table(
                 f"{model_name(name)}Walking",
-                kind_field(name, kind.summary) | sampling | quantity_fields(kind.quantities),
+                kind_field(name, kind.summary)
+                | sampling
+                | (whole | quantity_fields(declaration.converter_settings(name)) if name in FIXED_WALKS else {})
+                | quantity_fields(kind.quantities),
             )
             for name, kind in walking_controllers().items()
         ]

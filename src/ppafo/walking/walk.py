@@ -21,6 +21,7 @@ from ppafo.simulation.sampled import state_row_numbers
 from ppafo.storage.opensim import write_opensim
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_segments import SegmentResult, course_metrics, segment_results, steady_strides
+from ppafo.walking.fixed_point import controller_of
 from ppafo.walking.loading import load_walk
 from ppafo.walking.on_bottle import SupplyCourse, run_on_bottle
 from ppafo.walking.planning import WalkPlan, course_of_walk, plan_walk
@@ -187,12 +188,13 @@ def record_interval(seconds: float) -> float:
 
 def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:
     """The plan of a walk of this length [s]."""
+    controller, settings = controller_of(configuration)
     return WalkPlan(
         device=_fed_device(configuration),
         wearer=configuration.wearer,
         gait=configuration.gait,
-        controller=configuration.controller,
-        settings=dict(configuration.settings),
+        controller=controller,
+        settings=settings,
         sensors=configuration.sensors,
         gait_sensors=configuration.gait_sensors,
         has_ideal_sensors=configuration.has_ideal_sensors,

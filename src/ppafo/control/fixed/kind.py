@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
-from ppafo.control.fixed.converter import OF_CONVERTER
+from ppafo.control.fixed.converter import OF_CONVERTER, Readings
 from ppafo.control.kind import ControllerKind
 from ppafo.model.declaration import Quantity
 
@@ -12,6 +12,36 @@ FLOAT, FIXED = "float", "fixed"
 """The two arithmetics of a controller."""
 TARGETS = ("msp430f2013",)
 """Processors that an integer controller can be written for."""
+WALK_TARGETS = ("msp430g2553",)
+"""And those for one of walking, which the smallest has no room for."""
+
+
+class WholeLaw(Protocol):
+    """A law on whole numbers as the proof and the translation take it: of a torque task, or of a walk."""
+
+    @property
+    def name(self) -> str:
+        """That of the controller whose form it is."""
+
+    @property
+    def sample(self) -> Callable[..., Any]:
+        """The law: command in steps and next state, from numbers, state and readings."""
+
+    @property
+    def numbers(self) -> type:
+        """The NamedTuple class of what it is given."""
+
+    @property
+    def readings(self) -> type:
+        """That of what the converter shows."""
+
+    @property
+    def state_ranges(self) -> Mapping[str, tuple[int, int]]:
+        """Lowest and highest of every number of the state, by its own name."""
+
+    @property
+    def number_quantities(self) -> tuple[Quantity, ...]:
+        """Declarations of the whole numbers that the law is given, in order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +69,11 @@ class FixedLaw:
     def name(self) -> str:
         """That of the controller whose form it is."""
         return self.kind.name
+
+    @property
+    def readings(self) -> type:
+        """What the converter shows."""
+        return Readings
 
     @property
     def number_quantities(self) -> tuple[Quantity, ...]:

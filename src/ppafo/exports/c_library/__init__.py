@@ -76,6 +76,10 @@ def scenario_library(scenario: Scenario) -> Library:
 def walk_library(configuration: Configuration) -> Library:
     """A library whose settings are all numbers of a walk; ScenarioError for one that cannot be exported."""
     check_can_leave(configuration)
+    if configuration.converter is not None:
+        raise ProgramError(
+            f"{configuration.name}: a controller on whole numbers has no library yet; 'ppafo firmware' writes it"
+        )
     run = plan_walk(plan_of(configuration, walk_duration(configuration)))
     program = exported(batch_of(run).program)
     settings = settings_of_walk(configuration)

@@ -1,11 +1,12 @@
 """The text of an integer controller for a small processor, and the proof that its numbers cannot overflow."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, get_type_hints
 
-from ppafo.control.fixed.converter import COMMAND_STEPS, LARGEST_READING, Limits, Readings
-from ppafo.control.fixed.kind import FixedLaw
+from ppafo.control.fixed.converter import COMMAND_STEPS, LARGEST_READING, Readings
+from ppafo.control.fixed.kind import FixedLaw, WholeLaw
 from ppafo.engine.composed_names import is_row
+from ppafo.engine.rows import is_number, leaf_paths, members
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Quantity
@@ -18,7 +19,7 @@ from ppafo.version import __version__
 PRELUDE = "prelude_whole.h"
 
 
-def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
+def proof(law: WholeLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     """The typed functions of a law in 16 and 32 bits, and the range of the command and of the next state.
 
     For every number within what ``numbers`` (those of the law) declare, every state within the ranges of the law and
@@ -26,14 +27,13 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     """
     collector = SourceCollector("")
     entry = collector.add(law.sample)
-    parameters = _row(law.numbers, collector), _row(state_type(law), collector), _row(Readings, collector)
+    parameters = _row(law.numbers, collector), _row(state_type(law), collector), _row(law.readings, collector)
     module = walk_module(collector.text(), {entry: parameters})
     declared = iter(numbers or law.number_quantities)
-    limits = tuple(_range(next(declared)) for _ in Limits._fields)
     given: dict[str, Range] = {
-        "numbers": (limits, *(_range(item) for item in declared)),
-        "state": tuple(Interval(*law.state_ranges[name]) for name in state_type(law)._fields),
-        "readings": (Interval(0, LARGEST_READING),) * len(Readings._fields),
+        "numbers": _nested(law.numbers, map(_range, declared)),
+        "state": _nested(state_type(law), (Interval(*law.state_ranges[name]) for name in _leaf_names(state_type(law)))),
+        "readings": (Interval(0, LARGEST_READING),) * len(members(law.readings)),
     }
     found = narrowed(module, given)
     allowed = Interval(-COMMAND_STEPS, COMMAND_STEPS)
@@ -92,9 +92,19 @@ def macro(item: Quantity) -> str:
     return f"CONTROLLER_{item.name.upper()}"
 
 
-def state_type(law: FixedLaw) -> Any:
+def state_type(law: WholeLaw) -> Any:
     """The NamedTuple class of the state of a law, which its function says."""
     return get_type_hints(law.sample)["state"]
+
+
+def _nested(row: type, ranges: Iterator[Interval]) -> Range:
+    """The ranges of a NamedTuple, nested ones in their place."""
+    return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
+
+
+def _leaf_names(row: type) -> Iterator[str]:
+    """Own names of all numbers of a NamedTuple, in order."""
+    return (path.rpartition(".")[2] for path in leaf_paths(row, ""))
 
 
 def _range(item: Quantity) -> Interval:

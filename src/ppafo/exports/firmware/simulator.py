@@ -5,13 +5,12 @@ import re
 import select
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from shutil import which
 from types import TracebackType
 from typing import NamedTuple, final
 
-from ppafo.control.fixed.converter import Readings
 from ppafo.errors import SimulationError, one_line, reason
 
 TOOLS = ("make", "clang", "ld.lld", "mspdebug")
@@ -85,7 +84,7 @@ class ChipSimulator:
     SimulationError where a tool is missing, or where the simulator does not answer.
     """
 
-    def __init__(self, contents: Mapping[str, bytes]) -> None:
+    def __init__(self, contents: Mapping[str, bytes], ram: int = RAM) -> None:
         absent = missing_tools()
         if absent:
             raise SimulationError(
@@ -97,6 +96,7 @@ class ChipSimulator:
         self.sizes = sizes(folder / "firmware.elf")
         self.simulated = sizes(folder / "simulated.elf")
         self._cycles = 0
+        self._ram = ram
         self._seen = b""
         self._process = subprocess.Popen(
             ["mspdebug", "-n", "-q", "sim"],
@@ -106,7 +106,7 @@ class ChipSimulator:
             stderr=subprocess.STDOUT,
             bufsize=0,
         )
-        free = RAM - self.simulated.data
+        free = ram - self.simulated.data
         self._say(f"prog simulated.elf\nfill {_RAM_START + self.simulated.data} {free} {_UNTOUCHED:x}")
         self._say("simio add tracer counter\nsetbreak board_wait\nrun\nsimio info counter\nmd simulated_outputs 4")
         self._answer()
@@ -127,7 +127,7 @@ class ChipSimulator:
         self._say("reset\nrun\nsimio info counter\nmd simulated_outputs 4")
         self._answer()
 
-    def sample(self, readings: Readings) -> Decision:
+    def sample(self, readings: Iterable[int]) -> Decision:
         """What the chip decides for the readings of one sample."""
         given = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
         self._say(f"mw simulated_readings {given}\nrun\nsimio info counter\nmd simulated_outputs 4")
@@ -139,7 +139,7 @@ class ChipSimulator:
     def stack(self) -> int:
         """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
         start = _RAM_START + self.simulated.data
-        self._say(f"md {start} {RAM - self.simulated.data}\nsimio info counter\nmd simulated_outputs 4")
+        self._say(f"md {start} {self._ram - self.simulated.data}\nsimio info counter\nmd simulated_outputs 4")
         shown = self._until(b"simulated_outputs 4\n")
         self._line()
         lines = re.findall(rb"^    [0-9a-f]{5}: ((?:[0-9a-f]{2} )+)", shown, re.MULTILINE)

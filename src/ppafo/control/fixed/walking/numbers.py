@@ -1,0 +1,168 @@
+"""The whole numbers of a walking controller: from settings in SI units to counts, samples and fractions of 15 bits."""
+
+from collections.abc import Mapping
+
+from ppafo.control.fixed.arithmetic import FRACTION_BITS, LARGEST_FRACTION
+from ppafo.control.fixed.walking.phases import HALVES, LONGEST, STRIDE_SHARE
+from ppafo.control.fixed.walking.readings import TOP, GaitConverter
+from ppafo.control.fixed.walking.safety import MOST_STRIDES
+from ppafo.control.walking import readings, safety
+from ppafo.model.declaration import Quantity
+
+SHARE: float = 2.0**FRACTION_BITS
+ROUNDING = 1.0e-6
+"""Of a sample: a time of whole samples is not taken for one more because of its last bit."""
+
+
+def _count(name: str, summary: str) -> Quantity:
+    return Quantity(name, "", f"{summary}, in counts", None, 0.0, float(TOP))
+
+
+def _samples(name: str, summary: str) -> Quantity:
+    return Quantity(name, "", f"{summary}, in samples", None, 0.0, float(LONGEST))
+
+
+def _stride_share(name: str, summary: str) -> Quantity:
+    return Quantity(name, "", f"{summary}, in 1/2^14 of the stride time", None, 0.0, float(LARGEST_FRACTION))
+
+
+def _share(name: str, summary: str) -> Quantity:
+    return Quantity(name, "", f"{summary}, in 1/2^15", None, 0.0, float(LARGEST_FRACTION))
+
+
+def _strides(name: str, summary: str) -> Quantity:
+    return Quantity(name, "", summary, None, 0.0, float(MOST_STRIDES))
+
+
+NUMBERS = (
+    _count("lifts_above", "angle above which the foot is lifted"),
+    _count("lets_go_below", "angle below which it is let go"),
+    _stride_share("push_off_end", "end of the push-off"),
+    _count("load", "a force sensor counts as loaded above this"),
+    _count("unload", "and as unloaded below this"),
+    _samples("debounce", "a change of load counts when it has lasted this long"),
+    Quantity("first_stride", "", "stride time until one is measured, in halves of a sample", None, 0.0, float(HALVES)),
+    _share("stride_weight", "weight of a new stride in the moving average"),
+    _stride_share("push_off_start", "start of the push-off"),
+    _count("lowest_force", "a force below this is no reading"),
+    _count("largest_force", "a force above this is no reading"),
+    _count("lowest_angle", "an angle below this is no reading"),
+    _count("highest_angle", "an angle above this is no reading"),
+    _stride_share("longest_phase", "longest stance or swing"),
+    _samples("frozen", "a loaded sensor whose reading stays the same for longer is frozen"),
+    _strides("most_toe_strides", "strides in a row that may be on the toes alone"),
+    _stride_share("flat_from", "from here on heel and toes are both loaded"),
+    _stride_share("flat_to", "and until here"),
+    _count("lowest_pressure", "a pressure below this is no reading"),
+    _count("highest_pressure", "a pressure above this is no reading"),
+    _samples("fill", "a chamber is filled when the valve has fed it for longer"),
+    _samples("vent", "both are vented when the valve has vented them for longer"),
+    _samples("late_vent", "and chamber 2 for sure after this"),
+    _stride_share("shortest_swing", "shortest swing of a steady stride"),
+    _stride_share("steady", "by how much a usual stride is longer or shorter"),
+    _strides("resume_strides", "good strides in a row after which a pause ends"),
+    _count("largest_drop", "no force above this is gone within a sample"),
+    _count("gone", "a force below this is gone"),
+    _count("lowest_flat_angle", "no ankle has less while the foot stands flat"),
+    _count("highest_flat_angle", "no ankle has more while the foot stands flat"),
+    _count("moves", "a force further than this from its slow reading moves"),
+    _count("turns", "an angle further than this from its slow reading moves"),
+    _samples("stands_up", "who stands for longer after sitting is helped again"),
+    _samples("lasts", "a pressure that rises for longer in a vented chamber was there before"),
+    _share("slow_share", "share of a change that slow readings take at once"),
+    _share("fall_share", "share of a change that slow pressures take at once"),
+    _count("fades", "what the highest angle of a swing loses at each sample"),
+    _count("turned_up", "by how much a foot has turned up at a strike in doubt"),
+    _count("turns_down", "a foot that turns down by more lands now"),
+    _count("is_flat", "one that turns up by more is flat"),
+    _samples("follow", "a pressure follows the valve within this"),
+    _samples("shown", "until here a vented chamber is watched"),
+    _count("rises", "a rise that is no noise"),
+    _count("filled", "a filled chamber has a higher pressure, a vented one a lower"),
+    _count("compresses", "from this angle on the ankle compresses chamber 2"),
+    _count("squeezes", "and from this one to any pressure"),
+)
+"""Every number of ``event_on_off.WalkNumbers``, in order."""
+
+
+def whole_numbers(settings: Mapping[str, float], period: float, converter: GaitConverter) -> dict[str, float]:
+    """Whole numbers by name, not yet limited, for settings in SI units and a sample period [s]."""
+    steps = _differences(settings, period, converter)
+    strides = {
+        name: settings[name] * STRIDE_SHARE
+        for name in ("push_off_end", "push_off_start", "longest_phase", "flat_from", "flat_to", "shortest_swing")
+    }
+    shares = {
+        "steady": safety.STEADY * STRIDE_SHARE,
+        "stride_weight": settings["stride_weight"] * SHARE,
+        "slow_share": period / (period + readings.SLOW_TIME) * SHARE,
+        "fall_share": period / (period + readings.FALL_TIME) * SHARE,
+    }
+    counted = {name: min(settings[name], MOST_STRIDES) for name in ("most_toe_strides", "resume_strides")}
+    found = _levels(settings, period, converter) | steps | strides | shares | counted
+    rounded = {name: float(int(value + 0.5)) for name, value in found.items()} | _times(settings, period)
+    return {item.name: rounded[item.name] for item in NUMBERS}
+
+
+def _levels(settings: Mapping[str, float], period: float, converter: GaitConverter) -> dict[str, float]:
+    """Readings in counts that others are compared with; a limit is within what the converter can show."""
+    forces = {
+        "load": settings["load_threshold"],
+        "unload": settings["unload_threshold"],
+        "lowest_force": settings["lowest_force"],
+        "largest_force": settings["largest_force"],
+        "largest_drop": settings["largest_drop"],
+        "gone": readings.GONE * settings["largest_drop"],
+    }
+    angles = {name: settings[name] for name in ("lowest_angle", "highest_angle", "lowest_flat_angle")}
+    angles |= {
+        "highest_flat_angle": settings["highest_flat_angle"],
+        "lifts_above": settings["swing_angle"] + settings["band"],
+        "lets_go_below": settings["swing_angle"] - settings["band"],
+        "squeezes": readings.SQUEEZING_ANGLE,
+    }
+    pressures = {"filled": settings["filled_pressure"]}
+    pressures |= {name: settings[name] for name in ("lowest_pressure", "highest_pressure")}
+    found = {name: (value - converter.force_zero) / converter.force_step for name, value in forces.items()}
+    found |= {name: value / converter.angle_step for name, value in angles.items()}
+    found |= {name: value / converter.pressure_step for name, value in pressures.items()}
+    ends = {"lowest_force", "largest_force", "lowest_angle", "highest_angle", "lowest_pressure", "highest_pressure"}
+    for name in ends & set(found):
+        found[name] = min(max(found[name], 1.0), converter.top - 1.0)
+    # Who samples slowly may miss how a force goes: no reading is above the largest.
+    found["largest_drop"] = found["largest_drop"] if period < readings.QUICK_PERIOD else converter.top
+    return {name: value * converter.scale for name, value in found.items()}
+
+
+def _differences(settings: Mapping[str, float], period: float, converter: GaitConverter) -> dict[str, float]:
+    """Changes of readings in counts."""
+    angle, force, pressure = (
+        step / converter.scale for step in (converter.angle_step, converter.force_step, converter.pressure_step)
+    )
+    return {
+        "moves": readings.MOVES / force,
+        "turns": readings.TURNS / angle,
+        "fades": readings.FADES * period / angle,
+        "turned_up": readings.TURNED_UP / angle,
+        "turns_down": readings.TURNS_DOWN / angle,
+        "is_flat": readings.IS_FLAT / angle,
+        "rises": readings.RISES / pressure,
+        "compresses": readings.COMPRESSES / angle,
+    }
+
+
+def _times(settings: Mapping[str, float], period: float) -> dict[str, float]:
+    """Times in samples: those that must be passed rounded down, those that must be reached rounded up."""
+    passed = {
+        "frozen": settings["frozen_time"],
+        "fill": settings["fill_time"],
+        "vent": settings["vent_time"],
+        "late_vent": safety.LATE * settings["vent_time"],
+        "stands_up": safety.STANDS_UP,
+        "lasts": readings.LASTS,
+        "follow": settings["follow_time"],
+    }
+    found = {name: float(int(time / period + ROUNDING)) for name, time in passed.items()}
+    reached = {"debounce": settings["debounce"], "shown": settings["follow_time"] + readings.SHOWN}
+    found |= {name: float(-int(-(time / period - ROUNDING) // 1)) for name, time in reached.items()}
+    return found | {"first_stride": float(int(2.0 * settings["first_stride_time"] / period + 0.5))}

@@ -1,0 +1,202 @@
+"""The controller of a walk as firmware: translated C, a thin layer for an MSP430G2553, make file and page."""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+from ppafo.control.fixed.kind import WALK_TARGETS
+from ppafo.control.fixed.walking.lanes import FIXED_WALKS, FixedWalk
+from ppafo.control.fixed.walking.readings import GaitConverter
+from ppafo.control.walking.signs import SIGNS
+from ppafo.engine.rows import rebuilt
+from ppafo.engine.source_text import SourceCollector
+from ppafo.errors import ScenarioError
+from ppafo.exports.firmware import MOST_TICKS, TICK
+from ppafo.exports.firmware.controller import PRELUDE, macro, proof, state_type
+from ppafo.simulation.reading import quantity_text
+from ppafo.translation.c99 import c_source, documents_of
+from ppafo.version import __version__
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.declaration import ARITHMETIC, quantities
+from ppafo.walking.fixed_point import converter_of_walk, numbers_of_walk
+
+MOST_CONVERTER_BITS = 10
+"""Of the converter of an MSP430G2553."""
+FLASH, RAM = 16384, 512
+"""What it has [bytes]."""
+_MARK = re.compile(r"@(\w+)@")
+_TEMPLATES = (
+    "Makefile",
+    "README.md",
+    "board.h",
+    "board_msp430g2553.c",
+    "board_simulated.c",
+    "controller.h",
+    "host.c",
+    "main.c",
+    "msp430g2553.ld",
+)
+
+
+class WalkChip(NamedTuple):
+    """The integer controller of a walk: law, whole numbers by name, converter, ticks of a sample."""
+
+    law: FixedWalk
+    numbers: Mapping[str, float]
+    converter: GaitConverter
+    ticks: int
+
+    @property
+    def of_law(self) -> Any:
+        """The numbers as the law takes them."""
+        return rebuilt(self.law.numbers, [int(value) for value in self.numbers.values()])
+
+
+def walk_chip(configuration: Configuration) -> WalkChip:
+    """The integer controller of a walk whose arithmetic is fixed.
+
+    ScenarioError where it is not, or where the chip's timer or converter cannot do what it asks for.
+    """
+    name, period, given = configuration.name, configuration.period, configuration.converter
+    if given is None:
+        if configuration.controller.name in FIXED_WALKS:
+            raise ScenarioError(f"{name}: the controller computes with floats; set {ARITHMETIC}=fixed")
+        raise ScenarioError(
+            f"{name}: the controller '{configuration.controller.name}' has no form on whole numbers; those that have "
+            f"one: {', '.join(FIXED_WALKS)}"
+        )
+    if given["converter_bits"] > MOST_CONVERTER_BITS:
+        raise ScenarioError(
+            f"{name}: controller.converter_bits = {given['converter_bits']:g}: the converter of the chip has "
+            f"{MOST_CONVERTER_BITS}"
+        )
+    ticks = round(period / TICK)
+    if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:
+        raise ScenarioError(
+            f"{name}: controller.period = {period:.9g} s: on the chip a multiple of 0.125 ms, "
+            f"up to {MOST_TICKS // 2 * TICK:.3g} s"
+        )
+    law = FIXED_WALKS[configuration.controller.name]
+    return WalkChip(law, numbers_of_walk(configuration), converter_of_walk(configuration), ticks)
+
+
+def walk_firmware(configuration: Configuration, target: str = WALK_TARGETS[0]) -> dict[str, bytes]:
+    """Files of the firmware of a walk's controller, by name. ScenarioError where it has no integer form."""
+    if target not in WALK_TARGETS:
+        raise ScenarioError(f"{configuration.name}: a walk's firmware is for {', '.join(WALK_TARGETS)}, not '{target}'")
+    chip = walk_chip(configuration)
+    words = _words(configuration, chip, target)
+    texts = {
+        name: _MARK.sub(lambda found: words[found[1]], _template("walking/templates", name)) for name in _TEMPLATES
+    }
+    texts["start_msp430.c"] = _template("templates", "start_msp430.c")
+    texts["LICENSE"] = files("ppafo.exports.c_library").joinpath("templates", "LICENSE").read_text(encoding="utf-8")
+    texts["controller.c"] = walk_source(chip.law)
+    texts["parameters.h"] = _parameters(configuration, chip)
+    return {name: text.encode() for name, text in sorted(texts.items())}
+
+
+def walk_source(law: FixedWalk) -> str:
+    """The law in C, with a state of its own and the numbers of ``parameters.h``."""
+    collector = SourceCollector("")
+    entry = collector.add(law.sample)
+    documents = documents_of(collector)
+    title = f"The walking controller '{law.name}' of ppafo {__version__} on whole numbers. Not to be edited."
+    text = c_source(proof(law).module, documents, title, prelude=PRELUDE)
+    numbers, state, readings = (collector.add(item) for item in (law.numbers, state_type(law), law.readings))
+    given = rebuilt(law.numbers, [macro(item) for item in law.number_quantities])
+    fields = ", ".join(f"readings.{name}" for name in law.readings.__annotations__)
+    return f"""#include "controller.h"
+
+#include "parameters.h"
+
+{text}
+static {state} state;
+
+void controller_begin(void)
+{{
+    static const {state} begin = {_written(law.begins)};
+    state = begin;
+}}
+
+int16_t controller_sample(controller_readings readings)
+{{
+    static const {numbers} numbers = {_written(given)};
+    const {readings} given = {{{fields}}};
+    const {entry}_result result = {entry}(numbers, state, given);
+    state = result.item_1;
+    return result.item_0;
+}}
+
+int16_t controller_level(void)
+{{
+    return state.safety.level;
+}}
+
+int16_t controller_sign(void)
+{{
+    return state.safety.sign;
+}}
+"""
+
+
+def _template(folder: str, name: str) -> str:
+    return files("ppafo.exports.firmware").joinpath(*folder.split("/"), name).read_text(encoding="utf-8")
+
+
+def _written(row: Any) -> str:
+    """A NamedTuple as C initialises it, nested ones in their place."""
+    return "{" + ", ".join(_written(item) if isinstance(item, tuple) else str(item) for item in row) + "}"
+
+
+def _words(configuration: Configuration, chip: WalkChip, target: str) -> dict[str, str]:
+    """What fills the templates."""
+    given, converter = configuration.converter or {}, chip.converter
+    return {
+        "title": configuration.name,
+        "description": configuration.description,
+        "kind": chip.law.name,
+        "target": target,
+        "version": __version__,
+        "period": quantity_text(configuration.period, "s"),
+        "force_zero": f"{given['force_zero']:.6g} N",
+        "force_range": f"{given['force_range']:.6g} N",
+        "force_step": f"{converter.force_step:.3g} N",
+        "angle_range": f"{math.degrees(given['angle_range']):.4g} deg",
+        "angle_step": f"{math.degrees(converter.angle_step):.3g} deg",
+        "pressure_range": f"{given['converter_range'] / 1.0e3:.6g} kPa",
+        "pressure_step": f"{converter.pressure_step / 1.0e3:.3g} kPa",
+        "silence": f"{(2 * chip.ticks * TICK + 2.05e-3) * 1.0e3:.4g} ms",
+        "signs": "\n".join(f"      {number:2.0f}  {sign.summary}" for number, sign in SIGNS.items()),
+    }
+
+
+def _parameters(configuration: Configuration, chip: WalkChip) -> str:
+    """The header with every number of the law, its unit, meaning and origin."""
+    bits = int((configuration.converter or {})["converter_bits"])
+    lines = [
+        f"/* Numbers of the controller '{chip.law.name}' of the walk {configuration.name}, ppafo {__version__}, from:",
+        *(f" *   {line}" for line in _origins(configuration)),
+        " * Every number must stay within its range: for that the arithmetic is proved not to overflow. */",
+        "#ifndef PPAFO_PARAMETERS_H",
+        "#define PPAFO_PARAMETERS_H",
+        "",
+        f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {configuration.period:.9g} s */",
+        f"#define CONTROLLER_BITS {bits} /* of the converter; counts are of 14 bits */",
+    ]
+    for item in chip.law.number_quantities:
+        number = int(chip.numbers[item.name])
+        lines.append(f"#define {macro(item)} {number} /* {item.summary}; {item.minimum:g} to {item.maximum:g} */")
+        lines += [f"#if {macro(item)} < {item.minimum:.0f} || {macro(item)} > {item.maximum:.0f}"]
+        lines += [f'#error "{macro(item)} is beyond its range"', "#endif"]
+    return "\n".join([*lines, "", "#endif", ""])
+
+
+def _origins(configuration: Configuration) -> Iterator[str]:
+    """Settings that the numbers come from, each with unit and value in SI units."""
+    declared = quantities(configuration.controller.name)
+    yield f"period {configuration.period:.9g} s (controller.rate or controller.period of {configuration.name})"
+    for name, value in {**configuration.settings, **(configuration.converter or {})}.items():
+        yield f"{name} {value:.9g} {declared[f'controller.{name}'].unit} (controller.{name})".replace("  ", " ")

@@ -1,0 +1,131 @@
+"""The controller of a walk on the chip's simulator beside the same in Python: drawn readings, or a whole walk."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.control.fixed.converter import COMMAND_STEPS
+from ppafo.control.fixed.walking.event_on_off import WalkCounts
+from ppafo.control.fixed.walking.readings import GaitConverter, GaitReadings, read_gait
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.run import batch_of
+from ppafo.errors import SimulationError
+from ppafo.exports.firmware.lock_step import Comparison, Cost
+from ppafo.exports.firmware.simulator import ChipSimulator, Decision
+from ppafo.exports.firmware.walking import RAM, WalkChip, walk_chip, walk_firmware
+from ppafo.exports.firmware.walking.drawn import DrawnGait
+from ppafo.model.command import VENT
+from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.simulation.sampled import state_row_numbers
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.recorded import SAFE_ROW
+from ppafo.walking.sampled import run_sampled_walk
+from ppafo.walking.walk import plan_of, walk_duration
+
+SIGN_BITS = 8
+"""A chip tells its level above these bits of a word, and its sign in them."""
+
+
+class PythonWalkChip:
+    """The integer controller of a walk in Python, as the chip computes it."""
+
+    def __init__(self, chip: WalkChip) -> None:
+        self.law, self.numbers = chip.law, chip.of_law
+        self.state: WalkCounts = chip.law.begins
+
+    def begin(self) -> None:
+        """Forget everything."""
+        self.state = self.law.begins
+
+    def sample(self, readings: GaitReadings) -> tuple[int, int]:
+        """Command in steps, and level and sign in one word."""
+        command, self.state = self.law.sample(self.numbers, self.state, readings)
+        return command, (self.state.safety.level << SIGN_BITS) + self.state.safety.sign
+
+
+class ChipOfWalk:
+    """The simulated chip as a controller of a walk; it keeps the decision of every sample."""
+
+    def __init__(self, simulator: ChipSimulator, converter: GaitConverter) -> None:
+        self.simulator = simulator
+        self.converter = converter
+        self.decisions: list[Decision] = []
+
+    def reset(self) -> None:
+        """Reset the processor."""
+        self.simulator.begin()
+        self.decisions.clear()
+
+    def update(self, measurement: GaitMeasurement) -> float:
+        """Command from -1 to 1, or ``VENT``, from what the converter shows."""
+        found = self.simulator.sample(read_gait(self.converter, measurement))
+        self.decisions.append(found)
+        return found.command / COMMAND_STEPS if found.command else VENT
+
+
+@dataclass(frozen=True, slots=True)
+class WalkOnChip:
+    """A walk with the chip's simulator in charge, and the same with the integer controller in the lanes.
+
+    ``differences`` are samples of the recording at which the commands differ; ``same_bits`` is true where all that is
+    no state of a controller is the same. ``level`` is that of the chip at the end.
+    """
+
+    cost: Cost
+    samples: int
+    differences: int
+    same_bits: bool
+    level: int
+    gas: float
+
+
+def walk_on_chip(configuration: Configuration, minutes: float | None = None) -> WalkOnChip:
+    """Walk with the controller on the chip's simulator, in virtual time, and once more in the lanes.
+
+    ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
+    """
+    chip = walk_chip(configuration)
+    run = plan_walk(plan_of(configuration, walk_duration(configuration, minutes)))
+    with ChipSimulator(walk_firmware(configuration), RAM) as simulator:
+        law = ChipOfWalk(simulator, chip.converter)
+        outside = run_sampled_walk(run, law)
+        cost = _cost(simulator, law.decisions)
+    inside = run_batch(batch_of(run))
+    rows = state_row_numbers(run)
+    shared = [path for path in rows if not path.startswith("controller_state.")]
+    theirs = inside.record[:, [rows[path] for path in shared], 0]
+    mine = outside.record[:, :, 0]
+    differ = int(np.count_nonzero(mine[:, shared.index("result.command")] != theirs[:, shared.index("result.command")]))
+    level = law.decisions[-1].is_sound >> SIGN_BITS
+    same = np.array_equal(mine, theirs) and level == inside.record[-1, rows[SAFE_ROW], 0]
+    gas = float(mine[-1, shared.index("state.supplied_mass")])
+    return WalkOnChip(cost, len(law.decisions), differ, same, level, gas)
+
+
+def compare_drawn_walk(configuration: Configuration, samples: int, seed: int = 1) -> Comparison:
+    """Give drawn readings of a gait to the chip's simulator and to Python, with a reset before every episode."""
+    chip = walk_chip(configuration)
+    reference, decisions, differences, first = PythonWalkChip(chip), [], 0, ""
+    drawn, command = DrawnGait(chip.converter, seed), 0
+    with ChipSimulator(walk_firmware(configuration), RAM) as simulator:
+        for number in range(samples):
+            readings, begins = drawn.next(command)
+            if begins:
+                reference.begin()
+                simulator.begin()
+            wanted, found = reference.sample(readings), simulator.sample(readings)
+            command = wanted[0]
+            decisions.append(found)
+            if wanted != found[:2]:
+                differences += 1
+                first = first or f"sample {number}, {tuple(readings)}: {found[:2]} on the chip, {wanted} in Python"
+        cost = _cost(simulator, decisions)
+    return Comparison(samples, differences, first, cost)
+
+
+def _cost(simulator: ChipSimulator, decisions: list[Decision]) -> Cost:
+    if not decisions:
+        raise SimulationError("no sample was taken on the chip")
+    cycles = [item.cycles for item in decisions]
+    return Cost(simulator.sizes, simulator.stack(), max(cycles), sum(cycles) / len(cycles))

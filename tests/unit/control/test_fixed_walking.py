@@ -1,0 +1,131 @@
+"""The walking controller on whole numbers: its numbers, what the converter shows, and the float form beside it."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ppafo.control.fixed.walking.lanes import EVENT_ON_OFF
+from ppafo.control.fixed.walking.phases import HALVES, LONGEST, next_phase, next_stride, next_switch, part_of
+from ppafo.control.fixed.walking.phases import PhaseNumbers as Numbers
+from ppafo.control.fixed.walking.phases import SwitchCounts as Switch
+from ppafo.control.fixed.walking.readings import SETTINGS, TOP, gait_converter, read_gait
+from ppafo.control.walking import phases
+from ppafo.control.walking.event_on_off import KIND as FLOAT_KIND
+from ppafo.engine.rows import leaf_paths, rebuilt
+from ppafo.exports.firmware.walking.drawn import DrawnGait
+from ppafo.model.command import VENTS_ABOVE
+from ppafo.model.gait_sensors import GaitMeasurement
+
+PERIOD = 1.0e-3
+SET = {item.name: float(item.default or 0.0) for item in FLOAT_KIND.quantities}
+CONVERTER = gait_converter(*(float(item.default or 0.0) for item in SETTINGS))
+NUMBERS = EVENT_ON_OFF.prepare(SET, PERIOD, CONVERTER)
+RULES = Numbers(
+    load=1200, unload=1050, debounce=10, first_stride=2200, stride_weight=9830, push_off_start=6554
+)  # 60 N, 30 N, 10 ms, 1.1 s, 0.3 and 0.4 at 1 kHz
+
+
+def own_names(row: type) -> list[str]:
+    return [path.rpartition(".")[2] for path in leaf_paths(row, "")]
+
+
+def test_every_number_is_declared_in_the_order_of_its_rows() -> None:
+    assert own_names(EVENT_ON_OFF.kind.parameters) == [item.name for item in EVENT_ON_OFF.kind.quantities]
+    assert own_names(EVENT_ON_OFF.numbers) == [item.name for item in EVENT_ON_OFF.number_quantities] == list(NUMBERS)
+    assert set(own_names(type(EVENT_ON_OFF.begins))) == set(EVENT_ON_OFF.state_ranges)
+
+
+def test_what_defaults_come_to_is_whole_and_within_what_is_declared() -> None:
+    for item in EVENT_ON_OFF.number_quantities:
+        assert NUMBERS[item.name] % 1.0 == 0.0
+        assert item.minimum <= NUMBERS[item.name] <= item.maximum
+
+
+def test_times_that_must_be_passed_and_times_that_must_be_reached_keep_their_sample() -> None:
+    settings = SET | {"fill_time": 0.0504, "debounce": 0.0101}
+    found = EVENT_ON_OFF.prepare(settings, PERIOD, CONVERTER)
+    assert (NUMBERS["fill"], NUMBERS["debounce"], NUMBERS["lasts"]) == (50.0, 10.0, 2.0)
+    assert (found["fill"], found["debounce"]) == (50.0, 11.0)
+
+
+def test_readings_are_counts_of_fourteen_bits_and_stay_in_their_range() -> None:
+    seen = read_gait(CONVERTER, GaitMeasurement(1.401, 0.0, 1.0e9, 0.0, -1.0e4, 1601.0))
+    assert seen == (0, 512 << 4, 512 << 4, 0, 1023 << 4)
+    fine = gait_converter(14.0, 2.2e6, -200.0, 3.4e3, 2.8)
+    assert max(read_gait(fine, GaitMeasurement(9.9, 1.0e9, 1.0e9, 0.0, 1.0e9, 1.0e9))) == TOP
+
+
+@given(st.integers(0, HALVES), st.floats(0.0, 1.999))
+def test_a_fraction_of_the_stride_is_at_most_two_samples_below_the_exact_one(stride: int, fraction: float) -> None:
+    exact = 0.5 * stride * fraction
+    assert exact - 2.0 <= part_of(stride, int(fraction * 2.0**14 + 0.5)) <= exact + 0.5
+
+
+@given(st.integers(600, 4000), st.integers(0, LONGEST))
+def test_the_moving_average_is_that_of_floats_to_a_sample(known: int, since: int) -> None:
+    usual = 0.25 * known < since < known
+    exact = 0.5 * known + 0.3 * (since - 0.5 * known) if usual else 0.5 * known
+    near = abs(since - 0.25 * known) <= 1.0 or abs(since - known) <= 1.0
+    assert near or abs(0.5 * next_stride(RULES, known, since) - exact) <= 1.0
+
+
+@given(st.integers(0, 3), st.booleans(), st.booleans(), st.booleans())
+def test_the_phases_follow_each_other_as_in_floats(phase: int, heel: bool, toe: bool, late: bool) -> None:
+    before = phases.START._replace(phase=float(phase), stride_time=1.0)
+    rules = phases.PhaseRules(60.0, 30.0, 0.01, 1.1, 0.3, 0.4)
+    wanted = phases.next_phase(rules, before, float(heel), float(toe), 0.5 if late else 0.1)
+    assert next_phase(phase, int(heel), int(toe), late) == wanted
+
+
+def test_a_change_of_load_counts_when_it_has_lasted() -> None:
+    switch, seen = Switch(0, 0), []
+    for force in (1201,) * 9 + (1100,) * 2 + (1201,) * 10 + (1049,) * 10:
+        switch = next_switch(RULES, switch, force)
+        seen.append(switch.loaded)
+    # Between both thresholds nothing is indicated but what was: what had begun ends there.
+    assert seen == [0] * 20 + [1] * 10 + [0]
+
+
+class Both:
+    """The float form and the integer form on the same measurements."""
+
+    def __init__(self) -> None:
+        values = [SET[item.name] for item in FLOAT_KIND.quantities]
+        self.floats, self.float_state = rebuilt(FLOAT_KIND.parameters, values), FLOAT_KIND.initial
+        own = [*CONVERTER, *NUMBERS.values()]
+        self.fixed, self.fixed_state = rebuilt(EVENT_ON_OFF.kind.parameters, own), EVENT_ON_OFF.kind.initial
+
+    def update(self, seen: GaitMeasurement) -> tuple[float, float]:
+        wanted, self.float_state = FLOAT_KIND.update(self.floats, self.float_state, 0.0, seen, PERIOD)
+        found, self.fixed_state = EVENT_ON_OFF.kind.update(self.fixed, self.fixed_state, 0.0, seen, PERIOD)
+        return wanted, found
+
+
+def steps(readings: tuple[int, ...]) -> GaitMeasurement:
+    """What the middle of each count stands for."""
+    heel, toe, angle, pressure_1, pressure_2 = (float(value >> 4) for value in readings)
+    return GaitMeasurement(
+        angle=angle * CONVERTER.angle_step,
+        pressure_1=pressure_1 * CONVERTER.pressure_step,
+        pressure_2=pressure_2 * CONVERTER.pressure_step,
+        torque=0.0,
+        heel_force=CONVERTER.force_zero + heel * CONVERTER.force_step,
+        toe_force=CONVERTER.force_zero + toe * CONVERTER.force_step,
+    )
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed: int) -> None:
+    drawn, command, both = DrawnGait(CONVERTER, seed), 0, Both()
+    levels, other_commands, other_levels, samples = set(), 0, 0, 15_000
+    for _ in range(samples):
+        readings, begins = drawn.next(command)
+        both = Both() if begins else both
+        wanted, found = both.update(steps(readings))
+        command = 0 if found > VENTS_ABOVE else int(found)
+        levels.add(both.fixed_state.safety.level)
+        other_commands += wanted != found
+        other_levels += both.float_state.safety.level != both.fixed_state.safety.level
+    assert {0.0, 3.0} <= levels
+    assert other_commands < 0.01 * samples
+    assert other_levels < 0.01 * samples
