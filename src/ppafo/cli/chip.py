@@ -1,4 +1,4 @@
-"""``ppafo chip``: a scenario with its controller on the simulator of a small processor."""
+"""``ppafo chip``: a scenario or a walk with its controller on the simulator of a small processor."""
 
 import argparse
 from typing import TYPE_CHECKING, Any
@@ -12,21 +12,32 @@ from ppafo.cli.output import (
     deliver,
 )
 from ppafo.cli.quick_imports import load_compiler
-from ppafo.control.fixed.kind import TARGETS
+from ppafo.control.fixed.kind import TARGETS, WALK_TARGETS
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
     from ppafo.exports.firmware.lock_step import ChipRun, Comparison, Cost
+    from ppafo.exports.firmware.walking.lock_step import WalkOnChip
     from ppafo.simulation.scenario import Scenario
+    from ppafo.walking.configuration import Configuration
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 MOST_SAMPLES = 10_000_000
+WALK_MINUTES = 0.2
+"""How long a walk with the chip in charge is, ten strides at the usual pace."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario, or a .toml file")
-    parser.add_argument("--target", choices=TARGETS, default=TARGETS[0], help=f"the processor (default: {TARGETS[0]})")
+    parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario or a walk, or a .toml file")
+    parser.add_argument(
+        "--target",
+        choices=(*TARGETS, *WALK_TARGETS),
+        help=f"the processor (default: {TARGETS[0]}, of a walk {WALK_TARGETS[0]})",
+    )
+    parser.add_argument(
+        "--minutes", metavar="MINUTES", type=float, help=f"length of a walk (default: {WALK_MINUTES:g}, ten strides)"
+    )
     parser.add_argument(
         "--samples",
         metavar="N",
@@ -43,18 +54,86 @@ def run(parsed: argparse.Namespace) -> int:
         raise ScenarioError(f"--samples {parsed.samples}: must be 1 to {MOST_SAMPLES}")
     check_output(parsed)
     load_compiler()
-    from ppafo.exports.firmware.lock_step import compare_drawn, run_on_chip
-    from ppafo.simulation.loading import load_scenario
+    from ppafo.exports.loading import load_exportable
+    from ppafo.simulation.scenario import Scenario
 
-    scenario = load_scenario(parsed.scenario, parsed.overrides)
+    chosen = load_exportable(parsed.scenario, parsed.overrides)
+    text, document, agrees = _scenario(chosen, parsed) if isinstance(chosen, Scenario) else _walk(chosen, parsed)
+    deliver("chip", text, document, parsed)
+    return EXIT_GOOD if agrees else EXIT_CHECK_FAILED
+
+
+def _scenario(scenario: "Scenario", parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
+    """A scenario on the chip: text, document, and whether all decisions are the same."""
+    from ppafo.exports.firmware.lock_step import compare_drawn, run_on_chip
+
+    target = parsed.target or TARGETS[0]
+    if target not in TARGETS or parsed.minutes is not None:
+        raise ScenarioError(f"{scenario.name}: {', '.join(WALK_TARGETS)} and --minutes are for walks")
     if parsed.samples is None:
         found = run_on_chip(scenario)
         text, document, agrees = _of_run(found), _run_document(found), found.same_bits and not found.differences
     else:
         drawn = compare_drawn(scenario, parsed.samples)
         text, document, agrees = _of_drawn(scenario, drawn), _drawn_document(drawn), not drawn.differences
-    deliver("chip", text, {"scenario": scenario.name, "target": parsed.target, **document}, parsed)
-    return EXIT_GOOD if agrees else EXIT_CHECK_FAILED
+    return text, {"scenario": scenario.name, "target": target, **document}, agrees
+
+
+def _walk(configuration: "Configuration", parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
+    """A walk on the chip: text, document, and whether all decisions are the same."""
+    from ppafo.exports.firmware.walking.lock_step import compare_drawn_walk, walk_on_chip
+
+    name, target = configuration.name, parsed.target or WALK_TARGETS[0]
+    if target not in WALK_TARGETS:
+        raise ScenarioError(f"{name}: a walk's controller runs on {', '.join(WALK_TARGETS)}, not on '{target}'")
+    if parsed.samples is not None:
+        if parsed.minutes is not None:
+            raise ScenarioError("--minutes: drawn samples take the place of a walk; leave out one of both")
+        drawn = compare_drawn_walk(configuration, parsed.samples)
+        head = f"{drawn.samples} drawn samples of the controller of {name} on the chip's simulator"
+        lines = [head, "", *_walk_cost(drawn.cost, configuration), _decisions(drawn, "Python")]
+        lines += [f"the first: {drawn.first_difference}"] if drawn.differences else []
+        text, document, agrees = "\n".join(lines), _drawn_document(drawn), not drawn.differences
+    else:
+        found = walk_on_chip(configuration, WALK_MINUTES if parsed.minutes is None else parsed.minutes)
+        text, document, agrees = _of_walk(found, configuration), _walk_document(found), found.same_bits
+    return text, {"walk": name, "target": target, **document}, agrees
+
+
+def _of_walk(found: "WalkOnChip", configuration: "Configuration") -> str:
+    """The walk in words."""
+    lines = [
+        f"{configuration.name} with the controller on the chip's simulator, the lanes as the plant",
+        "",
+        *_walk_cost(found.cost, configuration),
+        _decisions(found, "the lanes"),
+        f"recording   {'the same bits' if found.same_bits else 'NOT the same bits'} as without the chip",
+        f"in the end  {('helps', 'lifts the foot only', 'pauses', 'has stopped')[found.level]}",
+        f"gas         {found.gas * 1.0e3:.4f} g",
+    ]
+    return "\n".join(lines)
+
+
+def _decisions(found: "WalkOnChip | Comparison", place: str) -> str:
+    return f"decisions   {found.samples}, {found.differences} other than those of the integer controller in {place}"
+
+
+def _walk_cost(cost: "Cost", configuration: "Configuration") -> list[str]:
+    from ppafo.exports.firmware.simulator import CLOCK
+    from ppafo.exports.firmware.walking import FLASH, RAM
+
+    worst, mean = cost.worst_cycles, cost.mean_cycles
+    share = worst / CLOCK / configuration.period
+    return [
+        f"flash       {cost.sizes.flash} of {FLASH} bytes, the whole program",
+        f"RAM         {cost.sizes.data} bytes of data, {cost.stack} of stack, 4 for the timer's interrupt, of {RAM}",
+        f"cycles      {worst} at worst, {mean:.0f} on average; {share:.2%} of a sample at 16 MHz",
+    ]
+
+
+def _walk_document(found: "WalkOnChip") -> dict[str, Any]:
+    told = {"samples": found.samples, "differences": found.differences, "same_bits": found.same_bits}
+    return {**told, **_cost_document(found.cost), "level": found.level, "gas": found.gas}
 
 
 def _of_run(found: "ChipRun") -> str:

@@ -13,7 +13,7 @@ FEWEST_BITS, MOST_BITS = 8, 14
 
 SETTINGS = (
     Quantity("converter_bits", "", "bits of the converter, whole", 10.0, float(FEWEST_BITS), float(MOST_BITS)),
-    Quantity("converter_range", "Pa_a", "pressure at which it shows its largest number", 2.2e6, 1.0e4, 1.0e8),
+    Quantity("converter_range", "Pa_a", "pressure at which it shows its largest number", 1.0e6, 1.0e4, 1.0e8),
     Quantity("force_zero", "N", "force at which the converter shows 0", -200.0, -1.0e5, 0.0),
     Quantity("force_range", "N", "force at which it shows its largest number", 3.4e3, 100.0, 1.0e6),
     Quantity("angle_range", "rad", "angle at which it shows its largest number; 0 rad is 0", 2.8, 0.1, 10.0),

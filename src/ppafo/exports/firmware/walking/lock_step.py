@@ -1,6 +1,6 @@
 """The controller of a walk on the chip's simulator beside the same in Python: drawn readings, or a whole walk."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from ppafo.control.fixed.converter import COMMAND_STEPS
 from ppafo.control.fixed.walking.event_on_off import WalkCounts
 from ppafo.control.fixed.walking.readings import GaitConverter, GaitReadings, read_gait
 from ppafo.engine.lanes import run_batch
+from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import SimulationError
 from ppafo.exports.firmware.lock_step import Comparison, Cost
@@ -22,6 +23,9 @@ from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.sampled import run_sampled_walk
 from ppafo.walking.walk import plan_of, walk_duration
+
+_INSIDE = ("controller_state.", "gait_seen.")
+"""What only the lanes keep: state of their controller, and the last readings."""
 
 SIGN_BITS = 8
 """A chip tells its level above these bits of a word, and its sign in them."""
@@ -93,12 +97,13 @@ def walk_on_chip(configuration: Configuration, minutes: float | None = None) -> 
         cost = _cost(simulator, law.decisions)
     inside = run_batch(batch_of(run))
     rows = state_row_numbers(run)
-    shared = [path for path in rows if not path.startswith("controller_state.")]
-    theirs = inside.record[:, [rows[path] for path in shared], 0]
-    mine = outside.record[:, :, 0]
+    shared = [path for path in rows if not path.startswith(_INSIDE)]
+    own = row_numbers(replace(run.program, controller=None).state_rows())
+    both = ((outside, own), (inside, rows))
+    mine, theirs = (one.record[:, [places[path] for path in shared], 0] for one, places in both)
     differ = int(np.count_nonzero(mine[:, shared.index("result.command")] != theirs[:, shared.index("result.command")]))
     level = law.decisions[-1].is_sound >> SIGN_BITS
-    same = np.array_equal(mine, theirs) and level == inside.record[-1, rows[SAFE_ROW], 0]
+    same = bool(np.array_equal(mine, theirs) and level == inside.record[-1, rows[SAFE_ROW], 0])
     gas = float(mine[-1, shared.index("state.supplied_mass")])
     return WalkOnChip(cost, len(law.decisions), differ, same, level, gas)
 

@@ -1,0 +1,142 @@
+"""Walks whose controller computes with whole numbers: what they cost, that the law decides, when it stops."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ppafo.control.fixed.walking.readings import read_gait
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.rows import leaf_paths, numbers, row_numbers
+from ppafo.engine.run import batch_of
+from ppafo.errors import ProgramError, ScenarioError
+from ppafo.exports.c_library import c_library
+from ppafo.exports.firmware.walking import walk_chip
+from ppafo.exports.firmware.walking.lock_step import PythonWalkChip
+from ppafo.model.command import VENT
+from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSensors
+from ppafo.simulation.sampled import state_row_numbers
+from ppafo.walking.comparison import with_device_off
+from ppafo.walking.loading import load_walk
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.recorded import SAFE_ROW
+from ppafo.walking.sampled import run_sampled_walk
+from ppafo.walking.walk import plan_of, walk
+
+FIXED = "controller.arithmetic=fixed"
+
+
+class InPython:
+    """The integer controller as a Python object."""
+
+    def __init__(self) -> None:
+        self.chip = walk_chip(load_walk("solenoid", (FIXED,)))
+        self.law = PythonWalkChip(self.chip)
+
+    def reset(self) -> None:
+        self.law.begin()
+
+    def update(self, measurement: GaitMeasurement) -> float:
+        return self.law.sample(read_gait(self.chip.converter, measurement))[0] / 1000 or VENT
+
+
+@pytest.mark.parametrize("valve", ["solenoid", "proportional"])
+def test_whole_numbers_cost_less_than_one_percent_of_gas_and_angle_with_either_valve(valve: str) -> None:
+    floats, fixed = (walk("solenoid", 0.2, (f"device.valve={valve}", *further)) for further in ((), (FIXED,)))
+    for name in ("gas", "angle_difference"):
+        assert fixed.metrics[name].value == pytest.approx(floats.metrics[name].value, rel=0.01)
+    assert fixed.metrics["vented_strides"].value == floats.metrics["vented_strides"].value == 0.0
+    assert fixed.recording["command"].tolist() != floats.recording["command"].tolist()
+
+
+def test_the_lanes_decide_as_python_does() -> None:
+    run = plan_walk(plan_of(load_walk("solenoid", (FIXED,)), 4.0))
+    inside, outside = run_batch(batch_of(run)), run_sampled_walk(run, InPython())
+    rows, own = state_row_numbers(run), row_numbers(replace(run.program, controller=None).state_rows())
+    for path in ("result.command", "state.angle", "state.mass_1", "state.mass_2", "state.supplied_mass"):
+        assert np.array_equal(inside.record[:, rows[path], 0], outside.record[:, own[path], 0])
+    assert set(inside.record[:, rows["result.command"], 0]) == {-1.0, 1.0, VENT}
+
+
+def found_at(configuration_overrides: tuple[str, ...], faults: list[dict[str, Fault]]) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] at which each fault makes the controller help less, inf for never, and the levels at the end."""
+    fault = ("faults.heel.kind=frozen", "faults.heel.time=99 s")
+    configuration = load_walk("solenoid", (*configuration_overrides, *fault))
+    run = plan_walk(plan_of(configuration, 9.0))
+    single, rows = batch_of(run), state_row_numbers(run)
+    paths = [path for group, row in single.program.parameter_rows().items() for path in leaf_paths(row, group)]
+    places = [paths.index(path) for path in leaf_paths(GaitSensors, "gait_sensors")]
+    sound = configuration.gait_sensors._replace(heel_fault=configuration.gait_sensors.toe_fault)
+    sensors = [sound._replace(**{f"{name}_fault": value for name, value in one.items()}) for one in faults]
+    parameters = np.repeat(single.parameters, len(sensors), axis=1)
+    parameters[places] = np.array([numbers(one) for one in sensors]).T
+    states = np.repeat(single.states, len(sensors), axis=1)
+    level = run_batch(replace(single, parameters=parameters, states=states)).record[:, rows[SAFE_ROW]]
+    time = np.arange(level.shape[0]) * run.step * run.record_every
+    return np.where(level.any(axis=0), time[np.argmax(level > 0.0, axis=0)], np.inf), level[-1]
+
+
+def test_faults_are_found_as_soon_as_with_floats_and_end_in_the_same_state() -> None:
+    faults = []
+    for at in (3.6, 4.1):
+        dead, held = Fault(at, 0.0, 0.0), Fault(at, 1.0, 0.0)
+        faults += [{sensor: dead} for sensor in ("heel", "toe", "angle", "pressure_1", "pressure_2")]
+        faults += [{sensor: held} for sensor in ("heel", "toe", "angle", "pressure_1", "pressure_2")]
+        faults += [{sensor: Fault(at, 0.0, 5.0e6)} for sensor in ("heel", "toe", "angle", "pressure_1", "pressure_2")]
+        faults += [{"heel": Fault(at, 0.0, 900.0)}, {"heel": dead, "toe": dead}, {}]
+    floats, level = found_at((), faults)
+    fixed, level_of_fixed = found_at((FIXED,), faults)
+    assert np.array_equal(level, level_of_fixed)
+    assert np.array_equal(np.isfinite(floats), np.isfinite(fixed))
+    assert not np.isfinite(floats[[17, 35]]).any()
+    seen = np.isfinite(floats)
+    assert seen.sum() >= 30
+    assert np.abs(fixed[seen] - floats[seen]).max() <= 0.02
+
+
+def test_what_stops_is_told_with_its_sign_and_readings() -> None:
+    found = walk("solenoid", 0.1, (FIXED, "faults.pressure_1.kind=stuck", "faults.pressure_1.time=3 s"))
+    event = found.events[-1]
+    assert event.sign is not None
+    assert (event.sign.name, event.readings["pressure_1"]) == ("pressure_range", 0.0)
+    assert event.time == pytest.approx(3.0, abs=2.0e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "said"),
+    [
+        ("solenoid", (FIXED, "controller.converter_bits=9.5"), "controller.converter_bits = 9.5: must be whole"),
+        ("solenoid", (FIXED, "controller.converter_bits=15"), "must be at least 8 and at most 14"),
+        ("solenoid", (FIXED, "controller.rate=8 kHz"), "first_stride .* would be 17600, beyond 0 to 16382"),
+        ("solenoid", (FIXED, "controller.longest_phase=3"), "longest_phase .* would be 49152, beyond 0 to 32767"),
+        ("solenoid", (FIXED, "timing.kind=fractional"), "know the time in the stride by thresholds only"),
+        ("solenoid", ("controller.converter_bits=10",), r'needs controller.arithmetic = "fixed"'),
+        ("proportional", (FIXED,), "no value 'controller.arithmetic'"),
+    ],
+)
+def test_what_whole_numbers_cannot_hold_is_refused(name: str, overrides: tuple[str, ...], said: str) -> None:
+    with pytest.raises(ScenarioError, match=said):
+        load_walk(name, overrides)
+
+
+def test_the_device_off_and_another_controller_have_no_whole_numbers() -> None:
+    configuration = load_walk("solenoid", (FIXED,))
+    assert configuration.converter is not None
+    assert with_device_off(configuration).converter is None
+    assert (
+        load_walk("proportional", ("controller.kind=event_on_off", FIXED, "controller.kind=event_pid")).converter
+        is None
+    )
+
+
+def test_whole_numbers_have_no_exported_library() -> None:
+    with pytest.raises(ProgramError, match="no library yet; 'ppafo firmware' writes it"):
+        c_library(load_walk("solenoid", (FIXED,)))
+
+
+def test_a_late_sensor_has_no_controller_outside_the_lanes() -> None:
+    late = load_walk(
+        "solenoid", (FIXED, "faults.heel.kind=distorted", "faults.heel.time=1 s", "faults.heel.delay=9 ms")
+    )
+    with pytest.raises(ScenarioError, match="no controller outside the lanes"):
+        run_sampled_walk(plan_walk(plan_of(late, 4.0)), InPython())
