@@ -6,6 +6,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.simulation.reading import Reading, short_quantity_text
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.fixed_point import check_fixed_walk
 from ppafo.walking.planning import walking_valve
 
 _NEWTON, _RADIAN, _SECOND, _METRE, _PASCAL = "N", "rad", "s", "m", "Pa_a"
@@ -18,6 +19,7 @@ def check_walk(configuration: Configuration, reading: Reading) -> None:
     """Raise ScenarioError with the first contradiction; ``reading`` tells how a value was given."""
     for path, reason in _contradictions(configuration):
         raise reading.refusal(path, reason) if _is_given(reading, path) else _of_default(reading, path, reason)
+    check_fixed_walk(configuration)
 
 
 def _is_given(reading: Reading, path: str) -> bool:

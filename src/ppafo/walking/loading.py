@@ -46,7 +46,6 @@ from ppafo.walking.declaration import (
     quantities,
     timing_settings,
 )
-from ppafo.walking.fixed_point import check_fixed_walk
 from ppafo.walking.gait_subject import read_wearer, wearer_origin
 from ppafo.walking.planning import course_of_walk, walking_valve
 from ppafo.walking.schema import walk_file
@@ -97,7 +96,6 @@ def load_walk(
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
     law = walking_controllers()[kind_at(document, "controller")]
-    kind = _timed(law, reading)
     device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
     walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
     is_named = gait is not None or "gait" in document
@@ -111,7 +109,7 @@ def load_walk(
         device=device,
         gait=walked,
         wearer=read_wearer(reading, walked, is_named),
-        controller=kind,
+        controller=_timed(law, reading),
         settings=_controller_settings(reading, law, device) | _timing_settings(reading, device, gait_sensors),
         sensors=_sensors(reading),
         gait_sensors=gait_sensors,
@@ -131,7 +129,6 @@ def load_walk(
         converter=_converter(reading, law),
     )
     check_walk(configuration, reading)
-    check_fixed_walk(configuration)
     course_of_walk(configuration)
     return configuration
 

@@ -65,7 +65,14 @@ def _measurements(batch: Batch, block: LaneBlock, step: float) -> Callable[[int]
         pressures = chamber_pressures(plant, angle, mass_1, mass_2)
         if program.ideal_sensors:
             torque = actuator_torque(*pressures, plant.torque_constant)
-            return GaitMeasurement(angle, *pressures, torque, heel, toe)
+            return GaitMeasurement(
+                angle=angle,
+                pressure_1=pressures[0],
+                pressure_2=pressures[1],
+                torque=torque,
+                heel_force=heel,
+                toe_force=toe,
+            )
         time = sample * batch.clock.steps_per_sample * step
         seen, last = measure_gait(
             sensors, gait_sensors, last, angle, *pressures, heel, toe, plant.torque_constant, time, sample

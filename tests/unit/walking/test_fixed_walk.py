@@ -1,6 +1,7 @@
 """Walks whose controller computes with whole numbers: what they cost, that the law decides, when it stops."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,7 +59,7 @@ def test_the_lanes_decide_as_python_does() -> None:
     assert set(inside.record[:, rows["result.command"], 0]) == {-1.0, 1.0, VENT}
 
 
-def found_at(configuration_overrides: tuple[str, ...], faults: list[dict[str, Fault]]) -> tuple[np.ndarray, np.ndarray]:
+def found_at(configuration_overrides: tuple[str, ...], faults: list[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] at which each fault makes the controller help less, inf for never, and the levels at the end."""
     fault = ("faults.heel.kind=frozen", "faults.heel.time=99 s")
     configuration = load_walk("solenoid", (*configuration_overrides, *fault))

@@ -79,7 +79,8 @@ def walk_chip(configuration: Configuration) -> WalkChip:
             f"up to {MOST_TICKS // 2 * TICK:.3g} s"
         )
     law = FIXED_WALKS[configuration.controller.name]
-    return WalkChip(law, numbers_of_walk(configuration), converter_of_walk(configuration), ticks)
+    numbers = numbers_of_walk(configuration)
+    return WalkChip(law=law, numbers=numbers, converter=converter_of_walk(configuration), ticks=ticks)
 
 
 def walk_firmware(configuration: Configuration, target: str = WALK_TARGETS[0]) -> dict[str, bytes]:

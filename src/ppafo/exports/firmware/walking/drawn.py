@@ -14,7 +14,7 @@ from ppafo.model.gait_sensors import GaitMeasurement
 
 EPISODES = (1200, 3600)
 """Samples from one reset to the next, at least and at most."""
-_FILLED, _ROOM = 4.4e5, 1.013e5
+_FILLED, _ROOM, _UPRIGHT = 4.4e5, 1.013e5, 1.57
 _ENDS = ("low end", "high end", "noise", "edges")
 _FAULTS = ("none", "none", "stuck", "frozen", "frozen", "room", "room", "offset", "swapped", "on and off", *_ENDS)
 _LATE = "late"
@@ -83,7 +83,7 @@ class DrawnGait:
         self._left -= 1
         self._at += 1
         self._sample += 1
-        return GaitReadings(*self._shown), begins
+        return GaitReadings._make(self._shown), begins
 
     def _forces(self, part: float) -> tuple[float, float]:
         """Forces under heel and toes [N] at a part of the stride."""
@@ -115,7 +115,7 @@ class DrawnGait:
             target, lag = (_FILLED, 12.0) if feeds else (_ROOM, 25.0)
             self._pressures[chamber] += (target - self._pressures[chamber]) / lag
         return GaitMeasurement(
-            angle=1.57 + turned + 1.0e-3 * moves,
+            angle=_UPRIGHT + turned + 1.0e-3 * moves,
             pressure_1=self._pressures[0],
             pressure_2=self._pressures[1],
             torque=0.0,
@@ -147,7 +147,10 @@ class DrawnGait:
     @property
     def _room(self) -> GaitReadings:
         """Nothing on the foot, and no gas in the chambers."""
-        return read_gait(self._converter, GaitMeasurement(1.57, _ROOM, _ROOM, 0.0, 0.0, 0.0))
+        seen = GaitMeasurement(
+            angle=_UPRIGHT, pressure_1=_ROOM, pressure_2=_ROOM, torque=0.0, heel_force=0.0, toe_force=0.0
+        )
+        return read_gait(self._converter, seen)
 
 
 def _bump(part: float, start: float, end: float) -> float:

@@ -133,4 +133,9 @@ def _cost(simulator: ChipSimulator, decisions: list[Decision]) -> Cost:
     if not decisions:
         raise SimulationError("no sample was taken on the chip")
     cycles = [item.cycles for item in decisions]
-    return Cost(simulator.sizes, simulator.stack(), max(cycles), sum(cycles) / len(cycles))
+    return Cost(
+        sizes=simulator.sizes,
+        stack=simulator.stack(),
+        worst_cycles=max(cycles),
+        mean_cycles=sum(cycles) / len(cycles),
+    )
