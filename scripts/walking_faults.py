@@ -44,6 +44,9 @@ TORQUE, CLEARANCE, SETTLED = 1.0, 0.002, 0.5
 LATER = 0.05
 """Strides by which two that find a fault may differ without a line."""
 
+NEAR = 1.5 * RECORD_EVERY * 1.0e-3
+"""Time [s] by which two that find it at about the same sample differ at most in the record."""
+
 PERIOD = 1.0e-3
 LATEST = 200.0
 """The longest delay of a sensor, in samples."""
@@ -237,28 +240,46 @@ def verdicts(kind_names: list[str], runs: dict[str, Runs], lowest: dict[str, flo
     return table
 
 
+def toes_of_bare(configuration: Configuration) -> float:
+    """Lowest toes in mid-swing against the healthy ones [m], with the device off."""
+    stride = configuration.gait.stride_time
+    bare = plan_walk(plan_of(with_device_off(configuration), (FIRST + 1.0 + AFTER) * stride))
+    batch = batch_of(bare)
+    record = run_batch(replace(batch, clock=replace(batch.clock, record_every=RECORD_EVERY))).record
+    return float(judged(bare, record, state_row_numbers(bare), np.array([FIRST * stride]), stride)[2][0])
+
+
 def compare_arithmetics() -> None:
     """Run ``event_on_off`` on either valve, with floats and on whole numbers, and print where they differ."""
     stride = load_walk("solenoid").gait.stride_time
     begins, every = (FIRST + np.arange(PHASES) / PHASES) * stride, kinds()
     for valve in ("solenoid", "proportional"):
         own = ("controller.kind=event_on_off", f"device.valve={valve}")
-        floats, whole = (
-            run(load_walk("solenoid", (*own, *further)), list(every.values()), begins)
-            for further in ((), ("controller.arithmetic=fixed",))
+        walks = [load_walk("solenoid", (*own, *further)) for further in ((), ("controller.arithmetic=fixed",))]
+        both = [run(configuration, list(every.values()), begins) for configuration in walks]
+        seen, found = (np.isfinite(one.found) for one in both)
+        later = np.zeros(seen.shape)
+        later[seen & found] = both[1].found[seen & found] - both[0].found[seen & found]
+        floor = toes_of_bare(walks[0]) - CLEARANCE
+        bad = [neither(one, floor) for one in both]
+        print(
+            f"{valve}: {seen.size} runs, {seen.sum()} found with floats and {found.sum()} on whole numbers, neither "
+            f"found nor harmless {bad[0].sum()} and {bad[1].sum()}; later by {later.max():.2f} strides at most, within "
+            f"{NEAR * 1.0e3:g} ms of each other in {(np.abs(later[seen & found]) * stride < NEAR).sum()}"
         )
-        seen, found = np.isfinite(floats.found), np.isfinite(whole.found)
-        both = seen & found
-        later = np.where(both, whole.found - np.where(both, floats.found, 0.0), 0.0)
-        words = (
-            f"{seen.size} runs, {seen.sum()} found with floats, {found.sum()} on whole numbers, {both.sum()} by both"
-        )
-        print(f"{valve}: {words}; later by {later.max():.3f}, earlier by {-later.min():.3f} strides at most")
         for row, what in enumerate(every):
-            ends = [np.nanmax(np.where(np.isfinite(one.found[row]), one.found[row], -1.0)) for one in (floats, whole)]
             if (seen[row] != found[row]).any() or np.abs(later[row]).max() > LATER:
                 counts = f"{seen[row].sum()} and {found[row].sum()} of {PHASES} found"
-                print(f"  {what}: {counts}, within {ends[0]:.2f} and {ends[1]:.2f} strides")
+                ends = [np.where(np.isfinite(one.found[row]), one.found[row], 0.0).max() for one in both]
+                harm = f"neither found nor harmless {bad[0][row].sum()} and {bad[1][row].sum()}"
+                print(f"  {what}: {counts}, within {ends[0]:.2f} and {ends[1]:.2f} strides, {harm}")
+
+
+def neither(runs: Runs, floor: float) -> NDArray[np.bool_]:
+    """Where a fault is not found in time and does harm, (kinds, PHASES), for the lowest toes [m] that are none."""
+    harmless = (runs.torque <= TORQUE) & (runs.toes >= floor)
+    settled = np.isfinite(runs.found) & (runs.late_torque <= TORQUE) & (runs.late_toes >= floor)
+    return ~(harmless | settled)
 
 
 def main() -> None:
@@ -268,11 +289,7 @@ def main() -> None:
     every = kinds()
     runs, lowest = {}, {}
     for name in CONFIGURATIONS:
-        bare = plan_walk(plan_of(with_device_off(load_walk(name)), (FIRST + 1.0 + AFTER) * stride))
-        record = run_batch(
-            replace(batch_of(bare), clock=replace(batch_of(bare).clock, record_every=RECORD_EVERY))
-        ).record
-        lowest[name] = float(judged(bare, record, state_row_numbers(bare), np.array([FIRST * stride]), stride)[2][0])
+        lowest[name] = toes_of_bare(load_walk(name))
         sound = run(load_walk(name), [{}], begins[:1])
         toes = f"toes {100.0 * sound.toes.min():.1f} cm against the healthy ones"
         bare_toes = f"without the device {100.0 * lowest[name]:.1f} cm"

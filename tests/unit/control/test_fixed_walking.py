@@ -18,7 +18,9 @@ from ppafo.model.gait_sensors import GaitMeasurement
 
 PERIOD = 1.0e-3
 SET = {item.name: float(item.default or 0.0) for item in FLOAT_KIND.quantities}
-CONVERTER = gait_converter(*(float(item.default or 0.0) for item in SETTINGS))
+GIVEN = {item.name: float(item.default or 0.0) for item in SETTINGS}
+# Both ends of this range of pressures are no readings with floats either.
+CONVERTER = gait_converter(*(GIVEN | {"converter_range": 2.2e6}).values())
 NUMBERS = EVENT_ON_OFF.prepare(SET, PERIOD, CONVERTER)
 RULES = Numbers(
     load=1200, unload=1050, debounce=10, first_stride=2200, stride_weight=9830, push_off_start=6554

@@ -13,17 +13,8 @@ from ppafo.control.fixed.walking.phases import (
     part_of,
 )
 from ppafo.control.fixed.walking.readings import GaitReadings
-from ppafo.control.fixed.walking.safety import (
-    BOTH,
-    NO_SIGN,
-    SafetyCounts,
-    SafetyNumbers,
-    found_sign,
-    is_gone,
-    next_level,
-    permits,
-    remembered,
-)
+from ppafo.control.fixed.walking.safety import next_level, permits, remembered
+from ppafo.control.fixed.walking.signs import BOTH, NO_SIGN, SafetyCounts, SafetyNumbers, found_sign, is_gone
 
 
 class WalkNumbers(NamedTuple):
@@ -64,9 +55,8 @@ def sample(numbers: WalkNumbers, state: WalkCounts, readings: GaitReadings) -> t
     last = state.safety
     phase = next_phase_state(numbers.phase, state.phase, readings.heel, readings.toe)
     now = remembered(numbers.safety, last, state.phase, phase, readings)
-    gone = is_gone(numbers.safety, last.heel.last, readings.heel) or is_gone(
-        numbers.safety, last.toe.last, readings.toe
-    )
+    still = numbers.safety.still
+    gone = is_gone(still, last.heel.last, readings.heel) or is_gone(still, last.toe.last, readings.toe)
     sign = found_sign(numbers.safety, gone, now, state.phase, phase, readings)
     good_strides = now.good_strides if sign == NO_SIGN else -1
     standing = phase.spell if phase.heel.loaded + phase.toe.loaded == BOTH else 0
@@ -88,8 +78,7 @@ def sample(numbers: WalkNumbers, state: WalkCounts, readings: GaitReadings) -> t
         angle=now.angle,
         landing=now.landing,
         emptying=now.emptying,
-        slow_pressure_1=now.slow_pressure_1,
-        slow_pressure_2=now.slow_pressure_2,
+        slow=now.slow,
     )
     command = COMMAND_STEPS if side > 0 else (-COMMAND_STEPS if side < 0 else 0)
     return command, WalkCounts(phase, safety, lifting)

@@ -10,7 +10,7 @@ from ppafo.control.fixed.walking.numbers import NUMBERS, whole_numbers
 from ppafo.control.fixed.walking.phases import HALVES, LONGEST, PUSH_OFF, SEVERAL, PhaseCounts, SwitchCounts
 from ppafo.control.fixed.walking.readings import OF_CONVERTER, TOP, GaitConverter, GaitReadings, read_gait
 from ppafo.control.fixed.walking.rows import kept_walk_counts, whole_walk_counts, whole_walk_numbers
-from ppafo.control.fixed.walking.safety import LATE_FORCES, MOST_STRIDES, STOPPED, SafetyCounts
+from ppafo.control.fixed.walking.signs import LATE_FORCES, MOST_STRIDES, STOPPED, PressureCounts, SafetyCounts
 from ppafo.control.fixed.walking.traces import MOST_LATE, EmptyingCounts, LandingCounts, TraceCounts
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.event_on_off import KIND as FLOAT_KIND
@@ -93,8 +93,7 @@ START_COUNTS = WalkCounts(
         angle=_TRACE,
         landing=LandingCounts(lowest=0, mark=0, late=0),
         emptying=EmptyingCounts(lowest=0, angle=0, rising=0),
-        slow_pressure_1=0,
-        slow_pressure_2=0,
+        slow=PressureCounts(0, 0),
     ),
     lifting=0,
 )
@@ -126,8 +125,8 @@ STATE_RANGES = {
     "late": (0, MOST_LATE),
     "angle": _READING,
     "rising": _TIME,
-    "slow_pressure_1": _READING,
-    "slow_pressure_2": _READING,
+    "first": _READING,
+    "second": _READING,
     "lifting": _BIT,
 }
 """Lowest and highest of every number of ``WalkCounts``, by its own name."""

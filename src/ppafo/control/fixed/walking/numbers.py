@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from ppafo.control.fixed.arithmetic import FRACTION_BITS, LARGEST_FRACTION
 from ppafo.control.fixed.walking.phases import HALVES, LONGEST, STRIDE_SHARE
 from ppafo.control.fixed.walking.readings import TOP, GaitConverter
-from ppafo.control.fixed.walking.safety import MOST_STRIDES
+from ppafo.control.fixed.walking.signs import MOST_STRIDES
 from ppafo.control.walking import readings, safety
 from ppafo.model.declaration import Quantity
 
@@ -48,27 +48,27 @@ NUMBERS = (
     _count("largest_force", "a force above this is no reading"),
     _count("lowest_angle", "an angle below this is no reading"),
     _count("highest_angle", "an angle above this is no reading"),
-    _stride_share("longest_phase", "longest stance or swing"),
-    _samples("frozen", "a loaded sensor whose reading stays the same for longer is frozen"),
-    _strides("most_toe_strides", "strides in a row that may be on the toes alone"),
-    _stride_share("flat_from", "from here on heel and toes are both loaded"),
-    _stride_share("flat_to", "and until here"),
     _count("lowest_pressure", "a pressure below this is no reading"),
     _count("highest_pressure", "a pressure above this is no reading"),
+    _stride_share("longest_phase", "longest stance or swing"),
+    _stride_share("flat_from", "from here on heel and toes are both loaded"),
+    _stride_share("flat_to", "and until here"),
+    _stride_share("shortest_swing", "shortest swing of a steady stride"),
+    _stride_share("steady", "by how much a usual stride is longer or shorter"),
+    _strides("most_toe_strides", "strides in a row that may be on the toes alone"),
+    _strides("resume_strides", "good strides in a row after which a pause ends"),
+    _count("lowest_flat_angle", "no ankle has less while the foot stands flat"),
+    _count("highest_flat_angle", "no ankle has more while the foot stands flat"),
+    _samples("frozen", "a loaded sensor whose reading stays the same for longer is frozen"),
+    _count("moves", "a force further than this from its slow reading moves"),
+    _count("turns", "an angle further than this from its slow reading moves"),
+    _count("largest_drop", "no force above this is gone within a sample"),
+    _count("gone", "a force below this is gone"),
     _samples("fill", "a chamber is filled when the valve has fed it for longer"),
     _samples("vent", "both are vented when the valve has vented them for longer"),
     _samples("late_vent", "and chamber 2 for sure after this"),
-    _stride_share("shortest_swing", "shortest swing of a steady stride"),
-    _stride_share("steady", "by how much a usual stride is longer or shorter"),
-    _strides("resume_strides", "good strides in a row after which a pause ends"),
-    _count("largest_drop", "no force above this is gone within a sample"),
-    _count("gone", "a force below this is gone"),
-    _count("lowest_flat_angle", "no ankle has less while the foot stands flat"),
-    _count("highest_flat_angle", "no ankle has more while the foot stands flat"),
-    _count("moves", "a force further than this from its slow reading moves"),
-    _count("turns", "an angle further than this from its slow reading moves"),
-    _samples("stands_up", "who stands for longer after sitting is helped again"),
     _samples("lasts", "a pressure that rises for longer in a vented chamber was there before"),
+    _samples("stands_up", "who stands for longer after sitting is helped again"),
     _share("slow_share", "share of a change that slow readings take at once"),
     _share("fall_share", "share of a change that slow pressures take at once"),
     _count("fades", "what the highest angle of a swing loses at each sample"),

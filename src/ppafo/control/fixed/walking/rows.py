@@ -4,7 +4,15 @@ from typing import Any
 
 from ppafo.control.fixed.walking.event_on_off import WalkCounts, WalkNumbers
 from ppafo.control.fixed.walking.phases import PhaseCounts, PhaseNumbers, SwitchCounts
-from ppafo.control.fixed.walking.safety import SafetyCounts, SafetyNumbers
+from ppafo.control.fixed.walking.signs import (
+    PressureCounts,
+    RangeNumbers,
+    SafetyCounts,
+    SafetyNumbers,
+    StillNumbers,
+    StrideNumbers,
+    ValveNumbers,
+)
 from ppafo.control.fixed.walking.traces import (
     EmptyingCounts,
     EmptyingNumbers,
@@ -28,6 +36,54 @@ def whole_phase_numbers(row: PhaseNumbers) -> PhaseNumbers:
         first_stride=int(row.first_stride),
         stride_weight=int(row.stride_weight),
         push_off_start=int(row.push_off_start),
+    )
+
+
+def whole_range_numbers(row: RangeNumbers) -> RangeNumbers:
+    """Whole ranges of the readings."""
+    return RangeNumbers(
+        lowest_force=int(row.lowest_force),
+        largest_force=int(row.largest_force),
+        lowest_angle=int(row.lowest_angle),
+        highest_angle=int(row.highest_angle),
+        lowest_pressure=int(row.lowest_pressure),
+        highest_pressure=int(row.highest_pressure),
+    )
+
+
+def whole_stride_numbers(row: StrideNumbers) -> StrideNumbers:
+    """Whole numbers of a stride."""
+    return StrideNumbers(
+        longest_phase=int(row.longest_phase),
+        flat_from=int(row.flat_from),
+        flat_to=int(row.flat_to),
+        shortest_swing=int(row.shortest_swing),
+        steady=int(row.steady),
+        most_toe_strides=int(row.most_toe_strides),
+        resume_strides=int(row.resume_strides),
+        lowest_flat_angle=int(row.lowest_flat_angle),
+        highest_flat_angle=int(row.highest_flat_angle),
+    )
+
+
+def whole_still_numbers(row: StillNumbers) -> StillNumbers:
+    """Whole numbers of readings that rest or drop."""
+    return StillNumbers(
+        frozen=int(row.frozen),
+        moves=int(row.moves),
+        turns=int(row.turns),
+        largest_drop=int(row.largest_drop),
+        gone=int(row.gone),
+    )
+
+
+def whole_valve_numbers(row: ValveNumbers) -> ValveNumbers:
+    """Whole numbers of the valve."""
+    return ValveNumbers(
+        fill=int(row.fill),
+        vent=int(row.vent),
+        late_vent=int(row.late_vent),
+        lasts=int(row.lasts),
     )
 
 
@@ -58,31 +114,11 @@ def whole_emptying_numbers(row: EmptyingNumbers) -> EmptyingNumbers:
 def whole_safety_numbers(row: SafetyNumbers) -> SafetyNumbers:
     """Whole numbers of the signs."""
     return SafetyNumbers(
-        lowest_force=int(row.lowest_force),
-        largest_force=int(row.largest_force),
-        lowest_angle=int(row.lowest_angle),
-        highest_angle=int(row.highest_angle),
-        longest_phase=int(row.longest_phase),
-        frozen=int(row.frozen),
-        most_toe_strides=int(row.most_toe_strides),
-        flat_from=int(row.flat_from),
-        flat_to=int(row.flat_to),
-        lowest_pressure=int(row.lowest_pressure),
-        highest_pressure=int(row.highest_pressure),
-        fill=int(row.fill),
-        vent=int(row.vent),
-        late_vent=int(row.late_vent),
-        shortest_swing=int(row.shortest_swing),
-        steady=int(row.steady),
-        resume_strides=int(row.resume_strides),
-        largest_drop=int(row.largest_drop),
-        gone=int(row.gone),
-        lowest_flat_angle=int(row.lowest_flat_angle),
-        highest_flat_angle=int(row.highest_flat_angle),
-        moves=int(row.moves),
-        turns=int(row.turns),
+        ranges=whole_range_numbers(row.ranges),
+        stride=whole_stride_numbers(row.stride),
+        still=whole_still_numbers(row.still),
+        valve=whole_valve_numbers(row.valve),
         stands_up=int(row.stands_up),
-        lasts=int(row.lasts),
         trace=whole_trace_numbers(row.trace),
         emptying=whole_emptying_numbers(row.emptying),
     )
@@ -147,6 +183,14 @@ def whole_emptying_counts(row: EmptyingCounts) -> EmptyingCounts:
     )
 
 
+def whole_pressure_counts(row: PressureCounts) -> PressureCounts:
+    """Whole: slow pressures."""
+    return PressureCounts(
+        first=int(row.first),
+        second=int(row.second),
+    )
+
+
 def whole_safety_counts(row: SafetyCounts) -> SafetyCounts:
     """Whole: the safety."""
     return SafetyCounts(
@@ -164,8 +208,7 @@ def whole_safety_counts(row: SafetyCounts) -> SafetyCounts:
         angle=whole_trace_counts(row.angle),
         landing=whole_landing_counts(row.landing),
         emptying=whole_emptying_counts(row.emptying),
-        slow_pressure_1=int(row.slow_pressure_1),
-        slow_pressure_2=int(row.slow_pressure_2),
+        slow=whole_pressure_counts(row.slow),
     )
 
 
@@ -226,6 +269,14 @@ def kept_emptying_counts(row: EmptyingCounts) -> EmptyingCounts:
     )
 
 
+def kept_pressure_counts(row: PressureCounts) -> PressureCounts:
+    """As the lanes keep it: slow pressures."""
+    return PressureCounts(
+        first=kept(row.first),
+        second=kept(row.second),
+    )
+
+
 def kept_safety_counts(row: SafetyCounts) -> SafetyCounts:
     """As the lanes keep it: the safety."""
     return SafetyCounts(
@@ -243,8 +294,7 @@ def kept_safety_counts(row: SafetyCounts) -> SafetyCounts:
         angle=kept_trace_counts(row.angle),
         landing=kept_landing_counts(row.landing),
         emptying=kept_emptying_counts(row.emptying),
-        slow_pressure_1=kept(row.slow_pressure_1),
-        slow_pressure_2=kept(row.slow_pressure_2),
+        slow=kept_pressure_counts(row.slow),
     )
 
 
