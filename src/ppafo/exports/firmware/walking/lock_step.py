@@ -27,6 +27,9 @@ from ppafo.walking.walk import plan_of, walk_duration
 _INSIDE = ("controller_state.", "gait_seen.")
 """What only the lanes keep: state of their controller, and the last readings."""
 
+TURN = 50
+"""Drawn samples that the chip is asked at once."""
+
 SIGN_BITS = 8
 """A chip tells its level above these bits of a word, and its sign in them."""
 
@@ -111,22 +114,29 @@ def walk_on_chip(configuration: Configuration, minutes: float | None = None) -> 
 def compare_drawn_walk(configuration: Configuration, samples: int, seed: int = 1) -> Comparison:
     """Give drawn readings of a gait to the chip's simulator and to Python, with a reset before every episode."""
     chip = walk_chip(configuration)
-    reference, decisions, differences, first = PythonWalkChip(chip), [], 0, ""
-    drawn, command = DrawnGait(chip.converter, seed), 0
+    reference, drawn, command = PythonWalkChip(chip), DrawnGait(chip.converter, seed), 0
+    decisions: list[Decision] = []
+    wanted: list[tuple[int, int]] = []
+    asked: list[GaitReadings] = []
     with ChipSimulator(walk_firmware(configuration), RAM) as simulator:
-        for number in range(samples):
+        for _ in range(samples):
             readings, begins = drawn.next(command)
+            if begins or len(asked) == TURN:
+                decisions += simulator.samples(asked)
+                asked = []
             if begins:
                 reference.begin()
                 simulator.begin()
-            wanted, found = reference.sample(readings), simulator.sample(readings)
-            command = wanted[0]
-            decisions.append(found)
-            if wanted != found[:2]:
-                differences += 1
-                first = first or f"sample {number}, {tuple(readings)}: {found[:2]} on the chip, {wanted} in Python"
+            asked.append(readings)
+            wanted.append(reference.sample(readings))
+            command = wanted[-1][0]
+        decisions += simulator.samples(asked)
         cost = _cost(simulator, decisions)
-    return Comparison(samples, differences, first, cost)
+    differ = [place for place, found in enumerate(decisions) if found[:2] != wanted[place]]
+    first = ""
+    if differ:
+        first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the chip, {wanted[differ[0]]} in Python"
+    return Comparison(samples, len(differ), first, cost)
 
 
 def _cost(simulator: ChipSimulator, decisions: list[Decision]) -> Cost:
