@@ -214,7 +214,7 @@ def remembered(
     period: float,
 ) -> SafetyState:
     """The state with what the signs remember of a sample of ``period`` [s]; the level is as it was."""
-    seen = readings.next_readings(state.readings, measurement, period)
+    seen = readings.next_readings(state.readings, measurement, phase, period)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
@@ -226,7 +226,7 @@ def remembered(
         ventings=state.ventings,
         finding=state.finding,
         readings=seen,
-        landing=readings.next_landing(state.landing, seen, before, phase, steady, period),
+        landing=readings.next_landing(rules, state.landing, seen, before, phase, steady, period),
         stance=next_stance(state.stance, before, phase, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,
@@ -247,7 +247,8 @@ def found_sign(
     period: float,
 ) -> float:
     """The sign of a sample that comes first in ``signs``; ``last`` are the readings before it, ``now`` remembers it."""
-    sign = signs.LATE_FORCES if now.landing.late > LATE_STRIDES else NO_SIGN
+    late = max(now.landing.late, now.landing.late_toes) > LATE_STRIDES
+    sign = signs.LATE_FORCES if late else NO_SIGN
     sign = signs.TOE_STRIDES if now.toe_strides > rules.most_toe_strides else sign
     sign = first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if now.steady > 0.5 else sign
     sign = first_sign(gait_sign(rules, before, phase, now.stance), sign)

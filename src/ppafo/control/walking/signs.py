@@ -68,6 +68,7 @@ class SafetyRules(NamedTuple):
     lowest_flat_angle: float
     highest_flat_angle: float
     follow_time: float
+    highest_toe_off_angle: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +132,10 @@ SIGNS: dict[float, Sign] = {
     ),
     TOE_STRIDES: Sign("toe_strides", "strides on the toes alone, one after the other", FORCES, ("most_toe_strides",)),
     LATE_FORCES: Sign(
-        "late_forces", "two strides in which the ankle shows the foot flat before the forces do", (*FORCES, "angle"), ()
+        "late_forces",
+        "two strides in which the ankle shows the foot flat, or in the air, before the forces do",
+        (*FORCES, "angle"),
+        ("highest_toe_off_angle",),
     ),
 }
 """Every sign by its number: those up to ``FORCE_GONE`` stop, from ``NO_HEEL`` on the foot is lifted only."""
