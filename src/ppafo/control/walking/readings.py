@@ -114,6 +114,9 @@ SHOWN = 0.1
 COMPRESSES = 0.02
 """Angle in plantarflexion [rad] from which the ankle compresses chamber 2 by enough to raise its pressure."""
 
+THIN, THIN_TIME = 7.0e4, 0.12
+"""Pressure [Pa] below which no chamber stays for longer than this time [s]: a moving foot lowers one to 60 kPa."""
+
 FALL_TIME = 0.03
 """Time constant [s] of the slow pressures, which tell whether a reading falls."""
 
@@ -150,8 +153,8 @@ def next_readings(last: LastReadings, measurement: GaitMeasurement, phase: Phase
     """The last readings after a sample, taken every ``period`` [s]; ``phase`` is that of the sample.
 
     Who stands with heel and toes on the ground has no moving sensor, and the steps of a converter then hold a reading
-    for long: a sensor is still only while another one moves. On the toes alone nobody stands still, and nobody lands for
-    long; on the heel alone somebody does whose toes the device holds up.
+    for long: a sensor is still only while another one moves. On the toes alone nobody stands still, and nobody lands
+    for long; on the heel alone somebody stands whose toes the device holds up.
     """
     is_first = last.angle == 0.0
     slow_heel = slow_reading(last.slow_heel, measurement.heel_force, is_first, period)
@@ -182,14 +185,19 @@ def next_readings(last: LastReadings, measurement: GaitMeasurement, phase: Phase
     )
 
 
-def range_sign(rules: SafetyRules, measurement: GaitMeasurement) -> float:
-    """The sign of a reading that no foot and no chamber gives."""
+def next_thin(last: float, measurement: GaitMeasurement, period: float) -> float:
+    """How long the lower pressure has been below ``THIN`` [s]."""
+    return last + period if min(measurement.pressure_1, measurement.pressure_2) < THIN else 0.0
+
+
+def range_sign(rules: SafetyRules, measurement: GaitMeasurement, thin: float) -> float:
+    """The sign of a reading that no foot and no chamber gives; one is thin for a time [s]."""
     force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
     force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
     angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
     squeezed = measurement.angle > SQUEEZING_ANGLE
     pressure = min(measurement.pressure_1, measurement.pressure_2) < rules.lowest_pressure
-    pressure = pressure | (measurement.pressure_1 > rules.highest_pressure)
+    pressure = pressure | (thin > THIN_TIME) | (measurement.pressure_1 > rules.highest_pressure)
     pressure = pressure | ((measurement.pressure_2 > rules.highest_pressure) & (not squeezed))
     found = signs.PRESSURE_RANGE if pressure else NO_SIGN
     found = signs.ANGLE_RANGE if angle else found

@@ -68,7 +68,8 @@ class SafetyState(NamedTuple):
     """Level of ``signs``; good strides in a row; how often help got less, and the last; what the signs remember.
 
     ``toe_strides`` are strides in a row on the toes alone, and ``steady`` is 1 where the last stride took about the
-    stride time. ``slow_pressure_1`` and ``_2`` [Pa] are above a reading that falls.
+    stride time. ``slow_pressure_1`` and ``_2`` [Pa] are above a reading that falls; ``thin`` [s] is how long one of
+    both has been below the pressure of a chamber at rest.
     """
 
     level: float
@@ -84,6 +85,7 @@ class SafetyState(NamedTuple):
     emptying: Emptying
     slow_pressure_1: float
     slow_pressure_2: float
+    thin: float
 
 
 START = SafetyState(
@@ -100,6 +102,7 @@ START = SafetyState(
     emptying=NOT_EMPTYING,
     slow_pressure_1=0.0,
     slow_pressure_2=0.0,
+    thin=0.0,
 )
 
 LIFT_STRIDES = 1.0
@@ -234,6 +237,7 @@ def remembered(
         emptying=readings.next_emptying(rules, state.emptying, vented, measurement, period),
         slow_pressure_1=readings.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
         slow_pressure_2=readings.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
+        thin=readings.next_thin(state.thin, measurement, period),
     )
 
 
@@ -254,7 +258,7 @@ def found_sign(
     sign = first_sign(gait_sign(rules, before, phase, now.stance), sign)
     sign = first_sign(readings.still_sign(rules, now.readings, before, phase), sign)
     sign = first_sign(readings.gone_sign(rules, last, measurement, period), sign)
-    sign = first_sign(readings.range_sign(rules, measurement), sign)
+    sign = first_sign(readings.range_sign(rules, measurement, now.thin), sign)
     return first_sign(valve_sign(rules, now, phase, measurement), sign)
 
 
@@ -286,6 +290,7 @@ def monitor(
         emptying=now.emptying,
         slow_pressure_1=now.slow_pressure_1,
         slow_pressure_2=now.slow_pressure_2,
+        thin=now.thin,
     )
 
 
@@ -336,4 +341,5 @@ def safe_command(state: SafetyState, phase: float, command: float, period: float
         emptying=state.emptying,
         slow_pressure_1=state.slow_pressure_1,
         slow_pressure_2=state.slow_pressure_2,
+        thin=state.thin,
     )

@@ -104,13 +104,13 @@ SIGNS: dict[float, Sign] = {
     FROZEN_ANGLE: Sign("frozen_angle", "an angle that stays the same for a whole stride", ("angle",), ()),
     FORCE_GONE: Sign("force_gone", "a large force that is gone within a sample", FORCES, ("largest_drop",)),
     STILL_HEEL: Sign(
-        "still_heel", "a loaded heel whose force stays the same, but not in standing", FORCES, ("frozen_time",)
+        "still_heel", "a loaded heel whose force stays the same while something else moves", FORCES, ("frozen_time",)
     ),
     STILL_TOE: Sign(
-        "still_toe", "loaded toes whose force stays the same, but not in standing", FORCES, ("frozen_time",)
+        "still_toe", "loaded toes whose force stays the same while something else moves", FORCES, ("frozen_time",)
     ),
     STILL_ANGLE: Sign(
-        "still_angle", "an angle in stance that stays the same, but not in standing", ("angle",), ("frozen_time",)
+        "still_angle", "an angle in stance that stays the same while something else moves", ("angle",), ("frozen_time",)
     ),
     ENDLESS_PHASE: Sign(
         "endless_phase", "a swing without end, or as long on heel or toes alone", FORCES, ("longest_phase",)
