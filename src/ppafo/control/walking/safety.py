@@ -28,7 +28,7 @@ from ppafo.control.walking.readings import (
     Landing,
     LastReadings,
 )
-from ppafo.control.walking.signs import HELPS, LIFTS, NO_SIGN, PAUSED, STOPPED, SafetyRules
+from ppafo.control.walking.signs import HELPS, LIFTS, NO_SIGN, PAUSED, STOPPED, SafetyRules, first_sign
 from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -177,12 +177,6 @@ def valve_sign(rules: SafetyRules, now: SafetyState, phase: PhaseState, measurem
     no_fall = stands & ((valve_times.venting > rules.vent_time) & left | late)
     found = signs.NO_FALL if no_fall | (now.emptying.rising > LASTS) else NO_SIGN
     return signs.NO_RISE if no_rise_1 | no_rise_2 else found
-
-
-def first_sign(some: float, others: float) -> float:
-    """The sign of two that comes first in ``signs``: one that stops before one that pauses, either before none."""
-    lower = min(some, others)
-    return lower if lower > NO_SIGN else max(some, others)
 
 
 def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState, sign: float) -> float:

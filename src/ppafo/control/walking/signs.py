@@ -146,3 +146,9 @@ def level_of(sign: float) -> float:
     level = LIFTS if sign >= NO_HEEL else PAUSED
     level = STOPPED if sign <= FORCE_GONE else level
     return level if sign > NO_SIGN else HELPS
+
+
+def first_sign(some: float, others: float) -> float:
+    """The sign of two that comes first: one that stops before one that pauses, either before none."""
+    lower = min(some, others)
+    return lower if lower > NO_SIGN else max(some, others)
