@@ -381,3 +381,39 @@ def test_a_change_of_direction_begins_to_fill_anew() -> None:
     state = after_commands(1.0, 0.04)
     _, state = safety.safe_command(state, SWING, -1.0, PERIOD)
     assert state.valve_times == ValveTimes(0.0, pytest.approx(PERIOD), 0.0)
+
+
+def pushes_that_end_at(*angles: float) -> SafetyState:
+    """The safety state after push-offs at whose end the ankle has these angles [deg]."""
+    state, air = safety.START, phase(SWING, 0.7, 0.0, 0.0)
+    for angle in angles:
+        seen = GOOD._replace(angle=math.radians(angle), heel_force=0.0, toe_force=0.0)
+        state = safety.monitor(RULES, state, ON_TOES, air, seen, PERIOD)
+    return state
+
+
+def test_toes_that_are_seen_to_leave_when_the_foot_has_long_turned_down_lift_only_from_the_second_time_on() -> None:
+    assert pushes_that_end_at(112.0, 119.0, 113.0, 125.0).level == signs.HELPS
+    late = pushes_that_end_at(119.0, 130.0)
+    assert (late.level, late.finding.sign) == (signs.LIFTS, signs.LATE_FORCES)
+    assert pushes_that_end_at(119.0, 130.0, 116.0).landing.late_toes == 2.0, "a dropped foot is not in time"
+    assert pushes_that_end_at(119.0, 130.0, 114.0).landing.late_toes == 0.0
+
+
+def test_a_shift_of_weight_after_seconds_of_rest_is_no_still_sensor() -> None:
+    flat, state, shifted = phase(MID_STANCE, 0.1), safety.START, GOOD._replace(toe_force=260.0)
+    for seen, samples in ((GOOD, 5000), (shifted, 200), (GOOD._replace(toe_force=330.0), 100)):
+        for _ in range(samples):
+            state = safety.monitor(RULES, state, flat, flat, seen, PERIOD)
+    assert state.level == signs.HELPS
+    assert 0.0 < state.readings.heel_unchanged < RULES.frozen_time, "only the time of the shifts counts"
+
+
+@pytest.mark.parametrize("sensor", ["pressure_1", "pressure_2"])
+def test_a_chamber_may_be_thin_for_a_moment_only(sensor: str) -> None:
+    flat, state, levels = phase(MID_STANCE, 0.1), safety.START, []
+    for _ in range(130):
+        state = safety.monitor(RULES, state, flat, flat, GOOD._replace(**{sensor: 5.5e4}), PERIOD)
+        levels.append(state.level)
+    assert max(levels[:119]) == signs.HELPS
+    assert (levels[-1], state.finding.sign) == (signs.STOPPED, signs.PRESSURE_RANGE)
