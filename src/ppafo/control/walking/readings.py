@@ -114,8 +114,8 @@ SHOWN = 0.1
 COMPRESSES = 0.02
 """Angle in plantarflexion [rad] from which the ankle compresses chamber 2 by enough to raise its pressure."""
 
-THIN, THIN_TIME = 7.0e4, 0.12
-"""Pressure [Pa] below which no chamber stays for longer than this time [s]: a moving foot lowers one to 60 kPa."""
+THIN, THIN_TIME = 6.0e4, 0.12
+"""Pressure [Pa] below which no chamber stays for longer than this time [s]: a moving foot may lower one so for less."""
 
 FALL_TIME = 0.03
 """Time constant [s] of the slow pressures, which tell whether a reading falls."""
