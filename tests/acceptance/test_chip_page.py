@@ -4,6 +4,7 @@ import re
 import shlex
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,8 +27,15 @@ def test_a_command_of_the_page_runs(command: str, tmp_path: Path, monkeypatch: p
     assert any((tmp_path / "out").iterdir())
 
 
-@pytest.mark.skipif(bool(missing_tools()), reason=f"not on this machine: {', '.join(missing_tools())}")
-@pytest.mark.parametrize("command", [line for line in COMMANDS if " chip " in line])
+def of_target(command: str) -> Any:
+    """A command, which is skipped where a tool of its target is missing."""
+    words = shlex.split(command)
+    missing = missing_tools(CATALOG[words[words.index("--target") + 1] if "--target" in words else TARGETS[0]])
+    reason = f"not on this machine: {', '.join(missing)}"
+    return pytest.param(command, marks=pytest.mark.skipif(bool(missing), reason=reason))
+
+
+@pytest.mark.parametrize("command", [of_target(line) for line in COMMANDS if " chip " in line])
 def test_the_simulated_chip_decides_as_the_page_says(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(shlex.split(command)[1:]) == 0
     said = capsys.readouterr().out
@@ -54,7 +62,12 @@ def test_what_whole_numbers_cost_is_as_in_the_table() -> None:
     assert not rows
 
 
-def test_the_tools_that_are_asked_for_are_looked_for() -> None:
-    assert set(missing_tools()) == {
-        tool for tool in ("make", "clang", "ld.lld", "mspdebug") if shutil.which(tool) is None
-    }
+@pytest.mark.parametrize(
+    ("target", "tools"),
+    [
+        ("msp430f2013", ("make", "clang", "ld.lld", "mspdebug")),
+        ("cortex-m0", ("make", "arm-none-eabi-gcc", "qemu-system-arm")),
+    ],
+)
+def test_the_tools_that_are_asked_for_are_looked_for(target: str, tools: tuple[str, ...]) -> None:
+    assert missing_tools(CATALOG[target]) == tuple(tool for tool in tools if shutil.which(tool) is None)

@@ -21,17 +21,23 @@ if TYPE_CHECKING:
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 MOST_SAMPLES = 10_000_000
+SAMPLES_OF_TABLE = 1000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario, or a .toml file")
-    parser.add_argument("--target", choices=TARGETS, default=TARGETS[0], help=f"the processor (default: {TARGETS[0]})")
+    parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help="name of a scenario, or a .toml file")
+    parser.add_argument("--target", choices=TARGETS, help=f"the processor (default: {TARGETS[0]}; with --table all)")
     parser.add_argument(
         "--samples",
         metavar="N",
         type=int,
         help="compare N drawn samples with the integer controller instead, with edges, jumps and sensor faults",
+    )
+    parser.add_argument(
+        "--table",
+        action="store_true",
+        help=f"compare every integer controller on every target instead (with {SAMPLES_OF_TABLE} samples each)",
     )
     add_override_argument(parser)
     add_output_arguments(parser)
@@ -41,20 +47,56 @@ def run(parsed: argparse.Namespace) -> int:
     """Run a scenario with the chip's simulator in charge of the valve; 1 where any decision differs."""
     if parsed.samples is not None and not 1 <= parsed.samples <= MOST_SAMPLES:
         raise ScenarioError(f"--samples {parsed.samples}: must be 1 to {MOST_SAMPLES}")
+    if parsed.table and (parsed.scenario is not None or parsed.overrides):
+        raise ScenarioError("--table: takes no SCENARIO and no --set; the scenarios are those of the table")
+    if not parsed.table and parsed.scenario is None:
+        raise ScenarioError("give a SCENARIO, or --table; see 'ppafo chip --help'")
     check_output(parsed)
     load_compiler()
+    text, document, agrees = _table(parsed) if parsed.table else _one(parsed)
+    deliver("chip", text, document, parsed)
+    return EXIT_GOOD if agrees else EXIT_CHECK_FAILED
+
+
+def _one(parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
+    """One scenario on one target: text, document, and whether all decisions are the same."""
     from ppafo.exports.firmware.lock_step import compare_drawn, run_on_chip
     from ppafo.simulation.loading import load_scenario
 
+    target = parsed.target or TARGETS[0]
     scenario = load_scenario(parsed.scenario, parsed.overrides)
     if parsed.samples is None:
-        found = run_on_chip(scenario)
+        found = run_on_chip(scenario, target)
         text, document, agrees = _of_run(found), _run_document(found), found.same_bits and not found.differences
     else:
-        drawn = compare_drawn(scenario, parsed.samples)
+        drawn = compare_drawn(scenario, parsed.samples, target=target)
         text, document, agrees = _of_drawn(scenario, drawn), _drawn_document(drawn), not drawn.differences
-    deliver("chip", text, {"scenario": scenario.name, "target": parsed.target, **document}, parsed)
-    return EXIT_GOOD if agrees else EXIT_CHECK_FAILED
+    return text, {"scenario": scenario.name, "target": target, **document}, agrees
+
+
+def _table(parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
+    """Every controller on every target: the table, its document, and whether all decisions are the same."""
+    from ppafo.exports.firmware.table import rows
+
+    lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
+    lines.append("|---|---|---|---|---|---|---|")
+    documents = []
+    agrees = True
+    targets = TARGETS if parsed.target is None else (parsed.target,)
+    for row in rows(targets, parsed.samples or SAMPLES_OF_TABLE):
+        found, own = row.found, {"target": row.target.name, "controller": row.law.replace("`", "")}
+        if found is None:
+            lines.append(f"| {row.target.name} | {row.law} | not run: {', '.join(row.missing)} is missing | | | | |")
+            documents.append({**own, "missing": list(row.missing)})
+            continue
+        cost = found.cost
+        lines.append(
+            f"| {row.target.name} | {row.law} | {cost.sizes.flash:,} | {cost.sizes.data} + {cost.stack} "
+            f"| {cost.worst:,}, {cost.mean:,.0f} {row.target.counted} | {found.samples:,} | {found.differences} |"
+        )
+        documents.append({**own, **_drawn_document(found)})
+        agrees = agrees and not found.differences
+    return "\n".join(lines), {"rows": documents}, agrees
 
 
 def _of_run(found: "ChipRun") -> str:
@@ -86,14 +128,17 @@ def _of_drawn(scenario: "Scenario", found: "Comparison") -> str:
 
 
 def _cost_lines(cost: "Cost", scenario: "Scenario") -> list[str]:
-    from ppafo.exports.firmware.simulator import CLOCK, FLASH, RAM
-
-    worst, mean = cost.worst_cycles, cost.mean_cycles
-    share = worst / CLOCK / scenario.control.period
+    target, worst, mean = cost.target, cost.worst, cost.mean
+    share = f"{worst / target.clock / scenario.control.period:.2%} of a sample at {target.clock / 1.0e6:g} MHz"
+    interrupt = target.interrupt_stack
     return [
-        f"flash       {cost.sizes.flash} of {FLASH} bytes, the whole program",
-        f"RAM         {cost.sizes.data} bytes of data, {cost.stack} of stack, 4 for the timer's interrupt, of {RAM}",
-        f"cycles      {worst} at worst, {mean:.0f} on average; {share:.2%} of a sample at 16 MHz",
+        f"flash       {cost.sizes.flash} of {target.flash.size} bytes, the whole program",
+        f"RAM         {cost.sizes.data} bytes of data, {cost.stack} of stack, {interrupt} for the timer's interrupt, "
+        f"of {target.ram.size}",
+        f"cycles      {worst} at worst, {mean:.0f} on average; {share}"
+        if target.counted == "cycles"
+        else f"cycles      not known to the simulator; {worst} {target.counted} at worst, {mean:.0f} on average; "
+        f"at one cycle each {share}",
     ]
 
 
@@ -102,15 +147,15 @@ def _cost_document(cost: "Cost") -> dict[str, Any]:
         "flash": cost.sizes.flash,
         "data": cost.sizes.data,
         "stack": cost.stack,
-        "worst_cycles": cost.worst_cycles,
-        "mean_cycles": cost.mean_cycles,
+        f"worst_{cost.target.counted}": cost.worst,
+        f"mean_{cost.target.counted}": cost.mean,
     }
 
 
 def _run_document(found: "ChipRun") -> dict[str, Any]:
     metrics = {name: found.chip.metrics[name].value for name in _SHOWN if name in found.chip.metrics}
-    told = {"samples": found.samples, "differences": found.differences, "same_bits": found.same_bits}
-    return {**told, **_cost_document(found.cost), "metrics": metrics}
+    compared = {"samples": found.samples, "differences": found.differences, "same_bits": found.same_bits}
+    return {**compared, **_cost_document(found.cost), "metrics": metrics}
 
 
 def _drawn_document(found: "Comparison") -> dict[str, Any]:

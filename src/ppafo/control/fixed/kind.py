@@ -10,7 +10,7 @@ from ppafo.model.declaration import Quantity
 
 FLOAT, FIXED = "float", "fixed"
 """The two arithmetics of a controller."""
-TARGETS = ("msp430f2013",)
+TARGETS = ("msp430f2013", "cortex-m0", "cortex-m4")
 """Processors that an integer controller can be written for."""
 
 

@@ -1,0 +1,95 @@
+"""What a small processor is for a firmware: its memory, how it is built for, and how its simulator is driven."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from ppafo.control.fixed.converter import Readings
+
+
+class Memory(NamedTuple):
+    """A range of addresses: its first one, and its size [bytes]."""
+
+    start: int
+    size: int
+
+    def holds(self, address: int) -> bool:
+        """True for an address within it."""
+        return self.start <= address < self.start + self.size
+
+
+class Decision(NamedTuple):
+    """Command in steps, 1 while all readings have been sound, and the cycles or instructions of the sample."""
+
+    command: int
+    is_sound: int
+    work: int
+
+
+class Sizes(NamedTuple):
+    """Flash of an image and RAM of its data [bytes]."""
+
+    flash: int
+    data: int
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """A program for the simulator that was built: its file, what it takes, the addresses of its symbols.
+
+    ``shipped`` is what the program for the board takes, which has the real layer around the controller.
+    """
+
+    file: Path
+    sizes: Sizes
+    shipped: Sizes
+    symbols: Mapping[str, int]
+
+
+class ChipSimulator(Protocol):
+    """A simulator with an image in it, which waits for a sample. SimulationError where it does not answer."""
+
+    def begin(self) -> None:
+        """Reset the processor, and let it come to where it waits for a sample."""
+
+    def sample(self, readings: Readings) -> Decision:
+        """What the chip decides for the readings of one sample."""
+
+    def stack(self) -> int:
+        """How deep the stack has been [bytes]."""
+
+    def close(self) -> None:
+        """End the simulator."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A processor that firmware is written for.
+
+    ``processor`` and ``board`` say what it is, ``clock`` is that of the processor [Hz], ``interrupt_stack`` what an
+    interrupt of the board puts on the stack [bytes], ``converter_bits`` those of its converter. ``words`` fill the
+    templates: how it is compiled, linked and written, which pins it has. ``templates`` are the files that belong to
+    this target alone, ``wiring`` is the one with the part of README.md that says what is wired to it.
+
+    ``tools`` are the programs that building and simulating need, ``packages`` those of Debian that have them.
+    ``simulator`` starts one with an image, ``machine`` is what it has to know of it, ``counted`` what it counts of a
+    sample: cycles or instructions.
+    """
+
+    name: str
+    processor: str
+    board: str
+    clock: float
+    flash: Memory
+    ram: Memory
+    interrupt_stack: int
+    converter_bits: int
+    words: Mapping[str, str]
+    templates: tuple[str, ...]
+    wiring: str
+    tools: tuple[str, ...]
+    packages: str
+    counted: str
+    simulator: Callable[["Target", Image], ChipSimulator]
+    machine: Mapping[str, str] = field(default_factory=dict)

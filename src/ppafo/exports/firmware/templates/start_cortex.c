@@ -1,0 +1,47 @@
+/* Reset of a Cortex-M: its vectors, then main. There are no data with a value at the start, so nothing is copied. */
+#include <stddef.h>
+
+int main(void);
+void start(void);
+void stuck(void);
+void __stack(void); /* the end of RAM, of the linker script */
+void board_tick(void) __attribute__((weak, alias("stuck")));
+void *memcpy(void *to, const void *from, size_t count);
+void *memset(void *to, int value, size_t count);
+
+/* The compiler calls these two for what it moves or clears. */
+void *memcpy(void *to, const void *from, size_t count)
+{
+    volatile char *next = to;
+    const char *given = from;
+    while (count-- > 0) {
+        *next++ = *given++;
+    }
+    return to;
+}
+
+void *memset(void *to, int value, size_t count)
+{
+    volatile char *next = to;
+    while (count-- > 0) {
+        *next++ = (char)value;
+    }
+    return to;
+}
+
+void start(void)
+{
+    (void)main();
+}
+
+/* A fault, or an interrupt that nobody asked for: nothing feeds the watchdog any longer, so that all vents. */
+__attribute__((used)) void stuck(void)
+{
+    for (;;) {
+    }
+}
+
+/* The stack, 15 exceptions of the processor, then the interrupts up to that of TIMER0. */
+__attribute__((section(".vectors"), used)) static void (*const vectors[16 + 9])(void) = {
+    __stack, start, stuck, stuck, stuck, stuck, stuck, stuck, stuck, stuck, stuck, stuck, stuck, stuck, stuck, stuck,
+    stuck, stuck, stuck, stuck, stuck, stuck, stuck, stuck, board_tick};
