@@ -12,11 +12,12 @@ from ppafo.cli.output import (
     deliver,
 )
 from ppafo.cli.quick_imports import load_compiler
-from ppafo.control.fixed.kind import TARGETS
+from ppafo.control.fixed.kind import PLANT_TARGETS, TARGETS
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
     from ppafo.exports.firmware.lock_step import ChipRun, Comparison, Cost
+    from ppafo.exports.firmware.two_boards import BoardsRun
     from ppafo.simulation.scenario import Scenario
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
@@ -35,6 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="compare N drawn samples with the integer controller instead, with edges, jumps and sensor faults",
     )
     parser.add_argument(
+        "--plant",
+        choices=PLANT_TARGETS,
+        help="let a second simulated chip be the plant, and compare both with the lanes",
+    )
+    parser.add_argument(
         "--table",
         action="store_true",
         help=f"compare every integer controller on every target instead (with {SAMPLES_OF_TABLE} samples each)",
@@ -47,8 +53,10 @@ def run(parsed: argparse.Namespace) -> int:
     """Run a scenario with the chip's simulator in charge of the valve; 1 where any decision differs."""
     if parsed.samples is not None and not 1 <= parsed.samples <= MOST_SAMPLES:
         raise ScenarioError(f"--samples {parsed.samples}: must be 1 to {MOST_SAMPLES}")
-    if parsed.table and (parsed.scenario is not None or parsed.overrides):
-        raise ScenarioError("--table: takes no SCENARIO and no --set; the scenarios are those of the table")
+    if parsed.table and (parsed.scenario is not None or parsed.overrides or parsed.plant):
+        raise ScenarioError("--table: takes no SCENARIO, no --set and no --plant; its scenarios are given")
+    if parsed.plant and parsed.samples is not None:
+        raise ScenarioError("--plant and --samples: give one of them; drawn samples have no plant")
     if not parsed.table and parsed.scenario is None:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo chip --help'")
     check_output(parsed)
@@ -61,11 +69,15 @@ def run(parsed: argparse.Namespace) -> int:
 def _one(parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
     """One scenario on one target: text, document, and whether all decisions are the same."""
     from ppafo.exports.firmware.lock_step import compare_drawn, run_on_chip
+    from ppafo.exports.firmware.two_boards import run_on_two_boards
     from ppafo.simulation.loading import load_scenario
 
     target = parsed.target or TARGETS[0]
     scenario = load_scenario(parsed.scenario, parsed.overrides)
-    if parsed.samples is None:
+    if parsed.plant:
+        both = run_on_two_boards(scenario, target, parsed.plant)
+        text, document, agrees = _of_boards(both, target), _boards_document(both), not both.differences
+    elif parsed.samples is None:
         found = run_on_chip(scenario, target)
         text, document, agrees = _of_run(found), _run_document(found), found.same_bits and not found.differences
     else:
@@ -125,6 +137,29 @@ def _of_drawn(scenario: "Scenario", found: "Comparison") -> str:
         f"decisions   {found.samples}, {found.differences} other than those of the integer controller in Python",
     ]
     return "\n".join([*lines, *([f"the first: {found.first_difference}"] if found.differences else [])])
+
+
+def _of_boards(found: "BoardsRun", target: str) -> str:
+    """The run of two boards in words."""
+    plant, name = found.plant, found.scenario.name
+    share = found.worst / plant.clock / found.scenario.control.period
+    lines = [
+        f"{name} with the controller on a simulated {target}, the plant on a simulated {plant.name}",
+        "",
+        f"plant       {found.sizes.flash} bytes of flash, {found.sizes.data} of data, {found.stack} of stack",
+        f"a sample    {found.worst} {plant.counted} at worst, {found.mean:.0f} on average; "
+        f"at one cycle each {share:.2%} of a sample at {plant.clock / 1.0e6:g} MHz",
+        f"samples     {found.samples}, {found.differences} with other bits than in the lanes",
+        f"compared    {', '.join(found.compared)}",
+    ]
+    return "\n".join([*lines, *([f"the first: {found.first_difference}"] if found.differences else [])])
+
+
+def _boards_document(found: "BoardsRun") -> dict[str, Any]:
+    work = {f"worst_{found.plant.counted}": found.worst, f"mean_{found.plant.counted}": found.mean}
+    plant = {"target": found.plant.name, **found.sizes._asdict(), "stack": found.stack, **work}
+    compared = {"samples": found.samples, "differences": found.differences, "compared": list(found.compared)}
+    return {**compared, "plant": plant}
 
 
 def _cost_lines(cost: "Cost", scenario: "Scenario") -> list[str]:

@@ -12,6 +12,8 @@ FLOAT, FIXED = "float", "fixed"
 """The two arithmetics of a controller."""
 TARGETS = ("msp430f2013", "cortex-m0", "cortex-m4")
 """Processors that an integer controller can be written for."""
+PLANT_TARGETS = ("cortex-m4",)
+"""Those that the plant can be written for too."""
 
 
 @dataclass(frozen=True, slots=True)

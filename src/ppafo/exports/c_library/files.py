@@ -189,7 +189,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "title": library.title,
         "description": "\n * ".join(textwrap.wrap(_in_comment(library.description), 110)),
         "version": __version__,
-        "advance": f"(run->needs_parts == 1 ? {IN_PARTS} : {WHOLE})" if program.chooses_parts else WHOLE,
+        "advance": _advance(program),
         "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),
         "outputs": _members((("time", "s", "since the start"), *((item, *OUTPUTS[item]) for item in program.outputs))),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
@@ -215,6 +215,17 @@ def _words(library: Library, name: str) -> dict[str, str]:
         ),
         **library.words,
     }
+
+
+def _advance(program: ExportedProgram) -> str:
+    """The lane loop of a run in C."""
+    return f"(run->needs_parts == 1 ? {IN_PARTS} : {WHOLE})" if program.chooses_parts else WHOLE
+
+
+def steps_source(library: Library) -> str:
+    """The function that does some steps of a run and takes a sample, for what stands behind the source of a library."""
+    words = {"name": library.name, "signal_rows": str(SIGNAL_ROWS), "advance": _advance(library.program)}
+    return _filled("steps.c", words)
 
 
 def _members(items: Iterable[tuple[str, str, str]]) -> str:

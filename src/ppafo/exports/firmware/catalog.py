@@ -137,6 +137,10 @@ CORTEX_M4 = Target(
     counted="instructions",
     simulator=QemuSimulator,
     machine={"name": "mps2-an386", "hertz": "25e6"},
+    arithmetic={
+        "flags": "-mcpu=cortex-m4",
+        "said": "its floats have 64 bits, which this processor computes by a library",
+    },
 )
 CATALOG: dict[str, Target] = {item.name: item for item in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
 

@@ -1,7 +1,7 @@
 """QEMU with a Cortex-M in it, driven by the remote protocol of gdb over its standard input and output."""
 
 import struct
-from typing import final
+from typing import NamedTuple, final
 
 from ppafo.control.fixed.converter import Readings
 from ppafo.errors import SimulationError
@@ -10,11 +10,14 @@ from ppafo.exports.firmware.target import Decision, Image, Target
 
 DEEPEST = 1024
 """How far below the end of RAM the stack is looked for [bytes]."""
+DEEPEST_OF_PLANT = 16384
 _SHIFT = 7
 _NANOSECONDS = 2**_SHIFT
 """What an instruction takes of the machine's time [ns]: more than two ticks of the counter, so that none is missed."""
 _COUNTER_BITS = 24
 """Those of SysTick, which counts the ticks of the processor's clock down."""
+_PIECE = 1024
+"""Bytes that are read or written at once; a packet has no room for many more."""
 _OUTPUTS = struct.Struct("<hhII")
 _THUMB, _LENGTH_OF_NOP = 1, 2
 
@@ -51,6 +54,11 @@ class Debugger:
 
     def read(self, address: int, size: int) -> bytes:
         """What is in memory."""
+        return b"".join(
+            self._read(at, min(_PIECE, address + size - at)) for at in range(address, address + size, _PIECE)
+        )
+
+    def _read(self, address: int, size: int) -> bytes:
         answer = self.packet(f"m{address:x},{size:x}")
         if len(answer) != 2 * size:
             raise SimulationError(f"QEMU cannot read {size} bytes at 0x{address:x}: {answer}")
@@ -58,7 +66,9 @@ class Debugger:
 
     def write(self, address: int, content: bytes) -> None:
         """Put something into memory."""
-        self._expect(self.packet(f"M{address:x},{len(content):x}:{content.hex()}"), "OK")
+        for at in range(0, len(content), _PIECE):
+            piece = content[at : at + _PIECE]
+            self._expect(self.packet(f"M{address + at:x},{len(piece):x}:{piece.hex()}"), "OK")
 
     def packet(self, text: str) -> str:
         """The answer to a packet of the protocol."""
@@ -111,3 +121,49 @@ class QemuSimulator:
     def stack(self) -> int:
         """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
         return depth_of_stack(self.debugger.read(self._bottom, DEEPEST))
+
+
+class PlantSample(NamedTuple):
+    """What the plant shows at a sample: readings, 1 while it is well, values; instructions since the last sample."""
+
+    readings: Readings
+    is_well: int
+    values: tuple[float, ...]
+    work: int
+
+
+@final
+class QemuPlant:
+    """QEMU with the image of a plant in it, which waits for a command."""
+
+    def __init__(self, target: Target, image: Image, value_count: int) -> None:
+        self._stop = image.symbols["simulated_stop"] & ~_THUMB
+        self._command, self._plant = image.symbols["simulated_command"], image.symbols["simulated_plant"]
+        self._form = struct.Struct(f"<4h{value_count}dII")
+        self._ticks = float(target.machine["hertz"]) * _NANOSECONDS * 1.0e-9
+        self._bottom = target.ram.start + target.ram.size - DEEPEST_OF_PLANT
+        self._debugger = Debugger(target.machine["name"], image)
+        self._debugger.write(self._bottom, bytes([UNTOUCHED]) * DEEPEST_OF_PLANT)
+        self._debugger.stop_at(self._stop)
+        self._debugger.go_on()
+
+    def close(self) -> None:
+        """End the simulator."""
+        self._debugger.close()
+
+    def shown(self) -> PlantSample:
+        """The sample that it shows."""
+        reference, first, second, is_well, *values, begun, ended = self._form.unpack(
+            self._debugger.read(self._plant, self._form.size)
+        )
+        work = round((begun - ended) % 2**32 / self._ticks)
+        return PlantSample(Readings(reference, first, second), is_well, tuple(values), work)
+
+    def go_on(self, command: int) -> None:
+        """Hand it the command for the sample that it shows; it then shows the next one."""
+        self._debugger.write(self._command, command.to_bytes(2, "little", signed=True))
+        self._debugger.go_on(self._stop + _LENGTH_OF_NOP)
+
+    def stack(self) -> int:
+        """How deep the stack has been [bytes]."""
+        return depth_of_stack(self._debugger.read(self._bottom, DEEPEST_OF_PLANT))

@@ -18,7 +18,7 @@ UNTOUCHED = 0xA5
 """What the RAM for the stack is filled with, so that what the stack has overwritten can be seen."""
 _PATIENCE = 60.0
 _LOADED = 2
-_SYMBOLS = 2
+_WITH_VALUES, _SYMBOLS = 1, 2
 _SECTION = struct.Struct("<IIIIIIIIII")
 _SYMBOL = struct.Struct("<IIIBBH")
 
@@ -26,6 +26,15 @@ _SYMBOL = struct.Struct("<IIIBBH")
 def missing_tools(target: Target) -> tuple[str, ...]:
     """The tools of a target that this computer lacks."""
     return tuple(tool for tool in target.tools if which(tool) is None)
+
+
+def check_tools(target: Target) -> None:
+    """SimulationError where this computer lacks a tool of a target."""
+    absent = missing_tools(target)
+    if absent:
+        raise SimulationError(
+            f"the simulator of {target.name} needs {', '.join(absent)}; {target.packages} are packages of Debian"
+        )
 
 
 def built(contents: Mapping[str, bytes], folder: Path, goals: Sequence[str] = ("all",)) -> None:
@@ -47,14 +56,7 @@ def chip_simulator(contents: Mapping[str, bytes], target: Target) -> Iterator[tu
 
     SimulationError where a tool is missing, the files cannot be built, or the simulator does not answer.
     """
-    absent = missing_tools(target)
-    if absent:
-        raise SimulationError(
-            f"the simulator of {target.name} needs {', '.join(absent)}; {target.packages} are packages of Debian"
-        )
-    with tempfile.TemporaryDirectory(prefix="ppafo-chip-", ignore_cleanup_errors=True) as folder:
-        built(contents, Path(folder))
-        image = read_image(Path(folder), target)
+    with built_image(contents, target) as image:
         simulator = target.simulator(target, image)
         try:
             yield simulator, image
@@ -62,11 +64,21 @@ def chip_simulator(contents: Mapping[str, bytes], target: Target) -> Iterator[tu
             simulator.close()
 
 
+@contextmanager
+def built_image(contents: Mapping[str, bytes], target: Target) -> Iterator[Image]:
+    """The image for the simulator that is built of these files, in a folder that goes with the ``with``."""
+    check_tools(target)
+    with tempfile.TemporaryDirectory(prefix="ppafo-chip-", ignore_cleanup_errors=True) as folder:
+        built(contents, Path(folder))
+        yield read_image(Path(folder), target)
+
+
 def read_image(folder: Path, target: Target) -> Image:
-    """The image for the simulator in a folder where a firmware was built."""
-    file = folder / "simulated.elf"
+    """The image for the simulator in a folder where a firmware was built; a plant has no other one."""
+    file, shipped = folder / "simulated.elf", folder / "firmware.elf"
     content = file.read_bytes()
-    return Image(file, _sizes(content, target), sizes(folder / "firmware.elf", target), _symbols(content))
+    own = _sizes(content, target)
+    return Image(file, own, sizes(shipped, target) if shipped.is_file() else own, _symbols(content))
 
 
 def sizes(image: Path, target: Target) -> Sizes:
@@ -98,10 +110,10 @@ def _sections(content: bytes) -> list[_Section]:
 
 def _sizes(content: bytes, target: Target) -> Sizes:
     loaded = [item for item in _sections(content) if item.flags & _LOADED]
-    flash, data = (
-        sum(item.size for item in loaded if memory.holds(item.address)) for memory in (target.flash, target.ram)
-    )
-    return Sizes(flash, data)
+    in_ram = [item for item in loaded if target.ram.holds(item.address)]
+    values = sum(item.size for item in in_ram if item.kind == _WITH_VALUES)
+    flash = sum(item.size for item in loaded if target.flash.holds(item.address))
+    return Sizes(flash + values, sum(item.size for item in in_ram))
 
 
 def _symbols(content: bytes) -> dict[str, int]:

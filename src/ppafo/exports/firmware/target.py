@@ -74,7 +74,8 @@ class Target:
 
     ``tools`` are the programs that building and simulating need, ``packages`` those of Debian that have them.
     ``simulator`` starts one with an image, ``machine`` is what it has to know of it, ``counted`` what it counts of a
-    sample: cycles or instructions.
+    sample: cycles or instructions. ``arithmetic`` has, where it can compute the plant, the flags for floats of 64 bits
+    and what they mean.
     """
 
     name: str
@@ -93,3 +94,4 @@ class Target:
     counted: str
     simulator: Callable[["Target", Image], ChipSimulator]
     machine: Mapping[str, str] = field(default_factory=dict)
+    arithmetic: Mapping[str, str] = field(default_factory=dict)

@@ -1,10 +1,13 @@
-/* Reset of a Cortex-M: its vectors, then main. There are no data with a value at the start, so nothing is copied. */
+/* Reset of a Cortex-M: its vectors, data with a value at the start, all others to 0, then main. */
 #include <stddef.h>
+#include <stdint.h>
 
 int main(void);
 void start(void);
 void stuck(void);
-void __stack(void); /* the end of RAM, of the linker script */
+/* Of the linker script: the end of RAM, and where data begin and end. */
+void __stack(void);
+extern uint32_t __data_begin[], __data_end[], __data_values[], __zero_begin[], __zero_end[];
 void board_tick(void) __attribute__((weak, alias("stuck")));
 void *memcpy(void *to, const void *from, size_t count);
 void *memset(void *to, int value, size_t count);
@@ -31,6 +34,13 @@ void *memset(void *to, int value, size_t count)
 
 void start(void)
 {
+    const uint32_t *given = __data_values;
+    for (volatile uint32_t *next = __data_begin; next < __data_end; ++next) {
+        *next = *given++;
+    }
+    for (volatile uint32_t *next = __zero_begin; next < __zero_end; ++next) {
+        *next = 0u;
+    }
     (void)main();
 }
 
