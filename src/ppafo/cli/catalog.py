@@ -31,7 +31,7 @@ COMMANDS: dict[str, str] = {
     "parts": QUESTIONS["parts"],
     "audit": "check a parameter set for contradictions",
     "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",
-    "firmware": "write a scenario's controller as firmware for a small processor",
+    "firmware": "write a scenario's controller, or its plant, as firmware for a small processor",
     "chip": "run a scenario with its controller on the simulator of a small processor",
     "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",
     "bits": QUESTIONS["bits"],

@@ -1,4 +1,4 @@
-"""The plant of a scenario as firmware: the exported library, a thin layer, and what the controller's converter shows."""
+"""The plant of a scenario as firmware: the exported library, a thin layer, and what the converter shows."""
 
 import textwrap
 from collections.abc import Mapping
