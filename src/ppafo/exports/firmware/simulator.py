@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from shutil import which
 from typing import NamedTuple, final
+from weakref import finalize
 
 from ppafo.errors import SimulationError, one_line, reason
 from ppafo.exports.firmware.target import ChipSimulator, Image, Sizes, Target
@@ -132,7 +133,7 @@ def _symbols(content: bytes) -> dict[str, int]:
 
 @final
 class Console:
-    """A program of this machine that is spoken to by its standard input and output."""
+    """A program of this machine that is spoken to by its standard input and output; ``close`` ends it."""
 
     def __init__(self, command: Sequence[str], folder: Path) -> None:
         self._name = command[0]
@@ -148,11 +149,8 @@ class Console:
             )
         except OSError as error:
             raise SimulationError(f"{self._name} cannot be run: {reason(error)}") from error
-
-    def close(self) -> None:
-        """End the program."""
-        self._process.kill()
-        self._process.communicate()
+        # Nothing else ends it where what holds this object fails before it can close it.
+        self.close = finalize(self, _end, self._process)
 
     def say(self, text: bytes) -> None:
         """Write to the program. SimulationError where it has ended."""
@@ -177,6 +175,11 @@ class Console:
     def _last(self) -> str:
         last = self._seen.decode(errors="replace").strip().splitlines()[-1:]
         return f"the last it said: {one_line(' '.join(last))}"
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    process.kill()
+    process.communicate()
 
 
 def depth_of_stack(memory: bytes) -> int:

@@ -76,7 +76,7 @@ def run_on_two_boards(scenario: Scenario, target: str, plant: str) -> BoardsRun:
 
 def _coupled(scenario: Scenario, chip: ChipSimulator, board: QemuPlant) -> list[tuple[PlantSample, int]]:
     """What the plant shows at every sample, and the command that the controller gives for it."""
-    found = []
+    found: list[tuple[PlantSample, int]] = []
     for number in range(int(scenario.duration / scenario.control.period + 1.0e-9)):
         if number:
             board.go_on(found[-1][1])
