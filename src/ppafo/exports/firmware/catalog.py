@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from ppafo.errors import ScenarioError
 from ppafo.exports.firmware.mspdebug import MspdebugSimulator
 from ppafo.exports.firmware.qemu import QemuSimulator
-from ppafo.exports.firmware.target import Memory, Target
+from ppafo.exports.firmware.target import Doubles, Machine, Memory, Target
 
 _VARIABLES = """\
 # Others do as well: make COMPILER="clang --target=arm-none-eabi" LINKER='$(COMPILER) -fuse-ld=lld',
@@ -43,6 +43,7 @@ MSP430F2013 = Target(
         "start": "start_msp430.o",
         "board_objects": "board_msp430f2013.o",
         "board_files": "`board_msp430f2013.c`",
+        "not_run": "no simulator here has them",
         "script": "msp430f2013.ld",
         "flash": _flash("Into the chip on an eZ430-F2013", "firmware.elf", 'mspdebug uif "prog firmware.elf"'),
         "flash_said": "into the chip on an eZ430-F2013, by mspdebug",
@@ -68,6 +69,7 @@ def _words_of_cortex(name: str, chip: str, pins: Mapping[str, str]) -> dict[str,
         "start": "start_cortex.o",
         "board_objects": f"board_microbit.o converter_{chip}.o",
         "board_files": f"`board_microbit.c` and `converter_{chip}.c`",
+        "not_run": "timer and outputs run in QEMU's micro:bit V1, converter and watchdog have no simulator",
         "script": f"{chip}.ld",
         "flash": _flash("Onto the drive that the board is", "firmware.hex", 'cp firmware.hex "$(MICROBIT)"') + _HEX,
         "flash_said": "onto the drive that the board is, as in make flash MICROBIT=/media/MICROBIT",
@@ -106,7 +108,7 @@ CORTEX_M0 = Target(
     packages=_PACKAGES,
     counted="instructions",
     simulator=QemuSimulator,
-    machine={"name": "microbit", "hertz": "16e6"},
+    machine=Machine("microbit", 16.0e6),
 )
 CORTEX_M4 = Target(
     name="cortex-m4",
@@ -136,11 +138,8 @@ CORTEX_M4 = Target(
     packages=_PACKAGES,
     counted="instructions",
     simulator=QemuSimulator,
-    machine={"name": "mps2-an386", "hertz": "25e6"},
-    arithmetic={
-        "flags": "-mcpu=cortex-m4",
-        "said": "its floats have 64 bits, which this processor computes by a library",
-    },
+    machine=Machine("mps2-an386", 25.0e6),
+    doubles=Doubles("-mcpu=cortex-m4", "its floats have 64 bits, which this processor computes by a library"),
 )
 CATALOG: dict[str, Target] = {item.name: item for item in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
 

@@ -16,7 +16,7 @@ from ppafo.exports.c_library import commanded, scenario_library
 from ppafo.exports.c_library.files import Library, filled, library_files, steps_source
 from ppafo.exports.firmware import chip_controller
 from ppafo.exports.firmware.catalog import target_of
-from ppafo.exports.firmware.target import Target
+from ppafo.exports.firmware.target import Doubles, Target
 from ppafo.model.sensors import Measurement
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.preparation import step_counts
@@ -42,10 +42,10 @@ def plant_firmware(scenario: Scenario, target: str) -> dict[str, bytes]:
     ScenarioError where the target has too little memory for doubles, or for sensors that have flaws.
     """
     chosen = target_of(target)
-    if not chosen.arithmetic:
+    if chosen.doubles is None:
         raise ScenarioError(f"no plant for '{target}': floats of 64 bits need more memory: {', '.join(PLANT_TARGETS)}")
     library = plant_library(scenario)
-    words = _words(scenario, library, chosen)
+    words = _words(scenario, library, chosen, chosen.doubles)
     texts = {name: _filled(template, words) for template, name in FILES.items()}
     texts |= {name: _filled(name, words) for name in ("start_cortex.c", words["script"])}
     written = library_files(library)
@@ -99,13 +99,13 @@ def _filled(template: str, words: Mapping[str, str]) -> str:
     return filled(files("ppafo.exports.firmware").joinpath("templates", template).read_text(encoding="utf-8"), words)
 
 
-def _words(scenario: Scenario, library: Library, target: Target) -> dict[str, str]:
+def _words(scenario: Scenario, library: Library, target: Target, doubles: Doubles) -> dict[str, str]:
     """What fills the templates."""
     control = scenario.control
     counts = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, control.period)
     program = library.program
     # The members of a run, as interface.c has them.
-    doubles = len(program.parameter_places) + 2 * len(program.state_places) + 2 * len(program.outputs) + 16
+    own = len(program.parameter_places) + 2 * len(program.state_places) + 2 * len(program.outputs) + 16
     values = plant_values(library)
     return {
         "name": library.name,
@@ -116,11 +116,11 @@ def _words(scenario: Scenario, library: Library, target: Target) -> dict[str, st
         "target": target.name,
         "processor": target.processor,
         "script": target.words["script"],
-        "processor_flags": target.arithmetic["flags"],
-        "arithmetic": target.arithmetic["said"],
+        "processor_flags": doubles.flags,
+        "arithmetic": doubles.said,
         "steps": steps_source(library),
         "steps_of_sample": f"{counts.steps_per_sample:.0f}",
-        "memory": str(doubles + 2 * SIGNAL_ROWS + LATE_COMMANDS),
+        "memory": str(own + 2 * SIGNAL_ROWS + LATE_COMMANDS),
         "command_steps": str(COMMAND_STEPS),
         "value_count": str(len(values)),
         "value_names": "\n".join(f" * {line}" for line in textwrap.wrap(", ".join(values), 110)),

@@ -94,9 +94,9 @@ class QemuSimulator:
     def __init__(self, target: Target, image: Image) -> None:
         self._stop = image.symbols["simulated_stop"] & ~_THUMB
         self._readings, self._outputs = (image.symbols[f"simulated_{name}"] for name in ("readings", "outputs"))
-        self._ticks = float(target.machine["hertz"]) * _NANOSECONDS * 1.0e-9
+        self._ticks = target.machine.clock * _NANOSECONDS * 1.0e-9
         self._bottom = target.ram.start + target.ram.size - DEEPEST
-        self.debugger = Debugger(target.machine["name"], image)
+        self.debugger = Debugger(target.machine.name, image)
         self.debugger.write(self._bottom, bytes([UNTOUCHED]) * DEEPEST)
         self.debugger.stop_at(self._stop)
         self.debugger.go_on()
@@ -140,9 +140,9 @@ class QemuPlant:
         self._stop = image.symbols["simulated_stop"] & ~_THUMB
         self._command, self._plant = image.symbols["simulated_command"], image.symbols["simulated_plant"]
         self._form = struct.Struct(f"<4h{value_count}dII")
-        self._ticks = float(target.machine["hertz"]) * _NANOSECONDS * 1.0e-9
+        self._ticks = target.machine.clock * _NANOSECONDS * 1.0e-9
         self._bottom = target.ram.start + target.ram.size - DEEPEST_OF_PLANT
-        self._debugger = Debugger(target.machine["name"], image)
+        self._debugger = Debugger(target.machine.name, image)
         self._debugger.write(self._bottom, bytes([UNTOUCHED]) * DEEPEST_OF_PLANT)
         self._debugger.stop_at(self._stop)
         self._debugger.go_on()

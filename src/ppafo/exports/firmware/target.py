@@ -1,7 +1,7 @@
 """What a small processor is for a firmware: its memory, how it is built for, and how its simulator is driven."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -17,6 +17,24 @@ class Memory(NamedTuple):
     def holds(self, address: int) -> bool:
         """True for an address within it."""
         return self.start <= address < self.start + self.size
+
+
+class Machine(NamedTuple):
+    """What QEMU calls a machine: its name, and the clock of its processor [Hz]."""
+
+    name: str
+    clock: float
+
+
+NO_MACHINE = Machine("", 0.0)
+"""That of a target which QEMU does not simulate."""
+
+
+class Doubles(NamedTuple):
+    """How a target computes floats of 64 bits: flags of the compiler, and the same in words."""
+
+    flags: str
+    said: str
 
 
 class Decision(NamedTuple):
@@ -73,9 +91,8 @@ class Target:
     this target alone, ``wiring`` is the one with the part of README.md that says what is wired to it.
 
     ``tools`` are the programs that building and simulating need, ``packages`` those of Debian that have them.
-    ``simulator`` starts one with an image, ``machine`` is what it has to know of it, ``counted`` what it counts of a
-    sample: cycles or instructions. ``arithmetic`` has, where it can compute the plant, the flags for floats of 64 bits
-    and what they mean.
+    ``simulator`` starts one with an image, ``machine`` is what QEMU has to know, ``counted`` what is counted of a
+    sample: cycles or instructions. The plant can be written for a target that has ``doubles``.
     """
 
     name: str
@@ -93,5 +110,5 @@ class Target:
     packages: str
     counted: str
     simulator: Callable[["Target", Image], ChipSimulator]
-    machine: Mapping[str, str] = field(default_factory=dict)
-    arithmetic: Mapping[str, str] = field(default_factory=dict)
+    machine: Machine = NO_MACHINE
+    doubles: Doubles | None = None

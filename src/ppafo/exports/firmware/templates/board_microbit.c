@@ -1,4 +1,5 @@
-/* The @processor@, on @board@: timer, outputs, pulse, watchdog. README.md says what is wired to it. Not run on a chip. */
+/* The @processor@, on @board@: timer, outputs, pulse, watchdog. README.md says what is wired to it.
+ * Not run on a chip; timer, outputs and pulse run in QEMU's micro:bit V1. */
 #include "board.h"
 #include "parameters.h"
 
