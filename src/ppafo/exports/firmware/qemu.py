@@ -157,7 +157,8 @@ class QemuPlant:
             self._debugger.read(self._plant, self._form.size)
         )
         work = round((begun - ended) % 2**32 / self._ticks)
-        return PlantSample(Readings(reference, first, second), is_well, tuple(values), work)
+        seen = Readings(reference, first, second)
+        return PlantSample(readings=seen, is_well=is_well, values=tuple(values), work=work)
 
     def go_on(self, command: int) -> None:
         """Hand it the command for the sample that it shows; it then shows the next one."""

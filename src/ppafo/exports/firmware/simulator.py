@@ -106,7 +106,7 @@ def _sections(content: bytes) -> list[_Section]:
     """The sections of a 32-bit ELF file, lowest byte first."""
     (start,) = struct.unpack_from("<I", content, 0x20)
     length, count = struct.unpack_from("<HH", content, 0x2E)
-    return [_Section(*_SECTION.unpack_from(content, start + length * place)) for place in range(count)]
+    return [_Section._make(_SECTION.unpack_from(content, start + length * place)) for place in range(count)]
 
 
 def _sizes(content: bytes, target: Target) -> Sizes:

@@ -45,4 +45,5 @@ def rows(targets: Sequence[str], samples: int) -> Iterator[Row]:
         missing = missing_tools(target)
         for law in TRIED:
             scenario = load_scenario(law.scenario, law.overrides)
-            yield Row(law.said, target, None if missing else compare_drawn(scenario, samples, target=name), missing)
+            found = None if missing else compare_drawn(scenario, samples, target=name)
+            yield Row(law=law.said, target=target, found=found, missing=missing)
