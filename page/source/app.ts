@@ -11,7 +11,7 @@ import { type Overlay, Panels } from "./panels";
 import { changed, type Configuration, contradiction, normalText, settingsByKey, valuesOf } from "./settings";
 import { Stage } from "./stage";
 import { addressOf, firstState, History, MOST_CONFIGURATIONS, type State, stateOfAddress } from "./state";
-import { InputError } from "./units";
+import { InputError, telling } from "./units";
 import { unpacked } from "./unpacking";
 import { makeFrame, type PageFrame } from "./frame";
 import { bandOf } from "./variation";
@@ -286,7 +286,7 @@ export class App {
       if (address !== location.hash.slice(1)) history.replaceState(null, "", `#${address}`);
     }
     this.extras.settle();
-    if (this.hasBand) for (const { configuration, place } of this.named) void this.drawBand(configuration, place);
+    if (this.hasBand) for (const { configuration, place } of this.named) void this.drawBand(configuration, place).catch(telling((words) => this.tell(words)));
     else this.latest.clear();
   }
 

@@ -12,7 +12,7 @@ import { shownNumber, valuesOf } from "./settings";
 import { samplesText, savePicture, saveState, saveText } from "./sharing";
 import { addressOf, stateOfFile } from "./state";
 import type { RecordedTable } from "./table";
-import { InputError, plain, readableUnit } from "./units";
+import { InputError, plain, readableUnit, telling } from "./units";
 import { type Effect, effectsOf } from "./variation";
 
 const TOLD_METRICS = 3;
@@ -188,7 +188,8 @@ export class Extras {
   }
 
   private makeAssumptions(): void {
-    const run = element("button", { type: "button", onclick: () => void this.showEffects() }, "Move each assumption");
+    const { app } = this;
+    const run = element("button", { type: "button", onclick: () => void this.showEffects().catch(telling((words) => app.tell(words))) }, "Move each assumption");
     this.frame.assumptions.append(
       element("p", {}, "Nobody printed some of the numbers. Each of these is moved alone, over its interval where one is known, else by a fifth down and up; the others stay."),
       element("div", { class: "buttons" }, run),

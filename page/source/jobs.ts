@@ -11,7 +11,8 @@ export interface RunsJob {
   readonly kind: "runs";
   readonly number: number;
   readonly program: string;
-  readonly rows: readonly Float64Array[];
+  /** Settings of the program, run after run. */
+  readonly rows: Float64Array<ArrayBuffer>;
   readonly channel: string | null;
   readonly every: number;
   readonly places: number;
@@ -30,6 +31,10 @@ export interface Reply {
 }
 
 const MOST_WORKERS = 4;
+/** Pieces of work for each worker: some runs take longer than others, and who is done takes the next piece. */
+const PIECES = 4;
+/** Runs that a program does side by side. */
+const TOGETHER = 8;
 
 /** A few workers that share work; they start when they are first wanted. */
 export class Workers {
@@ -44,19 +49,26 @@ export class Workers {
     return this.crew.length;
   }
 
-  /** Many runs of a program, in as many parts as there are workers. */
-  async runMany(program: Program, rows: readonly Float64Array[], channel: string | null = null, every = 1, places = 0): Promise<Ensemble> {
+  /** Many runs of a program, settings run after run, shared out among the workers. */
+  async runMany(program: Program, rows: Float64Array<ArrayBuffer>, channel: string | null = null, every = 1, places = 0): Promise<Ensemble> {
     this.start();
     const bytes = await this.bytesOf(program);
-    const size = Math.ceil(rows.length / this.crew.length / 8) * 8;
-    const parts = this.crew.map((_, place) => rows.slice(place * size, (place + 1) * size)).filter((part) => part.length > 0);
-    const replies = await Promise.all(
-      parts.map((part, place) => {
-        this.introduce(place, program, bytes);
-        return this.ask(place, (number) => ({ kind: "runs", number, program: program.name, rows: part, channel, every, places }));
-      }),
-    );
-    const found = replies.map((reply) => reply.runs).filter((runs) => runs !== undefined);
+    const width = program.settings.length;
+    const size = Math.ceil(rows.length / width / this.crew.length / PIECES / TOGETHER) * TOGETHER * width;
+    const found: Ensemble[] = [];
+    let next = 0;
+    const work = async (place: number) => {
+      this.introduce(place, program, bytes);
+      while (next * size < rows.length) {
+        const piece = next;
+        next += 1;
+        const part = rows.slice(piece * size, (piece + 1) * size);
+        const { runs } = await this.ask(place, (number) => ({ kind: "runs", number, program: program.name, rows: part, channel, every, places }), [part.buffer]);
+        if (runs !== undefined) found[piece] = runs;
+      }
+    };
+    // Two pieces wait at each worker, so that it does not wait for a page that is drawing.
+    await Promise.all([...this.crew.keys(), ...this.crew.keys()].map(work));
     return {
       metrics: joined(found.map((runs) => runs.metrics)),
       ended: Int32Array.from(found.flatMap((runs) => [...runs.ended])),
@@ -94,7 +106,7 @@ export class Workers {
     member.worker.postMessage(job);
   }
 
-  private ask(place: number, job: (number: number) => Job): Promise<Reply> {
+  private ask(place: number, job: (number: number) => Job, handed: ArrayBuffer[] = []): Promise<Reply> {
     const number = this.next;
     this.next += 1;
     return new Promise((resolve, reject) => {
@@ -102,7 +114,7 @@ export class Workers {
         if (reply.fault === undefined) resolve(reply);
         else reject(new InputError(reply.fault));
       });
-      this.crew[place]?.worker.postMessage(job(number));
+      this.crew[place]?.worker.postMessage(job(number), handed);
     });
   }
 }
