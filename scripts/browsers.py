@@ -128,10 +128,22 @@ def driven(name: str) -> Iterator[DrivenPage]:
 @contextlib.contextmanager
 def _in_firefox(place: Path) -> Iterator[DrivenPage]:
     port = _free_port()
-    settings = {"marionette.port": port, "browser.shell.checkDefaultBrowser": False, "datareporting.policy.dataSubmissionEnabled": False}
+    settings = {
+        "marionette.port": port,
+        "browser.shell.checkDefaultBrowser": False,
+        "datareporting.policy.dataSubmissionEnabled": False,
+    }
     lines = [f"user_pref({json.dumps(name)}, {json.dumps(value)});" for name, value in settings.items()]
     (place / "user.js").write_text("\n".join(lines), encoding="utf-8")
-    words = [str(_firefox()), "--headless", "--no-remote", "--marionette", "--remote-allow-system-access", "--profile", str(place)]
+    words = [
+        str(_firefox()),
+        "--headless",
+        "--no-remote",
+        "--marionette",
+        "--remote-allow-system-access",
+        "--profile",
+        str(place),
+    ]
     with _running(words, place / "log.txt"), contextlib.closing(_connected(port)) as wire:
         _received(wire)
         count = 0
@@ -157,11 +169,18 @@ def _in_firefox(place: Path) -> Iterator[DrivenPage]:
 @contextlib.contextmanager
 def _in_webkit(place: Path) -> Iterator[DrivenPage]:
     port, log = _free_port(), place / "log.txt"
-    options = {"binary": str(_mini_browser()), "args": ["--automation", "--enable-write-console-messages-to-stdout=true"]}
+    options = {
+        "binary": str(_mini_browser()),
+        "args": ["--automation", "--enable-write-console-messages-to-stdout=true"],
+    }
     match = {"alwaysMatch": {"webkitgtk:browserOptions": options}}
     with _display(place) as display:
         words = [str(shutil.which("WebKitWebDriver")), f"--port={port}"]
-        with _running(words, log, {"DISPLAY": display, "WEBKIT_DISABLE_SANDBOX_THIS_IS_DANGEROUS": "1", "XDG_RUNTIME_DIR": str(place)}):
+        with _running(
+            words,
+            log,
+            {"DISPLAY": display, "WEBKIT_DISABLE_SANDBOX_THIS_IS_DANGEROUS": "1", "XDG_RUNTIME_DIR": str(place)},
+        ):
             _connected(port).close()
             base = f"http://127.0.0.1:{port}/session"
             session = f"{base}/{_posted(base, {'capabilities': match})['sessionId']}"
@@ -191,11 +210,18 @@ def _display(place: Path) -> Iterator[str]:
 
 
 @contextlib.contextmanager
-def _running(words: list[str], log: Path, given: Mapping[str, str] | None = None, handed: tuple[int, ...] = ()) -> Iterator[None]:
+def _running(
+    words: list[str], log: Path, given: Mapping[str, str] | None = None, handed: tuple[int, ...] = ()
+) -> Iterator[None]:
     """Run a program with all that it starts, and end them."""
     with log.open("wb") as told:
         program = subprocess.Popen(
-            words, stdout=told, stderr=subprocess.STDOUT, env={**os.environ, **(given or {})}, pass_fds=handed, start_new_session=True
+            words,
+            stdout=told,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, **(given or {})},
+            pass_fds=handed,
+            start_new_session=True,
         )
         try:
             yield

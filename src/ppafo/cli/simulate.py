@@ -39,7 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="run again with half the error and from a start moved by 1e-7, and report which metrics it determines",
     )
     add_json_argument(parser)
-    parser.add_argument("--out", metavar="DIR", type=Path, help="result folder with the report; default out/NAME of the scenario")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="result folder with the report; default out/NAME of the scenario"
+    )
 
 
 def run(parsed: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ from scripts.browsers import NAMES, DrivenPage, driven, missing
 from scripts.live_page import check_bits, check_damage
 
 SLIDER = ".control[data-key='supply.pressure'] input[type=range]"
+UNDO = "button[title^=Undo]:enabled"
 FOCUSED = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent"
 
 
@@ -35,7 +36,9 @@ def test_it_opens_from_a_file_asks_for_nothing_and_says_nothing(page: DrivenPage
         page.wait_for_timeout(200)
     page.evaluate("document.querySelectorAll('details.folded').forEach(one => { one.open = true; })")
     page.wait_for_selector("canvas.map[data-milliseconds]")
-    page.evaluate("[...document.querySelectorAll('button')].find(one => one.textContent === 'Move each assumption').click()")
+    page.evaluate(
+        "[...document.querySelectorAll('button')].find(one => one.textContent === 'Move each assumption').click()"
+    )
     page.wait_for_selector(".assumptions table")
     asked = page.evaluate("performance.getEntriesByType('resource').map(one => one.name)")
     assert [url for url in asked if not url.startswith(("blob:", "data:"))] == []
@@ -47,7 +50,8 @@ def test_a_drag_changes_the_metrics_and_is_undone_at_once(page: DrivenPage, file
     before, run = page.evaluate("workbench.file()"), page.evaluate("workbench.run(0).metrics")
     page.drag(SLIDER, (0.4, 0.5, 0.6, 0.7, 0.8))
     assert page.evaluate("workbench.run(0).metrics") != run
-    page.evaluate("[...document.querySelectorAll('button')].find(one => one.textContent === 'Undo').click()")
+    page.wait_for_selector(UNDO)
+    page.evaluate("wanted => document.querySelector(wanted).click()", UNDO)
     assert page.evaluate("workbench.file()") == before
 
 
