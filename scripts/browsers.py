@@ -1,4 +1,4 @@
-"""Firefox and WebKit, headless, through the protocol of W3C WebDriver: Marionette for the one, WebKitWebDriver for the other.
+"""Firefox, by Marionette, and WebKit, by WebKitWebDriver: both headless, both with the commands of W3C WebDriver.
 
 Playwright drives Chromium; of these two it knows builds of its own only. A ``DrivenPage`` has what the checks of
 ``live_page.py`` ask of a page: ``evaluate``, ``wait_for_selector``, ``wait_for_timeout``, ``said``. It needs
@@ -34,7 +34,8 @@ _PATHS = {
     "PerformActions": "actions",
 }
 _CALL = """const done = arguments[arguments.length - 1];
-Promise.resolve().then(() => { const given = (SCRIPT); return typeof given === "function" ? given(arguments[0]) : given; })
+const given = () => (SCRIPT);
+Promise.resolve().then(given).then(found => typeof found === "function" ? found(arguments[0]) : found)
     .then(value => done({value}), error => done({error: String(error)}));"""
 _CONSOLE = """return Services.console.getMessageArray()
     .filter(one => one instanceof Ci.nsIScriptError && /^(file|blob):/.test(one.sourceName))
@@ -80,7 +81,7 @@ class DrivenPage:
         self.wait_for_selector('[data-ready="true"]')
 
     def evaluate(self, script: str, given: object = None) -> Any:
-        """Return the value of an expression, or of a function called with an argument; RuntimeError for what it throws."""
+        """Return the value of an expression, or of a function called with an argument; RuntimeError for a fault."""
         found = self._send("ExecuteAsyncScript", {"script": _CALL.replace("SCRIPT", script), "args": [given]})
         if "error" in found:
             raise RuntimeError(found["error"])

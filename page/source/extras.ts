@@ -4,6 +4,7 @@ import type { App, Named } from "./app";
 import { programNamed } from "./content";
 import { element, say } from "./dom";
 import type { PageFrame } from "./frame";
+import { refuseFile } from "./jobs";
 import { MapView } from "./map";
 import { shownMetric } from "./outcome";
 import { agreementTable, askForColumns, type ColumnMap, compare, mapOfHeader, recordingOf } from "./recording";
@@ -93,7 +94,7 @@ export class Extras {
 
   private async loadState(file: Blob): Promise<void> {
     try {
-      this.app.become(stateOfFile(this.app.content, await file.text()));
+      this.app.become(stateOfFile(this.app.content, await file.text().catch(refuseFile)));
       this.app.tell("");
     } catch (error) {
       if (!(error instanceof InputError)) throw error;

@@ -20,7 +20,7 @@ export interface RunsJob {
 
 export type Job =
   | { readonly kind: "program"; readonly program: Program; readonly bytes: ArrayBuffer }
-  | { readonly kind: "table"; readonly number: number; readonly file: Blob }
+  | { readonly kind: "table"; readonly number: number; readonly reading: number; readonly bytes: ArrayBuffer; readonly isLast: boolean }
   | RunsJob;
 
 export interface Reply {
@@ -31,6 +31,8 @@ export interface Reply {
 }
 
 const MOST_WORKERS = 4;
+/** Bytes of a file that are read at once. */
+const PIECE = 4_000_000;
 /** Pieces of work for each worker: some runs take longer than others, and who is done takes the next piece. */
 const PIECES = 4;
 /** Runs that a program does side by side. */
@@ -76,12 +78,17 @@ export class Workers {
     };
   }
 
-  /** The table in a file. */
+  /** The table in a file. The page reads it, piece by piece: in WebKit a worker of a page from a file may not. */
   async readTable(file: Blob): Promise<RecordedTable> {
     this.start();
-    const { table } = await this.ask(this.crew.length - 1, (number) => ({ kind: "table", number, file }));
-    if (table === undefined) throw new InputError("the file could not be read");
-    return table;
+    const reading = this.next;
+    for (let place = 0; ; place += PIECE) {
+      const bytes = await file.slice(place, place + PIECE).arrayBuffer().catch(refuseFile);
+      const isLast = place + PIECE >= file.size;
+      const { table } = await this.ask(this.crew.length - 1, (number) => ({ kind: "table", number, reading, bytes, isLast }), [bytes]);
+      if (table !== undefined) return table;
+      if (isLast) throw new InputError("the file could not be read");
+    }
   }
 
   private start(): void {
@@ -117,6 +124,12 @@ export class Workers {
       this.crew[place]?.worker.postMessage(job(number), handed);
     });
   }
+}
+
+/** What a browser says of a file that is gone, or is a folder. */
+export function refuseFile(error: unknown): never {
+  if (error instanceof DOMException) throw new InputError("the file could not be read");
+  throw error;
 }
 
 function joined(parts: readonly Float64Array[]): Float64Array {
