@@ -1,6 +1,7 @@
 """``ppafo simulate`` and ``ppafo plot``."""
 
 import dataclasses
+import html
 import json
 import os
 import signal
@@ -53,7 +54,7 @@ def test_a_run_writes_a_whole_result_folder_and_nothing_else(saved: Path) -> Non
 
 
 def test_the_report_has_the_metrics_the_figure_and_the_run_to_drag(saved: Path) -> None:
-    page = (saved / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    page = html.unescape((saved / "report.html").read_text(encoding="utf-8")).replace("\N{NO-BREAK SPACE}", " ")
     metrics = read_result(saved).document["metrics"]
     assert f"{1000.0 * metrics['gas_supplied']['value']:.4g} g" in page
     assert 'src="data:image/svg+xml;base64,' in page
