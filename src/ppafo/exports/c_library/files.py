@@ -161,10 +161,10 @@ def filled(text: str, words: Mapping[str, str]) -> str:
     return _MARK.sub(lambda found: words[found[1]], text)
 
 
-def run_words(library: Library) -> dict[str, str]:
-    """Marks of every template in which a run of a library is made of its settings."""
+def run_words(library: Library, settings_type: str) -> dict[str, str]:
+    """Marks of every template in which a run of a library is made of its settings, a struct of that type."""
     program = library.program
-    return {
+    words = {
         "never": repr(NEVER_FAILED),
         "same_moment": repr(SAME_MOMENT),
         "signal_rows": str(SIGNAL_ROWS),
@@ -176,14 +176,16 @@ def run_words(library: Library) -> dict[str, str]:
         "setting_count": str(len(library.settings)),
         "prepare": "\n".join(f"    {line}" for line in library.preparation),
         "other_program": other_program_of(library),
+        "settings_type": settings_type,
     }
+    return {**words, "prepared_run": _filled("prepared_run.c", words)}
 
 
 def _words(library: Library, name: str) -> dict[str, str]:
     program = library.program
     outputs = ["time", *program.outputs]
     return {
-        **run_words(library),
+        **run_words(library, f"{name}_settings"),
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
