@@ -18,7 +18,7 @@ REACHED = (0.90, 0.98)
 """Shares of 95 % intervals that hold between which a cell counts as good."""
 
 _SHORT = ("discharge coefficient", "leak area", "static friction", "damping", "inertia")
-_SETS, _SETS_FOR_ALL, _LEVELS, _SEED = 4000, 40000, 99, 1
+_SETS, _SETS_FOR_ALL, _LEVELS, _SEED = 4000, 20000, 99, 1
 _LEAST = 1.0e-6
 
 

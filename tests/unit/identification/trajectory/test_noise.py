@@ -160,6 +160,14 @@ def test_the_noise_of_a_sensor_is_recognised(kind: str, shape: Any, is_heavy: bo
     assert np.abs(neighbours).max() < 4.0 / math.sqrt(COUNT)
 
 
+@pytest.mark.parametrize("seed", [41, 52, 66, 120])
+def test_a_long_autoregression_is_not_taken_for_the_drift_that_is_there(seed: int) -> None:
+    # Of 130 drifts these are the four that the criterion of Akaike alone takes for an autoregression of 5 to 10.
+    random = np.random.default_rng(seed)
+    segments = [noise_kind("drift").draw(400, number, random) for number in range(2)]
+    assert isinstance(sensor_noise(segments).shape, Drift)
+
+
 def test_levels_of_recordings_that_differ_are_told_apart() -> None:
     noise = sensor_noise(drawn("unequal", 10))
     assert not noise.is_shared
