@@ -237,7 +237,6 @@ def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random
     """Return the states with the numbers of every shape that has few drawn; the columns are left out of that.
 
     Given the columns slow noise looks quicker than it is, for they have taken part of it, and would stay so for long.
-    Whether a drift begins at 0 is drawn too: recordings seldom tell.
     """
     found = list(states)
     for sensor, state in enumerate(states):
@@ -247,21 +246,17 @@ def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random
         longest = longest_memory(model.segments(model.residuals, sensor))
         here = _shape_of(state.numbers, state.noise.shape, longest)
         likelihood = _without_columns(model, others + state.products) - state.spread + (here[1] if here else 0.0)
-        for turn in range(_PROPOSALS + isinstance(state.noise.shape, Drift)):
-            before, numbers = state.noise.shape, state.numbers
-            if turn == _PROPOSALS and isinstance(before, Drift):
-                before = replace(before, is_zeroed=not before.is_zeroed)
-            else:
-                numbers = numbers + state.step @ random.standard_normal(len(numbers))
-            tried = _shape_of(numbers, before, longest)
+        for _ in range(_PROPOSALS):
+            numbers = state.numbers + state.step @ random.standard_normal(len(state.numbers))
+            tried = _shape_of(numbers, state.noise.shape, longest)
             if tried is None:
                 continue
             noise = replace(state.noise, shape=tried[0])
             products, spread = _products(model, noise, state.weights, sensor)
             other = _without_columns(model, others + products) - spread + tried[1]
             if math.log(random.random()) < other - likelihood:
-                state = replace(state, noise=noise, products=products, spread=spread, numbers=numbers)  # noqa: PLW2901
-                likelihood = other
+                moved = replace(state, noise=noise, products=products, spread=spread, numbers=numbers)
+                state, likelihood = moved, other  # noqa: PLW2901
         found[sensor] = state
     return found
 

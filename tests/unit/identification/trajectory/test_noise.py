@@ -1,7 +1,6 @@
 """Noise of sensors: recognised, whitened exactly, and honest in the intervals that rest on it."""
 
 import dataclasses
-import itertools
 import math
 from typing import Any
 
@@ -232,62 +231,39 @@ def test_with_white_noise_the_posterior_is_that_of_least_squares() -> None:
     assert found.quantile(0, 0.975) - found.quantile(0, 0.025) == pytest.approx(2.0 * 1.965 * error, rel=0.02)
 
 
-def sums_over_drifts(segments: list[Floats], longest: float) -> tuple[float, float, float]:
-    """Mean and standard deviation of the logarithm of a drift's steps, and the chance that it begins at 0.
+def step_of_a_drift(segments: list[Floats], longest: float) -> tuple[float, float]:
+    """Mean and standard deviation of the logarithm of a drift's steps, from a sum with dense covariances.
 
-    Sums with dense covariances. The prior is even in the standard deviation of the steps and in the logarithm of the
-    memory, and begins as likely at 0 as anywhere; each level and an offset of all samples are integrated out.
+    The prior is even in the standard deviation of the steps and in the logarithm of the memory; each level and an
+    offset of all samples are integrated out.
     """
     count = len(segments[0])
-    lags = np.subtract.outer(np.arange(count), np.arange(count))
+    ones, lags = np.ones(count), np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
     steps, logarithms = np.linspace(0.005, 2.5, 100), []
-    for is_zeroed, step in itertools.product((True, False), steps):
+    for step in steps:
         for timescale in np.exp(np.linspace(0.0, longest, 20)):
             memory = math.exp(-1.0 / timescale)
-            changes = np.full(count, step)
-            changes[0] /= 1.0 if is_zeroed else math.sqrt(1.0 - memory**2)
-            drifts = np.where(lags >= 0, memory ** np.abs(lags), 0.0) * changes
-            root = np.linalg.cholesky(np.eye(count) + drifts @ drifts.T)
-            white = [np.linalg.solve(root, np.column_stack([np.ones(count), one])) for one in segments]
+            root = np.linalg.cholesky(np.eye(count) + step**2 / (1.0 - memory**2) * memory**lags)
+            white = [np.linalg.solve(root, np.column_stack([ones, one])) for one in segments]
             products = np.sum([one.T @ one for one in white], axis=0)
             left = products[1, 1] - products[0, 1] ** 2 / products[0, 0]
             spread = len(segments) * np.sum(np.log(np.diag(root))) + 0.5 * math.log(products[0, 0])
             logarithms.append(-spread - 0.5 * (count * len(segments) - 1) * math.log(left))
-    chances = np.exp(np.array(logarithms) - max(logarithms)).reshape(2, len(steps), -1).sum(axis=2)
-    by_step = chances.sum(axis=0)
-    mean = float(np.average(np.log(steps), weights=by_step))
-    deviation = math.sqrt(np.average((np.log(steps) - mean) ** 2, weights=by_step))
-    return mean, deviation, float(chances[0].sum() / chances.sum())
-
-
-def drifts_drawn(segments: list[Floats], is_zeroed: bool) -> list[Drift]:
-    """Drifts of the posterior of recordings with an offset that all samples share."""
-    places = tuple(slice(number * len(one), (number + 1) * len(one)) for number, one in enumerate(segments))
-    columns = np.column_stack([np.ones(places[-1].stop), -np.concatenate(segments)])
-    model = LinearModel(columns, (places,), np.zeros(1), np.zeros((1, 1)))
-    start = SensorNoise(Drift(0.01, 0.95, is_zeroed), np.ones(len(segments)))
-    _, shown = draw_posterior(model, [start], 1, 1, chains=2, count=800)
-    return [one.noises[0].shape for one in shown if isinstance(one.noises[0].shape, Drift)]
+    chances = np.exp(np.array(logarithms) - max(logarithms)).reshape(len(steps), -1).sum(axis=1)
+    mean = float(np.average(np.log(steps), weights=chances))
+    return mean, math.sqrt(np.average((np.log(steps) - mean) ** 2, weights=chances))
 
 
 def test_a_drift_is_drawn_as_a_sum_over_all_drifts_says() -> None:
     random, count = np.random.default_rng(23), 60
     segments = [NOISE_KINDS["drift"].draw(count, number, random) for number in range(2)]
-    mean, deviation, _ = sums_over_drifts(segments, math.log(50.0 * count))
+    columns = np.column_stack([np.ones(2 * count), -np.concatenate(segments)])
+    model = LinearModel(columns, ((slice(0, count), slice(count, 2 * count)),), np.zeros(1), np.zeros((1, 1)))
+    _, shown = draw_posterior(model, [SensorNoise(Drift(0.01, 0.95), np.ones(2))], 1, 1, chains=2, count=800)
+    drawn_steps = [0.5 * math.log(one.noises[0].shape.ratio) for one in shown]  # type: ignore[union-attr]
+    mean, deviation = step_of_a_drift(segments, math.log(50.0 * count))
     # With a prior even in the logarithm they came out ten times as small, for no recording tells none from very little.
-    drawn_steps = [0.5 * math.log(one.ratio) for one in drifts_drawn(segments, False)]
     assert np.mean(drawn_steps) == pytest.approx(mean, abs=0.4 * deviation)
-
-
-@pytest.mark.parametrize("offset", [0.0, 1.2])
-def test_whether_a_drift_begins_at_zero_is_drawn_and_not_taken_for_certain(offset: float) -> None:
-    random, count = np.random.default_rng(24), 40
-    walks = [offset * sign + 0.5 * np.cumsum(random.standard_normal(count)) for sign in (1.0, -1.0)]
-    segments = [walk + random.standard_normal(count) for walk in walks]
-    expected = sums_over_drifts(segments, math.log(50.0 * count))[2]
-    for begins in (True, False):
-        drawn_starts = [one.is_zeroed for one in drifts_drawn(segments, begins)]
-        assert np.mean(drawn_starts) == pytest.approx(expected, abs=0.12)
 
 
 def test_bounds_cut_the_interval_and_a_direction_that_nothing_fixes_stays_finite() -> None:
