@@ -94,7 +94,7 @@ def test_even_ranks_are_good_and_a_table_says_so() -> None:
     assert is_good(lines, True)
     assert "0 of 5 cells outside" in coverage_text(lines, False)
     assert "leave it in 0.3 of 5 cells" in coverage_text(lines, True)
-    assert coverage_text(lines, True).splitlines()[2].split()[7:13] == ["95.0", "%", "-", "0.99", "+0.00", "1.00"]
+    assert coverage_text(lines, True).splitlines()[2].split()[7:13] == ["95.0", "%", "-", "1.00", "+0.00", "1.00"]
     assert coverage_document(lines, True)["kinds"][0]["held"]["foot_plate.inertia"] == pytest.approx(0.95)
 
 

@@ -290,16 +290,18 @@ def test_intervals_hold_the_truth_under_noise_that_is_not_white(kind: str) -> No
     assert all(0.6 < width < 2.0 for line in lines for width in line.width)
 
 
-def test_a_drift_of_a_sensor_is_said_and_does_not_cap_the_verdict(experiment: Experiment) -> None:
+@pytest.mark.parametrize("kind", ["drift", "heavy-drift"])
+def test_a_drift_of_a_sensor_is_said_and_does_not_cap_the_verdict(experiment: Experiment, kind: str) -> None:
     random = np.random.default_rng(17)
     recording = experiment.recording
     for name, size in experiment.noise.items():
-        drift = 2.0 * size * (NOISE_KINDS["drift"].draw(len(recording), 0, random))
+        drift = 2.0 * size * (NOISE_KINDS[kind].draw(len(recording), 0, random))
         recording = recording.with_channel(name, recording[name] + drift, recording.unit(name))
     drifting = dataclasses.replace(experiment, recording=recording, noise={})
     found = fit(TrajectoryProblem((FreeParameter("foot_plate.inertia", start=0.0085),), (drifting,)))
     assert found.estimates[0].verdict == "identified"
     assert "drift" in found.estimates[0].explanation
+    assert any("drift under heavy tails" in remark for remark in found.remarks) == (kind == "heavy-drift")
 
 
 def test_gaps_and_a_lone_sample_between_two_do_no_harm(experiment: Experiment) -> None:
