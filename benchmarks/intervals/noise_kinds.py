@@ -26,12 +26,14 @@ class NoiseKind:
     """How errors of a sensor are drawn and what covariance they have, all over the size of the white noise.
 
     Both are functions of the number of samples and of the number of the recording. Where errors are not normal the
-    covariance is that of normal ones which say as much. ``channels`` has the kind; the other channels are white.
+    covariance is that of normal ones which say as much, and the kind ``is_heavy``. ``channels`` has the kind; the other
+    channels are white.
     """
 
     draw: Callable[[int, int, np.random.Generator], Floats]
     covariance: Callable[[int, int], Floats]
     channels: tuple[str, ...] = ("angle", "pressure_1", "pressure_2")
+    is_heavy: bool = False
 
 
 def noise_kind(name: str) -> NoiseKind:
@@ -144,8 +146,8 @@ NOISE_KINDS: dict[str, NoiseKind] = {
     "drift": NoiseKind(_drift, _of_drift),
     "random-walk": NoiseKind(_walk, _of_walk),
     "hum": NoiseKind(_hum, _of_hum),
-    "heavy-tails": NoiseKind(_heavy, _of_heavy),
-    "heavy-drift": NoiseKind(_heavy_drift, _of_heavy_drift),
+    "heavy-tails": NoiseKind(_heavy, _of_heavy, is_heavy=True),
+    "heavy-drift": NoiseKind(_heavy_drift, _of_heavy_drift, is_heavy=True),
     "unequal": NoiseKind(_unequal, _of_unequal),
 }
 """By name: an autoregression of 0.95 on one channel and on all, a drift with white and with t (3) noise upon it, ..."""

@@ -18,13 +18,14 @@ REACHED = (0.90, 0.98)
 """Shares of 95 % intervals that hold between which a cell counts as good."""
 
 _SHORT = ("discharge coefficient", "leak area", "static friction", "damping", "inertia")
-_SETS, _LEVELS, _SEED = 4000, 99, 1
+_SETS, _SETS_FOR_ALL, _LEVELS, _SEED = 4000, 20000, 99, 1
+_LEAST = 1.0e-6
 
 
 def coverage_text(lines: Sequence[Line], is_drawn: bool) -> str:
     """Return the table: shares of intervals that hold, widths over the best possible, alarms; or ranks."""
     rows = [_cells(kind, of_kind, is_drawn) for kind, of_kind in _by_kind(lines)]
-    head = ("noise", "fits", *_SHORT, "width", "alarms")
+    head = ("noise", "fits", *_SHORT, "held", "known", "spread", "shift", "width", "alarms")
     widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
     told = (
         f"ranks of truths drawn from the prior: largest fraction of the {CONFIDENCE:.0%} simultaneous band (* outside)"
@@ -41,10 +42,27 @@ def coverage_text(lines: Sequence[Line], is_drawn: bool) -> str:
         [
             told,
             *body,
+            f"held: {CONFIDENCE:.0%} intervals of all parameters that hold; known: of fits that know the noise",
+            "spread, shift: deviation of the ranks as normal scores (1; above it: too narrow), largest mean (0)",
             "width: median of the standard deviation over the best possible, of the least and the greatest parameter",
             "alarms: fits of the right model that the test of misfit called wrong",
             f"{_missed(lines, is_drawn)} of {len(rows) * len(_SHORT)} cells outside; {seconds:.1f} s a fit (median)",
+            *([_chance_of_missed(lines)] if is_drawn else []),
         ]
+    )
+
+
+def _chance_of_missed(lines: Sequence[Line]) -> str:
+    """Return what the number of cells outside means: the band is one over all levels, but each cell has its own."""
+    kinds = _by_kind(lines)
+    cells = len(kinds) * len(_SHORT)
+    beyond = sum(
+        int(np.sum(_shares_of_band(of_kind) * _critical(len(of_kind)) > _critical(len(of_kind), cells)))
+        for _, of_kind in kinds
+    )
+    return (
+        f"right intervals leave it in {cells * (1.0 - CONFIDENCE):.1f} of {cells} cells; the band that all cells keep "
+        f"with that chance at once is left by {beyond}"
     )
 
 
@@ -59,6 +77,9 @@ def coverage_document(lines: Sequence[Line], is_drawn: bool) -> dict[str, Any]:
                 "held": dict(zip(FIVE_PARAMETERS, _held(of_kind).tolist(), strict=True)),
                 "width_over_best": dict(zip(FIVE_PARAMETERS, _widths(of_kind).tolist(), strict=True)),
                 "share_of_band": dict(zip(FIVE_PARAMETERS, _shares_of_band(of_kind).tolist(), strict=True)),
+                "held_with_known_noise": dict(zip(FIVE_PARAMETERS, _held_if_known(of_kind).tolist(), strict=False)),
+                "spread_of_scores": dict(zip(FIVE_PARAMETERS, _scores(of_kind).std(axis=0).tolist(), strict=True)),
+                "shift_of_scores": dict(zip(FIVE_PARAMETERS, _scores(of_kind).mean(axis=0).tolist(), strict=True)),
                 "alarms": sum(line.alarm for line in of_kind),
             }
         )
@@ -109,9 +130,19 @@ def _cells(kind: str, lines: Sequence[Line], is_drawn: bool) -> tuple[str, ...]:
     values = _shares_of_band(lines) if is_drawn else _held(lines)
     shown = [f"{value:.2f}" if is_drawn else f"{100.0 * value:.1f} %" for value in values]
     marked = [f"{text}{' ' if good else '*'}" for text, good in zip(shown, _good(lines, is_drawn), strict=True)]
-    widths = _widths(lines)
-    alarms = sum(line.alarm for line in lines)
-    return (kind, str(len(lines)), *marked, f"{widths.min():.2f} to {widths.max():.2f}", str(alarms))
+    widths, scores, known = _widths(lines), _scores(lines), _held_if_known(lines)
+    shifts = scores.mean(axis=0)
+    return (
+        kind,
+        str(len(lines)),
+        *marked,
+        f"{100.0 * _held(lines).mean():.1f} %",
+        f"{100.0 * known.mean():.1f} %" if known.size else "-",
+        f"{np.sqrt(np.mean(np.var(scores, axis=0))):.2f}",
+        f"{shifts[np.argmax(np.abs(shifts))]:+.2f}",
+        f"{widths.min():.2f} to {widths.max():.2f}",
+        str(sum(line.alarm for line in lines)),
+    )
 
 
 def _good(lines: Sequence[Line], is_drawn: bool) -> list[bool]:
@@ -125,8 +156,24 @@ def _missed(lines: Sequence[Line], is_drawn: bool) -> int:
 
 
 def _held(lines: Sequence[Line]) -> "np.ndarray":
-    below, tail = np.array([line.below for line in lines]), 0.5 - 0.5 * CONFIDENCE
+    return _inside(np.array([line.below for line in lines]))
+
+
+def _held_if_known(lines: Sequence[Line]) -> "np.ndarray":
+    """Return the same of the intervals that know the noise; empty where there are none."""
+    return _inside(np.array([line.exact for line in lines])) if all(line.exact for line in lines) else np.zeros(0)
+
+
+def _inside(below: "np.ndarray") -> "np.ndarray":
+    tail = 0.5 - 0.5 * CONFIDENCE
     return np.asarray(np.mean((below >= tail) & (below <= 1.0 - tail), axis=0))
+
+
+def _scores(lines: Sequence[Line]) -> "np.ndarray":
+    """Return the ranks as normal scores, in which a shift and a wrong width are easy to see."""
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri(np.clip([line.below for line in lines], _LEAST, 1.0 - _LEAST)))
 
 
 def _widths(lines: Sequence[Line]) -> "np.ndarray":
@@ -151,10 +198,18 @@ def _shares_of_band(lines: Sequence[Line]) -> "np.ndarray":
 
 
 @cache
-def _critical(count: int) -> float:
-    """Return the standard errors within which even ranks stay at all levels at once with the chance of the band."""
+def _critical(count: int, cells: int = 1) -> float:
+    """Return the standard errors within which even ranks stay at all levels at once with the chance of the band.
+
+    With several independent cells, in all of them at once.
+    """
+    return float(np.quantile(_worst(count, _SETS if cells == 1 else _SETS_FOR_ALL), CONFIDENCE ** (1.0 / cells)))
+
+
+@cache
+def _worst(count: int, sets: int) -> "np.ndarray":
+    """Return how far even ranks are from even at most, in standard errors, in each of many draws."""
     random = np.random.default_rng(_SEED)
     levels = _levels()
     spread = np.sqrt(levels * (1.0 - levels) / count)
-    worst = [np.max(np.abs(_away(random.random(count))) / spread) for _ in range(_SETS)]
-    return float(np.quantile(worst, CONFIDENCE))
+    return np.array([np.max(np.abs(_away(random.random(count))) / spread) for _ in range(sets)])

@@ -11,7 +11,7 @@ import { type Overlay, Panels } from "./panels";
 import { changed, type Configuration, contradiction, normalText, settingsByKey, valuesOf } from "./settings";
 import { Stage } from "./stage";
 import { addressOf, firstState, History, MOST_CONFIGURATIONS, type State, stateOfAddress } from "./state";
-import { InputError } from "./units";
+import { InputError, telling } from "./units";
 import { unpacked } from "./unpacking";
 import { makeFrame, type PageFrame } from "./frame";
 import { bandOf } from "./variation";
@@ -183,6 +183,9 @@ export class App {
   }
 
   undo(): void {
+    // While a slider is still held, what its drag began from is wanted back.
+    if (this.dragged !== null) this.history.keep(this.dragged);
+    this.dragged = null;
     const state = this.history.undo(this.state);
     if (state !== null) this.restore(state);
   }
@@ -256,7 +259,7 @@ export class App {
       return run === null || run === undefined ? [] : [{ ...item, run, program: item.configuration.program, values: valuesOf(this.content, item.configuration) }];
     });
     const programs = [...new Set(this.bench.map(({ program }) => program))].map((name) => programNamed(this.content, name));
-    this.frame.follow(this.state, named, this.target, this.isBeside, this.history.canUndo, this.history.canRedo);
+    this.frame.follow(this.state, named, this.target, this.isBeside, this.history.canUndo || this.dragged !== null, this.history.canRedo);
     this.controls.show(programs, this.tab.first, this.target === null ? this.bench : this.bench.filter((_, place) => place === this.target));
     if (done.length < named.length) return;
     const faults = done.filter(({ run }) => run.fault !== "").map(({ name, run }) => `${name}: ${run.fault}.`);
@@ -286,7 +289,7 @@ export class App {
       if (address !== location.hash.slice(1)) history.replaceState(null, "", `#${address}`);
     }
     this.extras.settle();
-    if (this.hasBand) for (const { configuration, place } of this.named) void this.drawBand(configuration, place);
+    if (this.hasBand) for (const { configuration, place } of this.named) void this.drawBand(configuration, place).catch(telling((words) => this.tell(words)));
     else this.latest.clear();
   }
 

@@ -2,9 +2,14 @@
 
 export const DASHES: readonly number[][] = [[], [7, 4], [2, 3], [9, 3, 2, 3]];
 
-/** The value of a custom property of the page's style. */
+const known = new Map<string, string>();
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => known.clear());
+
+/** The value of a custom property of the page's style. To ask for it makes the browser work out its styles: once will do. */
 export function colour(name: string): string {
-  return getComputedStyle(document.querySelector(".workbench") ?? document.body).getPropertyValue(`--${name}`).trim();
+  const found = known.get(name) ?? getComputedStyle(document.querySelector(".workbench") ?? document.body).getPropertyValue(`--${name}`).trim();
+  if (found !== "") known.set(name, found);
+  return found;
 }
 
 /** The colour of a configuration by its place. */

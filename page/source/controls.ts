@@ -41,7 +41,9 @@ export interface Wishes {
 }
 
 export class Controls {
-  private controls: Control[] = [];
+  /** Those that can be seen; a group is made when it is opened for the first time. */
+  private groups: { readonly isOpen: () => boolean; readonly controls: Control[] }[] = [];
+  private configurations: readonly Configuration[] = [];
   private programs = "";
 
   constructor(
@@ -57,12 +59,12 @@ export class Controls {
       this.programs = names;
       this.build(programs, first);
     }
-    this.update(configurations);
+    this.configurations = configurations;
+    this.update();
   }
 
   private build(programs: readonly Program[], first: readonly string[]): void {
     const all = new Map(programs.flatMap((program) => [...settingsByKey(program)]));
-    this.controls = [];
     const leading = first.filter((key) => all.has(key));
     const groups = new Map<string, Setting[]>();
     for (const setting of all.values()) {
@@ -71,30 +73,39 @@ export class Controls {
       groups.set(group, [...(groups.get(group) ?? []), setting]);
     }
     const order = [...groups.keys()].sort((a, b) => rank(a) - rank(b));
-    const rows = (settings: readonly Setting[]) => settings.map((setting) => this.made(setting));
-    const open = element("div", { class: "group first" }, ...rows(leading.map((key) => all.get(key)).filter((setting) => setting !== undefined)));
-    const closed = order.map((group) =>
-      element(
-        "details",
-        { class: "group" },
-        element("summary", {}, GROUPS[group] ?? group, element("span", { class: "count" }, ` ${groups.get(group)?.length ?? 0}`)),
-        ...rows(groups.get(group) ?? []),
-      ),
-    );
-    this.host.replaceChildren(open, ...(this.content.form === "block" ? [] : closed));
+    const controls = leading.map((key) => all.get(key)).flatMap((setting) => (setting === undefined ? [] : [this.made(setting)]));
+    this.groups = [{ isOpen: () => true, controls }];
+    const open = element("div", { class: "group first" }, ...controls.map(({ row }) => row));
+    this.host.replaceChildren(open, ...(this.content.form === "block" ? [] : order.map((name) => this.folded(name, groups.get(name) ?? []))));
   }
 
-  private made(setting: Setting): Control["row"] {
+  private folded(name: string, settings: readonly Setting[]): HTMLElement {
+    const controls: Control[] = [];
+    const group = element("details", { class: "group" }, element("summary", {}, GROUPS[name] ?? name, element("span", { class: "count" }, ` ${settings.length}`)));
+    group.addEventListener("toggle", () => {
+      if (controls.length === 0) {
+        controls.push(...settings.map((setting) => this.made(setting)));
+        group.append(...controls.map(({ row }) => row));
+      }
+      this.update();
+    });
+    this.groups.push({ isOpen: () => group.open, controls });
+    return group;
+  }
+
+  private made(setting: Setting): Control {
     const { key, label } = setting;
     const about = element("p", { class: "about", id: `about-${key}`, hidden: true });
-    const name = element(
+    const describe = () => (name.title ||= this.words(setting).join("\n"));
+    const name: HTMLButtonElement = element(
       "button",
       {
         type: "button",
         class: "name",
         "aria-expanded": "false",
         "aria-controls": `about-${key}`,
-        title: this.words(setting).join("\n"),
+        onpointerenter: describe,
+        onfocus: describe,
         onclick: () => {
           about.hidden = !about.hidden;
           name.setAttribute("aria-expanded", String(!about.hidden));
@@ -122,8 +133,7 @@ export class Controls {
     });
     back.addEventListener("click", () => wish(null, false));
     const row = element("div", { class: "control", "data-key": key }, name, value, slider, back, fault, about);
-    this.controls.push({ setting, row, slider, value, back });
-    return row;
+    return { setting, row, slider, value, back };
   }
 
   /** What is known of a setting, line by line. */
@@ -137,9 +147,10 @@ export class Controls {
     ];
   }
 
-  private update(configurations: readonly Configuration[]): void {
+  private update(): void {
+    const { configurations } = this;
     const values = configurations.map((configuration) => valuesOf(this.content, configuration));
-    for (const { setting, row, slider, value, back } of this.controls) {
+    for (const { setting, row, slider, value, back } of this.groups.flatMap(({ isOpen, controls }) => (isOpen() ? controls : []))) {
       const { key } = setting;
       const having = configurations.map((_, place) => place).filter((place) => values[place]?.has(key));
       row.hidden = having.length === 0;

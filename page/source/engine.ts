@@ -69,7 +69,7 @@ export class Engine {
   /** One run with all its samples. */
   run(values: Values): Run {
     return this.aside(() => {
-      const settings = this.written([this.row(values)]);
+      const settings = this.written(Float64Array.from(this.program.settings, (setting) => values.get(setting.key) ?? setting.value));
       const fault = this.faultOf(settings);
       if (fault !== "") return failedRun("refused", fault);
       const { exports, program } = this;
@@ -94,37 +94,31 @@ export class Engine {
     });
   }
 
-  /** Many runs, with their metrics, and samples of one channel where one is named. */
-  runMany(rows: readonly Float64Array[], channel: string | null, every: number, places: number): Ensemble {
+  /** Many runs, settings run after run, with their metrics, and samples of one channel where one is named. */
+  runMany(rows: Float64Array, channel: string | null, every: number, places: number): Ensemble {
     return this.aside(() => {
       const { exports, program } = this;
+      const runs = rows.length / program.settings.length;
       const settings = this.written(rows);
       const wanted = channel === null ? 0 : places;
-      const metrics = exports.reserve(rows.length * program.metrics.length * NUMBER);
-      const ended = exports.reserve(rows.length * 4);
-      const traces = exports.reserve(Math.max(1, rows.length * wanted) * NUMBER);
+      const metrics = exports.reserve(runs * program.metrics.length * NUMBER);
+      const ended = exports.reserve(runs * 4);
+      const traces = exports.reserve(Math.max(1, runs * wanted) * NUMBER);
       const place = channel === null ? -1 : program.channels.findIndex((item) => item.name === channel);
-      const isDone = traces !== 0 && exports.ensemble(settings, rows.length, metrics, ended, place, every, wanted, traces) === 0;
+      const isDone = traces !== 0 && exports.ensemble(settings, runs, metrics, ended, place, every, wanted, traces) === 0;
       if (!isDone) throw new RangeError("these runs need more memory than this page has");
       const { buffer } = exports.memory;
       return {
-        metrics: new Float64Array(buffer, metrics, rows.length * program.metrics.length).slice(),
-        ended: new Int32Array(buffer, ended, rows.length).slice(),
-        traces: new Float64Array(buffer, traces, rows.length * wanted).slice(),
+        metrics: new Float64Array(buffer, metrics, runs * program.metrics.length).slice(),
+        ended: new Int32Array(buffer, ended, runs).slice(),
+        traces: new Float64Array(buffer, traces, runs * wanted).slice(),
       };
     });
   }
 
-  /** The numbers of a configuration as the module takes them. */
-  row(values: Values): Float64Array {
-    return Float64Array.from(this.program.settings, (setting) => values.get(setting.key) ?? setting.value);
-  }
-
-  private written(rows: readonly Float64Array[]): number {
-    const width = this.program.settings.length;
-    const place = this.exports.reserve(rows.length * width * NUMBER);
-    const numbers = new Float64Array(this.exports.memory.buffer, place, rows.length * width);
-    rows.forEach((row, number) => numbers.set(row, number * width));
+  private written(numbers: Float64Array): number {
+    const place = this.exports.reserve(numbers.length * NUMBER);
+    new Float64Array(this.exports.memory.buffer, place, numbers.length).set(numbers);
     return place;
   }
 

@@ -4,6 +4,7 @@ import type { App, Named } from "./app";
 import { programNamed } from "./content";
 import { element, say } from "./dom";
 import type { PageFrame } from "./frame";
+import { refuseFile } from "./jobs";
 import { MapView } from "./map";
 import { shownMetric } from "./outcome";
 import { agreementTable, askForColumns, type ColumnMap, compare, mapOfHeader, recordingOf } from "./recording";
@@ -12,7 +13,7 @@ import { shownNumber, valuesOf } from "./settings";
 import { samplesText, savePicture, saveState, saveText } from "./sharing";
 import { addressOf, stateOfFile } from "./state";
 import type { RecordedTable } from "./table";
-import { InputError, plain, readableUnit } from "./units";
+import { InputError, plain, readableUnit, telling } from "./units";
 import { type Effect, effectsOf } from "./variation";
 
 const TOLD_METRICS = 3;
@@ -93,7 +94,7 @@ export class Extras {
 
   private async loadState(file: Blob): Promise<void> {
     try {
-      this.app.become(stateOfFile(this.app.content, await file.text()));
+      this.app.become(stateOfFile(this.app.content, await file.text().catch(refuseFile)));
       this.app.tell("");
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
@@ -188,7 +189,8 @@ export class Extras {
   }
 
   private makeAssumptions(): void {
-    const run = element("button", { type: "button", onclick: () => void this.showEffects() }, "Move each assumption");
+    const { app } = this;
+    const run = element("button", { type: "button", onclick: () => void this.showEffects().catch(telling((words) => app.tell(words))) }, "Move each assumption");
     this.frame.assumptions.append(
       element("p", {}, "Nobody printed some of the numbers. Each of these is moved alone, over its interval where one is known, else by a fifth down and up; the others stay."),
       element("div", { class: "buttons" }, run),

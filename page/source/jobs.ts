@@ -11,7 +11,8 @@ export interface RunsJob {
   readonly kind: "runs";
   readonly number: number;
   readonly program: string;
-  readonly rows: readonly Float64Array[];
+  /** Settings of the program, run after run. */
+  readonly rows: Float64Array<ArrayBuffer>;
   readonly channel: string | null;
   readonly every: number;
   readonly places: number;
@@ -19,7 +20,7 @@ export interface RunsJob {
 
 export type Job =
   | { readonly kind: "program"; readonly program: Program; readonly bytes: ArrayBuffer }
-  | { readonly kind: "table"; readonly number: number; readonly file: Blob }
+  | { readonly kind: "table"; readonly number: number; readonly reading: number; readonly bytes: ArrayBuffer; readonly isLast: boolean }
   | RunsJob;
 
 export interface Reply {
@@ -30,6 +31,12 @@ export interface Reply {
 }
 
 const MOST_WORKERS = 4;
+/** Bytes of a file that are read at once. */
+const PIECE = 4_000_000;
+/** Pieces of work for each worker: some runs take longer than others, and who is done takes the next piece. */
+const PIECES = 4;
+/** Runs that a program does side by side. */
+const TOGETHER = 8;
 
 /** A few workers that share work; they start when they are first wanted. */
 export class Workers {
@@ -44,19 +51,26 @@ export class Workers {
     return this.crew.length;
   }
 
-  /** Many runs of a program, in as many parts as there are workers. */
-  async runMany(program: Program, rows: readonly Float64Array[], channel: string | null = null, every = 1, places = 0): Promise<Ensemble> {
+  /** Many runs of a program, settings run after run, shared out among the workers. */
+  async runMany(program: Program, rows: Float64Array<ArrayBuffer>, channel: string | null = null, every = 1, places = 0): Promise<Ensemble> {
     this.start();
     const bytes = await this.bytesOf(program);
-    const size = Math.ceil(rows.length / this.crew.length / 8) * 8;
-    const parts = this.crew.map((_, place) => rows.slice(place * size, (place + 1) * size)).filter((part) => part.length > 0);
-    const replies = await Promise.all(
-      parts.map((part, place) => {
-        this.introduce(place, program, bytes);
-        return this.ask(place, (number) => ({ kind: "runs", number, program: program.name, rows: part, channel, every, places }));
-      }),
-    );
-    const found = replies.map((reply) => reply.runs).filter((runs) => runs !== undefined);
+    const width = program.settings.length;
+    const size = Math.ceil(rows.length / width / this.crew.length / PIECES / TOGETHER) * TOGETHER * width;
+    const found: Ensemble[] = [];
+    let next = 0;
+    const work = async (place: number) => {
+      this.introduce(place, program, bytes);
+      while (next * size < rows.length) {
+        const piece = next;
+        next += 1;
+        const part = rows.slice(piece * size, (piece + 1) * size);
+        const { runs } = await this.ask(place, (number) => ({ kind: "runs", number, program: program.name, rows: part, channel, every, places }), [part.buffer]);
+        if (runs !== undefined) found[piece] = runs;
+      }
+    };
+    // Two pieces wait at each worker, so that it does not wait for a page that is drawing.
+    await Promise.all([...this.crew.keys(), ...this.crew.keys()].map(work));
     return {
       metrics: joined(found.map((runs) => runs.metrics)),
       ended: Int32Array.from(found.flatMap((runs) => [...runs.ended])),
@@ -64,12 +78,17 @@ export class Workers {
     };
   }
 
-  /** The table in a file. */
+  /** The table in a file. The page reads it, piece by piece: in WebKit a worker of a page from a file may not. */
   async readTable(file: Blob): Promise<RecordedTable> {
     this.start();
-    const { table } = await this.ask(this.crew.length - 1, (number) => ({ kind: "table", number, file }));
-    if (table === undefined) throw new InputError("the file could not be read");
-    return table;
+    const reading = this.next;
+    for (let place = 0; ; place += PIECE) {
+      const bytes = await file.slice(place, place + PIECE).arrayBuffer().catch(refuseFile);
+      const isLast = place + PIECE >= file.size;
+      const { table } = await this.ask(this.crew.length - 1, (number) => ({ kind: "table", number, reading, bytes, isLast }), [bytes]);
+      if (table !== undefined) return table;
+      if (isLast) throw new InputError("the file could not be read");
+    }
   }
 
   private start(): void {
@@ -94,7 +113,7 @@ export class Workers {
     member.worker.postMessage(job);
   }
 
-  private ask(place: number, job: (number: number) => Job): Promise<Reply> {
+  private ask(place: number, job: (number: number) => Job, handed: ArrayBuffer[] = []): Promise<Reply> {
     const number = this.next;
     this.next += 1;
     return new Promise((resolve, reject) => {
@@ -102,9 +121,15 @@ export class Workers {
         if (reply.fault === undefined) resolve(reply);
         else reject(new InputError(reply.fault));
       });
-      this.crew[place]?.worker.postMessage(job(number));
+      this.crew[place]?.worker.postMessage(job(number), handed);
     });
   }
+}
+
+/** What a browser says of a file that is gone, or is a folder. */
+export function refuseFile(error: unknown): never {
+  if (error instanceof DOMException) throw new InputError("the file could not be read");
+  throw error;
 }
 
 function joined(parts: readonly Float64Array[]): Float64Array {

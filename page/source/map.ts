@@ -7,7 +7,7 @@ import { element, say } from "./dom";
 import type { Workers } from "./jobs";
 import { shownMetric } from "./outcome";
 import { ATMOSPHERE, type Configuration, settingsByKey, shownNumber, valuesOf } from "./settings";
-import { plain, readableUnit } from "./units";
+import { plain, readableUnit, telling } from "./units";
 import { type Landscape, landscapeOf, SIDE } from "./variation";
 
 const SIZE = 320;
@@ -100,16 +100,18 @@ export class MapView {
     }
     this.isBusy = true;
     const began = performance.now();
-    void landscapeOf(this.content, this.workers, chosen.configuration, chosen.across, chosen.up, chosen.metric).then((landscape) => {
+    const show = (landscape: Landscape) => {
       this.landscape = landscape;
-      this.isBusy = false;
       this.canvas.dataset["milliseconds"] = String(Math.round(performance.now() - began));
       this.draw(chosen.configuration, landscape);
-      if (this.isDue) {
-        this.isDue = false;
-        this.update();
-      }
-    });
+    };
+    const end = () => {
+      this.isBusy = false;
+      if (!this.isDue) return;
+      this.isDue = false;
+      this.update();
+    };
+    void landscapeOf(this.content, this.workers, chosen.configuration, chosen.across, chosen.up, chosen.metric).then(show).catch(telling((words) => say(this.words, words))).then(end);
   }
 
   private draw(configuration: Configuration, { across, up, metric, values }: Landscape): void {

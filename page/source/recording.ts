@@ -33,7 +33,7 @@ export interface ColumnMap {
 
 /** The map that the header of a table gives by itself; null where it leaves something open. */
 export function mapOfHeader(table: RecordedTable): readonly ColumnMap[] | null {
-  const map = table.heads.map(({ name, unit }) => ({ channel: name in RECORDED ? name : "", unit: unit === "-" ? "" : unit }));
+  const map = table.heads.map(({ name, unit }) => ({ channel: Object.hasOwn(RECORDED, name) ? name : "", unit: unit === "-" ? "" : unit }));
   const isGood = map[0]?.channel === "time" && map.some(({ channel }) => channel !== "" && channel !== "time");
   return isGood && map.every(({ channel, unit }) => channel === "" || channel === "command" || unit !== "") ? map : null;
 }

@@ -40,7 +40,7 @@ export function valuesOf(content: Content, configuration: Configuration): Values
   for (const setting of program.settings) {
     const typed = changes[setting.key];
     if (setting.key === ATMOSPHERE) continue;
-    if (typed === undefined ? setting.follows !== "" : typed in setting.words) followers.push(setting);
+    if (typed === undefined ? setting.follows !== "" : Object.hasOwn(setting.words, typed)) followers.push(setting);
     else if (typed !== undefined) values.set(setting.key, numberFrom(content, setting, typed, atmosphere));
     else if (setting.text !== "" && other !== undefined) values.set(setting.key, numberFrom(content, setting, setting.text, atmosphere));
   }
@@ -77,7 +77,7 @@ export function isInside(setting: Setting, value: number): boolean {
 /** What is typed, in the spelling that files have: a number with its unit, or a word. */
 export function normalText(setting: Setting, text: string): string {
   const trimmed = text.trim().replace(/\s+/g, " ");
-  if (trimmed in setting.words) return trimmed;
+  if (Object.hasOwn(setting.words, trimmed)) return trimmed;
   const { number, unit } = splitQuantity(trimmed);
   return `${String(number)} ${unit === "" ? setting.shown : unit}`.trim();
 }

@@ -75,13 +75,12 @@ function placeOf(content: Content, text: string): number {
 
 function configurationOf(text: string): Configuration {
   const [program = "", ...texts] = text.split(";");
-  const changes: Record<string, string> = {};
-  for (const one of texts) {
+  const changes = texts.map((one) => {
     const equals = one.indexOf("=");
     if (equals < 1) throw new InputError(`'${short(one)}' is not of the form KEY=VALUE`);
-    changes[one.slice(0, equals)] = one.slice(equals + 1);
-  }
-  return { program, changes };
+    return [one.slice(0, equals), one.slice(equals + 1)] as const;
+  });
+  return { program, changes: Object.fromEntries(changes) };
 }
 
 /** Refuse what this page does not have, or numbers that are none. */

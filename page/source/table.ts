@@ -12,20 +12,8 @@ const MOST_COLUMNS = 200;
 const MOST_ROWS = 20_000_000;
 const LONGEST_LINE = 100_000;
 const HEAD = /^\s*(.+?)\s*[[(]\s*([^\])]*?)\s*[\])]\s*$/;
-const PIECE = 4_000_000;
 
 type Mark = "," | ";" | "\t";
-
-/** The table in a file. Throws InputError with the line for what is no table of numbers. */
-export async function readTable(file: Blob): Promise<RecordedTable> {
-  const decoder = new TextDecoder("utf-8", { fatal: true });
-  const reading = new TableReading();
-  for (let place = 0; place < file.size; place += PIECE) {
-    const bytes = await file.slice(place, place + PIECE).arrayBuffer();
-    reading.take(decoded(decoder, bytes, place + PIECE >= file.size));
-  }
-  return reading.end();
-}
 
 function decoded(decoder: TextDecoder, bytes: ArrayBuffer, isLast: boolean): string {
   try {
@@ -38,7 +26,9 @@ function decoded(decoder: TextDecoder, bytes: ArrayBuffer, isLast: boolean): str
   }
 }
 
-class TableReading {
+/** A table that comes in pieces. Throws InputError with the line for what is no table of numbers. */
+export class TableReading {
+  private readonly decoder = new TextDecoder("utf-8", { fatal: true });
   private rest = "";
   private line = 0;
   private mark: Mark = ",";
@@ -47,8 +37,8 @@ class TableReading {
   private rows = 0;
   private blank = 0;
 
-  take(text: string): void {
-    const lines = (this.rest + text).split(/\r\n|\n|\r(?!$)/);
+  take(bytes: ArrayBuffer, isLast: boolean): void {
+    const lines = (this.rest + decoded(this.decoder, bytes, isLast)).split(/\r\n|\n|\r(?!$)/);
     this.rest = lines.pop() ?? "";
     if (this.rest.length > LONGEST_LINE) throw new InputError(`line ${this.line + 1} is too long for a row of numbers`);
     for (const line of lines) this.takeLine(line);

@@ -19,6 +19,14 @@ const SPELLINGS: ReadonlyArray<readonly [RegExp, string]> = [
 /** What can be wrong with what somebody typed: one line for them to read. */
 export class InputError extends Error {}
 
+/** What is to be done with an error that came late: tell the person what they can mend, and let all others be seen. */
+export function telling(tell: (words: string) => void): (error: unknown) => void {
+  return (error) => {
+    if (!(error instanceof InputError)) throw error;
+    tell(`${error.message.slice(0, 1).toUpperCase()}${error.message.slice(1)}.`);
+  };
+}
+
 /** A unit as the tables spell it. */
 export function normalUnit(unit: string): string {
   return SPELLINGS.reduce((text, [pattern, other]) => text.replace(pattern, other), unit.trim());

@@ -33,11 +33,10 @@ export async function landscapeOf(
   const program = programNamed(content, configuration.program);
   const base = valuesOf(content, configuration);
   const [columns, lines] = [across, up].map((setting) => placesOf(setting).map((place) => differences(content, configuration, base, setting, place)));
-  const rows = (lines ?? []).flatMap((line) => (columns ?? []).map((column) => rowOf(program, base, [...column, ...line])));
-  const runs = await workers.runMany(program, rows);
+  const runs = await workers.runMany(program, rowsOf(program, base, (lines ?? []).flatMap((line) => (columns ?? []).map((column) => [...column, ...line]))));
   const width = program.metrics.length;
   const at = program.metrics.indexOf(metric);
-  const values = Float64Array.from(rows, (_, place) => (runs.ended[place] === 0 ? (runs.metrics[place * width + at] ?? NaN) : NaN));
+  const values = Float64Array.from(runs.ended, (ended, place) => (ended === 0 ? (runs.metrics[place * width + at] ?? NaN) : NaN));
   return { across, up, metric, values };
 }
 
@@ -55,9 +54,16 @@ function differences(content: Content, configuration: Configuration, base: Value
   return [...other].filter(([key, number]) => number !== base.get(key));
 }
 
-function rowOf(program: Program, base: Values, differing: readonly (readonly [string, number])[]): Float64Array {
-  const values = new Map([...base, ...differing]);
-  return Float64Array.from(program.settings, (setting) => values.get(setting.key) ?? setting.value);
+/** The settings of many runs, one after the other: those of a configuration but for what differs in each. */
+function rowsOf(program: Program, base: Values, differing: readonly (readonly (readonly [string, number])[])[]): Float64Array<ArrayBuffer> {
+  const usual = Float64Array.from(program.settings, (setting) => base.get(setting.key) ?? setting.value);
+  const places = new Map(program.settings.map((setting, place) => [setting.key, place]));
+  const rows = new Float64Array(differing.length * usual.length);
+  differing.forEach((changes, number) => {
+    rows.set(usual, number * usual.length);
+    for (const [key, value] of changes) rows[number * usual.length + (places.get(key) ?? NaN)] = value;
+  });
+  return rows;
 }
 
 /** Settings of a program of which the set says how well they are known. */
@@ -71,10 +77,10 @@ export async function bandOf(content: Content, workers: Workers, configuration: 
   const base = valuesOf(content, configuration);
   const draw = evenly();
   const free = uncertainSettings(program).filter((setting) => configuration.changes[setting.key] === undefined);
-  const rows = Array.from({ length: DRAWS }, () => {
-    const drawn = free.map(({ key, interval }): [string, number] => [key, (interval?.[0] ?? 0) + ((interval?.[1] ?? 0) - (interval?.[0] ?? 0)) * draw()]);
-    return rowOf(program, base, drawn);
-  });
+  const drawn = Array.from({ length: DRAWS }, () =>
+    free.map(({ key, interval }): [string, number] => [key, (interval?.[0] ?? 0) + ((interval?.[1] ?? 0) - (interval?.[0] ?? 0)) * draw()]),
+  );
+  const rows = rowsOf(program, base, drawn);
   const every = Math.max(1, Math.floor(run.time.length / BAND_PLACES));
   const places = Math.floor((run.time.length - 1) / every) + 1;
   const time = Float64Array.from({ length: places }, (_, place) => run.time[place * every] ?? 0);
@@ -127,9 +133,9 @@ export async function effectsOf(content: Content, workers: Workers, configuratio
   const moved = found.filter(isMoved);
   const assumed = moved.map(([setting]) => setting);
   const ends = moved.map(([, both]) => both);
-  const rows = assumed.flatMap(({ key }, place) => (ends[place] ?? [0, 0]).map((end) => rowOf(program, base, [[key, end]])));
-  if (rows.length === 0) return [];
-  const runs = await workers.runMany(program, rows);
+  const differing = assumed.flatMap(({ key }, place) => (ends[place] ?? [0, 0]).map((end) => [[key, end] as const]));
+  if (differing.length === 0) return [];
+  const runs = await workers.runMany(program, rowsOf(program, base, differing));
   const width = program.metrics.length;
   const metricsOf = (row: number) =>
     new Map(program.metrics.map((metric, place) => [metric.name, runs.ended[row] === 0 ? (runs.metrics[row * width + place] ?? NaN) : NaN]));

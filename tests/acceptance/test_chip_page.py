@@ -3,11 +3,15 @@
 import re
 import shlex
 import shutil
+import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.control.fixed.kind import TARGETS
+from ppafo.exports.firmware.catalog import CATALOG
 from ppafo.exports.firmware.simulator import missing_tools
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
@@ -16,7 +20,9 @@ PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "run-on-a-chip.md").read
 COMMANDS = [
     line for block in re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) for line in block.splitlines()
 ]
-LINES = re.findall(r"^    (flash .*(?:\n    .*)*)", PAGE, re.MULTILINE)
+BLOCKS = {block.split()[0]: block.splitlines() for block in re.findall(r"^    (\w.*(?:\n    .*)*)", PAGE, re.MULTILINE)}
+OF_PAGE = {"msp430f2013": "14.0.6", "cortex": "12.2.1"}
+"""Versions of the compilers that the table of the page was made with."""
 
 
 @pytest.mark.parametrize("command", [line for line in COMMANDS if " chip " not in line])
@@ -26,18 +32,56 @@ def test_a_command_of_the_page_runs(command: str, tmp_path: Path, monkeypatch: p
     assert any((tmp_path / "out").iterdir())
 
 
-@pytest.mark.skipif(bool(missing_tools()), reason=f"not on this machine: {', '.join(missing_tools())}")
-@pytest.mark.parametrize("command", [line for line in COMMANDS if " chip " in line])
+def of_target(command: str) -> Any:
+    """A command, which is skipped where a tool of its target is missing."""
+    words = shlex.split(command)
+    given = [words[words.index(option) + 1] for option in ("--target", "--plant") if option in words]
+    names = [] if "--table" in words else given if "--target" in words else [*given, TARGETS[0]]
+    missing = sorted({tool for name in names for tool in missing_tools(CATALOG[name])})
+    reason = f"not on this machine: {', '.join(missing)}"
+    return pytest.param(command, marks=pytest.mark.skipif(bool(missing), reason=reason))
+
+
+@pytest.mark.parametrize("command", [of_target(line) for line in COMMANDS if " chip " in line])
 def test_the_simulated_chip_decides_as_the_page_says(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(shlex.split(command)[1:]) == 0
-    said = capsys.readouterr().out
+    said = capsys.readouterr().out.strip().splitlines()
     if "--samples" in command:
-        assert "1000, 0 other than" in said
-        return
-    # Another clang may need other bytes and cycles; decisions and what they come to are the same.
-    wanted = [line.strip() for line in LINES[0].splitlines()]
-    assert said.strip().splitlines()[-4:] == wanted[-4:]
-    assert [line.split()[0] for line in said.strip().splitlines()[2:]] == [line.split()[0] for line in wanted]
+        assert said[-1].endswith("1000, 0 other than those of the integer controller in Python")
+    elif "--table" in command:
+        check_table(said)
+    elif "--plant" in command:
+        # Another gcc may need other bytes and instructions.
+        wanted = [line.strip() for line in BLOCKS["plant"]]
+        assert said[-2:] == wanted[-2:]
+        assert [line.split()[0] for line in said[2:]] == [line.split()[0] for line in wanted]
+    else:
+        # Another clang may need other bytes and cycles; decisions and what they come to are the same.
+        wanted = [line.strip() for line in BLOCKS["flash"]]
+        assert said[-4:] == wanted[-4:]
+        assert [line.split()[0] for line in said[2:]] == [line.split()[0] for line in wanted]
+
+
+def check_table(said: list[str]) -> None:
+    """The table is that of the page, where the compilers are; targets without their tools are left out."""
+    shown = re.findall(r"^\|(?: target| msp| cortex|---).*$", PAGE, re.MULTILINE)
+    table = [line for line in shown if line.count("|") == said[0].count("|")]
+    assert len(said) == len(table) == 2 + 4 * len(CATALOG)
+    assert said[:2] == table[:2]
+    for found, wanted in zip(said[2:], table[2:], strict=True):
+        if "not run" in found:
+            continue
+        cells, others = ([cell.strip() for cell in line.split("|")[1:-1]] for line in (found, wanted))
+        assert cells[-2:] == others[-2:] == ["1,000", "0"]
+        assert cells[:2] == others[:2]
+        if compiler_of(cells[0]) == OF_PAGE[cells[0].partition("-")[0]]:
+            assert cells == others
+
+
+def compiler_of(target: str) -> str:
+    """The version of the compiler of a target."""
+    tool = "arm-none-eabi-gcc" if target.startswith("cortex") else "clang"
+    return subprocess.run([tool, "-dumpversion"], capture_output=True, text=True, check=True).stdout.strip()
 
 
 def test_what_whole_numbers_cost_is_as_in_the_table() -> None:
@@ -54,7 +98,12 @@ def test_what_whole_numbers_cost_is_as_in_the_table() -> None:
     assert not rows
 
 
-def test_the_tools_that_are_asked_for_are_looked_for() -> None:
-    assert set(missing_tools()) == {
-        tool for tool in ("make", "clang", "ld.lld", "mspdebug") if shutil.which(tool) is None
-    }
+@pytest.mark.parametrize(
+    ("target", "tools"),
+    [
+        ("msp430f2013", ("make", "clang", "ld.lld", "mspdebug")),
+        ("cortex-m0", ("make", "arm-none-eabi-gcc", "qemu-system-arm")),
+    ],
+)
+def test_the_tools_that_are_asked_for_are_looked_for(target: str, tools: tuple[str, ...]) -> None:
+    assert missing_tools(CATALOG[target]) == tuple(tool for tool in tools if shutil.which(tool) is None)

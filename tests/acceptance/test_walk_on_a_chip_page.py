@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.firmware.simulator import missing_tools
 from ppafo.walking.walk import walk
 
+MISSING = missing_tools(MSP430G2553)
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "walk-on-a-chip.md").read_text(encoding="utf-8")
 COMMANDS = [
     line for block in re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) for line in block.splitlines()
@@ -25,7 +27,7 @@ def test_a_command_of_the_page_runs(command: str, tmp_path: Path, monkeypatch: p
     assert any((tmp_path / "out").iterdir())
 
 
-@pytest.mark.skipif(bool(missing_tools()), reason=f"not on this machine: {', '.join(missing_tools())}")
+@pytest.mark.skipif(bool(MISSING), reason=f"not on this machine: {', '.join(MISSING)}")
 @pytest.mark.parametrize("command", [line for line in COMMANDS if " chip " in line])
 def test_the_simulated_chip_decides_as_the_page_says(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(shlex.split(command)[1:]) == 0

@@ -1,4 +1,4 @@
-"""``ppafo firmware``: the controller of a scenario or a walk as firmware for a small processor."""
+"""``ppafo firmware``: the controller of a scenario or a walk, or a plant, as firmware for a small processor."""
 
 import argparse
 import shlex
@@ -12,7 +12,8 @@ from ppafo.cli.output import (
     print_result,
     write_files,
 )
-from ppafo.control.fixed.kind import TARGETS, WALK_TARGETS
+from ppafo.control.fixed.kind import PLANT_TARGETS, TARGETS, WALK_TARGETS
+from ppafo.errors import ScenarioError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,15 +24,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=(*TARGETS, *WALK_TARGETS),
         help=f"the processor (default: {TARGETS[0]}, of a walk {WALK_TARGETS[0]})",
     )
+    parser.add_argument(
+        "--plant",
+        action="store_true",
+        help=f"write a scenario's plant instead of the controller ({', '.join(PLANT_TARGETS)})",
+    )
     add_override_argument(parser)
     add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Write the firmware of the controller of a scenario or a walk, and say what to do next."""
+    """Write the firmware of the controller of a scenario or a walk, or of a plant, and say what to do next."""
     check_output(parsed)
     from ppafo.exports.firmware import firmware
+    from ppafo.exports.firmware.plant import plant_firmware
     from ppafo.exports.firmware.walking import walk_firmware
     from ppafo.exports.loading import load_exportable
     from ppafo.simulation.scenario import Scenario
@@ -39,8 +46,10 @@ def run(parsed: argparse.Namespace) -> int:
     chosen = load_exportable(parsed.scenario, parsed.overrides)
     if isinstance(chosen, Scenario):
         target = parsed.target or TARGETS[0]
-        contents = firmware(chosen, target)
+        contents = (plant_firmware if parsed.plant else firmware)(chosen, target)
     else:
+        if parsed.plant:
+            raise ScenarioError(f"{chosen.name}: --plant is for scenarios; of a walk the controller alone is written")
         target = parsed.target or WALK_TARGETS[0]
         contents = walk_firmware(chosen, target)
     write_files(parsed, contents)

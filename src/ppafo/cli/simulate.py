@@ -1,4 +1,4 @@
-"""``ppafo simulate SCENARIO``: runs a scenario and writes a result folder."""
+"""``ppafo simulate SCENARIO``: runs a scenario and writes a result folder, with a report that simulates."""
 
 import argparse
 import sys
@@ -18,12 +18,14 @@ from ppafo.documents.json_text import json_text
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
+    from ppafo.answers import Answer, Table
     from ppafo.simulation.check import Check
     from ppafo.simulation.result import Result
     from ppafo.simulation.scenario import Scenario
 
 DEFAULT_FOLDER = Path("out")
 CHECK_FILE = "check.json"
+FIGURE = "figure"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="run again with half the error and from a start moved by 1e-7, and report which metrics it determines",
     )
     add_json_argument(parser)
-    parser.add_argument("--out", metavar="DIR", type=Path, help="result folder; default out/NAME of the scenario")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="result folder with the report; default out/NAME of the scenario"
+    )
 
 
 def run(parsed: argparse.Namespace) -> int:
@@ -72,10 +76,51 @@ def _simulate(scenario: "Scenario") -> "Result":
 
 def _save(result: "Result", check: "Check | None", folder: Path) -> None:
     load_drawing()
+    from ppafo.answers.page import page_of
     from ppafo.answers.recording_figure import figure_files
+    from ppafo.answers.writing import REPORT
 
+    figures = figure_files(result.plot())
+    report = page_of(_answer(result, check), {FIGURE: figures[f"{FIGURE}.svg"]})
     checked = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
-    result.save(folder, {**figure_files(result.plot()), **checked})
+    result.save(folder, {**figures, REPORT: report, **checked})
+
+
+def _answer(result: "Result", check: "Check | None") -> "Answer":
+    """Return what the page of a result says: the metrics, the figure, and the run again, to be dragged."""
+    from ppafo.answers import Answer, Figure, Section
+    from ppafo.live.workbench import live_part
+
+    scenario, status = result.scenario, result.status
+    device = f"device '{scenario.device.name}', valve '{scenario.device.valve_name}'"
+    changed = f"; values changed for this run: {', '.join(scenario.origin.overrides)}"
+    figure = Figure(FIGURE, "What the device does over time. Pressures count from the atmosphere.", result.plot)
+    return Answer(
+        name="run",
+        kicker=f"A run of {scenario.duration:g} s",
+        title=scenario.name,
+        lead=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
+        sections=(
+            Section(remarks=() if status.is_completed else (f"The run {status.message}",)),
+            Section("What comes of it", table=_metrics_table(result)),
+            Section("Over time", figure=figure),
+            Section() if check is None else Section("What the run determines", code=repr(check)),
+        ),
+        data={},
+        live=lambda: live_part([scenario]),
+    )
+
+
+def _metrics_table(result: "Result") -> "Table":
+    from ppafo.answers import Column, Table
+    from ppafo.answers.shown_metrics import metric_level, metric_words
+
+    shown = {name: metric_level(metric.value, metric.unit) for name, metric in result.metrics.items()}
+    rows = [
+        (metric_words(name), f"{value:.4g} {unit}".strip(), result.metrics[name].summary)
+        for name, (value, unit) in shown.items()
+    ]
+    return Table((Column("Metric"), Column("Value"), Column("What it is")), tuple(rows), left=3)
 
 
 def _list(parsed: argparse.Namespace) -> int:
@@ -94,7 +139,7 @@ def _text(result: "Result", check: "Check | None", folder: Path) -> str:
 
     head = f"{result.scenario.name}: {result.status.kind}"
     checked = [] if check is None else [repr(check), ""]
-    files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg"]
+    files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     return "\n".join([head, "", *metrics_lines(result.metrics), "", *checked, f"written: {folder} ({written})"])
 

@@ -116,9 +116,7 @@ def load_walk(
         sensor_settings=sensor_settings,
         period=_period(reading),
         step=reading.number("run.step", STEP),
-        assumed=dict(document.get("assumed", {}))
-        | {item.path: f"{item.value}, {item.note}" for item in assumed_lines(reading)}
-        | ({} if carried is None else carried.assumed),
+        assumed=_assumed(reading, carried),
         file=str(name_or_path),
         overrides=given,
         supply_lines=lines,
@@ -131,6 +129,12 @@ def load_walk(
     check_walk(configuration, reading)
     course_of_walk(configuration)
     return configuration
+
+
+def _assumed(reading: Reading, carried: BottleSupply | None) -> dict[str, str]:
+    """Return what a walk assumes, by path: its file says it, its lines and the bottle that it hangs on."""
+    lines = {item.path: f"{item.value}, {item.note}" for item in assumed_lines(reading)}
+    return {**reading.document.get("assumed", {}), **lines, **({} if carried is None else carried.assumed)}
 
 
 def _check_given_once(overrides: tuple[str, ...], others: Mapping[str, object], file: str) -> None:

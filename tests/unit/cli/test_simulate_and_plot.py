@@ -1,6 +1,7 @@
 """``ppafo simulate`` and ``ppafo plot``."""
 
 import dataclasses
+import html
 import json
 import os
 import signal
@@ -22,7 +23,7 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.storage.owned_folder import check_owned_folder, marked_folder, write_marked_folder
 
-FILES = ["figure.png", "figure.svg", "recording.csv", "recording.nc", "run.json"]
+FILES = ["figure.png", "figure.svg", "recording.csv", "recording.nc", "report.html", "run.json"]
 
 
 def names(folder: Path) -> list[str]:
@@ -50,6 +51,15 @@ def test_a_run_writes_a_whole_result_folder_and_nothing_else(saved: Path) -> Non
     assert names(saved.parent) == ["step"]
     assert read_result(saved).document["status"]["kind"] == "completed"
     assert read_result(saved).recording.kind == "simulated"
+
+
+def test_the_report_has_the_metrics_the_figure_and_the_run_to_drag(saved: Path) -> None:
+    page = html.unescape((saved / "report.html").read_text(encoding="utf-8")).replace("\N{NO-BREAK SPACE}", " ")
+    metrics = read_result(saved).document["metrics"]
+    assert f"{1000.0 * metrics['gas_supplied']['value']:.4g} g" in page
+    assert 'src="data:image/svg+xml;base64,' in page
+    assert '<div id="workbench">' in page
+    assert "default-src 'none'" in page
 
 
 def test_without_a_folder_the_result_goes_to_out_and_the_name_of_the_scenario(

@@ -10,17 +10,19 @@ import pytest
 from ppafo.control.fixed.walking.lanes import EVENT_ON_OFF
 from ppafo.control.walking.signs import SIGNS
 from ppafo.errors import ProgramError, ScenarioError
+from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.firmware.controller import proof
-from ppafo.exports.firmware.simulator import CLOCK, built, missing_tools, sizes
-from ppafo.exports.firmware.walking import FLASH, RAM, walk_chip, walk_firmware
+from ppafo.exports.firmware.simulator import built, missing_tools, sizes
+from ppafo.exports.firmware.walking import walk_chip, walk_firmware
 from ppafo.exports.firmware.walking.drawn import DrawnGait
 from ppafo.exports.firmware.walking.lock_step import SIGN_BITS, PythonWalkChip, compare_drawn_walk, walk_on_chip
 from ppafo.translation.widths import Interval
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
 
+MISSING = missing_tools(MSP430G2553)
 FIXED = "controller.arithmetic=fixed"
-on_chip = pytest.mark.skipif(bool(missing_tools()), reason=f"not on this machine: {', '.join(missing_tools())}")
+on_chip = pytest.mark.skipif(bool(MISSING), reason=f"not on this machine: {', '.join(MISSING)}")
 with_compiler = pytest.mark.skipif(
     shutil.which("make") is None or shutil.which("cc") is None, reason="no make or no cc on this machine"
 )
@@ -92,11 +94,10 @@ def test_the_chip_decides_as_python_does_within_its_memory_and_time() -> None:
     found = compare_drawn_walk(configuration, 2500, seed=2)
     assert found.first_difference == ""
     assert found.differences == 0
-    assert found.cost.sizes.flash <= FLASH
+    assert found.cost.sizes.flash <= MSP430G2553.flash.size
     assert found.cost.stack > 0
-    # The timer's interrupt takes two words more.
-    assert found.cost.sizes.data + found.cost.stack + 4 <= RAM
-    assert 0 < found.cost.mean_cycles <= found.cost.worst_cycles <= 0.5 * CLOCK * configuration.period
+    assert found.cost.sizes.data + found.cost.stack + MSP430G2553.interrupt_stack <= MSP430G2553.ram.size
+    assert 0 < found.cost.mean <= found.cost.worst <= 0.5 * MSP430G2553.clock * configuration.period
 
 
 @on_chip
@@ -118,7 +119,7 @@ def test_a_chip_with_other_numbers_is_found_out(tmp_path: Path, monkeypatch: pyt
     assert found.differences > 0
     assert "on the chip" in found.first_difference
     built(wrong, tmp_path)
-    assert sizes(tmp_path / "firmware.elf").flash > sizes(tmp_path / "simulated.elf").flash
+    assert sizes(tmp_path / "firmware.elf", MSP430G2553).flash > sizes(tmp_path / "simulated.elf", MSP430G2553).flash
 
 
 def test_numbers_stand_in_a_header_with_range_and_origin_and_signs_in_the_page() -> None:

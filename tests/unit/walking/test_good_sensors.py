@@ -74,6 +74,13 @@ def test_nondisabled_wearers_whose_feet_roll_slowly_are_helped_without_a_pause()
     assert (people.vented, people.paused) == (0, 0)
 
 
+def test_coarse_sensors_take_no_help_away_on_a_course_with_stops() -> None:
+    """Their steps hold a reading for long: half to seven tenths of the wearers paused by a sensor that seemed still."""
+    people = walk_population(load_walk("solenoid", SENSORS["coarse"], course="corridor"), None, 24)
+    assert people.vented == 0
+    assert not [name for name in people.signs if name.startswith(("still_", "frozen_"))]
+
+
 def test_an_impaired_wearer_has_no_moment_of_dorsiflexors_to_speak_of() -> None:
     result = walk(load_walk("proportional"), MINUTES)
     assert "dorsiflexor_moment" not in result.recording

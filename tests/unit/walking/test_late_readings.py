@@ -41,3 +41,12 @@ def test_what_is_known_of_valve_and_sensors_may_delay_a_pressure() -> None:
     ideal, slow = load_walk("proportional"), load_walk("proportional", given)
     assert slow.settings["follow_time"] - ideal.settings["follow_time"] == pytest.approx(lags)
     assert load_walk("proportional", [*given, "controller.follow_time=9 ms"]).settings["follow_time"] == 9.0e-3
+
+
+@pytest.mark.parametrize("valve", ["solenoid", "proportional"])
+def test_forces_that_come_65_ms_late_lift_only_within_two_and_a_half_strides(valve: str) -> None:
+    words = ("kind=distorted", f"time={BEGINS} s", "delay=0.065 s")
+    result = walk(load_walk(valve, [f"faults.{sensor}.{word}" for sensor in ("heel", "toe") for word in words]), 0.12)
+    lifted = np.flatnonzero(result.recording["safe_state"] > 0.0)
+    assert BEGINS < result.recording.time[lifted[0]] < BEGINS + 2.5 * 1.04
+    assert set(result.recording["safe_state"][lifted]) == {1.0}, "and so it stays"

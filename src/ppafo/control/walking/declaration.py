@@ -20,7 +20,7 @@ SAFETY_QUANTITIES = (
     Quantity("lowest_angle", "rad", "an angle below this is not a valid reading", 0.3, -10.0, 10.0),
     Quantity("highest_angle", "rad", "an angle above this is not a valid reading", 2.4, -10.0, 10.0),
     Quantity("longest_phase", "1", "longest stance or swing, in stride times", 1.2, 0.3, 20.0),
-    Quantity("frozen_time", "s", "a loaded sensor whose reading does not change for longer is frozen", 0.25, 0.01, 5.0),
+    Quantity("frozen_time", "s", "a loaded sensor whose reading does not change for longer is frozen", 0.24, 0.01, 5.0),
     Quantity("most_toe_strides", "1", "strides in a row that may be on the toes alone", 1.0, 0.0, 1.0e6),
     Quantity(
         "flat_from", "1", "from this fraction of a steady stride on, heel and toes are both loaded", 0.16, 0.05, 0.6
@@ -48,6 +48,7 @@ SAFETY_QUANTITIES = (
         0.0,
         1.0,
     ),
+    Quantity("highest_toe_off_angle", "rad", "no ankle has more while its toes still carry", 2.06, -10.0, 10.0),
 )
 
 HOLD_QUANTITIES = (

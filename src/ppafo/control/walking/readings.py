@@ -9,13 +9,16 @@ Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep
 from typing import NamedTuple
 
 from ppafo.control.walking import signs
-from ppafo.control.walking.phases import LANDING, MID_STANCE, SWING, PhaseState, lifts
+from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, lifts
 from ppafo.control.walking.signs import NO_SIGN, SafetyRules
 from ppafo.model.gait_sensors import GaitMeasurement
 
 
 class LastReadings(NamedTuple):
-    """Last readings of heel, toe [N] and angle [rad], how long each has not changed [s], and each filtered."""
+    """Last readings of heel, toe [N] and angle [rad], how long each stayed the same [s], and each filtered.
+
+    Only time in which another sensor moves, or the wearer steps, counts as time in which one stayed the same.
+    """
 
     heel_force: float
     toe_force: float
@@ -31,13 +34,15 @@ class LastReadings(NamedTuple):
 class Landing(NamedTuple):
     """Lowest ankle angle of this swing, or since the strike [rad]; highest after it, which fades; strikes in doubt.
 
-    ``in_doubt`` is the angle of a strike [rad], 0 where the foot lands in time; ``late`` are late ones in a row.
+    ``in_doubt`` is the angle of a strike [rad], 0 where the foot lands in time; ``late`` are late ones in a row, and
+    ``late_toes`` push-offs in a row at whose end the foot had turned down as it does in the air only.
     """
 
     lowest: float
     highest: float
     in_doubt: float
     late: float
+    late_toes: float
 
 
 class Emptying(NamedTuple):
@@ -48,7 +53,7 @@ class Emptying(NamedTuple):
     rising: float
 
 
-AIRBORNE = Landing(lowest=0.0, highest=0.0, in_doubt=0.0, late=0.0)
+AIRBORNE = Landing(lowest=0.0, highest=0.0, in_doubt=0.0, late=0.0, late_toes=0.0)
 NOT_EMPTYING = Emptying(lowest=0.0, angle=0.0, rising=0.0)
 NOTHING_READ = LastReadings(
     heel_force=0.0,
@@ -65,8 +70,12 @@ NOTHING_READ = LastReadings(
 SLOW_TIME = 0.08
 """Time constant [s] of the slow readings: a step has faded from them when a sensor counts as frozen."""
 
-MOVES, TURNS = 40.0, 0.05
+MOVES, TURNS = 40.0, 0.04
 """A force [N] and an angle [rad] move that are further than this from their slow reading: not those of who stands."""
+
+IN_TIME = 0.06
+"""Angle [rad] below ``highest_toe_off_angle``, 3.4 deg, up to which toes that are seen to leave the ground do so in
+time: between both nothing is known. A dropped foot that nobody pushes turns down in the air too, but more slowly."""
 
 GONE = 0.1
 """What is left of a force that is gone, as a fraction of ``largest_drop``."""
@@ -105,19 +114,33 @@ SHOWN = 0.1
 COMPRESSES = 0.02
 """Angle in plantarflexion [rad] from which the ankle compresses chamber 2 by enough to raise its pressure."""
 
+THIN, THIN_TIME = 6.0e4, 0.12
+"""Pressure [Pa] below which no chamber stays for longer than this time [s]: a moving foot may lower one so for less."""
+
 FALL_TIME = 0.03
 """Time constant [s] of the slow pressures, which tell whether a reading falls."""
 
 FALLS = 0.03
 """A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.1."""
 
+DWELLS, TURNS_BACK = 0.235, 0.35
+"""Fractions of the stride in which a force and an ankle angle may stay within a step of their converter: in a usual
+stride the first one is ``frozen_time``, and slow strides turn back slowly."""
+
+LANDS = 0.3
+"""Fraction of the stride in which who comes down on the heel is stepping, and may then stand on it."""
+
+MOST = 0.75
+"""Fraction of a stride after which an angle has been the same for all of it, less where nothing else moved."""
+
 HALF = 0.5
 """A stride of less than this fraction of the stride time, or of more than its inverse, is not a good one."""
 
 
-def time_unchanged(last: float, reading: float, since: float, period: float) -> float:
-    """How long a reading has been the same to the last bit [s]."""
-    return since + period if reading == last else 0.0
+def time_unchanged(last: float, reading: float, since: float, moves: bool, period: float) -> float:
+    """How long a reading has been the same to the last bit [s] while something else ``moves``."""
+    kept = since + period if moves else since
+    return kept if reading == last else 0.0
 
 
 def slow_reading(last: float, reading: float, is_first: bool, period: float) -> float:
@@ -126,30 +149,55 @@ def slow_reading(last: float, reading: float, is_first: bool, period: float) -> 
     return reading if is_first else followed
 
 
-def next_readings(last: LastReadings, measurement: GaitMeasurement, period: float) -> LastReadings:
-    """The last readings after a sample, taken every ``period`` [s]."""
+def next_readings(last: LastReadings, measurement: GaitMeasurement, phase: PhaseState, period: float) -> LastReadings:
+    """The last readings after a sample, taken every ``period`` [s]; ``phase`` is that of the sample.
+
+    Who stands with heel and toes on the ground has no moving sensor, and the steps of a converter then hold a reading
+    for long: a sensor is still only while another one moves. On the toes alone nobody stands still, and nobody lands
+    for long; on the heel alone somebody stands whose toes the device holds up.
+    """
     is_first = last.angle == 0.0
+    slow_heel = slow_reading(last.slow_heel, measurement.heel_force, is_first, period)
+    slow_toe = slow_reading(last.slow_toe, measurement.toe_force, is_first, period)
+    slow_angle = slow_reading(last.slow_angle, measurement.angle, is_first, period)
+    lands = (phase.phase == LANDING) & (phase.in_phase < LANDS * phase.stride_time)
+    steps = (phase.heel.loaded < 0.5) | lands
+    heel_moves = abs(measurement.heel_force - slow_heel) > MOVES
+    toe_moves = abs(measurement.toe_force - slow_toe) > MOVES
+    turns = abs(measurement.angle - slow_angle) > TURNS
+    beside_heel, beside_toe, beside_angle = (
+        toe_moves | turns | steps,
+        heel_moves | turns | steps,
+        heel_moves | toe_moves | steps,
+    )
     return LastReadings(
         heel_force=measurement.heel_force,
         toe_force=measurement.toe_force,
         angle=measurement.angle,
-        heel_unchanged=time_unchanged(last.heel_force, measurement.heel_force, last.heel_unchanged, period),
-        toe_unchanged=time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, period),
-        angle_unchanged=time_unchanged(last.angle, measurement.angle, last.angle_unchanged, period),
-        slow_heel=slow_reading(last.slow_heel, measurement.heel_force, is_first, period),
-        slow_toe=slow_reading(last.slow_toe, measurement.toe_force, is_first, period),
-        slow_angle=slow_reading(last.slow_angle, measurement.angle, is_first, period),
+        heel_unchanged=time_unchanged(
+            last.heel_force, measurement.heel_force, last.heel_unchanged, beside_heel, period
+        ),
+        toe_unchanged=time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, beside_toe, period),
+        angle_unchanged=time_unchanged(last.angle, measurement.angle, last.angle_unchanged, beside_angle, period),
+        slow_heel=slow_heel,
+        slow_toe=slow_toe,
+        slow_angle=slow_angle,
     )
 
 
-def range_sign(rules: SafetyRules, measurement: GaitMeasurement) -> float:
-    """The sign of a reading that no foot and no chamber gives."""
+def next_thin(last: float, measurement: GaitMeasurement, period: float) -> float:
+    """How long the lower pressure has been below ``THIN`` [s]."""
+    return last + period if min(measurement.pressure_1, measurement.pressure_2) < THIN else 0.0
+
+
+def range_sign(rules: SafetyRules, measurement: GaitMeasurement, thin: float) -> float:
+    """The sign of a reading that no foot and no chamber gives; one is thin for a time [s]."""
     force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
     force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
     angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
     squeezed = measurement.angle > SQUEEZING_ANGLE
     pressure = min(measurement.pressure_1, measurement.pressure_2) < rules.lowest_pressure
-    pressure = pressure | (measurement.pressure_1 > rules.highest_pressure)
+    pressure = pressure | (thin > THIN_TIME) | (measurement.pressure_1 > rules.highest_pressure)
     pressure = pressure | ((measurement.pressure_2 > rules.highest_pressure) & (not squeezed))
     found = signs.PRESSURE_RANGE if pressure else NO_SIGN
     found = signs.ANGLE_RANGE if angle else found
@@ -169,31 +217,43 @@ def gone_sign(rules: SafetyRules, last: LastReadings, measurement: GaitMeasureme
 
 
 def still_sign(rules: SafetyRules, readings: LastReadings, before: PhaseState, phase: PhaseState) -> float:
-    """The sign of a reading that does not change; a fault only where another sensor shows a step meanwhile.
+    """The sign of a reading that does not change while another sensor moves, a fault where that one shows a step.
 
-    An unloaded force sensor shows the same for long, and so does the angle of a foot that is held up. Who
-    stands with heel and toes on the ground has no moving sensor: there one that is still counts only beside one that
-    moves. On heel or toes alone nobody stands still.
+    An unloaded force sensor shows the same for long, and so does the angle of a foot that is held up.
     """
-    steps = (phase.phase != MID_STANCE) | (min(phase.heel.loaded, phase.toe.loaded) < 0.5)
-    heel_moves = abs(readings.heel_force - readings.slow_heel) > MOVES
-    toe_moves = abs(readings.toe_force - readings.slow_toe) > MOVES
-    turns = abs(readings.angle - readings.slow_angle) > TURNS
-    heel = (readings.heel_unchanged > rules.frozen_time) & (phase.heel.loaded > 0.5)
-    toe = (readings.toe_unchanged > rules.frozen_time) & (phase.toe.loaded > 0.5)
-    angle = readings.angle_unchanged > rules.frozen_time
-    held = lifts(phase.phase)
-    whole = (before.phase == SWING) & (phase.phase != SWING) & (before.since_strike > HALF * phase.stride_time)
-    found = signs.STILL_ANGLE if angle & (not held) & (heel_moves | toe_moves | steps) else NO_SIGN
-    found = signs.STILL_TOE if toe & (heel_moves | turns | steps) else found
-    found = signs.STILL_HEEL if heel & (toe_moves | turns | steps) else found
-    found = signs.FROZEN_ANGLE if angle & whole & (readings.angle_unchanged > before.since_strike) else found
+    longest = max(rules.frozen_time, DWELLS * phase.stride_time)
+    heel = (readings.heel_unchanged > longest) & (phase.heel.loaded > 0.5)
+    toe = (readings.toe_unchanged > longest) & (phase.toe.loaded > 0.5)
+    angle = readings.angle_unchanged > max(rules.frozen_time, TURNS_BACK * phase.stride_time)
+    whole = (before.phase == SWING) & (phase.phase != SWING)
+    whole = whole & (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)
+    found = signs.STILL_ANGLE if angle & (not lifts(phase.phase)) else NO_SIGN
+    found = signs.STILL_TOE if toe else found
+    found = signs.STILL_HEEL if heel else found
+    found = signs.FROZEN_ANGLE if whole & (readings.angle_unchanged > MOST * before.since_strike) else found
     found = signs.FROZEN_TOE if toe & (phase.heel.loaded != before.heel.loaded) else found
     return signs.FROZEN_HEEL if heel & (phase.toe.loaded != before.toe.loaded) else found
 
 
+def next_late_toes(rules: SafetyRules, last: float, angle: float, before: PhaseState, phase: PhaseState) -> float:
+    """Push-offs in a row that ended late, after a sample with an ankle angle [rad].
+
+    Toes that still carry hold the foot. In the air one that is pushed turns down until its stop, within 60 ms.
+    """
+    leaves = (before.phase == PUSH_OFF) & (phase.phase == SWING)
+    counted = last + 1.0 if angle > rules.highest_toe_off_angle else last
+    counted = 0.0 if angle < rules.highest_toe_off_angle - IN_TIME else counted
+    return counted if leaves else last
+
+
 def next_landing(
-    last: Landing, readings: LastReadings, before: PhaseState, phase: PhaseState, steady: float, period: float
+    rules: SafetyRules,
+    last: Landing,
+    readings: LastReadings,
+    before: PhaseState,
+    phase: PhaseState,
+    steady: float,
+    period: float,
 ) -> Landing:
     """The landing after a sample of ``period`` [s].
 
@@ -214,6 +274,7 @@ def next_landing(
         highest=angle if lower else highest,
         in_doubt=0.0 if lands else in_doubt,
         late=(last.late + 1.0 if is_late else 0.0) if flat else last.late,
+        late_toes=next_late_toes(rules, last.late_toes, angle, before, phase),
     )
 
 

@@ -28,7 +28,7 @@ from ppafo.control.walking.readings import (
     Landing,
     LastReadings,
 )
-from ppafo.control.walking.signs import HELPS, LIFTS, NO_SIGN, PAUSED, STOPPED, SafetyRules
+from ppafo.control.walking.signs import HELPS, LIFTS, NO_SIGN, PAUSED, STOPPED, SafetyRules, first_sign
 from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -68,7 +68,8 @@ class SafetyState(NamedTuple):
     """Level of ``signs``; good strides in a row; how often help got less, and the last; what the signs remember.
 
     ``toe_strides`` are strides in a row on the toes alone, and ``steady`` is 1 where the last stride took about the
-    stride time. ``slow_pressure_1`` and ``_2`` [Pa] are above a reading that falls.
+    stride time. ``slow_pressure_1`` and ``_2`` [Pa] are above a reading that falls; ``thin`` [s] is how long one of
+    both has been below the pressure of a chamber at rest.
     """
 
     level: float
@@ -84,6 +85,7 @@ class SafetyState(NamedTuple):
     emptying: Emptying
     slow_pressure_1: float
     slow_pressure_2: float
+    thin: float
 
 
 START = SafetyState(
@@ -100,6 +102,7 @@ START = SafetyState(
     emptying=NOT_EMPTYING,
     slow_pressure_1=0.0,
     slow_pressure_2=0.0,
+    thin=0.0,
 )
 
 LIFT_STRIDES = 1.0
@@ -176,12 +179,6 @@ def valve_sign(rules: SafetyRules, now: SafetyState, phase: PhaseState, measurem
     return signs.NO_RISE if no_rise_1 | no_rise_2 else found
 
 
-def first_sign(some: float, others: float) -> float:
-    """The sign of two that comes first in ``signs``: one that stops before one that pauses, either before none."""
-    lower = min(some, others)
-    return lower if lower > NO_SIGN else max(some, others)
-
-
 def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState, sign: float) -> float:
     """Good strides in a row after a sample: in about the stride time, on heel and toes, without a sign.
 
@@ -214,7 +211,7 @@ def remembered(
     period: float,
 ) -> SafetyState:
     """The state with what the signs remember of a sample of ``period`` [s]; the level is as it was."""
-    seen = readings.next_readings(state.readings, measurement, period)
+    seen = readings.next_readings(state.readings, measurement, phase, period)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
@@ -226,7 +223,7 @@ def remembered(
         ventings=state.ventings,
         finding=state.finding,
         readings=seen,
-        landing=readings.next_landing(state.landing, seen, before, phase, steady, period),
+        landing=readings.next_landing(rules, state.landing, seen, before, phase, steady, period),
         stance=next_stance(state.stance, before, phase, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,
@@ -234,6 +231,7 @@ def remembered(
         emptying=readings.next_emptying(rules, state.emptying, vented, measurement, period),
         slow_pressure_1=readings.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
         slow_pressure_2=readings.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
+        thin=readings.next_thin(state.thin, measurement, period),
     )
 
 
@@ -247,13 +245,14 @@ def found_sign(
     period: float,
 ) -> float:
     """The sign of a sample that comes first in ``signs``; ``last`` are the readings before it, ``now`` remembers it."""
-    sign = signs.LATE_FORCES if now.landing.late > LATE_STRIDES else NO_SIGN
+    late = max(now.landing.late, now.landing.late_toes) > LATE_STRIDES
+    sign = signs.LATE_FORCES if late else NO_SIGN
     sign = signs.TOE_STRIDES if now.toe_strides > rules.most_toe_strides else sign
     sign = first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if now.steady > 0.5 else sign
     sign = first_sign(gait_sign(rules, before, phase, now.stance), sign)
     sign = first_sign(readings.still_sign(rules, now.readings, before, phase), sign)
     sign = first_sign(readings.gone_sign(rules, last, measurement, period), sign)
-    sign = first_sign(readings.range_sign(rules, measurement), sign)
+    sign = first_sign(readings.range_sign(rules, measurement, now.thin), sign)
     return first_sign(valve_sign(rules, now, phase, measurement), sign)
 
 
@@ -285,6 +284,7 @@ def monitor(
         emptying=now.emptying,
         slow_pressure_1=now.slow_pressure_1,
         slow_pressure_2=now.slow_pressure_2,
+        thin=now.thin,
     )
 
 
@@ -335,4 +335,5 @@ def safe_command(state: SafetyState, phase: float, command: float, period: float
         emptying=state.emptying,
         slow_pressure_1=state.slow_pressure_1,
         slow_pressure_2=state.slow_pressure_2,
+        thin=state.thin,
     )

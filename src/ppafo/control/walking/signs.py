@@ -68,6 +68,7 @@ class SafetyRules(NamedTuple):
     lowest_flat_angle: float
     highest_flat_angle: float
     follow_time: float
+    highest_toe_off_angle: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,13 +104,13 @@ SIGNS: dict[float, Sign] = {
     FROZEN_ANGLE: Sign("frozen_angle", "an angle that stays the same for a whole stride", ("angle",), ()),
     FORCE_GONE: Sign("force_gone", "a large force that is gone within a sample", FORCES, ("largest_drop",)),
     STILL_HEEL: Sign(
-        "still_heel", "a loaded heel whose force stays the same, but not in standing", FORCES, ("frozen_time",)
+        "still_heel", "a loaded heel whose force stays the same while something else moves", FORCES, ("frozen_time",)
     ),
     STILL_TOE: Sign(
-        "still_toe", "loaded toes whose force stays the same, but not in standing", FORCES, ("frozen_time",)
+        "still_toe", "loaded toes whose force stays the same while something else moves", FORCES, ("frozen_time",)
     ),
     STILL_ANGLE: Sign(
-        "still_angle", "an angle in stance that stays the same, but not in standing", ("angle",), ("frozen_time",)
+        "still_angle", "an angle in stance that stays the same while something else moves", ("angle",), ("frozen_time",)
     ),
     ENDLESS_PHASE: Sign(
         "endless_phase", "a swing without end, or as long on heel or toes alone", FORCES, ("longest_phase",)
@@ -131,7 +132,10 @@ SIGNS: dict[float, Sign] = {
     ),
     TOE_STRIDES: Sign("toe_strides", "strides on the toes alone, one after the other", FORCES, ("most_toe_strides",)),
     LATE_FORCES: Sign(
-        "late_forces", "two strides in which the ankle shows the foot flat before the forces do", (*FORCES, "angle"), ()
+        "late_forces",
+        "two strides in which the ankle shows the foot flat, or in the air, before the forces do",
+        (*FORCES, "angle"),
+        ("highest_toe_off_angle",),
     ),
 }
 """Every sign by its number: those up to ``FORCE_GONE`` stop, from ``NO_HEEL`` on the foot is lifted only."""
@@ -142,3 +146,9 @@ def level_of(sign: float) -> float:
     level = LIFTS if sign >= NO_HEEL else PAUSED
     level = STOPPED if sign <= FORCE_GONE else level
     return level if sign > NO_SIGN else HELPS
+
+
+def first_sign(some: float, others: float) -> float:
+    """The sign of two that comes first: one that stops before one that pauses, either before none."""
+    lower = min(some, others)
+    return lower if lower > NO_SIGN else max(some, others)

@@ -1,6 +1,7 @@
 """A scenario as a library in C99, with an example and make files."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from ppafo.engine.program import Program
 from ppafo.engine.run import batch_of
@@ -18,7 +19,8 @@ from ppafo.exports.c_library.walk_preparation import (
 )
 from ppafo.parameters.device import Device
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.preparation import step_counts
+from ppafo.simulation.scenario import Control, Scenario, Sensors
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import plan_of, walk_duration
@@ -70,6 +72,20 @@ def scenario_library(scenario: Scenario) -> Library:
         other_program=(_samples_elsewhere(program.program),),
         words=words_of(scenario),
         further=lambda collector: preparation_of(scenario, program.program, collector),
+    )
+
+
+def commanded(scenario: Scenario) -> Scenario:
+    """The plant of a scenario alone, under a command that is handed in at every step of its engine."""
+    step = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period).step
+    return replace(
+        scenario,
+        name=f"{scenario.name}-plant",
+        description=f"The plant alone of this scenario: {scenario.description}",
+        time_step=step,
+        output_interval=step,
+        control=Control("constant", {"command": 0.0}, step),
+        sensors=Sensors(),
     )
 
 

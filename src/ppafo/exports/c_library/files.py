@@ -161,10 +161,10 @@ def filled(text: str, words: Mapping[str, str]) -> str:
     return _MARK.sub(lambda found: words[found[1]], text)
 
 
-def run_words(library: Library) -> dict[str, str]:
-    """Marks of every template in which a run of a library is made of its settings."""
+def run_words(library: Library, settings_type: str) -> dict[str, str]:
+    """Marks of every template in which a run of a library is made of its settings, a struct of that type."""
     program = library.program
-    return {
+    words = {
         "never": repr(NEVER_FAILED),
         "same_moment": repr(SAME_MOMENT),
         "signal_rows": str(SIGNAL_ROWS),
@@ -176,20 +176,22 @@ def run_words(library: Library) -> dict[str, str]:
         "setting_count": str(len(library.settings)),
         "prepare": "\n".join(f"    {line}" for line in library.preparation),
         "other_program": other_program_of(library),
+        "settings_type": settings_type,
     }
+    return {**words, "prepared_run": _filled("prepared_run.c", words)}
 
 
 def _words(library: Library, name: str) -> dict[str, str]:
     program = library.program
     outputs = ["time", *program.outputs]
     return {
-        **run_words(library),
+        **run_words(library, f"{name}_settings"),
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
         "description": "\n * ".join(textwrap.wrap(_in_comment(library.description), 110)),
         "version": __version__,
-        "advance": f"(run->needs_parts == 1 ? {IN_PARTS} : {WHOLE})" if program.chooses_parts else WHOLE,
+        "advance": _advance(program),
         "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),
         "outputs": _members((("time", "s", "since the start"), *((item, *OUTPUTS[item]) for item in program.outputs))),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
@@ -215,6 +217,17 @@ def _words(library: Library, name: str) -> dict[str, str]:
         ),
         **library.words,
     }
+
+
+def _advance(program: ExportedProgram) -> str:
+    """The lane loop of a run in C."""
+    return f"(run->needs_parts == 1 ? {IN_PARTS} : {WHOLE})" if program.chooses_parts else WHOLE
+
+
+def steps_source(library: Library) -> str:
+    """The function that does some steps of a run and takes a sample, for what stands behind the source of a library."""
+    words = {"name": library.name, "signal_rows": str(SIGNAL_ROWS), "advance": _advance(library.program)}
+    return _filled("steps.c", words)
 
 
 def _members(items: Iterable[tuple[str, str, str]]) -> str:

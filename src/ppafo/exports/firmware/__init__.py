@@ -11,7 +11,9 @@ from ppafo.control.fixed.converter import SETTINGS, Converter
 from ppafo.control.fixed.kind import TARGETS, FixedLaw
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
+from ppafo.exports.firmware.catalog import target_of
 from ppafo.exports.firmware.controller import controller_source, macro
+from ppafo.exports.firmware.target import Target
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.fixed_point import fixed_controller
@@ -24,18 +26,7 @@ TICK = 125.0e-6
 """What a sample period must be a multiple of [s]: one pulse of the timer."""
 MOST_TICKS = 32767
 _MARK = re.compile(r"@(\w+)@")
-_TEMPLATES = (
-    "Makefile",
-    "README.md",
-    "board.h",
-    "board_msp430f2013.c",
-    "board_simulated.c",
-    "controller.h",
-    "host.c",
-    "main.c",
-    "msp430f2013.ld",
-    "start_msp430.c",
-)
+_TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controller.h", "host.c", "main.c")
 
 
 class ChipController(NamedTuple):
@@ -77,11 +68,11 @@ def chip_controller(scenario: Scenario) -> ChipController:
 
 def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     """Files of the firmware of a scenario's controller, by name. ScenarioError where it has no integer form."""
-    if target not in TARGETS:
-        raise ScenarioError(f"no firmware for '{target}'; targets: {', '.join(TARGETS)}")
+    chosen = target_of(target)
     chip = chip_controller(scenario)
-    words = _words(scenario, chip, target)
-    texts = {name: _filled(name, words) for name in _TEMPLATES}
+    words = _words(scenario, chip, chosen)
+    words["wiring"] = _filled(chosen.wiring, words).rstrip()
+    texts = {name: _filled(name, words) for name in (*_TEMPLATES, *chosen.templates)}
     texts["LICENSE"] = files("ppafo.exports.c_library").joinpath("templates", "LICENSE").read_text(encoding="utf-8")
     texts["controller.c"] = controller_source(chip.law)
     texts["parameters.h"] = _parameters(scenario, chip)
@@ -93,14 +84,17 @@ def _filled(name: str, words: Mapping[str, str]) -> str:
     return _MARK.sub(lambda found: words[found[1]], text)
 
 
-def _words(scenario: Scenario, chip: ChipController, target: str) -> dict[str, str]:
+def _words(scenario: Scenario, chip: ChipController, target: Target) -> dict[str, str]:
     """What fills the templates."""
     converter = chip.converter
     return {
         "title": scenario.name,
         "description": scenario.description,
         "kind": chip.law.name,
-        "target": target,
+        "target": target.name,
+        "processor": target.processor,
+        "board": target.board,
+        "own_bits": str(target.converter_bits),
         "version": __version__,
         "period": quantity_text(scenario.control.period, "s"),
         "range": f"{scenario.control.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
@@ -109,6 +103,7 @@ def _words(scenario: Scenario, chip: ChipController, target: str) -> dict[str, s
         "lowest": f"{-converter.middle * converter.torque_step:.4g} N m",
         "highest": f"{(converter.top - converter.middle) * converter.torque_step:.4g} N m",
         "silence": f"{(2 * chip.ticks * TICK + 2.05e-3) * 1.0e3:.4g} ms",
+        **target.words,
     }
 
 

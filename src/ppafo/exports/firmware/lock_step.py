@@ -8,10 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ppafo.control.fixed.converter import COMMAND_STEPS, Converter, Limits, Readings, read
+from ppafo.control.fixed.kind import TARGETS
 from ppafo.errors import SimulationError
 from ppafo.exports.firmware import ChipController, chip_controller, firmware
+from ppafo.exports.firmware.catalog import target_of
 from ppafo.exports.firmware.controller import state_type
-from ppafo.exports.firmware.simulator import ChipSimulator, Decision, Sizes
+from ppafo.exports.firmware.simulator import chip_simulator
+from ppafo.exports.firmware.target import ChipSimulator, Decision, Image, Sizes, Target
 from ppafo.model.sensors import Measurement
 from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
@@ -43,7 +46,7 @@ class PythonChip:
 
 
 class ChipLaw:
-    """The simulated chip as a controller of a scenario; it keeps what each sample took and told."""
+    """The simulated chip as a controller of a scenario; it keeps the decision of every sample."""
 
     def __init__(self, simulator: ChipSimulator, converter: Converter) -> None:
         self.simulator = simulator
@@ -63,12 +66,17 @@ class ChipLaw:
 
 
 class Cost(NamedTuple):
-    """Sizes of the image and depth of the stack [bytes], worst and mean cycles of a sample."""
+    """What a controller takes of a target.
 
+    Sizes of the program and depth of the stack [bytes]; cycles or instructions of a sample, as the target counts them,
+    the most and the mean of all.
+    """
+
+    target: Target
     sizes: Sizes
     stack: int
-    worst_cycles: int
-    mean_cycles: float
+    worst: int
+    mean: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,16 +95,16 @@ class ChipRun:
     same_bits: bool
 
 
-def run_on_chip(scenario: Scenario) -> ChipRun:
+def run_on_chip(scenario: Scenario, target: str = TARGETS[0]) -> ChipRun:
     """Run a scenario with its controller on the chip's simulator, in virtual time, and once more in the lanes.
 
     ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
     """
     chip = chip_controller(scenario)
-    with ChipSimulator(firmware(scenario)) as simulator:
+    with chip_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
         law = ChipLaw(simulator, chip.converter)
         on_chip = simulate(scenario.controlled_by(law))
-        cost = _cost(simulator, law.decisions)
+        cost = cost_of(target_of(target), image, simulator.stack(), law.decisions)
     in_lanes = simulate(scenario)
     mine, theirs = on_chip.recording.channels, in_lanes.recording.channels
     same = all(np.array_equal(mine[name].values, theirs[name].values) for name in theirs)
@@ -114,12 +122,12 @@ class Comparison:
     cost: Cost
 
 
-def compare_drawn(scenario: Scenario, samples: int, seed: int = 1) -> Comparison:
+def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str = TARGETS[0]) -> Comparison:
     """Give drawn readings to the chip's simulator and to Python, with a reset after every ``EPISODE`` of them."""
     chip = chip_controller(scenario)
     reference, decisions = PythonChip(chip), []
     differences, first = 0, ""
-    with ChipSimulator(firmware(scenario)) as simulator:
+    with chip_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
         for number, readings in enumerate(drawn_readings(int(chip.converter.top), samples, seed)):
             if number % EPISODE == 0 and number:
                 reference.begin()
@@ -129,7 +137,7 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1) -> Comparison
             if wanted != found[:2]:
                 differences += 1
                 first = first or f"sample {number}, {tuple(readings)}: {found[:2]} on the chip, {wanted} in Python"
-        cost = _cost(simulator, decisions)
+        cost = cost_of(target_of(target), image, simulator.stack(), decisions)
     return Comparison(samples, differences, first, cost)
 
 
@@ -155,13 +163,9 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
             yield Readings(*shown)
 
 
-def _cost(simulator: ChipSimulator, decisions: list[Decision]) -> Cost:
+def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:
+    """What the decisions of a chip took of it. SimulationError where there are none."""
     if not decisions:
         raise SimulationError("no sample was taken on the chip")
-    cycles = [item.cycles for item in decisions]
-    return Cost(
-        sizes=simulator.sizes,
-        stack=simulator.stack(),
-        worst_cycles=max(cycles),
-        mean_cycles=sum(cycles) / len(cycles),
-    )
+    work = [item.work for item in decisions]
+    return Cost(target, image.shipped, stack, worst=max(work), mean=sum(work) / len(work))

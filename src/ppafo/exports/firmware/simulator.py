@@ -1,49 +1,44 @@
-"""The image of a controller in the simulator of its processor, one sample after another, driven by its console."""
+"""Images of a firmware: built, measured, and put into the simulator of their processor."""
 
 import os
-import re
 import select
+import struct
 import subprocess
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from shutil import which
-from types import TracebackType
 from typing import NamedTuple, final
+from weakref import finalize
 
 from ppafo.errors import SimulationError, one_line, reason
+from ppafo.exports.firmware.target import ChipSimulator, Image, Sizes, Target
 
-TOOLS = ("make", "clang", "ld.lld", "mspdebug")
-CLOCK = 16.0e6
-"""Of the processor [Hz]."""
-FLASH, RAM = 2048, 128
-"""What an MSP430F2013 has [bytes]."""
+UNTOUCHED = 0xA5
+"""What the RAM for the stack is filled with, so that what the stack has overwritten can be seen."""
 _PATIENCE = 60.0
-_RAM_START, _UNTOUCHED = 0x200, 0xA5
-_CYCLES = re.compile(rb"MCLK:\s+(\d+)")
+_LOADED = 2
+_WITH_VALUES, _SYMBOLS = 1, 2
+_SECTION = struct.Struct("<IIIIIIIIII")
+_SYMBOL = struct.Struct("<IIIBBH")
 
 
-class Decision(NamedTuple):
-    """Command in steps, 1 while all readings have been sound, and the cycles that the sample took."""
-
-    command: int
-    is_sound: int
-    cycles: int
+def missing_tools(target: Target) -> tuple[str, ...]:
+    """The tools of a target that this computer lacks."""
+    return tuple(tool for tool in target.tools if which(tool) is None)
 
 
-class Sizes(NamedTuple):
-    """Flash of an image and RAM of its data [bytes]."""
-
-    flash: int
-    data: int
-
-
-def missing_tools() -> tuple[str, ...]:
-    """Those of ``TOOLS`` that this computer lacks."""
-    return tuple(tool for tool in TOOLS if which(tool) is None)
+def check_tools(target: Target) -> None:
+    """SimulationError where this computer lacks a tool of a target."""
+    absent = missing_tools(target)
+    if absent:
+        raise SimulationError(
+            f"the simulator of {target.name} needs {', '.join(absent)}; {target.packages} are packages of Debian"
+        )
 
 
-def built(contents: Mapping[str, bytes], folder: Path, goals: tuple[str, ...] = ("all",)) -> None:
+def built(contents: Mapping[str, bytes], folder: Path, goals: Sequence[str] = ("all",)) -> None:
     """Write the files of a firmware into a folder and make what is asked for; SimulationError where that fails."""
     for name, content in contents.items():
         (folder / name).write_bytes(content)
@@ -56,130 +51,137 @@ def built(contents: Mapping[str, bytes], folder: Path, goals: tuple[str, ...] = 
         raise SimulationError(f"the firmware cannot be built: {one_line(said)}")
 
 
-def sizes(image: Path) -> Sizes:
-    """Flash and RAM of an image, as the headers of its segments have them."""
-    return _sizes_of(image.read_bytes())
+@contextmanager
+def chip_simulator(contents: Mapping[str, bytes], target: Target) -> Iterator[tuple[ChipSimulator, Image]]:
+    """The simulator of a target with the firmware of these files in it, and the image; both end with the ``with``.
+
+    SimulationError where a tool is missing, the files cannot be built, or the simulator does not answer.
+    """
+    with built_image(contents, target) as image:
+        simulator = target.simulator(target, image)
+        try:
+            yield simulator, image
+        finally:
+            simulator.close()
 
 
-def _sizes_of(image: bytes) -> Sizes:
-    """The same of the bytes of a 32-bit ELF file: sections that are loaded, in flash or in RAM."""
+@contextmanager
+def built_image(contents: Mapping[str, bytes], target: Target) -> Iterator[Image]:
+    """The image for the simulator that is built of these files, in a folder that goes with the ``with``."""
+    check_tools(target)
+    with tempfile.TemporaryDirectory(prefix="ppafo-chip-", ignore_cleanup_errors=True) as folder:
+        built(contents, Path(folder))
+        yield read_image(Path(folder), target)
 
-    def number(at: int, length: int) -> int:
-        return int.from_bytes(image[at : at + length], "little")
 
-    start, length, count = number(0x20, 4), number(0x2E, 2), number(0x30, 2)
-    flash = data = 0
-    for at in range(start, start + length * count, length):
-        is_loaded = number(at + 8, 4) & 2
-        address, size = number(at + 12, 4), number(at + 20, 4)
-        flash += size if is_loaded and address >= 2 * _RAM_START else 0
-        data += size if is_loaded and address < 2 * _RAM_START else 0
-    return Sizes(flash, data)
+def read_image(folder: Path, target: Target) -> Image:
+    """The image for the simulator in a folder where a firmware was built; a plant has no other one."""
+    file, shipped = folder / "simulated.elf", folder / "firmware.elf"
+    content = file.read_bytes()
+    own = _sizes(content, target)
+    return Image(file, own, sizes(shipped, target) if shipped.is_file() else own, _symbols(content))
+
+
+def sizes(image: Path, target: Target) -> Sizes:
+    """Flash and RAM that a program takes of a target."""
+    return _sizes(image.read_bytes(), target)
+
+
+class _Section(NamedTuple):
+    """A section of an ELF file."""
+
+    name: int
+    kind: int
+    flags: int
+    address: int
+    offset: int
+    size: int
+    link: int
+    info: int
+    alignment: int
+    entry_size: int
+
+
+def _sections(content: bytes) -> list[_Section]:
+    """The sections of a 32-bit ELF file, lowest byte first."""
+    (start,) = struct.unpack_from("<I", content, 0x20)
+    length, count = struct.unpack_from("<HH", content, 0x2E)
+    return [_Section._make(_SECTION.unpack_from(content, start + length * place)) for place in range(count)]
+
+
+def _sizes(content: bytes, target: Target) -> Sizes:
+    loaded = [item for item in _sections(content) if item.flags & _LOADED]
+    in_ram = [item for item in loaded if target.ram.holds(item.address)]
+    values = sum(item.size for item in in_ram if item.kind == _WITH_VALUES)
+    flash = sum(item.size for item in loaded if target.flash.holds(item.address))
+    return Sizes(flash + values, sum(item.size for item in in_ram))
+
+
+def _symbols(content: bytes) -> dict[str, int]:
+    """Addresses of the symbols of an ELF file, by name."""
+    sections = _sections(content)
+    found = {}
+    for item in sections:
+        if item.kind == _SYMBOLS:
+            names = sections[item.link].offset
+            for at in range(item.offset, item.offset + item.size, _SYMBOL.size):
+                name, address, *_ = _SYMBOL.unpack_from(content, at)
+                begin = names + name
+                found[content[begin : content.index(b"\0", begin)].decode()] = address
+    return found
 
 
 @final
-class ChipSimulator:
-    """mspdebug's simulator with the image of a folder in it; to be used in a ``with``.
+class Console:
+    """A program of this machine that is spoken to by its standard input and output; ``close`` ends it."""
 
-    SimulationError where a tool is missing, or where the simulator does not answer.
-    """
-
-    def __init__(self, contents: Mapping[str, bytes], ram: int = RAM) -> None:
-        absent = missing_tools()
-        if absent:
-            raise SimulationError(
-                f"the chip's simulator needs {', '.join(absent)}; make, clang, lld and mspdebug are packages of Debian"
-            )
-        self._folder = tempfile.TemporaryDirectory(prefix="ppafo-chip-", ignore_cleanup_errors=True)
-        folder = Path(self._folder.name)
-        built(contents, folder)
-        self.sizes = sizes(folder / "firmware.elf")
-        self.simulated = sizes(folder / "simulated.elf")
-        self._cycles = 0
-        self._ram = ram
+    def __init__(self, command: Sequence[str], folder: Path) -> None:
+        self._name = command[0]
         self._seen = b""
-        self._process = subprocess.Popen(
-            ["mspdebug", "-n", "-q", "sim"],
-            cwd=folder,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            bufsize=0,
-        )
-        free = ram - self.simulated.data
-        self._say(f"prog simulated.elf\nfill {_RAM_START + self.simulated.data} {free} {_UNTOUCHED:x}")
-        self._say("simio add tracer counter\nsetbreak board_wait\nrun\nsimio info counter\nmd simulated_outputs 4")
-        self._answer()
+        try:
+            self._process = subprocess.Popen(
+                command,
+                cwd=folder,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                bufsize=0,
+            )
+        except OSError as error:
+            raise SimulationError(f"{self._name} cannot be run: {reason(error)}") from error
+        # Nothing else ends it where what holds this object fails before it can close it.
+        self.close = finalize(self, _end, self._process)
 
-    def __enter__(self) -> "ChipSimulator":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End the simulator and remove its folder."""
-        self._process.kill()
-        self._process.communicate()
-        self._folder.cleanup()
-
-    def begin(self) -> None:
-        """Reset the processor, and let it come to where it waits for a sample."""
-        self._say("reset\nrun\nsimio info counter\nmd simulated_outputs 4")
-        self._answer()
-
-    def sample(self, readings: Iterable[int]) -> Decision:
-        """What the chip decides for the readings of one sample."""
-        return self.samples((readings,))[0]
-
-    def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
-        """What it decides for some samples in turn, at most 50: asked at once, so that neither waits for the other."""
-        for readings in every:
-            given = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
-            self._say(f"mw simulated_readings {given}\nrun\nsimio info counter\nmd simulated_outputs 4")
-        return [self._decision() for _ in every]
-
-    def _decision(self) -> Decision:
-        before = self._cycles
-        words = self._answer()
-        command = int.from_bytes(words[:2], "little", signed=True)
-        return Decision(command, int.from_bytes(words[2:], "little"), self._cycles - before)
-
-    def stack(self) -> int:
-        """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
-        start = _RAM_START + self.simulated.data
-        self._say(f"md {start} {self._ram - self.simulated.data}\nsimio info counter\nmd simulated_outputs 4")
-        shown = self._until(b"simulated_outputs 4\n")
-        self._line()
-        lines = re.findall(rb"^    [0-9a-f]{5}: ((?:[0-9a-f]{2} )+)", shown, re.MULTILINE)
-        memory = bytes.fromhex(b"".join(lines).decode())
-        untouched = next(place for place, byte in enumerate(memory) if byte != _UNTOUCHED)
-        return len(memory) - untouched
-
-    def _say(self, text: str) -> None:
+    def say(self, text: bytes) -> None:
+        """Write to the program. SimulationError where it has ended."""
         assert self._process.stdin is not None
         try:
-            self._process.stdin.write(f"{text}\n".encode())
+            self._process.stdin.write(text)
         except OSError as error:
-            raise SimulationError(f"mspdebug has ended: {reason(error)}") from error
+            raise SimulationError(f"{self._name} has ended: {reason(error)}; {self._last()}") from error
 
-    def _answer(self) -> bytes:
-        """The four bytes of the outputs, at the end of what was asked; the cycles are noted."""
-        said = self._until(b"simulated_outputs 4\n")
-        self._cycles = int(_CYCLES.findall(said)[-1])
-        return bytes.fromhex(self._line().split(b":")[1].split(b"|")[0].decode())
-
-    def _line(self) -> bytes:
-        return self._until(b"\n")
-
-    def _until(self, mark: bytes) -> bytes:
-        """What the simulator says up to a mark. SimulationError where it falls silent."""
+    def until(self, mark: bytes) -> bytes:
+        """What the program says up to a mark. SimulationError where it falls silent."""
         assert self._process.stdout is not None
         while mark not in self._seen:
             ready, _, _ = select.select([self._process.stdout], [], [], _PATIENCE)
             said = os.read(self._process.stdout.fileno(), 65536) if ready else b""
             if not said:
-                last = self._seen.decode(errors="replace").strip().splitlines()[-1:]
-                raise SimulationError(f"mspdebug does not answer; the last it said: {one_line(' '.join(last))}")
+                raise SimulationError(f"{self._name} does not answer; {self._last()}")
             self._seen += said
         found, _, self._seen = self._seen.partition(mark)
         return found
+
+    def _last(self) -> str:
+        last = self._seen.decode(errors="replace").strip().splitlines()[-1:]
+        return f"the last it said: {one_line(' '.join(last))}"
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    process.kill()
+    process.communicate()
+
+
+def depth_of_stack(memory: bytes) -> int:
+    """How deep a stack has been [bytes] that grows down from the end of memory filled with ``UNTOUCHED``."""
+    return len(memory) - next((place for place, byte in enumerate(memory) if byte != UNTOUCHED), len(memory))

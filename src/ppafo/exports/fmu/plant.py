@@ -4,15 +4,14 @@ from dataclasses import replace
 
 from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import constant
-from ppafo.engine.lanes import SIGNAL_ROWS
-from ppafo.exports.c_library import scenario_library, walk_library
-from ppafo.exports.c_library.files import Library
+from ppafo.exports.c_library import commanded, scenario_library, walk_library
+from ppafo.exports.c_library.files import Library, steps_source
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.exports.fmu.variables import Input, Interface
 from ppafo.model.command import VENT
 from ppafo.model.sensors import SensorParameters
 from ppafo.simulation.preparation import step_counts
-from ppafo.simulation.scenario import Control, FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Sensors
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice, Scenario
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.declaration import WALK_SENSORS
 from ppafo.walking.sensor_settings import FaultSettings, SensorSettings, sensors_of
@@ -69,7 +68,7 @@ def _walking_plant(configuration: Configuration) -> Interface:
         clock=None,
         hidden=_hidden(library),
         inputs=(WALKING_COMMAND,),
-        words={"signal_rows": str(SIGNAL_ROWS), "highest": repr(VENT), "follow": "", "lead": ""},
+        words={"steps": steps_source(library), "highest": repr(VENT), "follow": "", "lead": ""},
     )
 
 
@@ -100,7 +99,7 @@ def _plant(scenario: Scenario) -> Interface:
         hidden=_hidden(library),
         inputs=_inputs(chosen),
         words={
-            "signal_rows": str(SIGNAL_ROWS),
+            "steps": steps_source(library),
             "highest": "1.0",
             "follow": _FOLLOW_ANGLE if is_led else "    settings->motion_external_torque = inputs[1];",
             "lead": _LEAD_ANGLE if is_led else "    rows[PARAMETER_PLANT_EXTERNAL_TORQUE] = inputs[1];",
@@ -110,22 +109,12 @@ def _plant(scenario: Scenario) -> Interface:
 
 def _scenario_of_plant(scenario: Scenario) -> Scenario:
     """The scenario with a command that is handed in at every step of its engine, and its ankle led from outside."""
-    step = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period).step
     motion = scenario.motion
     if isinstance(motion, PrescribedMotion):
         angle, _, _ = _path_at_start(motion)
         settings = {"start_level": angle, "level": angle, "ramp_start": 0.0, "ramp_time": 2.0}
         motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
-    return replace(
-        scenario,
-        name=f"{scenario.name}-plant",
-        description=f"The plant alone of this scenario: {scenario.description}",
-        time_step=step,
-        output_interval=step,
-        control=Control("constant", {"command": 0.0}, step),
-        sensors=Sensors(),
-        motion=motion,
-    )
+    return replace(commanded(scenario), motion=motion)
 
 
 def _walk_of_plant(configuration: Configuration) -> Configuration:

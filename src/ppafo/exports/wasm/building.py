@@ -51,7 +51,7 @@ def source_of(library: Library) -> str:
     program, names = library.program, [item.name for item in library.settings]
     refused = "    if (!({})) {{\n        return SETTING_{};\n    }}"
     words = {
-        **run_words(library),
+        **run_words(library, "run_settings"),
         "functions": c_text(program, _TITLE, names, library.further, LANES),
         "lanes": str(LANES),
         "go_on": _chosen_loop(program, ""),

@@ -39,7 +39,9 @@ from ppafo.identification.trajectory.whitening import (
     from_reflections,
 )
 
-CHAINS, DRAWS, SETTLING = 2, 100, 20
+CHAINS, DRAWS, HEAVY_DRAWS, SETTLING = 2, 100, 300, 20
+"""Chains, draws of each that count, the same where weights of samples are drawn too, and draws before them."""
+
 _PROPOSALS, _SHOWN = 3, 10
 _STEP = 0.3
 _SHARE_OF_ERROR = 1.5

@@ -27,7 +27,7 @@ FREEDOMS = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 25.0, 50.0, 
 
 MAXIMUM_ORDER = 30
 _HEAVY_ORDERS = (0, 1, 2, 3, 5, 8, 12, 20)
-_SAMPLES_FOR_EACH = 8
+_SAMPLES_FOR_EACH, _NUMBERS_OF_DRIFT = 8, 2
 _HEAVY = 4.0
 """Log likelihood that a t distribution must gain before tails are called heavy."""
 _UNEQUAL = 5.0
@@ -86,7 +86,7 @@ def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNo
     if any(_tails(one, scaled)[1] > _HEAVY for one in candidates):
         candidates += [_heavy_autoregression(scaled, candidates[0]), _heavy_drift(scaled, drift)]
     count = len(whole)
-    best = min(candidates, key=lambda one: _criterion(one.likelihood, one.numbers, count))
+    best = min(candidates, key=lambda one: _criterion_beside_drifts(one, count))
     return SensorNoise(best.shape, best.levels * levels, best.freedom, is_shared, False, best.likelihood, best.numbers)
 
 
@@ -142,6 +142,16 @@ def longest_memory(segments: Sequence[Floats]) -> float:
 
 def _criterion(likelihood: float, numbers: int, count: int) -> float:
     return -2.0 * likelihood + 2.0 * numbers * count / max(1.0, count - numbers - 1.0)
+
+
+def _criterion_beside_drifts(noise: SensorNoise, count: int) -> float:
+    """Return the criterion; a number that an autoregression has more than a drift costs what Schwarz's takes for it.
+
+    The best of so many orders is now and then better than a drift that is there, by chance, and intervals are then too
+    narrow.
+    """
+    more = max(0, noise.shape.order - _NUMBERS_OF_DRIFT) if isinstance(noise.shape, AutoRegression) else 0
+    return _criterion(noise.likelihood, noise.numbers, count) + (math.log(count) - 2.0) * more
 
 
 def _of(shape: Shape, level: float, parts: int, likelihood: float, freedom: float = math.inf) -> SensorNoise:

@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.trajectory.information import Mixture, covariance, data_information, prior_information
 from ppafo.identification.trajectory.misfit import Misfit, misfit_of
-from ppafo.identification.trajectory.posterior import draw_posterior
+from ppafo.identification.trajectory.posterior import DRAWS, HEAVY_DRAWS, draw_posterior
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.problem import Range, Search
 from ppafo.identification.trajectory.search import is_at_bound
@@ -222,7 +222,8 @@ def uncertainty_of(found: WhitenedFit, search: Search, low: Floats, high: Floats
     """Return the uncertainty at an optimum of known noise; ``low`` and ``high`` [unit] bound the coordinates."""
     point = found.optimum.point
     kept = len(point)
-    mixture, shown = draw_posterior(found.model, found.noises, kept, search.seed)
+    count = HEAVY_DRAWS if any(noise.is_heavy for noise in found.noises) else DRAWS
+    mixture, shown = draw_posterior(found.model, found.noises, kept, search.seed, count=count)
     matrix, curvature = mixture.covariance, found.optimum.information
     tail = 0.5 - 0.5 * search.confidence
     ends = [

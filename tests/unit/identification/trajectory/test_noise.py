@@ -159,6 +159,14 @@ def test_the_noise_of_a_sensor_is_recognised(kind: str, shape: Any, is_heavy: bo
     assert np.abs(neighbours).max() < 4.0 / math.sqrt(COUNT)
 
 
+@pytest.mark.parametrize("seed", [41, 52, 66, 120])
+def test_a_long_autoregression_is_not_taken_for_the_drift_that_is_there(seed: int) -> None:
+    # Of 130 drifts these are the four that the criterion of Akaike alone takes for an autoregression of 5 to 10.
+    random = np.random.default_rng(seed)
+    segments = [noise_kind("drift").draw(400, number, random) for number in range(2)]
+    assert isinstance(sensor_noise(segments).shape, Drift)
+
+
 def test_levels_of_recordings_that_differ_are_told_apart() -> None:
     noise = sensor_noise(drawn("unequal", 10))
     assert not noise.is_shared
@@ -282,16 +290,18 @@ def test_intervals_hold_the_truth_under_noise_that_is_not_white(kind: str) -> No
     assert all(0.6 < width < 2.0 for line in lines for width in line.width)
 
 
-def test_a_drift_of_a_sensor_is_said_and_does_not_cap_the_verdict(experiment: Experiment) -> None:
+@pytest.mark.parametrize("kind", ["drift", "heavy-drift"])
+def test_a_drift_of_a_sensor_is_said_and_does_not_cap_the_verdict(experiment: Experiment, kind: str) -> None:
     random = np.random.default_rng(17)
     recording = experiment.recording
     for name, size in experiment.noise.items():
-        drift = 2.0 * size * (NOISE_KINDS["drift"].draw(len(recording), 0, random))
+        drift = 2.0 * size * (NOISE_KINDS[kind].draw(len(recording), 0, random))
         recording = recording.with_channel(name, recording[name] + drift, recording.unit(name))
     drifting = dataclasses.replace(experiment, recording=recording, noise={})
     found = fit(TrajectoryProblem((FreeParameter("foot_plate.inertia", start=0.0085),), (drifting,)))
     assert found.estimates[0].verdict == "identified"
     assert "drift" in found.estimates[0].explanation
+    assert any("drift under heavy tails" in remark for remark in found.remarks) == (kind == "heavy-drift")
 
 
 def test_gaps_and_a_lone_sample_between_two_do_no_harm(experiment: Experiment) -> None:

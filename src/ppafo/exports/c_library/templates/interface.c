@@ -1,17 +1,6 @@
 /* ---- From here on the interface: what @name@.h declares. ---- */
 
-#define NEVER_FAILED @never@
-#define SAME_MOMENT @same_moment@
-
-enum {
-    SETTINGS = @setting_count@,
-    OUTPUTS = @output_count@,
-    STATES = @state_count@,
-    PARAMETERS = @parameter_count@,
-    METRICS = @metric_count@,
-    COUNTS = @count_count@
-};
-
+@prepared_run@
 struct @name@_run {
     double parameters[PARAMETERS];
     double states[STATES];
@@ -32,34 +21,10 @@ struct @name@_run {
     /* Late signals and commands follow in memory. */
 };
 
-/* What the settings come to: numbers of the steps, parameters and states at the start. */
-typedef struct {
-    double parameters[PARAMETERS];
-    double states[STATES];
-    double counts[COUNTS];
-} prepared_run;
-
-static ppafo_array array_of(double *values, int64_t first, int64_t second, int64_t third)
-{
-    ppafo_array made;
-    made.values = values;
-    made.extent[0] = first;
-    made.extent[1] = second;
-    made.extent[2] = third;
-    return made;
-}
-
 static void prepare_run(const @name@_settings *settings, prepared_run *prepared)
 {
     memset(prepared, 0, sizeof(*prepared));
 @prepare@
-}
-
-/* True where Python would run other functions for these settings than there are here. */
-static bool is_other_program(const @name@_settings *settings, const prepared_run *prepared)
-{
-    (void)settings;
-    return prepared->counts[COUNT_INTERVAL] < 1.0 || prepared->counts[COUNT_STEPS] > 1.0e9@other_program@;
 }
 
 static int64_t values_of_history(int64_t signal_delay, int64_t command_delay)

@@ -14,6 +14,7 @@ from ppafo.engine.rows import rebuilt
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ScenarioError
 from ppafo.exports.firmware import MOST_TICKS, TICK
+from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.firmware.controller import PRELUDE, macro, proof, state_type
 from ppafo.simulation.reading import quantity_text
 from ppafo.translation.c99 import c_source, documents_of
@@ -22,21 +23,16 @@ from ppafo.walking.configuration import Configuration
 from ppafo.walking.declaration import ARITHMETIC, quantities
 from ppafo.walking.fixed_point import converter_of_walk, numbers_of_walk
 
-MOST_CONVERTER_BITS = 10
-"""Of the converter of an MSP430G2553."""
-FLASH, RAM = 16384, 512
-"""What it has [bytes]."""
 _MARK = re.compile(r"@(\w+)@")
 _TEMPLATES = (
     "Makefile",
     "README.md",
     "board.h",
-    "board_msp430g2553.c",
     "board_simulated.c",
     "controller.h",
     "host.c",
     "main.c",
-    "msp430g2553.ld",
+    *MSP430G2553.templates,
 )
 
 
@@ -67,10 +63,10 @@ def walk_chip(configuration: Configuration) -> WalkChip:
             f"{name}: the controller '{configuration.controller.name}' has no form on whole numbers; those that have "
             f"one: {', '.join(FIXED_WALKS)}"
         )
-    if given["converter_bits"] > MOST_CONVERTER_BITS:
+    if given["converter_bits"] > MSP430G2553.converter_bits:
         raise ScenarioError(
             f"{name}: controller.converter_bits = {given['converter_bits']:g}: the converter of the chip has "
-            f"{MOST_CONVERTER_BITS}"
+            f"{MSP430G2553.converter_bits}"
         )
     ticks = round(period / TICK)
     if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:

@@ -10,10 +10,11 @@ from ppafo.control.fixed.walking.readings import GaitConverter, GaitReadings, re
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
-from ppafo.errors import SimulationError
-from ppafo.exports.firmware.lock_step import Comparison, Cost
-from ppafo.exports.firmware.simulator import ChipSimulator, Decision
-from ppafo.exports.firmware.walking import RAM, WalkChip, walk_chip, walk_firmware
+from ppafo.exports.firmware.catalog import MSP430G2553
+from ppafo.exports.firmware.lock_step import Comparison, Cost, cost_of
+from ppafo.exports.firmware.simulator import chip_simulator
+from ppafo.exports.firmware.target import ChipSimulator, Decision
+from ppafo.exports.firmware.walking import WalkChip, walk_chip, walk_firmware
 from ppafo.exports.firmware.walking.drawn import DrawnGait
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
@@ -94,10 +95,10 @@ def walk_on_chip(configuration: Configuration, minutes: float | None = None) -> 
     """
     chip = walk_chip(configuration)
     run = plan_walk(plan_of(configuration, walk_duration(configuration, minutes)))
-    with ChipSimulator(walk_firmware(configuration), RAM) as simulator:
+    with chip_simulator(walk_firmware(configuration), MSP430G2553) as (simulator, image):
         law = ChipOfWalk(simulator, chip.converter)
         outside = run_sampled_walk(run, law)
-        cost = _cost(simulator, law.decisions)
+        cost = cost_of(MSP430G2553, image, simulator.stack(), law.decisions)
     inside = run_batch(batch_of(run))
     rows = state_row_numbers(run)
     shared = [path for path in rows if not path.startswith(_INSIDE)]
@@ -118,7 +119,7 @@ def compare_drawn_walk(configuration: Configuration, samples: int, seed: int = 1
     decisions: list[Decision] = []
     wanted: list[tuple[int, int]] = []
     asked: list[GaitReadings] = []
-    with ChipSimulator(walk_firmware(configuration), RAM) as simulator:
+    with chip_simulator(walk_firmware(configuration), MSP430G2553) as (simulator, image):
         for _ in range(samples):
             readings, begins = drawn.next(command)
             if begins or len(asked) == TURN:
@@ -131,21 +132,9 @@ def compare_drawn_walk(configuration: Configuration, samples: int, seed: int = 1
             wanted.append(reference.sample(readings))
             command = wanted[-1][0]
         decisions += simulator.samples(asked)
-        cost = _cost(simulator, decisions)
+        cost = cost_of(MSP430G2553, image, simulator.stack(), decisions)
     differ = [place for place, found in enumerate(decisions) if found[:2] != wanted[place]]
     first = ""
     if differ:
         first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the chip, {wanted[differ[0]]} in Python"
     return Comparison(samples, len(differ), first, cost)
-
-
-def _cost(simulator: ChipSimulator, decisions: list[Decision]) -> Cost:
-    if not decisions:
-        raise SimulationError("no sample was taken on the chip")
-    cycles = [item.cycles for item in decisions]
-    return Cost(
-        sizes=simulator.sizes,
-        stack=simulator.stack(),
-        worst_cycles=max(cycles),
-        mean_cycles=sum(cycles) / len(cycles),
-    )

@@ -7,16 +7,13 @@
 /* ---- From here on what the module shows; src/ppafo/exports/wasm/__init__.py says how it is called. ---- */
 
 #define SHOWN(name) __attribute__((export_name(#name))) name
-#define NEVER_FAILED @never@
-#define SAME_MOMENT @same_moment@
 
+typedef struct {
+@members@
+} run_settings;
+
+@prepared_run@
 enum {
-    SETTINGS = @setting_count@,
-    OUTPUTS = @output_count@,
-    STATES = @state_count@,
-    PARAMETERS = @parameter_count@,
-    METRICS = @metric_count@,
-    COUNTS = @count_count@,
     SIGNALS = @signal_rows@,
     LANES = @lanes@,
     /* Samples of one run that are taken at once, and room for them: the last step brings one more. */
@@ -28,17 +25,6 @@ enum {
 /* How a run ended. */
 enum { COMPLETED, DIVERGED, TOO_MANY_PARTS, REFUSED, NO_MEMORY };
 
-typedef struct {
-@members@
-} run_settings;
-
-/* What the settings come to: numbers of the steps, parameters and states at the start. */
-typedef struct {
-    double parameters[PARAMETERS];
-    double states[STATES];
-    double counts[COUNTS];
-} prepared_run;
-
 /* The clock of runs that can go on together. */
 typedef struct {
     double interval; /* steps from one sample to the next */
@@ -49,16 +35,6 @@ typedef struct {
     int64_t command_delay;
     bool needs_parts;
 } run_clock;
-
-static ppafo_array array_of(double *values, int64_t first, int64_t second, int64_t third)
-{
-    ppafo_array made;
-    made.values = values;
-    made.extent[0] = first;
-    made.extent[1] = second;
-    made.extent[2] = third;
-    return made;
-}
 
 static void fill(double *values, int64_t count, double value)
 {
@@ -119,13 +95,6 @@ static int32_t bad_setting(const run_settings *settings)
 {
 @conditions@
     return SETTINGS;
-}
-
-/* True where Python would run other functions for these settings than there are here. */
-static bool is_other_program(const run_settings *settings, const prepared_run *prepared)
-{
-    (void)settings;
-    return prepared->counts[COUNT_INTERVAL] < 1.0 || prepared->counts[COUNT_STEPS] > 1.0e9@other_program@;
 }
 
 int32_t SHOWN(check)(const run_settings *settings)

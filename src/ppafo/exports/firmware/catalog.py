@@ -1,0 +1,170 @@
+"""Processors that firmware is written for. To add one here: a description, and the files of its board."""
+
+from collections.abc import Mapping
+
+from ppafo.errors import ScenarioError
+from ppafo.exports.firmware.mspdebug import MspdebugSimulator
+from ppafo.exports.firmware.qemu import QemuSimulator
+from ppafo.exports.firmware.target import Doubles, Machine, Memory, Target
+
+_VARIABLES = """\
+# Others do as well: make COMPILER="clang --target=arm-none-eabi" LINKER='$(COMPILER) -fuse-ld=lld',
+# or make COMPILER="{zig}" PROCESSOR=
+COMPILER ?= arm-none-eabi-gcc
+LINKER ?= $(COMPILER)
+PROCESSOR ?= -mcpu={name}
+OBJCOPY ?= arm-none-eabi-objcopy"""
+_HEX = """
+firmware.hex: firmware.elf
+\t$(OBJCOPY) -O ihex $< $@
+"""
+
+
+def _flash(said: str, needs: str, command: str) -> str:
+    """The part of a make file that writes the chip."""
+    return f"\n# {said}. Read README.md first.\nflash: {needs}\n\t{command}\n"
+
+
+MSP430F2013 = Target(
+    name="msp430f2013",
+    processor="MSP430F2013",
+    board="an eZ430-F2013",
+    clock=16.0e6,
+    flash=Memory(0xF800, 0x800),
+    ram=Memory(0x200, 0x80),
+    interrupt_stack=4,
+    converter_bits=16,
+    words={
+        "needs": "clang and lld of LLVM",
+        "variables": "CLANG ?= clang\nLINKER ?= ld.lld",
+        "compiler": "$(CLANG)",
+        "flags_of_target": "--target=msp430-none-elf -mmcu=msp430f2013",
+        "link": "$(LINKER) --gc-sections",
+        "start": "start_msp430.o",
+        "board_objects": "board_msp430f2013.o",
+        "board_files": "`board_msp430f2013.c`",
+        "not_run": "no simulator here has them",
+        "script": "msp430f2013.ld",
+        "flash": _flash("Into the chip on an eZ430-F2013", "firmware.elf", 'mspdebug uif "prog firmware.elf"'),
+        "flash_said": "into the chip on an eZ430-F2013, by mspdebug",
+    },
+    templates=("board_msp430f2013.c", "msp430f2013.ld", "start_msp430.c"),
+    wiring="wiring_msp430f2013.md",
+    tools=("make", "clang", "ld.lld", "mspdebug"),
+    packages="make, clang, lld and mspdebug",
+    counted="cycles",
+    simulator=MspdebugSimulator,
+)
+
+MSP430G2553 = Target(
+    name="msp430g2553",
+    processor="MSP430G2553",
+    board="a LaunchPad",
+    clock=16.0e6,
+    flash=Memory(0xC000, 0x4000),
+    ram=Memory(0x200, 0x200),
+    interrupt_stack=4,
+    converter_bits=10,
+    words={},
+    templates=("board_msp430g2553.c", "msp430g2553.ld"),
+    wiring="README.md",
+    tools=MSP430F2013.tools,
+    packages=MSP430F2013.packages,
+    counted=MSP430F2013.counted,
+    simulator=MspdebugSimulator,
+)
+"""That of a controller of walking, whose templates are in ``walking/templates`` and have words of their own."""
+
+
+def _words_of_cortex(name: str, chip: str, pins: Mapping[str, str]) -> dict[str, str]:
+    """What fills the templates for a Cortex-M on a micro:bit, whose compiler may be gcc, clang or zig."""
+    for_zig = f"zig cc -target thumb-freestanding-eabi -mcpu={name.replace('-', '_')}"
+    return {
+        "needs": "gcc for ARM without a system",
+        "variables": _VARIABLES.format(name=name, zig=for_zig),
+        "compiler": "$(COMPILER)",
+        "flags_of_target": "$(PROCESSOR) -mthumb -fomit-frame-pointer",
+        "link": "$(LINKER) $(PROCESSOR) -mthumb -nostdlib -Wl,--gc-sections",
+        "start": "start_cortex.o",
+        "board_objects": f"board_microbit.o converter_{chip}.o",
+        "board_files": f"`board_microbit.c` and `converter_{chip}.c`",
+        "not_run": "timer and outputs run in QEMU's micro:bit V1, converter and watchdog have no simulator",
+        "script": f"{chip}.ld",
+        "flash": _flash("Onto the drive that the board is", "firmware.hex", 'cp firmware.hex "$(MICROBIT)"') + _HEX,
+        "flash_said": "onto the drive that the board is, as in make flash MICROBIT=/media/MICROBIT",
+        **pins,
+    }
+
+
+_OF_CORTEX = ("board_microbit.c", "start_cortex.c")
+_TOOLS = ("make", "arm-none-eabi-gcc", "qemu-system-arm")
+_PACKAGES = "make, gcc-arm-none-eabi and qemu-system-arm"
+CORTEX_M0 = Target(
+    name="cortex-m0",
+    processor="nRF51822, a Cortex-M0",
+    board="a BBC micro:bit V1",
+    clock=16.0e6,
+    flash=Memory(0, 256 * 1024),
+    ram=Memory(0x20000000, 16 * 1024),
+    interrupt_stack=40,
+    converter_bits=10,
+    words=_words_of_cortex(
+        "cortex-m0",
+        "nrf51822",
+        {
+            "pin_pressure_1": "P0.03, AIN4",
+            "pin_pressure_2": "P0.02, AIN3",
+            "pin_reference": "P0.01, AIN2",
+            "pin_a": "23",
+            "pin_b": "22",
+            "pin_pulse": "21",
+            "pin_enable": "20",
+        },
+    ),
+    templates=(*_OF_CORTEX, "converter_nrf51822.c", "nrf51822.ld"),
+    wiring="wiring_microbit.md",
+    tools=_TOOLS,
+    packages=_PACKAGES,
+    counted="instructions",
+    simulator=QemuSimulator,
+    machine=Machine("microbit", 16.0e6),
+)
+CORTEX_M4 = Target(
+    name="cortex-m4",
+    processor="nRF52833, a Cortex-M4",
+    board="a BBC micro:bit V2",
+    clock=64.0e6,
+    flash=Memory(0, 512 * 1024),
+    ram=Memory(0x20000000, 128 * 1024),
+    interrupt_stack=40,
+    converter_bits=14,
+    words=_words_of_cortex(
+        "cortex-m4",
+        "nrf52833",
+        {
+            "pin_pressure_1": "P0.02, AIN0",
+            "pin_pressure_2": "P0.03, AIN1",
+            "pin_reference": "P0.04, AIN2",
+            "pin_a": "17",
+            "pin_b": "01",
+            "pin_pulse": "13",
+            "pin_enable": "12",
+        },
+    ),
+    templates=(*_OF_CORTEX, "converter_nrf52833.c", "nrf52833.ld"),
+    wiring="wiring_microbit.md",
+    tools=_TOOLS,
+    packages=_PACKAGES,
+    counted="instructions",
+    simulator=QemuSimulator,
+    machine=Machine("mps2-an386", 25.0e6),
+    doubles=Doubles("-mcpu=cortex-m4", "its floats have 64 bits, which this processor computes by a library"),
+)
+CATALOG: dict[str, Target] = {item.name: item for item in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
+
+
+def target_of(name: str) -> Target:
+    """The target of a name; ScenarioError where there is none."""
+    if name not in CATALOG:
+        raise ScenarioError(f"no firmware for '{name}'; targets: {', '.join(CATALOG)}")
+    return CATALOG[name]
