@@ -56,7 +56,7 @@ def sample(numbers: WalkNumbers, state: WalkCounts, readings: GaitReadings) -> t
     phase = next_phase_state(numbers.phase, state.phase, readings.heel, readings.toe)
     now = remembered(numbers.safety, last, state.phase, phase, readings)
     still = numbers.safety.still
-    gone = is_gone(still, last.heel.last, readings.heel) or is_gone(still, last.toe.last, readings.toe)
+    gone = is_gone(still, last.seen.heel.last, readings.heel) or is_gone(still, last.seen.toe.last, readings.toe)
     sign = found_sign(numbers.safety, gone, now, state.phase, phase, readings)
     good_strides = now.good_strides if sign == NO_SIGN else -1
     standing = phase.spell if phase.heel.loaded + phase.toe.loaded == BOTH else 0
@@ -73,12 +73,11 @@ def sample(numbers: WalkNumbers, state: WalkCounts, readings: GaitReadings) -> t
         steady=now.steady,
         side=side,
         held=counted(last.held) if side == last.side else 1,
-        heel=now.heel,
-        toe=now.toe,
-        angle=now.angle,
+        seen=now.seen,
         landing=now.landing,
         emptying=now.emptying,
         slow=now.slow,
+        thin=now.thin,
     )
     command = COMMAND_STEPS if side > 0 else (-COMMAND_STEPS if side < 0 else 0)
     return command, WalkCounts(phase, safety, lifting)

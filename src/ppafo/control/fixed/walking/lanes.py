@@ -11,7 +11,7 @@ from ppafo.control.fixed.walking.phases import HALVES, LONGEST, PUSH_OFF, SEVERA
 from ppafo.control.fixed.walking.readings import OF_CONVERTER, TOP, GaitConverter, GaitReadings, read_gait
 from ppafo.control.fixed.walking.rows import kept_walk_counts, whole_walk_counts, whole_walk_numbers
 from ppafo.control.fixed.walking.signs import LATE_FORCES, MOST_STRIDES, STOPPED, PressureCounts, SafetyCounts
-from ppafo.control.fixed.walking.traces import MOST_LATE, EmptyingCounts, LandingCounts, TraceCounts
+from ppafo.control.fixed.walking.traces import MOST_LATE, EmptyingCounts, LandingCounts, SensorCounts, TraceCounts
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.event_on_off import KIND as FLOAT_KIND
 from ppafo.control.walking.safety import START as SAFETY_START
@@ -88,12 +88,11 @@ START_COUNTS = WalkCounts(
         steady=0,
         side=0,
         held=0,
-        heel=_TRACE,
-        toe=_TRACE,
-        angle=_TRACE,
-        landing=LandingCounts(lowest=0, mark=0, late=0),
+        seen=SensorCounts(_TRACE, _TRACE, _TRACE),
+        landing=LandingCounts(lowest=0, mark=0, late=0, late_toes=0),
         emptying=EmptyingCounts(lowest=0, angle=0, rising=0),
         slow=PressureCounts(0, 0),
+        thin=0,
     ),
     lifting=0,
 )
@@ -123,10 +122,12 @@ STATE_RANGES = {
     "lowest": _READING,
     "mark": _READING,
     "late": (0, MOST_LATE),
+    "late_toes": (0, MOST_LATE),
     "angle": _READING,
     "rising": _TIME,
     "first": _READING,
     "second": _READING,
+    "thin": _TIME,
     "lifting": _BIT,
 }
 """Lowest and highest of every number of ``WalkCounts``, by its own name."""

@@ -50,6 +50,8 @@ NUMBERS = (
     _count("highest_angle", "an angle above this is no reading"),
     _count("lowest_pressure", "a pressure below this is no reading"),
     _count("highest_pressure", "a pressure above this is no reading"),
+    _count("thin", "no chamber stays below this pressure"),
+    _samples("thin_time", "for longer"),
     _stride_share("longest_phase", "longest stance or swing"),
     _stride_share("flat_from", "from here on heel and toes are both loaded"),
     _stride_share("flat_to", "and until here"),
@@ -60,8 +62,8 @@ NUMBERS = (
     _count("lowest_flat_angle", "no ankle has less while the foot stands flat"),
     _count("highest_flat_angle", "no ankle has more while the foot stands flat"),
     _samples("frozen", "a loaded sensor whose reading stays the same for longer is frozen"),
-    _count("moves", "a force further than this from its slow reading moves"),
-    _count("turns", "an angle further than this from its slow reading moves"),
+    _stride_share("dwells", "and for more than this part of a stride"),
+    _stride_share("turns_back", "an angle for this part"),
     _count("largest_drop", "no force above this is gone within a sample"),
     _count("gone", "a force below this is gone"),
     _samples("fill", "a chamber is filled when the valve has fed it for longer"),
@@ -71,10 +73,15 @@ NUMBERS = (
     _samples("stands_up", "who stands for longer after sitting is helped again"),
     _share("slow_share", "share of a change that slow readings take at once"),
     _share("fall_share", "share of a change that slow pressures take at once"),
+    _stride_share("lands", "who comes down on the heel steps within this"),
+    _count("moves", "a force further than this from its slow reading moves"),
+    _count("turns", "an angle further than this from its slow reading moves"),
     _count("fades", "what the highest angle of a swing loses at each sample"),
     _count("turned_up", "by how much a foot has turned up at a strike in doubt"),
     _count("turns_down", "a foot that turns down by more lands now"),
     _count("is_flat", "one that turns up by more is flat"),
+    _count("toes_late", "toes that leave the ground at a larger angle do so late"),
+    _count("toes_in_time", "and at a smaller one in time"),
     _samples("follow", "a pressure follows the valve within this"),
     _samples("shown", "until here a vented chamber is watched"),
     _count("rises", "a rise that is no noise"),
@@ -94,6 +101,9 @@ def whole_numbers(settings: Mapping[str, float], period: float, converter: GaitC
     }
     shares = {
         "steady": safety.STEADY * STRIDE_SHARE,
+        "dwells": readings.DWELLS * STRIDE_SHARE,
+        "turns_back": readings.TURNS_BACK * STRIDE_SHARE,
+        "lands": readings.LANDS * STRIDE_SHARE,
         "stride_weight": settings["stride_weight"] * SHARE,
         "slow_share": period / (period + readings.SLOW_TIME) * SHARE,
         "fall_share": period / (period + readings.FALL_TIME) * SHARE,
@@ -120,8 +130,10 @@ def _levels(settings: Mapping[str, float], period: float, converter: GaitConvert
         "lifts_above": settings["swing_angle"] + settings["band"],
         "lets_go_below": settings["swing_angle"] - settings["band"],
         "squeezes": readings.SQUEEZING_ANGLE,
+        "toes_late": settings["highest_toe_off_angle"],
+        "toes_in_time": settings["highest_toe_off_angle"] - readings.IN_TIME,
     }
-    pressures = {"filled": settings["filled_pressure"]}
+    pressures = {"filled": settings["filled_pressure"], "thin": readings.THIN}
     pressures |= {name: settings[name] for name in ("lowest_pressure", "highest_pressure")}
     found = {name: (value - converter.force_zero) / converter.force_step for name, value in forces.items()}
     found |= {name: value / converter.angle_step for name, value in angles.items()}
@@ -155,6 +167,7 @@ def _times(settings: Mapping[str, float], period: float) -> dict[str, float]:
     """Times in samples: those that must be passed rounded down, those that must be reached rounded up."""
     passed = {
         "frozen": settings["frozen_time"],
+        "thin_time": readings.THIN_TIME,
         "fill": settings["fill_time"],
         "vent": settings["vent_time"],
         "late_vent": safety.LATE * settings["vent_time"],

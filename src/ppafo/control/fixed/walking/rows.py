@@ -17,6 +17,7 @@ from ppafo.control.fixed.walking.traces import (
     EmptyingCounts,
     EmptyingNumbers,
     LandingCounts,
+    SensorCounts,
     TraceCounts,
     TraceNumbers,
 )
@@ -48,6 +49,8 @@ def whole_range_numbers(row: RangeNumbers) -> RangeNumbers:
         highest_angle=int(row.highest_angle),
         lowest_pressure=int(row.lowest_pressure),
         highest_pressure=int(row.highest_pressure),
+        thin=int(row.thin),
+        thin_time=int(row.thin_time),
     )
 
 
@@ -70,8 +73,8 @@ def whole_still_numbers(row: StillNumbers) -> StillNumbers:
     """Whole numbers of readings that rest or drop."""
     return StillNumbers(
         frozen=int(row.frozen),
-        moves=int(row.moves),
-        turns=int(row.turns),
+        dwells=int(row.dwells),
+        turns_back=int(row.turns_back),
         largest_drop=int(row.largest_drop),
         gone=int(row.gone),
     )
@@ -92,10 +95,15 @@ def whole_trace_numbers(row: TraceNumbers) -> TraceNumbers:
     return TraceNumbers(
         slow_share=int(row.slow_share),
         fall_share=int(row.fall_share),
+        lands=int(row.lands),
+        moves=int(row.moves),
+        turns=int(row.turns),
         fades=int(row.fades),
         turned_up=int(row.turned_up),
         turns_down=int(row.turns_down),
         is_flat=int(row.is_flat),
+        toes_late=int(row.toes_late),
+        toes_in_time=int(row.toes_in_time),
     )
 
 
@@ -165,12 +173,22 @@ def whole_trace_counts(row: TraceCounts) -> TraceCounts:
     )
 
 
+def whole_sensor_counts(row: SensorCounts) -> SensorCounts:
+    """Whole: forces and angle."""
+    return SensorCounts(
+        heel=whole_trace_counts(row.heel),
+        toe=whole_trace_counts(row.toe),
+        angle=whole_trace_counts(row.angle),
+    )
+
+
 def whole_landing_counts(row: LandingCounts) -> LandingCounts:
     """Whole: the landing."""
     return LandingCounts(
         lowest=int(row.lowest),
         mark=int(row.mark),
         late=int(row.late),
+        late_toes=int(row.late_toes),
     )
 
 
@@ -203,12 +221,11 @@ def whole_safety_counts(row: SafetyCounts) -> SafetyCounts:
         steady=int(row.steady),
         side=int(row.side),
         held=int(row.held),
-        heel=whole_trace_counts(row.heel),
-        toe=whole_trace_counts(row.toe),
-        angle=whole_trace_counts(row.angle),
+        seen=whole_sensor_counts(row.seen),
         landing=whole_landing_counts(row.landing),
         emptying=whole_emptying_counts(row.emptying),
         slow=whole_pressure_counts(row.slow),
+        thin=int(row.thin),
     )
 
 
@@ -251,12 +268,22 @@ def kept_trace_counts(row: TraceCounts) -> TraceCounts:
     )
 
 
+def kept_sensor_counts(row: SensorCounts) -> SensorCounts:
+    """As the lanes keep it: forces and angle."""
+    return SensorCounts(
+        heel=kept_trace_counts(row.heel),
+        toe=kept_trace_counts(row.toe),
+        angle=kept_trace_counts(row.angle),
+    )
+
+
 def kept_landing_counts(row: LandingCounts) -> LandingCounts:
     """As the lanes keep it: the landing."""
     return LandingCounts(
         lowest=kept(row.lowest),
         mark=kept(row.mark),
         late=kept(row.late),
+        late_toes=kept(row.late_toes),
     )
 
 
@@ -289,12 +316,11 @@ def kept_safety_counts(row: SafetyCounts) -> SafetyCounts:
         steady=kept(row.steady),
         side=kept(row.side),
         held=kept(row.held),
-        heel=kept_trace_counts(row.heel),
-        toe=kept_trace_counts(row.toe),
-        angle=kept_trace_counts(row.angle),
+        seen=kept_sensor_counts(row.seen),
         landing=kept_landing_counts(row.landing),
         emptying=kept_emptying_counts(row.emptying),
         slow=kept_pressure_counts(row.slow),
+        thin=kept(row.thin),
     )
 
 

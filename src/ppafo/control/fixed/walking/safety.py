@@ -1,6 +1,6 @@
 """Pause, stop and return of help on whole numbers, and what the signs remember: ``control.walking.safety``."""
 
-from ppafo.control.fixed.walking.phases import PUSH_OFF, SWING, PhaseCounts, part_of
+from ppafo.control.fixed.walking.phases import PUSH_OFF, SWING, PhaseCounts, counted, part_of
 from ppafo.control.fixed.walking.readings import GaitReadings
 from ppafo.control.fixed.walking.signs import (
     ENDLESS_PHASE,
@@ -14,14 +14,13 @@ from ppafo.control.fixed.walking.signs import (
     SafetyNumbers,
     level_of,
 )
-from ppafo.control.fixed.walking.traces import followed, next_emptying, next_landing, next_trace
+from ppafo.control.fixed.walking.traces import followed, next_emptying, next_landing, next_sensors
 
 
 def remembered(
     numbers: SafetyNumbers, state: SafetyCounts, before: PhaseCounts, phase: PhaseCounts, given: GaitReadings
 ) -> SafetyCounts:
     """The state with what the signs remember of a sample; the level is as it was, good strides without the sign."""
-    begins = state.angle.last == 0
     enters = before.phase == SWING and phase.phase != SWING
     double = before.since_strike + before.since_strike
     steady, good_strides, toe_strides = state.steady, state.good_strides, state.toe_strides
@@ -34,7 +33,8 @@ def remembered(
         good_strides = min(good_strides + 1, MOST_STRIDES) if good else 0
         on_toes = state.heel_seen == 0 and before.strikes > 0
         toe_strides = min(toe_strides + 1, MOST_STRIDES) if on_toes else 0
-    angle = next_trace(state.angle, given.angle, numbers.trace.slow_share, begins)
+    seen = next_sensors(numbers.trace, state.seen, given, phase)
+    is_thin = min(given.pressure_1, given.pressure_2) < numbers.ranges.thin
     return SafetyCounts(
         level=state.level,
         sign=state.sign,
@@ -45,15 +45,16 @@ def remembered(
         steady=steady,
         side=state.side,
         held=state.held,
-        heel=next_trace(state.heel, given.heel, numbers.trace.slow_share, begins),
-        toe=next_trace(state.toe, given.toe, numbers.trace.slow_share, begins),
-        angle=angle,
-        landing=next_landing(numbers.trace, state.landing, angle.slow, given.angle, before.phase, phase.phase, steady),
+        seen=seen,
+        landing=next_landing(
+            numbers.trace, state.landing, seen.angle.slow, given.angle, before.phase, phase.phase, steady
+        ),
         emptying=next_emptying(numbers.emptying, state.emptying, state.held if state.side >= 0 else 0, given),
         slow=PressureCounts(
             followed(state.slow.first, given.pressure_1, numbers.trace.fall_share),
             followed(state.slow.second, given.pressure_2, numbers.trace.fall_share),
         ),
+        thin=counted(state.thin) if is_thin else 0,
     )
 
 

@@ -17,7 +17,7 @@ from ppafo.control.fixed.walking.traces import (
     EmptyingCounts,
     EmptyingNumbers,
     LandingCounts,
-    TraceCounts,
+    SensorCounts,
     TraceNumbers,
 )
 from ppafo.control.walking import readings, signs
@@ -57,9 +57,13 @@ MOST_STRIDES = 1000
 FALLS_BITS = 5
 """A reading falls that is below the slow one by more than 1/32 of itself, the 3 % of floats."""
 
+QUARTER_BITS = 2
+ALL_BUT_ONE = 3
+"""Three quarters of a stride, ``readings.MOST``, are all but one of four."""
+
 
 class RangeNumbers(NamedTuple):
-    """Lowest and largest readings that can be, in counts."""
+    """Lowest and largest readings that can be, in counts; a pressure below ``thin`` can for ``thin_time`` [samples]."""
 
     lowest_force: int
     largest_force: int
@@ -67,6 +71,8 @@ class RangeNumbers(NamedTuple):
     highest_angle: int
     lowest_pressure: int
     highest_pressure: int
+    thin: int
+    thin_time: int
 
 
 class StrideNumbers(NamedTuple):
@@ -84,11 +90,14 @@ class StrideNumbers(NamedTuple):
 
 
 class StillNumbers(NamedTuple):
-    """Samples after which a reading is frozen, and in counts: what moves, what drops at once and what is left then."""
+    """Samples and parts of a stride [1/2^14] after which a force and an angle are still, and a force that is gone.
+
+    In counts: no force above ``largest_drop`` is below ``gone`` a sample later.
+    """
 
     frozen: int
-    moves: int
-    turns: int
+    dwells: int
+    turns_back: int
     largest_drop: int
     gone: int
 
@@ -126,7 +135,7 @@ class SafetyCounts(NamedTuple):
 
     ``heel_seen`` and ``toe_seen`` are 1 once loaded since the strike, ``toe_strides`` those on the toes alone, and
     ``steady`` is 1 after a stride of the usual time. ``side`` is the last command, 1, -1 or 0 where it vented, and
-    ``held`` for how many samples it has been that.
+    ``held`` for how many samples it has been that. ``thin`` is for how many the lower pressure has been too low.
     """
 
     level: int
@@ -138,17 +147,16 @@ class SafetyCounts(NamedTuple):
     steady: int
     side: int
     held: int
-    heel: TraceCounts
-    toe: TraceCounts
-    angle: TraceCounts
+    seen: SensorCounts
     landing: LandingCounts
     emptying: EmptyingCounts
     slow: PressureCounts
+    thin: int
 
 
-def has_moved(trace: TraceCounts, limit: int) -> bool:
-    """True where a reading is further from the slow one than a limit [counts]."""
-    return trace.last - trace.slow > limit or trace.slow - trace.last > limit
+def is_still(numbers: StillNumbers, still: int, stride: int, share: int) -> bool:
+    """True where a reading was the same for too many samples: for a stride [halves], and a share of it [1/2^14]."""
+    return still > numbers.frozen and still > part_of(stride, share)
 
 
 def is_gone(numbers: StillNumbers, last: int, force: int) -> bool:
@@ -161,14 +169,15 @@ def holds_pressure(filled: int, pressure: int, slow: int) -> bool:
     return pressure > filled and slow <= pressure + (pressure >> FALLS_BITS)
 
 
-def range_sign(numbers: RangeNumbers, squeezes: int, given: GaitReadings) -> int:
-    """The sign of a reading that no foot and no chamber gives."""
+def range_sign(numbers: RangeNumbers, squeezes: int, given: GaitReadings, thin: int) -> int:
+    """The sign of a reading that no foot and no chamber gives; one is thin for some samples."""
     if max(given.heel, given.toe) > numbers.largest_force or min(given.heel, given.toe) < numbers.lowest_force:
         return FORCE_RANGE
     if given.angle < numbers.lowest_angle or given.angle > numbers.highest_angle:
         return ANGLE_RANGE
     if (
         min(given.pressure_1, given.pressure_2) < numbers.lowest_pressure
+        or thin > numbers.thin_time
         or given.pressure_1 > numbers.highest_pressure
         or (given.pressure_2 > numbers.highest_pressure and given.angle <= squeezes)
     ):
@@ -196,29 +205,30 @@ def valve_sign(numbers: SafetyNumbers, now: SafetyCounts, phase: PhaseCounts, gi
     return NO_SIGN
 
 
-def frozen_sign(numbers: StillNumbers, now: SafetyCounts, before: PhaseCounts, phase: PhaseCounts) -> int:
-    """The sign of a reading that does not change while another sensor goes on or off, or for a whole stride."""
-    if now.heel.still > numbers.frozen and phase.heel.loaded == 1 and phase.toe.loaded != before.toe.loaded:
+def frozen_sign(numbers: StillNumbers, seen: SensorCounts, before: PhaseCounts, phase: PhaseCounts) -> int:
+    """The sign of a reading that does not change while another sensor goes on or off, or for most of a stride."""
+    toe_changes, heel_changes = phase.toe.loaded != before.toe.loaded, phase.heel.loaded != before.heel.loaded
+    if toe_changes and phase.heel.loaded == 1 and is_still(numbers, seen.heel.still, phase.stride, numbers.dwells):
         return FROZEN_HEEL
-    if now.toe.still > numbers.frozen and phase.toe.loaded == 1 and phase.heel.loaded != before.heel.loaded:
+    if heel_changes and phase.toe.loaded == 1 and is_still(numbers, seen.toe.still, phase.stride, numbers.dwells):
         return FROZEN_TOE
     since = before.since_strike
-    whole = before.phase == SWING and phase.phase != SWING and since + since > phase.stride >> 1
-    if now.angle.still > numbers.frozen and whole and now.angle.still > since:
+    whole = (
+        before.phase == SWING and phase.phase != SWING and since + since > phase.stride >> 1 and since < phase.stride
+    )
+    # Less than a quarter of the stride, rounded up, is left where it was the same.
+    if whole and since - seen.angle.still < (since + ALL_BUT_ONE) >> QUARTER_BITS:
         return FROZEN_ANGLE
     return NO_SIGN
 
 
-def still_sign(numbers: StillNumbers, now: SafetyCounts, phase: PhaseCounts) -> int:
+def still_sign(numbers: StillNumbers, seen: SensorCounts, phase: PhaseCounts) -> int:
     """The sign of a reading that does not change while another sensor moves, or where nobody stands still."""
-    steps = phase.phase != MID_STANCE or phase.heel.loaded + phase.toe.loaded < BOTH
-    turns = has_moved(now.angle, numbers.turns)
-    heel_moves, toe_moves = has_moved(now.heel, numbers.moves), has_moved(now.toe, numbers.moves)
-    if now.heel.still > numbers.frozen and phase.heel.loaded == 1 and (steps or turns or toe_moves):
+    if phase.heel.loaded == 1 and is_still(numbers, seen.heel.still, phase.stride, numbers.dwells):
         return STILL_HEEL
-    if now.toe.still > numbers.frozen and phase.toe.loaded == 1 and (steps or turns or heel_moves):
+    if phase.toe.loaded == 1 and is_still(numbers, seen.toe.still, phase.stride, numbers.dwells):
         return STILL_TOE
-    if now.angle.still > numbers.frozen and phase.phase > LANDING and (steps or heel_moves or toe_moves):
+    if phase.phase > LANDING and is_still(numbers, seen.angle.still, phase.stride, numbers.turns_back):
         return STILL_ANGLE
     return NO_SIGN
 
@@ -259,21 +269,21 @@ def found_sign(
     given: GaitReadings,
 ) -> int:
     """The sign of a sample that comes first; ``now`` remembers the sample, a force is ``gone`` since the last."""
-    sign = range_sign(numbers.ranges, numbers.emptying.squeezes, given)
+    sign = range_sign(numbers.ranges, numbers.emptying.squeezes, given, now.thin)
     sign = valve_sign(numbers, now, phase, given) if sign == NO_SIGN else sign
     if sign != NO_SIGN:
         return sign
-    sign = frozen_sign(numbers.still, now, before, phase)
+    sign = frozen_sign(numbers.still, now.seen, before, phase)
     if sign == NO_SIGN and gone:
         return FORCE_GONE
-    sign = still_sign(numbers.still, now, phase) if sign == NO_SIGN else sign
+    sign = still_sign(numbers.still, now.seen, phase) if sign == NO_SIGN else sign
     sign = gait_sign(numbers.stride, before, phase) if sign == NO_SIGN else sign
     sign = steady_sign(numbers.stride, before, phase, given.angle) if sign == NO_SIGN and now.steady == 1 else sign
     if sign != NO_SIGN:
         return sign
     if now.toe_strides > numbers.stride.most_toe_strides:
         return TOE_STRIDES
-    return LATE_FORCES if now.landing.late > LATE_STRIDES else NO_SIGN
+    return LATE_FORCES if max(now.landing.late, now.landing.late_toes) > LATE_STRIDES else NO_SIGN
 
 
 def level_of(sign: int) -> int:
