@@ -9,10 +9,10 @@ from ppafo.control.fixed.walking.phases import HALVES, LONGEST, next_phase, next
 from ppafo.control.fixed.walking.phases import PhaseNumbers as Numbers
 from ppafo.control.fixed.walking.phases import SwitchCounts as Switch
 from ppafo.control.fixed.walking.readings import SETTINGS, TOP, gait_converter, read_gait
-from ppafo.control.walking import phases
+from ppafo.control.walking import phases, signs
 from ppafo.control.walking.event_on_off import KIND as FLOAT_KIND
 from ppafo.engine.rows import leaf_paths, rebuilt
-from ppafo.exports.firmware.walking.drawn import DrawnGait
+from ppafo.exports.firmware.walking.drawn import DrawnGait, Manner
 from ppafo.model.command import VENTS_ABOVE
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -116,10 +116,10 @@ def steps(readings: tuple[int, ...]) -> GaitMeasurement:
     )
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed: int) -> None:
     drawn, command, both = DrawnGait(CONVERTER, seed), 0, Both()
-    levels, other_commands, other_levels, samples = set(), 0, 0, 15_000
+    levels, other_commands, other_signs, samples = set(), 0, 0, 15_000
     for _ in range(samples):
         readings, begins = drawn.next(command)
         both = Both() if begins else both
@@ -127,7 +127,40 @@ def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed:
         command = 0 if found > VENTS_ABOVE else int(found)
         levels.add(both.fixed_state.safety.level)
         other_commands += wanted != found
-        other_levels += both.float_state.safety.level != both.fixed_state.safety.level
+        wanted_safety, found_safety = both.float_state.safety, both.fixed_state.safety
+        other_signs += (wanted_safety.level, wanted_safety.finding.sign) != (
+            found_safety.level,
+            found_safety.finding.sign,
+        )
     assert {0.0, 3.0} <= levels
-    assert other_commands < 0.01 * samples
-    assert other_levels < 0.01 * samples
+    # A threshold that is crossed by less than a count or a sample moves a change by a sample or two.
+    assert other_commands < 0.001 * samples
+    assert other_signs < 0.001 * samples
+
+
+@pytest.mark.parametrize(
+    ("odd", "sensor", "fault", "wanted"),
+    [
+        ("turns down", 0, "none", {signs.LATE_FORCES}),
+        ("", 3, "half", {signs.PRESSURE_RANGE}),
+        ("", 4, "half", {signs.PRESSURE_RANGE}),
+        ("", 0, "frozen", {signs.STILL_HEEL, signs.FROZEN_HEEL}),
+        ("", 1, "frozen", {signs.STILL_TOE, signs.FROZEN_TOE}),
+        ("", 2, "frozen", {signs.STILL_ANGLE, signs.FROZEN_ANGLE}),
+    ],
+)
+def test_a_fault_is_found_by_the_same_signs_within_two_samples(
+    odd: str, sensor: int, fault: str, wanted: set[float]
+) -> None:
+    drawn, command, both = DrawnGait(CONVERTER, 1), 0, Both()
+    manner = Manner(stride=800, spread=0.0, odd_share=1.0, odd=odd, sensor=sensor, fault=fault, begins=1700, value=0)
+    drawn.begin(manner, 3000)
+    floats: dict[float, int] = {}
+    whole: dict[float, int] = {}
+    for place in range(3000):
+        _, found = both.update(steps(drawn.next(command)[0]))
+        command = 0 if found > VENTS_ABOVE else int(found)
+        floats.setdefault(both.float_state.safety.finding.sign, place)
+        whole.setdefault(both.fixed_state.safety.finding.sign, place)
+    assert set(floats) == set(whole) == {signs.NO_SIGN, *wanted}
+    assert all(abs(floats[sign] - whole[sign]) <= 2 for sign in wanted)

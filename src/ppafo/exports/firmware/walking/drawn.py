@@ -16,9 +16,33 @@ EPISODES = (1200, 3600)
 """Samples from one reset to the next, at least and at most."""
 _FILLED, _ROOM, _UPRIGHT = 4.4e5, 1.013e5, 1.57
 _ENDS = ("low end", "high end", "noise", "edges")
-_FAULTS = ("none", "none", "stuck", "frozen", "frozen", "room", "room", "offset", "swapped", "on and off", *_ENDS)
+_FAULTS = (
+    "none",
+    "none",
+    "stuck",
+    "frozen",
+    "frozen",
+    "room",
+    "room",
+    "offset",
+    "swapped",
+    "on and off",
+    "half",
+    *_ENDS,
+)
 _LATE = "late"
-_ODD = ("stands", "in the air", "rocks", "on toes", "stays on toes", "no toes", "late toes", "short swing", "bent")
+_ODD = (
+    "stands",
+    "in the air",
+    "rocks",
+    "on toes",
+    "stays on toes",
+    "no toes",
+    "late toes",
+    "short swing",
+    "bent",
+    "turns down",
+)
 
 
 class Manner(NamedTuple):
@@ -43,14 +67,13 @@ class DrawnGait:
     def __init__(self, converter: GaitConverter, seed: int) -> None:
         self._converter = converter
         self._draw = random.Random(seed)
-        self._begin()
+        self._begin_drawn()
 
-    def _begin(self) -> None:
+    def _begin_drawn(self) -> None:
         draw = self._draw
-        self._left = draw.randint(*EPISODES)
-        self._sample = 0
+        left = draw.randint(*EPISODES)
         fault = draw.choice(_FAULTS)
-        self._manner = Manner(
+        manner = Manner(
             stride=draw.choice((600, 700, 800, 1100)),
             spread=draw.choice((0.0, 0.0, 0.0, 0.02, 0.4)),
             odd_share=draw.choice((0.0, 0.1, 0.3, 1.0)),
@@ -58,9 +81,14 @@ class DrawnGait:
             sensor=draw.randrange(5),
             fault=fault,
             # A reading at an end stops at once: it comes late, so that more is seen before.
-            begins=self._left - draw.randrange(50, 400 if fault in _ENDS else self._left),
+            begins=left - draw.randrange(50, 400 if fault in _ENDS else left),
             value=draw.randint(0, TOP),
         )
+        self.begin(manner, left)
+
+    def begin(self, manner: Manner, samples: int) -> None:
+        """Begin an episode of some manner and so many samples."""
+        self._manner, self._left, self._sample = manner, samples, 0
         self._pressures = [_ROOM, _ROOM]
         self._shown: tuple[int, ...] = (0,) * 5
         self._stride()
@@ -75,7 +103,7 @@ class DrawnGait:
     def next(self, command: int) -> tuple[GaitReadings, bool]:
         """The next readings, and whether an episode begins with them."""
         if self._left == 0:
-            self._begin()
+            self._begin_drawn()
         begins = self._sample == 0
         if self._at >= self._length:
             self._stride()
@@ -109,6 +137,8 @@ class DrawnGait:
         turned = 0.25 * math.sin(math.pi * (part - 0.5) / 0.5) if part > 0.5 else turned
         if self._odd == "bent":
             turned += 0.5
+        if self._odd == "turns down" and 0.5 < part < 0.7:
+            turned = 0.55
         if self._odd == _LATE:
             turned = 0.15 * math.sin(2.0 * math.pi * (part + 0.08))
         for chamber, feeds in enumerate((command > 0, command < 0)):
@@ -137,6 +167,7 @@ class DrawnGait:
             "room": lambda: self._room[place],
             "offset": lambda: min(TOP, max(0, value + manner.value // 8 - TOP // 16)),
             "swapped": lambda: readings[other],
+            "half": lambda: value // 2,
             "on and off": lambda: value if self._sample // 300 % 2 else self._room[place],
             "noise": lambda: self._draw.randint(0, TOP),
             "edges": lambda: self._draw.choice((1, 2, TOP // 2, TOP - 1, value)),
