@@ -102,9 +102,9 @@ def test_the_chip_decides_as_python_does_within_its_memory_and_time() -> None:
 
 @on_chip
 def test_a_walk_with_a_failing_heel_sensor_and_the_chip_in_charge_has_the_bits_of_the_lanes() -> None:
-    configuration = fixed_walk("faults.heel.kind=stuck", "faults.heel.time=3.5 s")
-    found = walk_on_chip(configuration, 0.1)
-    assert found.samples == 6000
+    configuration = fixed_walk("faults.heel.kind=stuck", "faults.heel.time=2 s")
+    found = walk_on_chip(configuration, 0.09)
+    assert found.samples == 5400
     assert found.differences == 0
     assert found.same_bits
     assert found.level > 0

@@ -136,7 +136,8 @@ def next_landing(
     lowest = angle if lower else last.lowest
     late_toes = next_late_toes(numbers, last.late_toes, angle, before, phase)
     if phase == SWING:
-        return LandingCounts(lowest, angle if lower else max(last.mark - numbers.fades, angle), last.late, late_toes)
+        highest = angle if lower else max(last.mark - numbers.fades, angle)
+        return LandingCounts(lowest=lowest, mark=highest, late=last.late, late_toes=late_toes)
     doubt = last.mark
     if before == SWING:
         turned = phase == LANDING and steady == 1 and max(last.mark, slow) - angle > numbers.turned_up
@@ -146,7 +147,7 @@ def next_landing(
         is_late = before == LANDING and last.mark - angle > numbers.is_flat
         late = min(late + 1, MOST_LATE) if is_late else 0
     lands = angle > doubt + numbers.turns_down or (phase == LANDING and angle > lowest + numbers.is_flat)
-    return LandingCounts(lowest, 0 if lands else doubt, late, late_toes)
+    return LandingCounts(lowest=lowest, mark=0 if lands else doubt, late=late, late_toes=late_toes)
 
 
 def next_emptying(numbers: EmptyingNumbers, last: EmptyingCounts, vented: int, given: GaitReadings) -> EmptyingCounts:
