@@ -23,7 +23,6 @@ BY_NUMBA = (
     "unit/cli/test_start_up.py",
     "contract/test_compiled_kinds.py",
     "judge",
-    "acceptance/test_readme.py",
     "acceptance/test_reproduce_command.py",
 )
 """Tests of the lanes as users have them. zig compiles for the others, with the same bits in a fraction of the time."""
