@@ -18,12 +18,15 @@ from ppafo.simulation.scenario import Scenario
 
 TESTS = Path(__file__).parent
 BY_NUMBA = (
-    "unit/engine",
+    "unit/engine/test_cache",
+    "unit/engine/test_compile",
+    "unit/engine/test_lane",
+    "unit/engine/test_private_cache",
+    "unit/engine/test_source_text",
+    "unit/engine/test_strict_arithmetic",
     "unit/questions/bits",
     "unit/cli/test_start_up.py",
     "contract/test_compiled_kinds.py",
-    "judge",
-    "acceptance/test_readme.py",
     "acceptance/test_reproduce_command.py",
 )
 """Tests of the lanes as users have them. zig compiles for the others, with the same bits in a fraction of the time."""

@@ -14,7 +14,7 @@ def printed_by(code: str) -> str:
 
 def test_a_run_loads_nothing_that_only_others_need(tmp_path: Path) -> None:
     words = ["simulate", "step-response", "--json", "--out", str(tmp_path / "step")]
-    heavy = ("scipy.linalg", "xarray", "pandas", "matplotlib.pyplot", "jinja2", "jax")
+    heavy = ("scipy.linalg", "xarray", "pandas", "matplotlib.pyplot", "jax")
     code = (
         # Where dask is installed, others look for it; what it loads is not ours.
         f"import sys\nsys.modules['dask'] = None\nfrom ppafo.cli.main import main\nassert main({words!r}) == 0\n"
