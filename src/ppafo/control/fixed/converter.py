@@ -64,6 +64,11 @@ def converter_of(bits: float, pressure_range: float, torque_constant: float) -> 
     )
 
 
+def limits_of(converter: Converter) -> Limits:
+    """The whole numbers of a converter that a law needs."""
+    return Limits(int(converter.top), int(converter.middle))
+
+
 def count_of(value: float, step: float, top: float) -> int:
     """Count that a converter shows for a value in the unit of its ``step``: rounded, and within 0 and ``top``."""
     return int(max(0.0, min(top, value / step + 0.5)))

@@ -13,6 +13,7 @@ from ppafo.control.fixed.converter import (
     Limits,
     Readings,
     error_of,
+    limits_of,
     read,
     still_sound,
 )
@@ -101,7 +102,7 @@ def update(
 ) -> tuple[float, OnOffStateRows]:
     """Command from -1 to 1 that ``sample`` gives for what the converter shows."""
     converter = parameters.converter
-    numbers = OnOffNumbers(Limits(int(converter.top), int(converter.middle)))
+    numbers = OnOffNumbers(limits_of(converter))
     command, after = sample(numbers, OnOffCounts(int(state.sound)), read(converter, reference, measurement))
     return float(command) / COMMAND_STEPS, OnOffStateRows(float(after.sound))
 
@@ -112,7 +113,7 @@ def dead_zone_update(
     """Command from -1 to 1 that ``dead_zone_sample`` gives for what the converter shows."""
     converter = parameters.converter
     numbers = DeadZoneNumbers(
-        limits=Limits(int(converter.top), int(converter.middle)),
+        limits=limits_of(converter),
         dead_zone=int(parameters.dead_zone),
         release=int(parameters.release),
         opening=int(parameters.opening),

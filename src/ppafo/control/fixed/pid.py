@@ -26,6 +26,7 @@ from ppafo.control.fixed.converter import (
     Limits,
     Readings,
     error_of,
+    limits_of,
     read,
     still_sound,
 )
@@ -126,7 +127,7 @@ def update(
     """Command from -1 to 1 that ``sample`` gives for what the converter shows, once every ``period`` [s]."""
     converter = parameters.converter
     numbers = PidNumbers(
-        limits=Limits(int(converter.top), int(converter.middle)),
+        limits=limits_of(converter),
         proportional=int(parameters.proportional),
         proportional_places=int(parameters.proportional_places),
         integral=int(parameters.integral),

@@ -12,7 +12,7 @@ from ppafo.control.fixed.kind import TARGETS, FixedLaw
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.exports.firmware.catalog import target_of
-from ppafo.exports.firmware.controller import controller_source, macro
+from ppafo.exports.firmware.controller import controller_source, defined_numbers
 from ppafo.exports.firmware.target import Target
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
@@ -120,12 +120,7 @@ def _parameters(scenario: Scenario, chip: ChipController) -> str:
         f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */",
         f"#define CONTROLLER_BITS {int(control.settings[SETTINGS[0].name])} /* of the converter */",
     ]
-    for item in chip.law.number_quantities:
-        number = int(chip.numbers[item.name])
-        lines.append(f"#define {macro(item)} {number} /* {item.summary}; {item.minimum:g} to {item.maximum:g} */")
-        lines += [f"#if {macro(item)} < {item.minimum:.0f} || {macro(item)} > {item.maximum:.0f}"]
-        lines += [f'#error "{macro(item)} is beyond its range"', "#endif"]
-    return "\n".join([*lines, "", "#endif", ""])
+    return "\n".join([*lines, *defined_numbers(chip.law.number_quantities, chip.numbers), "", "#endif", ""])
 
 
 def _origins(scenario: Scenario) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """The text of an integer controller for a small processor, and the proof that its numbers cannot overflow."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, get_type_hints
 
 from ppafo.control.fixed.converter import COMMAND_STEPS, LARGEST_READING, Readings
@@ -90,6 +90,17 @@ bool controller_is_sound(void)
 def macro(item: Quantity) -> str:
     """Name of a number in ``parameters.h``."""
     return f"CONTROLLER_{item.name.upper()}"
+
+
+def defined_numbers(quantities: Iterable[Quantity], numbers: Mapping[str, float]) -> list[str]:
+    """Lines of ``parameters.h`` that define the numbers of a law, and refuse one beyond its range."""
+    lines = []
+    for item in quantities:
+        number = int(numbers[item.name])
+        lines.append(f"#define {macro(item)} {number} /* {item.summary}; {item.minimum:g} to {item.maximum:g} */")
+        lines += [f"#if {macro(item)} < {item.minimum:.0f} || {macro(item)} > {item.maximum:.0f}"]
+        lines += [f'#error "{macro(item)} is beyond its range"', "#endif"]
+    return lines
 
 
 def state_type(law: WholeLaw) -> Any:

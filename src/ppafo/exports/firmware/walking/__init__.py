@@ -15,7 +15,7 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ScenarioError
 from ppafo.exports.firmware import MOST_TICKS, TICK
 from ppafo.exports.firmware.catalog import MSP430G2553
-from ppafo.exports.firmware.controller import PRELUDE, macro, proof, state_type
+from ppafo.exports.firmware.controller import PRELUDE, defined_numbers, macro, proof, state_type
 from ppafo.simulation.reading import quantity_text
 from ppafo.translation.c99 import c_source, documents_of
 from ppafo.version import __version__
@@ -183,12 +183,7 @@ def _parameters(configuration: Configuration, chip: WalkChip) -> str:
         f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {configuration.period:.9g} s */",
         f"#define CONTROLLER_BITS {bits} /* of the converter; counts are of 14 bits */",
     ]
-    for item in chip.law.number_quantities:
-        number = int(chip.numbers[item.name])
-        lines.append(f"#define {macro(item)} {number} /* {item.summary}; {item.minimum:g} to {item.maximum:g} */")
-        lines += [f"#if {macro(item)} < {item.minimum:.0f} || {macro(item)} > {item.maximum:.0f}"]
-        lines += [f'#error "{macro(item)} is beyond its range"', "#endif"]
-    return "\n".join([*lines, "", "#endif", ""])
+    return "\n".join([*lines, *defined_numbers(chip.law.number_quantities, chip.numbers), "", "#endif", ""])
 
 
 def _origins(configuration: Configuration) -> Iterator[str]:
