@@ -29,14 +29,14 @@ quick: check
 	$(BIN)/python -m pytest -n $(CORES) --quick $(QUICK_TESTS)
 
 check: $(READY)
-	$(BIN)/ruff format --check src tests examples benchmarks scripts
-	$(BIN)/ruff check src tests examples benchmarks scripts
+	$(BIN)/ruff format --check src tests benchmarks scripts
+	$(BIN)/ruff check src tests benchmarks scripts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
 format: $(READY)
-	$(BIN)/ruff format src tests examples benchmarks scripts
-	$(BIN)/ruff check --fix src tests examples benchmarks scripts
+	$(BIN)/ruff format src tests benchmarks scripts
+	$(BIN)/ruff check --fix src tests benchmarks scripts
 
 # The benchmark also needs JAX, which is large; it goes into the same environment, from its own lock file.
 bench: $(READY)

@@ -26,6 +26,7 @@ COMMANDS: dict[str, str] = {
     "design": QUESTIONS["design"],
     "size": QUESTIONS["size"],
     "new": "write an input file to start from: a template, or a copy of a shipped one",
+    "examples": "list the examples of the how-to pages, or write one into a folder, ready to run",
     "plot": "redraw the figures of a result folder",
     "sets": "list parameter sets, or show one with the source of every value",
     "parts": QUESTIONS["parts"],
@@ -41,7 +42,7 @@ COMMANDS: dict[str, str] = {
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "the paper": ("reproduce", "unreported"),
-    "your device": ("new", "simulate", "workbench", "plot", "sets", "parts", "audit"),
+    "your device": ("new", "examples", "simulate", "workbench", "plot", "sets", "parts", "audit"),
     "from bench to model": ("record", "rig", "identify", "validate"),
     "decide": (
         "sweep",

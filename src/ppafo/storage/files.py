@@ -61,13 +61,14 @@ def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Make ``folder`` hold exactly these files; an earlier folder stays as it was until the new one is whole."""
+    """Make ``folder`` hold exactly these files, by path; an earlier one stays as it was until the new one is whole."""
     target = _real(folder)
     with _write_errors(folder), _make_folder(target.parent):
         aside = _sibling(target, "writing")
         try:
             aside.mkdir()
             for name, content in contents.items():
+                (aside / name).parent.mkdir(parents=True, exist_ok=True)
                 (aside / name).write_bytes(content)
             _swap(aside, target)
         finally:

@@ -1,0 +1,101 @@
+"""``ppafo examples``: the files and scripts of the how-to pages, ready to run."""
+
+import argparse
+import os
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path, PurePosixPath
+
+from ppafo.cli.output import EXIT_GOOD, add_json_argument, print_result
+from ppafo.errors import DataError, nearest_name
+
+_FOLDER = resources.files("ppafo") / "examples"
+
+
+@dataclass(frozen=True, slots=True)
+class Example:
+    """What an example shows, the page that explains it, its commands in order, and what it needs that is not there."""
+
+    summary: str
+    page: str
+    commands: tuple[str, ...]
+    needs: str = ""
+
+
+def load_examples() -> dict[str, Example]:
+    """Return the examples of the package by name."""
+    content = tomllib.loads((_FOLDER / "catalogue.toml").read_text(encoding="utf-8"))
+    return {
+        name: Example(entry["summary"], entry["page"], tuple(entry["commands"]), entry.get("needs", ""))
+        for name, entry in content.items()
+    }
+
+
+def example_files(name: str) -> dict[PurePosixPath, bytes]:
+    """Return the files of an example, by their path in its folder."""
+    return dict(sorted(_contents(_FOLDER / name, PurePosixPath())))
+
+
+def _contents(folder: Traversable, path: PurePosixPath) -> list[tuple[PurePosixPath, bytes]]:
+    found: list[tuple[PurePosixPath, bytes]] = []
+    for item in folder.iterdir():
+        if item.is_file():
+            found.append((path / item.name, item.read_bytes()))
+        elif item.name != "__pycache__":
+            found += _contents(item, path / item.name)
+    return found
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("name", metavar="NAME", nargs="?", help="the example to write; default: list them")
+    add_json_argument(parser)
+    parser.add_argument("--out", metavar="DIR", type=Path, help="the new folder; default NAME")
+
+
+def run(parsed: argparse.Namespace) -> int:
+    """List the examples, or write one and say what to run."""
+    examples = load_examples()
+    if parsed.name is None:
+        if parsed.out is not None:
+            raise DataError("--out: needs the NAME of the example to write")
+        _list(examples, parsed.json)
+    elif parsed.name not in examples:
+        hint = nearest_name(parsed.name, examples)
+        raise DataError(f"there is no example '{parsed.name}'{hint}; available: {', '.join(examples)}")
+    else:
+        _write(parsed.name, examples[parsed.name], parsed.out or Path(parsed.name), parsed.json)
+    return EXIT_GOOD
+
+
+def _list(examples: dict[str, Example], as_json: bool) -> None:
+    width = max(map(len, examples))
+    lines = [f"{name:<{width}}  {example.summary}" for name, example in examples.items()]
+    document = {"examples": [{"name": name, **_document(example)} for name, example in examples.items()]}
+    print_result("\n".join([*lines, "", "ppafo examples NAME writes one into a new folder."]), document, as_json)
+
+
+def _write(name: str, example: Example, folder: Path, as_json: bool) -> None:
+    """Write the files of an example, all or none, into a folder that is not there yet."""
+    from ppafo.storage.files import replace_folder
+
+    if os.path.lexists(folder):
+        raise DataError(f"{folder}: already exists; remove it or choose another with --out")
+    files = example_files(name)
+    replace_folder(folder, {str(path): content for path, content in files.items()})
+    lines = [f"written: {folder}, {', '.join(map(str, files))}", f"page: {example.page}"]
+    lines += [f"needs: {example.needs}"] if example.needs else []
+    lines += ["run there:", *(f"  {command}" for command in example.commands)]
+    document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **_document(example)}
+    print_result("\n".join(lines), document, as_json)
+
+
+def _document(example: Example) -> dict[str, object]:
+    return {
+        "summary": example.summary,
+        "page": example.page,
+        "commands": list(example.commands),
+        "needs": example.needs or None,
+    }
