@@ -21,9 +21,18 @@ LONGEST_SHOWN = 8
 Graph = Mapping[str, frozenset[str]]
 
 
+def source_files(package: Path) -> list[Path]:
+    """The modules of a package: files that every folder above them makes importable, so no example for users."""
+    return sorted(path for path in package.rglob("*.py") if _is_importable(path.parent, package))
+
+
+def _is_importable(folder: Path, package: Path) -> bool:
+    return folder == package or ((folder / "__init__.py").is_file() and _is_importable(folder.parent, package))
+
+
 def module_names(package: Path) -> dict[str, Path]:
     """The modules of a package by dotted name."""
-    files = sorted(package.rglob("*.py"))
+    files = source_files(package)
     dotted = {path: ".".join(path.relative_to(package.parent).with_suffix("").parts) for path in files}
     return {name.removesuffix(".__init__"): path for path, name in dotted.items()}
 
@@ -97,7 +106,7 @@ def functions(path: Path) -> Iterator[tuple[str, int]]:
 def small_folders(package: Path) -> dict[str, float]:
     """Folders of two files or more, ``__init__`` not counted, whose median file has fewer than 50 lines."""
     medians = {}
-    for folder in sorted({path.parent for path in package.rglob("*.py")}):
+    for folder in sorted({path.parent for path in source_files(package)}):
         lengths = [line_count(path) for path in sorted(folder.glob("*.py")) if path.stem != "__init__"]
         if len(lengths) > 1 and (median := statistics.median(lengths)) < SMALL_MEDIAN:
             medians[str(folder.relative_to(package))] = median
@@ -105,7 +114,7 @@ def small_folders(package: Path) -> dict[str, float]:
 
 
 def _rooms(package: Path) -> Iterator[str]:
-    lengths = {path: line_count(path) for path in package.rglob("*.py")}
+    lengths = {path: line_count(path) for path in source_files(package)}
     rooms: dict[str, list[int]] = {}
     for path, length in sorted(lengths.items()):
         parts = path.relative_to(package).parts

@@ -37,7 +37,7 @@ def instant(valve: ThreePosition, state: Position, command: float) -> Openings:
     """Openings at an instant."""
     opening = position_of(valve, command)
     towards_1, towards_2 = max(opening, 0.0), max(-opening, 0.0)
-    return Openings(towards_1, towards_2, towards_2, towards_1)
+    return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1)
 
 
 def rates(valve: ThreePosition, state: Position, command: float) -> Position:
