@@ -7,7 +7,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce gallery test coverage quick check format bench bits dist page lock clean
+.PHONY: reproduce gallery validation test coverage quick check format bench bits dist page lock clean
 
 reproduce: $(READY)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -15,6 +15,10 @@ reproduce: $(READY)
 # Ready workbenches, each one file that simulates in a browser: out/gallery/*.html.
 gallery: $(READY)
 	$(BIN)/python scripts/gallery.py out/gallery
+
+# What was judged by what, with which result, and what was not: out/validation/report.md. Half an hour; goes on where it was interrupted.
+validation: $(READY)
+	$(BIN)/python scripts/validation_report.py --out out/validation
 
 test: check
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile

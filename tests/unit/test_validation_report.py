@@ -1,0 +1,72 @@
+"""The report of what was judged: its table, what was not run, and going on after an interruption."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from scripts import validation_report
+from scripts.validation_report import AGREES, DIFFERS, NOT_RUN, Line, alarms, intervals, main, report
+
+
+def line(verdict: str, command: str = "ppafo bits") -> Line:
+    """A line of the table with a verdict."""
+    return Line("bits", "golden hashes", "the same", "", verdict, command)
+
+
+def test_the_report_counts_the_verdicts_and_numbers_the_commands() -> None:
+    text = report([("Bits", [line(AGREES), line(DIFFERS), line(NOT_RUN, "make bits"), line("stated")])])
+    assert "Of 4 lines 1 agree, 1 differ, 1 not run here." in text
+    assert "| bits | golden hashes | the same | - | agrees | 1 |" in text
+    assert "| not run | 2 |" in text
+    assert "1. `ppafo bits`\n2. `make bits`\n" in text
+    assert "## What was not judged" in text
+
+
+def test_what_takes_hours_is_read_from_its_folder_or_said_not_to_have_run(tmp_path: Path) -> None:
+    assert [found.verdict for found in intervals(tmp_path)] == [NOT_RUN, NOT_RUN]
+    kind = {
+        "noise": "white",
+        "fits": 100,
+        "held": {"inertia": 0.95, "damping": 0.89},
+        "share_of_band": {"inertia": 0.4},
+    }
+    for folder in ("coverage-fixed", "coverage-prior"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "coverage.json").write_text(json.dumps({"kinds": [kind]}))
+    fixed, drawn = intervals(tmp_path)
+    assert (fixed.verdict, drawn.verdict) == (DIFFERS, AGREES)
+    assert "hold 89% (white, damping) to 95%; 1 of 2 cells outside; 100 fits a kind" in fixed.result
+
+
+def test_one_false_stop_differs(tmp_path: Path) -> None:
+    assert alarms(tmp_path)[0].verdict == NOT_RUN
+    (tmp_path / "false-alarms").mkdir()
+    for stops, expected in ((0, AGREES), (1, DIFFERS)):
+        found = {"wearers": 1000, "stops": stops}
+        (tmp_path / "false-alarms" / "solenoid-ideal-stairs-impaired-1000.json").write_text(json.dumps(found))
+        assert alarms(tmp_path)[0].verdict == expected
+
+
+def test_a_second_call_goes_on_where_the_first_one_was_interrupted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    called: list[str] = []
+
+    def first(long: Path) -> list[Line]:
+        called.append("first")
+        return [line(AGREES)]
+
+    def second(long: Path) -> list[Line]:
+        called.append("second")
+        if called.count("second") == 1:
+            raise KeyboardInterrupt
+        return [line(DIFFERS)]
+
+    monkeypatch.setattr(validation_report, "SECTIONS", {"Bits": {"first": first, "second": second}})
+    monkeypatch.setattr("sys.argv", ["validation_report.py", "--out", str(tmp_path)])
+    with pytest.raises(KeyboardInterrupt):
+        main()
+    assert main() == 1
+    assert called == ["first", "second", "second"]
+    assert "1 agree, 1 differ" in (tmp_path / "report.md").read_text()
