@@ -17,6 +17,8 @@ import { makeFrame, type PageFrame } from "./frame";
 import { bandOf } from "./variation";
 import type { Band } from "./panels";
 
+const MOST_RUNS = 4 * MOST_CONFIGURATIONS;
+
 export interface Named {
   readonly name: string;
   readonly place: number;
@@ -30,7 +32,7 @@ export class App {
   private readonly history = new History();
   private readonly engines = new Map<string, Engine>();
   private readonly bytes = new Map<string, Promise<ArrayBuffer>>();
-  private readonly runs = new WeakMap<Configuration, Run>();
+  private readonly runs = new Map<Configuration, Run>();
   private readonly bands = new WeakMap<Configuration, ReadonlyMap<string, Band>>();
   private readonly frame: PageFrame;
   private readonly controls: Controls;
@@ -49,7 +51,10 @@ export class App {
     host: HTMLElement,
     readonly content: Content,
   ) {
-    this.state = firstState(content);
+    const [state, wrong] = this.opened();
+    this.state = state;
+    // Programs are made ready while the page is put together; both are shown at once.
+    void Promise.all(this.bench.map(({ program }) => this.load(programNamed(content, program)))).then(() => this.schedule());
     this.workers = new Workers((program) => this.bytesOf(program));
     this.frame = makeFrame(host, content, this);
     this.controls = new Controls(this.frame.controls, content, { change: (key, text, isDragging) => this.change(key, text, isDragging) });
@@ -58,7 +63,7 @@ export class App {
     this.stage = new Stage(this.frame.stage, (time) => this.panels.point(time));
     this.outcome = new OutcomeTable(this.frame.outcome, content);
     this.extras = new Extras(this.frame, this);
-    this.readAddress();
+    this.tell(wrong);
     addEventListener("hashchange", () => this.readAddress());
   }
 
@@ -87,14 +92,23 @@ export class App {
     const program = programNamed(this.content, configuration.program);
     const engine = this.engines.get(program.name);
     if (engine === undefined) {
-      void this.load(program);
+      void this.load(program).then(() => this.schedule());
       return null;
     }
     const values = valuesOf(this.content, configuration);
     const wrong = contradiction(program, values);
     const run = wrong === "" ? engine.run(values) : failedRun("refused", wrong);
-    this.runs.set(configuration, run);
+    this.keep(configuration, run);
     return run;
+  }
+
+  /** Keep a run, but not those of all states that undo could come back to: each is half a megabyte. */
+  private keep(configuration: Configuration, run: Run): void {
+    this.runs.set(configuration, run);
+    for (const oldest of this.runs.keys()) {
+      if (this.runs.size <= MOST_RUNS) break;
+      this.runs.delete(oldest);
+    }
   }
 
   private bytesOf(program: Program): Promise<ArrayBuffer> {
@@ -107,7 +121,6 @@ export class App {
     const bytes = await this.bytesOf(program);
     if (this.engines.has(program.name)) return;
     this.engines.set(program.name, await Engine.of(program, bytes));
-    this.schedule();
   }
 
   /** Make a state the present one. What was before can be come back to, but for what is on the way. */
@@ -225,18 +238,22 @@ export class App {
 
   private readAddress(): void {
     const address = location.hash;
-    if (this.content.form === "page" && address.length > 1 && address.slice(1) !== addressOf(this.content, this.state)) {
-      try {
-        this.state = stateOfAddress(this.content, address);
-        this.tell("");
-      } catch (error) {
-        if (!(error instanceof InputError)) throw error;
-        this.state = firstState(this.content);
-        this.tell(`The address holds no state of this page: ${error.message}. It begins as usual.`);
-      }
+    if (this.content.form !== "page" || address.length < 2 || address.slice(1) === addressOf(this.content, this.state)) return;
+    const [state, wrong] = this.opened();
+    this.tell(wrong);
+    this.become(state);
+  }
+
+  /** The state in the address, else the first one, and what is wrong with the address. */
+  private opened(): readonly [State, string] {
+    const first = firstState(this.content);
+    if (this.content.form !== "page" || location.hash.length < 2) return [first, ""];
+    try {
+      return [stateOfAddress(this.content, location.hash), ""];
+    } catch (error) {
+      if (!(error instanceof InputError)) throw error;
+      return [first, `The address holds no state of this page: ${error.message}. It begins as usual.`];
     }
-    this.schedule();
-    this.settle();
   }
 
   /** Draw with the next frame. */

@@ -82,7 +82,8 @@ export class Engine {
       const ending = ENDINGS[exports.run(settings, columns, metrics, good)] ?? "refused";
       const { buffer } = exports.memory;
       const length = new Int32Array(buffer, good, 1)[0] ?? 0;
-      const column = (place: number) => new Float64Array(buffer, columns + place * count * NUMBER, length).slice();
+      const table = new Float64Array(buffer, columns, count * rows).slice();
+      const column = (place: number) => table.subarray(place * count, place * count + length);
       const found = new Float64Array(buffer, metrics, program.metrics.length);
       return {
         ending,

@@ -1,6 +1,5 @@
 /** Where the page begins: its content is unpacked, and the workbench is put in its place. */
 
-import "./language";
 import { App } from "./app";
 import type { Content } from "./content";
 import { element } from "./dom";

@@ -26,8 +26,18 @@ export function settingsByKey(program: Program): ReadonlyMap<string, Setting> {
   return found;
 }
 
+const reckoned = new WeakMap<Configuration, Values>();
+
 /** All numbers of a configuration in SI, in the order of the program. Throws InputError for a text that is no such number. */
 export function valuesOf(content: Content, configuration: Configuration): Values {
+  const known = reckoned.get(configuration);
+  if (known !== undefined) return known;
+  const values = valuesFrom(content, configuration);
+  reckoned.set(configuration, values);
+  return values;
+}
+
+function valuesFrom(content: Content, configuration: Configuration): Values {
   const program = programNamed(content, configuration.program);
   const { changes } = configuration;
   const settings = settingsByKey(program);
