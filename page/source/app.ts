@@ -1,5 +1,6 @@
 /** The page as a whole: its state, what is simulated again when it changes, and what shows it. */
 
+import type { Overlay } from "./agreement";
 import { type Content, programNamed, type Program, type Tab } from "./content";
 import { Controls } from "./controls";
 import { say, whenQuiet } from "./dom";
@@ -7,7 +8,7 @@ import { Engine, failedRun, type Run } from "./engine";
 import { Extras } from "./extras";
 import { Workers } from "./jobs";
 import { OutcomeTable } from "./outcome";
-import { type Overlay, Panels } from "./panels";
+import { type Band, Panels } from "./panels";
 import { changed, type Configuration, contradiction, normalText, settingsByKey, valuesOf } from "./settings";
 import { Stage } from "./stage";
 import { addressOf, firstState, History, MOST_CONFIGURATIONS, type State, stateOfAddress } from "./state";
@@ -15,7 +16,6 @@ import { InputError, telling } from "./units";
 import { unpacked } from "./unpacking";
 import { makeFrame, type PageFrame } from "./frame";
 import { bandOf } from "./variation";
-import type { Band } from "./panels";
 
 const MOST_RUNS = 4 * MOST_CONFIGURATIONS;
 
@@ -54,7 +54,10 @@ export class App {
     const [state, wrong] = this.opened();
     this.state = state;
     // Programs are made ready while the page is put together; both are shown at once.
-    void Promise.all(this.bench.map(({ program }) => this.load(programNamed(content, program)))).then(() => this.schedule());
+    void Promise.all(this.bench.map(({ program }) => this.load(programNamed(content, program)))).then(() => {
+      this.schedule();
+      this.settle();
+    });
     this.workers = new Workers((program) => this.bytesOf(program));
     this.frame = makeFrame(host, content, this);
     this.controls = new Controls(this.frame.controls, content, { change: (key, text, isDragging) => this.change(key, text, isDragging) });
@@ -283,12 +286,13 @@ export class App {
     say(this.frame.fault, faults.join(" "));
     this.frame.fault.hidden = faults.length === 0;
     const shown = done.filter(({ run }) => run.time.length > 1);
-    if (shown.length > 0) {
-      this.panels.show(shown.map((item) => ({ ...item, band: this.hasBand ? (this.bands.get(item.configuration) ?? this.lastBand(item.place)) : null })), this.isBeside, this.overlay);
-      this.stage.show(shown);
-    }
     this.outcome.show(done);
     this.extras.follow(named);
+    // Plots come last: they ask how wide they may be, and then all else is in its place.
+    if (shown.length > 0) {
+      this.stage.show(shown);
+      this.panels.show(shown.map((item) => ({ ...item, band: this.hasBand ? (this.bands.get(item.configuration) ?? this.lastBand(item.place)) : null })), this.isBeside, this.overlay);
+    }
     this.frame.root.dataset["milliseconds"] = taken.toFixed(2);
     this.frame.root.dataset["ready"] = "true";
   }

@@ -128,7 +128,7 @@ export class Engine {
     if (found < 0) return "";
     const setting = this.program.settings[found];
     if (setting !== undefined) return `${setting.key} is out of range, or contradicts another setting`;
-    return "a setting that is 0 in this scenario, or is not, asks for another program; this one is in the page as it began";
+    return "another program is needed, and this page has that of the scenario as it began: a setting that is 0 there has to stay 0, one that is not has to stay above 0, and samples have to fall on steps (run.output_interval, run.step, controller.period)";
   }
 
   /** Memory that is taken meanwhile is given back. */

@@ -37,7 +37,7 @@ function interfaceOf(app: App) {
     values: (place: number) => Object.fromEntries(valuesOf(content, configuration(place))),
     settings: (place: number) => [...settingsByKey(programNamed(content, configuration(place).program)).values()],
     scenario: (place: number) => scenarioFile(content, configuration(place)),
-    read: async (name: string, text: string) => {
+    read: async (name: string, text: string | Blob) => {
       await app.extras.read(new File([text], name));
       return app.told;
     },

@@ -1,12 +1,12 @@
 /** Plots over time with one cursor: torque, pressures, command, angle, gas, with bands and recordings behind the curves. */
 
 import uPlot from "../vendor/uplot/uPlot.esm.js";
-import { interpolated } from "./agreement";
+import { interpolated, type Overlay } from "./agreement";
 import { colour, colourOf, DASHES } from "./colours";
 import { type Content, scalesOf } from "./content";
-import { element } from "./dom";
+import { element, whenQuiet } from "./dom";
 import type { Run } from "./engine";
-import { pathsOf } from "./paths";
+import { lineOn, pathsOf } from "./paths";
 import { fromSi, plain, readableUnit, scaleOf } from "./units";
 
 export interface Panel {
@@ -40,11 +40,6 @@ export interface Band {
   readonly high: Float64Array;
 }
 
-export interface Overlay {
-  readonly time: Float64Array;
-  readonly channels: ReadonlyMap<string, Float64Array>;
-}
-
 interface Drawn {
   readonly panel: Panel;
   readonly readout: HTMLElement;
@@ -66,6 +61,8 @@ interface Line {
 const AXIS_SIZE = 52;
 /** Plots this near to the window are drawn too, so that they are there when somebody scrolls. */
 const NEAR = "100px";
+/** Milliseconds without a change after which the other plots are drawn too. */
+const UNHURRIED = 1500;
 /** Channels that keep a value until the next sample. */
 const HELD = new Set(["command", "safe_state"]);
 
@@ -77,6 +74,7 @@ export class Panels {
   private first: Panel | null = null;
   private ranges = new Map<Panel, readonly [number, number]>();
   private readonly watcher = new ResizeObserver(() => this.fit());
+  private readonly rest = whenQuiet(UNHURRIED, () => this.drawRest());
   private readonly sight = new IntersectionObserver((entries) => this.look(entries), { rootMargin: NEAR });
 
   constructor(
@@ -107,6 +105,7 @@ export class Panels {
       for (const item of this.drawn) item.isStale = true;
       for (const item of this.drawn) if (item.isInSight) this.draw(item);
     }
+    this.rest();
   }
 
   /** Put the cursor of all plots to a time [s], or take it away. */
@@ -165,6 +164,14 @@ export class Panels {
     }
   }
 
+  /** Draw what is out of sight too, plot by plot, so that nothing waits for all of them. */
+  private drawRest(): void {
+    const next = this.drawn.find(({ isStale }) => isStale);
+    if (next === undefined) return;
+    this.draw(next);
+    setTimeout(() => this.drawRest(), 0);
+  }
+
   private drawAll(): void {
     for (const item of this.drawn) this.draw(item);
   }
@@ -197,7 +204,7 @@ export class Panels {
       legend: { show: false },
       cursor: { sync: { key: "time" }, drag: { x: false, y: false }, points: { size: 7 } },
       scales: { x: { time: false }, y: { range: () => [...this.rangeFor(panel)] as [number, number] } },
-      axes: [{ ...axis, size: 28, values: (_, ticks) => ticks.map((tick) => `${plain(tick)}`) }, { ...axis, size: AXIS_SIZE, values: (_, ticks) => ticks.map((tick) => plain(tick)) }],
+      axes: [{ ...axis, size: 28, space: 80, values: (_, ticks) => ticks.map((tick) => `${plain(tick)}`) }, { ...axis, size: AXIS_SIZE, values: (_, ticks) => ticks.map((tick) => plain(tick)) }],
       series: [{}, ...series],
       hooks: {
         drawAxes: [(plot) => this.drawBehind(plot, panel, shown)],
@@ -357,14 +364,9 @@ export class Panels {
 
   private drawRecorded(plot: uPlot, channel: string, time: Float64Array, values: Float64Array): void {
     const { ctx } = plot;
-    const step = Math.max(1, Math.floor(time.length / 8000));
-    ctx.beginPath();
-    for (let place = 0; place < time.length; place += step) {
-      ctx.lineTo(plot.valToPos(time[place] ?? 0, "x", true), plot.valToPos(this.display(channel, values[place] ?? 0), "y", true));
-    }
     ctx.strokeStyle = colour("recorded");
     ctx.lineWidth = 1.5 * devicePixelRatio;
-    ctx.stroke();
+    ctx.stroke(lineOn(plot, time, this.displayed(channel, values), false));
   }
 
   private fit(): void {

@@ -7,24 +7,29 @@ const FINEST = 0.25;
 /** uPlot's number for a path that is clipped to the plot. */
 const CLIPPED = 1;
 
-/** Draws samples; `isHeld` where a value stays until the next one. Samples that are no number leave a gap. */
+/** Draws series; `isHeld` where a value stays until the next one. */
 export function pathsOf(isHeld: boolean): uPlot.Series.PathBuilder {
-  return (plot, series, from, to) => {
-    const [times, values] = [plot.data[0] as Float64Array, plot.data[series] as Float64Array];
-    const { left, top, width, height } = plot.bbox;
-    const [x, y] = [plot.scales["x"], plot.scales["y"]];
-    const across = width / ((x?.max ?? 1) - (x?.min ?? 0));
-    const up = height / ((y?.max ?? 1) - (y?.min ?? 0));
-    const stroke = new Path2D();
-    const pen = new Pen(stroke, isHeld);
-    for (let place = from; place <= to; place += 1) {
-      const value = values[place] ?? NaN;
-      if (Number.isNaN(value)) pen.lift();
-      else pen.put(left + ((times[place] ?? 0) - (x?.min ?? 0)) * across, top + height - (value - (y?.min ?? 0)) * up);
-    }
-    pen.lift();
+  return (plot, series) => {
+    const stroke = lineOn(plot, plot.data[0] as Float64Array, plot.data[series] as Float64Array, isHeld);
     return { stroke, fill: null, clip: null, band: null, gaps: [], flags: CLIPPED };
   };
+}
+
+/** The line of samples in the units of a plot; those that are no number leave a gap. */
+export function lineOn(plot: uPlot, times: Float64Array, values: Float64Array, isHeld: boolean): Path2D {
+  const { left, top, width, height } = plot.bbox;
+  const [x, y] = [plot.scales["x"], plot.scales["y"]];
+  const across = width / ((x?.max ?? 1) - (x?.min ?? 0));
+  const up = height / ((y?.max ?? 1) - (y?.min ?? 0));
+  const path = new Path2D();
+  const pen = new Pen(path, isHeld);
+  for (let place = 0; place < times.length; place += 1) {
+    const value = values[place] ?? NaN;
+    if (Number.isNaN(value)) pen.lift();
+    else pen.put(left + ((times[place] ?? 0) - (x?.min ?? 0)) * across, top + height - (value - (y?.min ?? 0)) * up);
+  }
+  pen.lift();
+  return path;
 }
 
 /** Draws from point to point, and leaves out those on the way where a line goes on level, or up and down within a pixel. */

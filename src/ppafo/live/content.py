@@ -152,7 +152,7 @@ def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapp
         "key": key,
         "label": words()["labels"].get(key, _called(entry["group"], entry["name"])),
         "unit": _bare(entry["unit"]),
-        "shown": _bare(entry["display"]["unit"]),
+        "shown": _typed(_bare(entry["display"]["unit"]), entry["unit"]),
         "low": entry["minimum"],
         "high": entry["maximum"],
         "isLowAllowed": entry["is_minimum_allowed"],
