@@ -92,7 +92,7 @@ export class Panels {
   show(shown: readonly Shown[], isBeside: boolean, overlay: Overlay | null): void {
     this.shown = shown;
     this.overlay = overlay;
-    const layout = JSON.stringify([isBeside, shown.map((item) => [item.name, item.place, [...item.run.channels.keys()].length > 0])]);
+    const layout = JSON.stringify([isBeside, shown.map((item) => [item.name, item.place, ...item.run.channels.keys()])]);
     const present = PANELS.filter((panel) => shown.some(({ run }) => panel.channels.some((name) => run.channels.has(name))));
     // What is asked for comes first: a torque, else how the vane moves.
     const leads = (panel: Panel) => panel.channels[0] === (shown.some(({ run }) => run.channels.has("reference")) ? "torque" : "angle");

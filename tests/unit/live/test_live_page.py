@@ -192,6 +192,16 @@ def test_a_slider_is_dragged_and_the_drag_is_undone_at_once(chromium: Any, file:
 
 
 @has_browser
+def test_tabs_whose_configurations_have_one_name_are_told_apart(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, "#1=torque-task-solenoid", viewport={"width": 1400, "height": 1000})
+    for title in ("Walk", "Torque task", "Walk"):
+        page.get_by_role("tab", name=title).click()
+        page.wait_for_timeout(100)
+    assert "Angle of the ankle" in page.locator(".panel figcaption").first.inner_text()
+    assert page.said == []
+
+
+@has_browser
 def test_everything_can_be_reached_and_changed_by_keyboard_alone(chromium: Any, file: Path) -> None:
     page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
     reached = set()
@@ -244,7 +254,7 @@ def test_a_large_recording_is_read_and_compared_while_the_page_goes_on(chromium:
         """async () => {
             const row = place => `${place / 1e5},${place % 1000 / 100},${place % 70},${place % 60},0.123456789`;
             const head = 'time [s],torque [N m],pressure_1 [psi_g],pressure_2 [psi_g],command [-]';
-            const file = new Blob([[head, ...Array.from({length: 1700000}, (_, place) => row(place))].join('\n') + '\n']);
+            const file = new Blob([[head, ...Array.from({length: 1700000}, (_, place) => row(place))].join('\\n') + '\\n']);
             window.size = file.size;
             let longest = 0, before = performance.now(), isDone = false;
             const next = now => {
