@@ -2,6 +2,7 @@
 
 import type { Program } from "./content";
 import type { Values } from "./settings";
+import { plain } from "./units";
 
 /** What a module exports: see `ppafo.exports.wasm`. */
 interface Exports extends WebAssembly.Exports {
@@ -46,6 +47,8 @@ export interface Ensemble {
 }
 
 const NUMBER = 8;
+/** Angle [rad] by which a vane may be beyond a stop, as in Python. */
+const SLACK = 1e-9;
 
 /** Whether the browser has the 128-bit vectors that the modules are made of. */
 export function hasVectors(): boolean {
@@ -85,6 +88,8 @@ export class Engine {
       const table = new Float64Array(buffer, columns, count * rows).slice();
       const column = (place: number) => table.subarray(place * count, place * count + length);
       const found = new Float64Array(buffer, metrics, program.metrics.length);
+      const beyond = beyondStops(program, values, column(0), column(1 + program.channels.findIndex(({ name }) => name === "angle")));
+      if (beyond !== "") return failedRun("refused", beyond);
       return {
         ending,
         time: column(0),
@@ -140,6 +145,15 @@ export class Engine {
       this.exports.release(before);
     }
   }
+}
+
+/** What a scenario file may not have: a vane that is led beyond its stops. */
+function beyondStops({ document }: Program, values: Values, time: Float64Array, angle: Float64Array): string {
+  const { motion } = document;
+  if (typeof motion !== "object" || motion === null || !("kind" in motion) || motion.kind !== "prescribed") return "";
+  const [low, high] = [values.get("actuator.angle_min") ?? -Infinity, values.get("actuator.angle_max") ?? Infinity];
+  const place = angle.findIndex((at) => at < low - SLACK || at > high + SLACK);
+  return place < 0 ? "" : `motion.profile leaves the stops of the device at ${plain(time[place] ?? 0)} s`;
 }
 
 const ENDING_TEXTS: Readonly<Record<Ending, string>> = {
