@@ -26,7 +26,23 @@ from ppafo.simulation.plan import plan_run
 from ppafo.walking.loading import load_walk
 from scripts.live_page import address_of, browser, missing, opened, programs_by_tab
 
-_TEXTS = ("nan", "inf", "-inf", "1_000", "0x10", "1,5", "+5", ".5", "5.", "1e400", "-0", "five", "1e-320", "\u0665", "5 5")
+_TEXTS = (
+    "nan",
+    "inf",
+    "-inf",
+    "1_000",
+    "0x10",
+    "1,5",
+    "+5",
+    ".5",
+    "5.",
+    "1e400",
+    "-0",
+    "five",
+    "1e-320",
+    "\u0665",
+    "5 5",
+)
 _SIZES = (0.0, 1e-300, 1e-12, 1e12, 1e300)
 MOST_STEPS = 100_000
 """Steps of a run that is tried; longer ones only take time."""
@@ -66,15 +82,31 @@ def states(program: Mapping[str, Any], units: Mapping[str, Any], draws: int, rng
         yield {key: f"{value!r} s" for key, value in times.items() if key in settings}
     for _ in range(draws):
         chosen = rng.sample(sorted(settings), min(len(settings), rng.randint(2, 6)))
-        yield {key: f"{rng.choice(_numbers(settings[key], units))!r} {settings[key]['shown']}".strip() for key in chosen}
+        yield {
+            key: f"{rng.choice(_numbers(settings[key], units))!r} {settings[key]['shown']}".strip() for key in chosen
+        }
 
 
 def _numbers(setting: Mapping[str, Any], units: Mapping[str, Any]) -> list[float]:
     """Numbers in the unit that is shown: round the ends, nothing, tiny, huge, negative, and some on the slider."""
     scale = next(one for one in units[setting["unit"]] if one["unit"] == setting["shown"])
     zero = 101325.0 if scale["isGauge"] else 0.0
-    ends = [(end - zero - float(scale["offset"])) / float(scale["scale"]) for end in (setting["low"], setting["high"]) if end is not None]
-    near = [number for end in ends for number in (end, math.nextafter(end, -math.inf), math.nextafter(end, math.inf), end * 1.01 - 0.01, end * 0.99 + 0.01)]
+    ends = [
+        (end - zero - float(scale["offset"])) / float(scale["scale"])
+        for end in (setting["low"], setting["high"])
+        if end is not None
+    ]
+    near = [
+        number
+        for end in ends
+        for number in (
+            end,
+            math.nextafter(end, -math.inf),
+            math.nextafter(end, math.inf),
+            end * 1.01 - 0.01,
+            end * 0.99 + 0.01,
+        )
+    ]
     low, high = setting["slider"]
     inside = [low, high, 0.5 * (low + high), 0.3 * low + 0.7 * high, -high, 3.0 * high]
     return [*near, *inside, *_SIZES, *(-size for size in _SIZES[1:])]

@@ -37,6 +37,8 @@ function writtenTexts(content: Content, configuration: Configuration): [Setting,
   const found: [Setting, string][] = [];
   for (const setting of program.settings) {
     if (program.kind === "walk" && NOT_OF_WALKS.includes(setting.key)) continue;
+    // What has to stay 0 is 0 in the scenario too, and a file may not say so.
+    if (setting.kept === "zero") continue;
     const value = values.get(setting.key) ?? setting.value;
     const typed = configuration.changes[setting.key];
     if (typed !== undefined) found.push([setting, setting.unit === "" ? String(value) : normalText(setting, typed)]);

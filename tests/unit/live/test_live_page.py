@@ -254,7 +254,8 @@ def test_a_large_recording_is_read_and_compared_while_the_page_goes_on(chromium:
         """async () => {
             const row = place => `${place / 1e5},${place % 1000 / 100},${place % 70},${place % 60},0.123456789`;
             const head = 'time [s],torque [N m],pressure_1 [psi_g],pressure_2 [psi_g],command [-]';
-            const file = new Blob([[head, ...Array.from({length: 1700000}, (_, place) => row(place))].join('\\n') + '\\n']);
+            const rows = Array.from({length: 1700000}, (_, place) => row(place));
+            const file = new Blob([[head, ...rows].join('\\n') + '\\n']);
             window.size = file.size;
             let longest = 0, before = performance.now(), isDone = false;
             const next = now => {
