@@ -29,7 +29,8 @@ await build({
   format: "iife",
   outdir: folder,
   banner: { js: banner },
-  define: { WORKER_SCRIPT: JSON.stringify(worker.outputFiles[0].text) },
+  inject: ["source/language.ts"],
+  define: { WORKER_SCRIPT: JSON.stringify(worker.outputFiles[0].text), "Intl.NumberFormat": "PlainNumbers", "Intl.DateTimeFormat": "NoCalendar" },
 });
 await build({ ...shared, entryPoints: { loader: "source/loader.ts" }, format: "iife", outdir: folder });
 await build({ ...shared, entryPoints: { page: "source/page.css" }, outdir: folder });

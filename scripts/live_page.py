@@ -274,20 +274,25 @@ def measure(chromium: Any, file: Path, seconds: float = 10.0) -> dict[str, float
     return found
 
 
+_DRAG_AT_ONCE = """new MutationObserver((_, observer) => {
+    observer.disconnect();
+    const slider = document.querySelector('.control input[type=range]');
+    slider.value = 200;
+    slider.dispatchEvent(new Event('input'));
+    // Drawn in the coming frame, and seen when the one after it begins.
+    requestAnimationFrame(() => requestAnimationFrame(() => { window.first_curve = performance.now(); }));
+}).observe(document, {subtree: true, attributeFilter: ['data-ready']})"""
+
+
 def _first_curve(chromium: Any, file: Path) -> float:
     """Milliseconds from opening to the first curve that was dragged, on a slow phone."""
     page = chromium.new_context(viewport={"width": 390, "height": 844}).new_page()
     page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": 4})
+    page.add_init_script(_DRAG_AT_ONCE)
     page.goto(f"file://{file}", wait_until="commit")
-    page.wait_for_selector(READY, state="attached")
-    before = page.evaluate("document.querySelector('.workbench').dataset.milliseconds")
-    page.evaluate(
-        """() => { const slider = document.querySelector('.control input[type=range]');
-            slider.value = 200; slider.dispatchEvent(new Event('input')); }"""
-    )
-    while page.evaluate("document.querySelector('.workbench').dataset.milliseconds") == before:
-        page.wait_for_timeout(5)
-    return float(page.evaluate("performance.now()"))
+    # The page drags itself: what Playwright puts into a page to ask it something takes its time there too.
+    page.wait_for_timeout(8000)
+    return float(page.evaluate("first_curve"))
 
 
 PICTURES: Sequence[tuple[str, dict[str, Any], str]] = (

@@ -1,7 +1,32 @@
 /** How far a run is from a recording, by the rules of `ppafo validate`: common delay, weights by time, full ranges. */
 
+import { ATMOSPHERE, type Values } from "./settings";
+import { InputError } from "./units";
+
+/** Samples over time; channels in SI. */
+export interface Overlay {
+  readonly time: Float64Array;
+  readonly channels: ReadonlyMap<string, Float64Array>;
+}
+
+/** A column of a table, the channel that it is, and the way of its numbers to SI. */
+export interface RecordedColumn {
+  readonly place: number;
+  readonly channel: string;
+  readonly factor: number;
+  readonly offset: number;
+}
+
+export interface ChannelError {
+  readonly channel: string;
+  readonly rms: number;
+  readonly bias: number;
+  readonly fraction: number;
+  readonly delay: number;
+}
+
 /** One channel of both: measured values at their times, the model's at its own, and the full range. */
-export interface Curve {
+interface Curve {
   readonly times: Float64Array;
   readonly values: Float64Array;
   readonly modelTimes: Float64Array;
@@ -9,19 +34,19 @@ export interface Curve {
   readonly fullRange: number;
 }
 
-export interface Delay {
+interface Delay {
   readonly value: number;
   readonly isAtLimit: boolean;
 }
 
-export interface ChannelAgreement {
+interface ChannelAgreement {
   readonly rms: number;
   readonly bias: number;
   readonly largest: number;
   readonly fraction: number;
 }
 
-export const LONGEST_DELAY = 0.02;
+const LONGEST_DELAY = 0.02;
 export const ACCEPTABLE_FRACTION = 0.1;
 const SHIFTS = 81;
 const MOST_SAMPLES = 4000;
@@ -32,10 +57,72 @@ const GOLDEN = 0.6180339887498949;
 const REFINEMENTS = 30;
 const AT_LIMIT = 0.99;
 const LONGEST_WEIGHT = 3;
+const MOST_DRAWN = 8000;
+const ALONE = ["angle", "pressure_1", "pressure_2"];
+const COMPARED = ["angle", "pressure_1", "pressure_2", "pressure_difference", "torque"] as const;
+
+/** The recording of a table. Throws InputError, with one line, where its clock does not go on. */
+export function recordingOf(table: readonly Float64Array[], columns: readonly RecordedColumn[]): Overlay {
+  const channels = new Map(
+    columns.map(({ place, channel, factor, offset }) => [channel, (table[place] ?? new Float64Array()).map((value) => value * factor + offset)]),
+  );
+  const time = channels.get("time") ?? new Float64Array();
+  for (let place = 1; place < time.length; place += 1) {
+    if (!((time[place] ?? 0) > (time[place - 1] ?? 0))) throw new InputError(`row ${place + 1}: the clock stands still or goes backwards`);
+  }
+  channels.delete("time");
+  return { time, channels };
+}
+
+/** As much of a recording as a plot can show. */
+export function drawnOf({ time, channels }: Overlay): Overlay {
+  const step = Math.max(1, Math.floor(time.length / MOST_DRAWN));
+  const kept = (values: Float64Array) => Float64Array.from({ length: Math.ceil(values.length / step) }, (_, place) => values[place * step] ?? 0);
+  return { time: kept(time), channels: new Map([...channels].map(([name, values]) => [name, kept(values)])) };
+}
+
+/** Errors of one run against a recording, channel by channel. */
+export function compare(recorded: Overlay, run: Overlay, values: Values, isHeld: boolean): ChannelError[] {
+  if (run.time.length < 2) return [];
+  const measured = withDifference(recorded.channels);
+  const model = withDifference(run.channels);
+  const ranges = fullRanges(recorded, values);
+  const names = COMPARED.filter((name) => measured.has(name) && model.has(name) && !(name === "angle" && isHeld));
+  const curves = new Map(
+    names.map((name): [string, Curve] => [
+      name,
+      { times: recorded.time, values: measured.get(name)!, modelTimes: run.time, modelValues: model.get(name)!, fullRange: ranges[name] ?? 1 },
+    ]),
+  );
+  const chosen = names.filter((name) => ALONE.includes(name));
+  const together = (chosen.length > 0 ? chosen : names.slice(0, 1)).map((name) => curves.get(name)!);
+  const delay = estimateDelay(together);
+  const correction = delay.isAtLimit ? 0 : delay.value;
+  const weights = sampleWeights(recorded.time);
+  return names.map((name) => ({ channel: name, delay: correction, ...channelAgreement(curves.get(name)!, correction, weights) }));
+}
+
+function fullRanges(recorded: Overlay, values: Values): Readonly<Record<string, number>> {
+  const value = (key: string) => values.get(key) ?? 0;
+  const supply = recorded.channels.get("supply_pressure");
+  const gauge = (supply === undefined ? Math.max(value("supply.pressure"), value("supply.dorsiflexion_pressure")) : median(supply)) - value(ATMOSPHERE);
+  return {
+    angle: value("actuator.angle_max") - value("actuator.angle_min"),
+    pressure_1: gauge,
+    pressure_2: gauge,
+    pressure_difference: 2 * gauge,
+    torque: 2 * gauge * value("actuator.torque_constant"),
+  };
+}
+
+function withDifference(channels: ReadonlyMap<string, Float64Array>): ReadonlyMap<string, Float64Array> {
+  const [first, second] = [channels.get("pressure_1"), channels.get("pressure_2")];
+  if (first === undefined || second === undefined) return channels;
+  return new Map([...channels, ["pressure_difference", first.map((value, place) => value - (second[place] ?? 0))]]);
+}
 
 /** Errors with the model shifted by a delay [s]. */
-export function channelAgreement(curve: Curve, delay: number): ChannelAgreement {
-  const weights = sampleWeights(curve.times);
+function channelAgreement(curve: Curve, delay: number, weights: Float64Array): ChannelAgreement {
   const model = shifted(curve, delay);
   let [squares, bias, largest] = [0, 0, 0];
   for (let place = 0; place < model.length; place += 1) {
@@ -49,7 +136,7 @@ export function channelAgreement(curve: Curve, delay: number): ChannelAgreement 
 }
 
 /** The delay [s] that brings the channels together best; 0 where none can be seen. */
-export function estimateDelay(curves: readonly Curve[], limit = LONGEST_DELAY): Delay {
+function estimateDelay(curves: readonly Curve[], limit = LONGEST_DELAY): Delay {
   const first = curves[0];
   if (limit <= 0 || first === undefined) return { value: 0, isAtLimit: false };
   const thinned = curves.map(thin);
@@ -146,10 +233,10 @@ function sampleWeights(times: Float64Array): Float64Array {
 }
 
 function differences(times: Float64Array): Float64Array {
-  return Float64Array.from({ length: times.length - 1 }, (_, place) => (times[place + 1] ?? 0) - (times[place] ?? 0));
+  return times.subarray(1).map((time, place) => time - (times[place] ?? 0));
 }
 
-export function median(values: Float64Array): number {
+function median(values: Float64Array): number {
   const sorted = values.slice().sort();
   const middle = sorted.length >> 1;
   return sorted.length % 2 === 1 ? (sorted[middle] ?? 0) : 0.5 * ((sorted[middle - 1] ?? 0) + (sorted[middle] ?? 0));

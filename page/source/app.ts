@@ -1,5 +1,6 @@
 /** The page as a whole: its state, what is simulated again when it changes, and what shows it. */
 
+import type { Overlay } from "./agreement";
 import { type Content, programNamed, type Program, type Tab } from "./content";
 import { Controls } from "./controls";
 import { say, whenQuiet } from "./dom";
@@ -7,7 +8,7 @@ import { Engine, failedRun, type Run } from "./engine";
 import { Extras } from "./extras";
 import { Workers } from "./jobs";
 import { OutcomeTable } from "./outcome";
-import { type Overlay, Panels } from "./panels";
+import { type Band, Panels } from "./panels";
 import { changed, type Configuration, contradiction, normalText, settingsByKey, valuesOf } from "./settings";
 import { Stage } from "./stage";
 import { addressOf, firstState, History, MOST_CONFIGURATIONS, type State, stateOfAddress } from "./state";
@@ -15,7 +16,8 @@ import { InputError, telling } from "./units";
 import { unpacked } from "./unpacking";
 import { makeFrame, type PageFrame } from "./frame";
 import { bandOf } from "./variation";
-import type { Band } from "./panels";
+
+const MOST_RUNS = 4 * MOST_CONFIGURATIONS;
 
 export interface Named {
   readonly name: string;
@@ -30,7 +32,7 @@ export class App {
   private readonly history = new History();
   private readonly engines = new Map<string, Engine>();
   private readonly bytes = new Map<string, Promise<ArrayBuffer>>();
-  private readonly runs = new WeakMap<Configuration, Run>();
+  private readonly runs = new Map<Configuration, Run>();
   private readonly bands = new WeakMap<Configuration, ReadonlyMap<string, Band>>();
   private readonly frame: PageFrame;
   private readonly controls: Controls;
@@ -49,7 +51,13 @@ export class App {
     host: HTMLElement,
     readonly content: Content,
   ) {
-    this.state = firstState(content);
+    const [state, wrong] = this.opened();
+    this.state = state;
+    // Programs are made ready while the page is put together; both are shown at once.
+    void Promise.all(this.bench.map(({ program }) => this.load(programNamed(content, program)))).then(() => {
+      this.schedule();
+      this.settle();
+    });
     this.workers = new Workers((program) => this.bytesOf(program));
     this.frame = makeFrame(host, content, this);
     this.controls = new Controls(this.frame.controls, content, { change: (key, text, isDragging) => this.change(key, text, isDragging) });
@@ -58,7 +66,7 @@ export class App {
     this.stage = new Stage(this.frame.stage, (time) => this.panels.point(time));
     this.outcome = new OutcomeTable(this.frame.outcome, content);
     this.extras = new Extras(this.frame, this);
-    this.readAddress();
+    this.tell(wrong);
     addEventListener("hashchange", () => this.readAddress());
   }
 
@@ -87,14 +95,23 @@ export class App {
     const program = programNamed(this.content, configuration.program);
     const engine = this.engines.get(program.name);
     if (engine === undefined) {
-      void this.load(program);
+      void this.load(program).then(() => this.schedule());
       return null;
     }
     const values = valuesOf(this.content, configuration);
     const wrong = contradiction(program, values);
     const run = wrong === "" ? engine.run(values) : failedRun("refused", wrong);
-    this.runs.set(configuration, run);
+    this.keep(configuration, run);
     return run;
+  }
+
+  /** Keep a run, but not those of all states that undo could come back to: each is half a megabyte. */
+  private keep(configuration: Configuration, run: Run): void {
+    this.runs.set(configuration, run);
+    for (const oldest of this.runs.keys()) {
+      if (this.runs.size <= MOST_RUNS) break;
+      this.runs.delete(oldest);
+    }
   }
 
   private bytesOf(program: Program): Promise<ArrayBuffer> {
@@ -107,7 +124,6 @@ export class App {
     const bytes = await this.bytesOf(program);
     if (this.engines.has(program.name)) return;
     this.engines.set(program.name, await Engine.of(program, bytes));
-    this.schedule();
   }
 
   /** Make a state the present one. What was before can be come back to, but for what is on the way. */
@@ -225,18 +241,22 @@ export class App {
 
   private readAddress(): void {
     const address = location.hash;
-    if (this.content.form === "page" && address.length > 1 && address.slice(1) !== addressOf(this.content, this.state)) {
-      try {
-        this.state = stateOfAddress(this.content, address);
-        this.tell("");
-      } catch (error) {
-        if (!(error instanceof InputError)) throw error;
-        this.state = firstState(this.content);
-        this.tell(`The address holds no state of this page: ${error.message}. It begins as usual.`);
-      }
+    if (this.content.form !== "page" || address.length < 2 || address.slice(1) === addressOf(this.content, this.state)) return;
+    const [state, wrong] = this.opened();
+    this.tell(wrong);
+    this.become(state);
+  }
+
+  /** The state in the address, else the first one, and what is wrong with the address. */
+  private opened(): readonly [State, string] {
+    const first = firstState(this.content);
+    if (this.content.form !== "page" || location.hash.length < 2) return [first, ""];
+    try {
+      return [stateOfAddress(this.content, location.hash), ""];
+    } catch (error) {
+      if (!(error instanceof InputError)) throw error;
+      return [first, `The address holds no state of this page: ${error.message}. It begins as usual.`];
     }
-    this.schedule();
-    this.settle();
   }
 
   /** Draw with the next frame. */
@@ -266,12 +286,13 @@ export class App {
     say(this.frame.fault, faults.join(" "));
     this.frame.fault.hidden = faults.length === 0;
     const shown = done.filter(({ run }) => run.time.length > 1);
-    if (shown.length > 0) {
-      this.panels.show(shown.map((item) => ({ ...item, band: this.hasBand ? (this.bands.get(item.configuration) ?? this.lastBand(item.place)) : null })), this.isBeside, this.overlay);
-      this.stage.show(shown);
-    }
     this.outcome.show(done);
     this.extras.follow(named);
+    // Plots come last: they ask how wide they may be, and then all else is in its place.
+    if (shown.length > 0) {
+      this.stage.show(shown);
+      this.panels.show(shown.map((item) => ({ ...item, band: this.hasBand ? (this.bands.get(item.configuration) ?? this.lastBand(item.place)) : null })), this.isBeside, this.overlay);
+    }
     this.frame.root.dataset["milliseconds"] = taken.toFixed(2);
     this.frame.root.dataset["ready"] = "true";
   }

@@ -55,7 +55,9 @@ export type Table = { readonly [key: string]: Json };
 export interface Relation {
   readonly key: string;
   readonly relation: string;
+  /** A setting, times a factor, is what it must be above or below. */
   readonly other: string;
+  readonly factor: number;
   readonly slack: number;
 }
 

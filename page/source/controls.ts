@@ -159,10 +159,12 @@ export class Controls {
       const different = [...new Set(texts)];
       const unit = readableUnit(setting.shown);
       if (document.activeElement !== value || different.length === 1) {
-        value.value = `${different.join(" | ")}${unit === "" || unit === "-" || different.length > 2 ? "" : ` ${unit}`}`;
+        const text = `${different.join(" | ")}${unit === "" || unit === "-" || different.length > 2 ? "" : ` ${unit}`}`;
+        if (value.value !== text) value.value = text;
       }
-      if (document.activeElement !== slider) slider.value = String(placeOf(setting, Number(texts[0])));
-      slider.setAttribute("aria-valuetext", value.value);
+      const place = String(placeOf(setting, Number(texts[0])));
+      if (document.activeElement !== slider && slider.value !== place) slider.value = place;
+      if (slider.getAttribute("aria-valuetext") !== value.value) slider.setAttribute("aria-valuetext", value.value);
       const isChanged = having.some((place) => configurations[place]?.changes[key] !== undefined);
       row.classList.toggle("changed", isChanged);
       back.disabled = !isChanged;

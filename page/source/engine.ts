@@ -2,6 +2,7 @@
 
 import type { Program } from "./content";
 import type { Values } from "./settings";
+import { plain } from "./units";
 
 /** What a module exports: see `ppafo.exports.wasm`. */
 interface Exports extends WebAssembly.Exports {
@@ -46,6 +47,8 @@ export interface Ensemble {
 }
 
 const NUMBER = 8;
+/** Angle [rad] by which a vane may be beyond a stop, as in Python. */
+const SLACK = 1e-9;
 
 /** Whether the browser has the 128-bit vectors that the modules are made of. */
 export function hasVectors(): boolean {
@@ -82,8 +85,11 @@ export class Engine {
       const ending = ENDINGS[exports.run(settings, columns, metrics, good)] ?? "refused";
       const { buffer } = exports.memory;
       const length = new Int32Array(buffer, good, 1)[0] ?? 0;
-      const column = (place: number) => new Float64Array(buffer, columns + place * count * NUMBER, length).slice();
+      const table = new Float64Array(buffer, columns, count * rows).slice();
+      const column = (place: number) => table.subarray(place * count, place * count + length);
       const found = new Float64Array(buffer, metrics, program.metrics.length);
+      const beyond = beyondStops(program, values, column(0), column(1 + program.channels.findIndex(({ name }) => name === "angle")));
+      if (beyond !== "") return failedRun("refused", beyond);
       return {
         ending,
         time: column(0),
@@ -127,7 +133,7 @@ export class Engine {
     if (found < 0) return "";
     const setting = this.program.settings[found];
     if (setting !== undefined) return `${setting.key} is out of range, or contradicts another setting`;
-    return "a setting that is 0 in this scenario, or is not, asks for another program; this one is in the page as it began";
+    return "another program is needed, and this page has that of the scenario as it began: a setting that is 0 there has to stay 0, one that is not has to stay above 0, and samples have to fall on steps (run.output_interval, run.step, controller.period)";
   }
 
   /** Memory that is taken meanwhile is given back. */
@@ -139,6 +145,15 @@ export class Engine {
       this.exports.release(before);
     }
   }
+}
+
+/** What a scenario file may not have: a vane that is led beyond its stops. */
+function beyondStops({ document }: Program, values: Values, time: Float64Array, angle: Float64Array): string {
+  const { motion } = document;
+  if (typeof motion !== "object" || motion === null || !("kind" in motion) || motion.kind !== "prescribed") return "";
+  const [low, high] = [values.get("actuator.angle_min") ?? -Infinity, values.get("actuator.angle_max") ?? Infinity];
+  const place = angle.findIndex((at) => at < low - SLACK || at > high + SLACK);
+  return place < 0 ? "" : `motion.profile leaves the stops of the device at ${plain(time[place] ?? 0)} s`;
 }
 
 const ENDING_TEXTS: Readonly<Record<Ending, string>> = {

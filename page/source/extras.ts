@@ -7,12 +7,11 @@ import type { PageFrame } from "./frame";
 import { refuseFile } from "./jobs";
 import { MapView } from "./map";
 import { shownMetric } from "./outcome";
-import { agreementTable, askForColumns, type ColumnMap, compare, mapOfHeader, recordingOf } from "./recording";
+import { agreementTable, askForColumns, columnsOf, type ColumnMap, mapOfHeader } from "./recording";
 import { scenarioFile } from "./scenario_file";
 import { shownNumber, valuesOf } from "./settings";
 import { samplesText, savePicture, saveState, saveText } from "./sharing";
 import { addressOf, stateOfFile } from "./state";
-import type { RecordedTable } from "./table";
 import { InputError, plain, readableUnit, telling } from "./units";
 import { type Effect, effectsOf } from "./variation";
 
@@ -53,7 +52,7 @@ export class Extras {
 
   /** What waits until a drag is over. */
   settle(): void {
-    if (this.app.overlay !== null) this.showErrors();
+    if (this.app.overlay !== null) void this.showErrors().catch(telling((words) => this.app.tell(words)));
   }
 
   private makeShare(): void {
@@ -148,14 +147,14 @@ export class Extras {
   async read(file: File): Promise<void> {
     this.app.tell(`Reading ${file.name} ...`);
     try {
-      const table = await this.app.workers.readTable(file);
-      const map = mapOfHeader(table);
-      if (map !== null) this.take(file.name, table, map);
+      const { reading, heads } = await this.app.workers.readTable(file);
+      const map = mapOfHeader(heads);
+      if (map !== null) await this.take(file.name, reading, map);
       else {
         this.app.tell(`${file.name}: say below what its columns are.`);
         const details = this.frame.recording.closest("details");
         if (details !== null) details.open = true;
-        this.asked.replaceChildren(askForColumns(table, (given) => this.take(file.name, table, given)));
+        this.asked.replaceChildren(askForColumns(heads, (given) => void this.take(file.name, reading, given)));
       }
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
@@ -163,10 +162,10 @@ export class Extras {
     }
   }
 
-  private take(name: string, table: RecordedTable, map: readonly ColumnMap[]): void {
+  private async take(name: string, reading: number, map: readonly ColumnMap[]): Promise<void> {
     try {
       const atmosphere = valuesOf(this.app.content, this.app.bench[0]!).get("supply.atmospheric_pressure") ?? 101325;
-      this.app.overlayWith(recordingOf(this.app.content, table, map, atmosphere));
+      this.app.overlayWith(await this.app.workers.takeRecording(reading, columnsOf(this.app.content, map, atmosphere)));
       this.asked.replaceChildren();
       this.app.tell(`${name} is drawn over the runs; below it is said how far they are from it.`);
       const details = this.frame.recording.closest("details");
@@ -177,15 +176,16 @@ export class Extras {
     }
   }
 
-  private showErrors(): void {
+  private async showErrors(): Promise<void> {
     const { app } = this;
-    if (app.overlay === null) return;
-    const found = app.named.map(({ name, configuration }) => {
+    const { overlay, state } = app;
+    const asked = app.named.map(async ({ name, configuration }) => {
       const run = app.runOf(configuration);
       const isHeld = JSON.stringify(programNamed(app.content, configuration.program).document["motion"] ?? "").includes('"held"');
-      return { name, errors: run === null || app.overlay === null ? [] : compare(app.overlay, run, valuesOf(app.content, configuration), isHeld) };
+      return { name, errors: run === null ? [] : await app.workers.agreement(run, valuesOf(app.content, configuration), isHeld) };
     });
-    this.errors.replaceChildren(agreementTable(found));
+    const found = await Promise.all(asked);
+    if (app.overlay === overlay && app.state === state) this.errors.replaceChildren(agreementTable(found));
   }
 
   private makeAssumptions(): void {

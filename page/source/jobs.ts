@@ -2,7 +2,9 @@
 
 import type { Program } from "./content";
 import type { Ensemble } from "./engine";
-import type { RecordedTable } from "./table";
+import type { ChannelError, Overlay, RecordedColumn } from "./agreement";
+import type { Values } from "./settings";
+import type { Heads } from "./table";
 import { InputError } from "./units";
 
 declare const WORKER_SCRIPT: string;
@@ -21,12 +23,16 @@ export interface RunsJob {
 export type Job =
   | { readonly kind: "program"; readonly program: Program; readonly bytes: ArrayBuffer }
   | { readonly kind: "table"; readonly number: number; readonly reading: number; readonly bytes: ArrayBuffer; readonly isLast: boolean }
+  | { readonly kind: "recording"; readonly number: number; readonly reading: number; readonly columns: readonly RecordedColumn[] }
+  | { readonly kind: "agreement"; readonly number: number; readonly run: Overlay; readonly values: Values; readonly isHeld: boolean }
   | RunsJob;
 
 export interface Reply {
   readonly number: number;
   readonly runs?: Ensemble;
-  readonly table?: RecordedTable;
+  readonly heads?: Heads;
+  readonly drawn?: Overlay;
+  readonly errors?: readonly ChannelError[];
   readonly fault?: string;
 }
 
@@ -78,17 +84,30 @@ export class Workers {
     };
   }
 
-  /** The table in a file. The page reads it, piece by piece: in WebKit a worker of a page from a file may not. */
-  async readTable(file: Blob): Promise<RecordedTable> {
+  /** Read the table in a file, which a worker keeps. The page reads it, piece by piece: in WebKit a worker of a page from a file may not. */
+  async readTable(file: Blob): Promise<{ readonly reading: number; readonly heads: Heads }> {
     this.start();
     const reading = this.next;
     for (let place = 0; ; place += PIECE) {
       const bytes = await file.slice(place, place + PIECE).arrayBuffer().catch(refuseFile);
       const isLast = place + PIECE >= file.size;
-      const { table } = await this.ask(this.crew.length - 1, (number) => ({ kind: "table", number, reading, bytes, isLast }), [bytes]);
-      if (table !== undefined) return table;
+      const { heads } = await this.ask(this.crew.length - 1, (number) => ({ kind: "table", number, reading, bytes, isLast }), [bytes]);
+      if (heads !== undefined) return { reading, heads };
       if (isLast) throw new InputError("the file could not be read");
     }
+  }
+
+  /** Make a recording of a table that was read; the worker keeps it, and gives as much of it as can be drawn. */
+  async takeRecording(reading: number, columns: readonly RecordedColumn[]): Promise<Overlay> {
+    const { drawn } = await this.ask(this.crew.length - 1, (number) => ({ kind: "recording", number, reading, columns }));
+    if (drawn === undefined) throw new RangeError("a worker gave no recording");
+    return drawn;
+  }
+
+  /** Errors of a run against the recording, of which millions of samples may be compared. */
+  async agreement({ time, channels }: Overlay, values: Values, isHeld: boolean): Promise<readonly ChannelError[]> {
+    const { errors } = await this.ask(this.crew.length - 1, (number) => ({ kind: "agreement", number, run: { time, channels }, values, isHeld }));
+    return errors ?? [];
   }
 
   private start(): void {

@@ -1,6 +1,5 @@
 /** Where the page begins: its content is unpacked, and the workbench is put in its place. */
 
-import "./language";
 import { App } from "./app";
 import type { Content } from "./content";
 import { element } from "./dom";
@@ -38,7 +37,7 @@ function interfaceOf(app: App) {
     values: (place: number) => Object.fromEntries(valuesOf(content, configuration(place))),
     settings: (place: number) => [...settingsByKey(programNamed(content, configuration(place).program)).values()],
     scenario: (place: number) => scenarioFile(content, configuration(place)),
-    read: async (name: string, text: string) => {
+    read: async (name: string, text: string | Blob) => {
       await app.extras.read(new File([text], name));
       return app.told;
     },

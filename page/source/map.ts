@@ -55,7 +55,9 @@ export class MapView {
   refresh(configurations: readonly Configuration[], names: readonly string[]): void {
     this.configurations = configurations;
     const chosen = Math.min(Math.max(0, this.of.selectedIndex), configurations.length - 1);
-    this.of.replaceChildren(...names.map((name, place) => element("option", { value: place, selected: place === chosen }, name)));
+    if ([...this.of.options].map((option) => option.text).join("\n") !== names.join("\n")) {
+      this.of.replaceChildren(...names.map((name, place) => element("option", { value: place, selected: place === chosen }, name)));
+    }
     const configuration = configurations[chosen];
     if (configuration === undefined || !this.isOpen) return;
     if (configuration.program !== this.program) this.fill(configuration.program);

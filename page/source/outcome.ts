@@ -18,6 +18,8 @@ interface Row {
   readonly changes: readonly HTMLElement[];
 }
 
+/** Metrics this small in SI are what rounding leaves of a balance. */
+const ROUNDING = 1e-12;
 const TOLD = ["rms_error", "gas_supplied", "switchings"];
 
 export class OutcomeTable {
@@ -59,7 +61,7 @@ export class OutcomeTable {
       {},
       element("th", { scope: "col" }, "Metric"),
       ...this.columns.map(({ name, place }) => element("th", { scope: "col", class: `number run-${place + 1}` }, name)),
-      ...others.map(({ name }) => element("th", { scope: "col", class: "number change" }, `${others.length > 1 ? `${name} ` : ""}less first`)),
+      ...others.map(({ name }) => element("th", { scope: "col", class: "number change" }, `${others.length > 1 ? `${name} ` : ""}vs first`)),
     );
     this.rows = [...metrics.values()].map((metric) => ({
       metric,
@@ -102,6 +104,7 @@ export function shownMetric(content: Content, metric: Metric, value: number): nu
 function changeText(first: number | undefined, other: number | undefined): string {
   if (first === undefined || other === undefined || !Number.isFinite(first - other)) return "–";
   if (first === other) return "0";
+  if (Math.max(Math.abs(first), Math.abs(other)) < ROUNDING) return "–";
   if (first === 0) return "–";
   const percent = ((other - first) / Math.abs(first)) * 100;
   return `${percent > 0 ? "+" : "−"}${plain(Math.abs(percent), 3)}\u00a0%`;

@@ -1,11 +1,12 @@
 /** Plots over time with one cursor: torque, pressures, command, angle, gas, with bands and recordings behind the curves. */
 
 import uPlot from "../vendor/uplot/uPlot.esm.js";
-import { interpolated } from "./agreement";
+import { interpolated, type Overlay } from "./agreement";
 import { colour, colourOf, DASHES } from "./colours";
 import { type Content, scalesOf } from "./content";
-import { element } from "./dom";
+import { element, whenQuiet } from "./dom";
 import type { Run } from "./engine";
+import { lineOn, pathsOf } from "./paths";
 import { fromSi, plain, readableUnit, scaleOf } from "./units";
 
 export interface Panel {
@@ -39,18 +40,16 @@ export interface Band {
   readonly high: Float64Array;
 }
 
-export interface Overlay {
-  readonly time: Float64Array;
-  readonly channels: ReadonlyMap<string, Float64Array>;
-}
-
 interface Drawn {
   readonly panel: Panel;
-  readonly plot: uPlot;
   readonly readout: HTMLElement;
   readonly shown: readonly number[];
-  /** A table for those who do not see the curves. */
   readonly figure: HTMLElement;
+  readonly host: HTMLElement;
+  /** Made when it first comes into sight, and drawn anew only while it is there: on a phone most plots never are. */
+  plot: uPlot | null;
+  isInSight: boolean;
+  isStale: boolean;
 }
 
 interface Line {
@@ -60,6 +59,10 @@ interface Line {
 }
 
 const AXIS_SIZE = 52;
+/** Plots this near to the window are drawn too, so that they are there when somebody scrolls. */
+const NEAR = "100px";
+/** Milliseconds without a change after which the other plots are drawn too. */
+const UNHURRIED = 1500;
 /** Channels that keep a value until the next sample. */
 const HELD = new Set(["command", "safe_state"]);
 
@@ -71,6 +74,8 @@ export class Panels {
   private first: Panel | null = null;
   private ranges = new Map<Panel, readonly [number, number]>();
   private readonly watcher = new ResizeObserver(() => this.fit());
+  private readonly rest = whenQuiet(UNHURRIED, () => this.drawRest());
+  private readonly sight = new IntersectionObserver((entries) => this.look(entries), { rootMargin: NEAR });
 
   constructor(
     private readonly host: HTMLElement,
@@ -80,42 +85,44 @@ export class Panels {
   ) {
     this.watcher.observe(host);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.rebuild());
+    addEventListener("beforeprint", () => this.drawAll());
   }
 
   /** Draw runs, over each other or beside each other. */
   show(shown: readonly Shown[], isBeside: boolean, overlay: Overlay | null): void {
     this.shown = shown;
     this.overlay = overlay;
-    const layout = JSON.stringify([isBeside, shown.map((item) => [item.name, item.place, [...item.run.channels.keys()].length > 0])]);
+    const layout = JSON.stringify([isBeside, shown.map((item) => [item.name, item.place, ...item.run.channels.keys()])]);
     const present = PANELS.filter((panel) => shown.some(({ run }) => panel.channels.some((name) => run.channels.has(name))));
     // What is asked for comes first: a torque, else how the vane moves.
     const leads = (panel: Panel) => panel.channels[0] === (shown.some(({ run }) => run.channels.has("reference")) ? "torque" : "angle");
     const panels = [...present.filter(leads), ...present.filter((panel) => !leads(panel))];
-    this.ranges = new Map(panels.map((panel) => [panel, this.rangeOf(panel)]));
+    this.ranges.clear();
     if (layout !== this.layout || this.drawn.length === 0) {
       this.layout = layout;
       this.build(panels, isBeside);
     } else {
-      for (const item of this.drawn) item.plot.setData(this.dataOf(item.panel, item.shown));
+      for (const item of this.drawn) item.isStale = true;
+      for (const item of this.drawn) if (item.isInSight) this.draw(item);
     }
+    this.rest();
   }
 
   /** Put the cursor of all plots to a time [s], or take it away. */
   point(time: number | null): void {
     for (const { plot } of this.drawn) {
-      const left = time === null ? -10 : plot.valToPos(time, "x");
-      plot.setCursor({ left, top: time === null ? -10 : 10 }, false);
+      const left = time === null || plot === null ? -10 : plot.valToPos(time, "x");
+      plot?.setCursor({ left, top: time === null ? -10 : 10 }, false);
     }
     this.read(time);
   }
 
   /** Names and canvases, from top to bottom, for a picture. */
   pictures(): { title: string; canvas: HTMLCanvasElement; box: DOMRect }[] {
-    return this.drawn.map(({ panel, plot, figure }) => ({
-      title: this.titleOf(panel),
-      canvas: plot.ctx.canvas,
-      box: figure.getBoundingClientRect(),
-    }));
+    this.drawAll();
+    return this.drawn.flatMap(({ panel, plot, figure }) =>
+      plot === null ? [] : [{ title: this.titleOf(panel), canvas: plot.ctx.canvas, box: figure.getBoundingClientRect() }],
+    );
   }
 
   private rebuild(): void {
@@ -125,7 +132,8 @@ export class Panels {
   }
 
   private build(panels: readonly Panel[], isBeside: boolean): void {
-    for (const { plot } of this.drawn) plot.destroy();
+    for (const { plot } of this.drawn) plot?.destroy();
+    this.sight.disconnect();
     this.first = panels[0] ?? null;
     this.host.classList.toggle("beside", isBeside);
     this.host.style.setProperty("--columns", String(isBeside ? this.shown.length : 2));
@@ -135,11 +143,44 @@ export class Panels {
       const readout = element("span", { class: "readout" });
       const name = isBeside ? `${this.shown[shown[0] ?? 0]?.name ?? ""}: ` : "";
       const title = element("figcaption", {}, element("span", { class: "title" }, `${name}${this.titleOf(panel)}`), readout);
-      return { panel, shown, readout, figure: element("figure", { class: "panel" }, title, element("div", { class: "plot", role: "img", "aria-label": `${name}${this.titleOf(panel)} over time; the table of metrics says it in numbers` })) };
+      const host = element("div", { class: "plot", role: "img", "aria-label": `${name}${this.titleOf(panel)} over time; the table of metrics says it in numbers` });
+      return { panel, shown, readout, host, figure: element("figure", { class: "panel" }, title, host), plot: null, isInSight: false, isStale: true };
     });
     this.host.replaceChildren(...figures.map(({ figure }) => figure));
-    this.drawn = figures.map((item) => ({ ...item, plot: this.plotOf(item.panel, item.shown, item.figure.lastElementChild as HTMLElement) }));
+    this.drawn = figures;
+    for (const item of this.drawn) {
+      if (item.panel === this.first) this.draw(item);
+      this.sight.observe(item.figure);
+    }
     this.read(null);
+  }
+
+  private look(entries: readonly IntersectionObserverEntry[]): void {
+    for (const item of this.drawn) {
+      const entry = entries.filter(({ target }) => target === item.figure).at(-1);
+      if (entry === undefined) continue;
+      item.isInSight = entry.isIntersecting;
+      if (item.isInSight) this.draw(item, entry.boundingClientRect.width);
+    }
+  }
+
+  /** Draw what is out of sight too, plot by plot, so that nothing waits for all of them. */
+  private drawRest(): void {
+    const next = this.drawn.find(({ isStale }) => isStale);
+    if (next === undefined) return;
+    this.draw(next);
+    setTimeout(() => this.drawRest(), 0);
+  }
+
+  private drawAll(): void {
+    for (const item of this.drawn) this.draw(item);
+  }
+
+  private draw(item: Drawn, width = 0): void {
+    if (!item.isStale) return;
+    item.isStale = false;
+    if (item.plot === null) item.plot = this.plotOf(item, width || item.host.clientWidth);
+    else item.plot.setData(this.dataOf(item.panel, item.shown));
   }
 
   private titleOf(panel: Panel): string {
@@ -147,7 +188,7 @@ export class Panels {
     return unit === "" || unit === "-" ? panel.title : `${panel.title} (${unit})`;
   }
 
-  private plotOf(panel: Panel, shown: readonly number[], host: HTMLElement): uPlot {
+  private plotOf({ panel, shown, host }: Drawn, width: number): uPlot {
     const lines = this.linesOf(panel, shown);
     const ink = colour("ink");
     const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
@@ -156,14 +197,14 @@ export class Panels {
       width: line.isWanted ? 1.5 : 2,
       dash: line.isWanted ? [6, 4] : (DASHES[panel.channels.indexOf(line.channel)] ?? []),
       points: { show: false },
-      ...(HELD.has(line.channel) ? { paths: uPlot.paths.stepped!({ align: 1 }) } : {}),
+      paths: pathsOf(HELD.has(line.channel)),
     }));
     const options: uPlot.Options = {
-      ...this.sizeOf(host, panel === this.first),
+      ...sizeOf(width, panel === this.first),
       legend: { show: false },
       cursor: { sync: { key: "time" }, drag: { x: false, y: false }, points: { size: 7 } },
-      scales: { x: { time: false }, y: { range: () => [...(this.ranges.get(panel) ?? [0, 1])] as [number, number] } },
-      axes: [{ ...axis, size: 28, values: (_, ticks) => ticks.map((tick) => `${plain(tick)}`) }, { ...axis, size: AXIS_SIZE, values: (_, ticks) => ticks.map((tick) => plain(tick)) }],
+      scales: { x: { time: false }, y: { range: () => [...this.rangeFor(panel)] as [number, number] } },
+      axes: [{ ...axis, size: 28, space: 80, values: (_, ticks) => ticks.map((tick) => `${plain(tick)}`) }, { ...axis, size: AXIS_SIZE, values: (_, ticks) => ticks.map((tick) => plain(tick)) }],
       series: [{}, ...series],
       hooks: {
         drawAxes: [(plot) => this.drawBehind(plot, panel, shown)],
@@ -254,6 +295,12 @@ export class Panels {
     return found;
   }
 
+  private rangeFor(panel: Panel): readonly [number, number] {
+    const found = this.ranges.get(panel) ?? this.rangeOf(panel);
+    this.ranges.set(panel, found);
+    return found;
+  }
+
   /** From least to largest of a panel over all that is shown in it, so that plots beside each other can be compared. */
   private rangeOf(panel: Panel): readonly [number, number] {
     let [low, high] = [Infinity, -Infinity];
@@ -317,27 +364,23 @@ export class Panels {
 
   private drawRecorded(plot: uPlot, channel: string, time: Float64Array, values: Float64Array): void {
     const { ctx } = plot;
-    const step = Math.max(1, Math.floor(time.length / 8000));
-    ctx.beginPath();
-    for (let place = 0; place < time.length; place += step) {
-      ctx.lineTo(plot.valToPos(time[place] ?? 0, "x", true), plot.valToPos(this.display(channel, values[place] ?? 0), "y", true));
-    }
     ctx.strokeStyle = colour("recorded");
     ctx.lineWidth = 1.5 * devicePixelRatio;
-    ctx.stroke();
-  }
-
-  private sizeOf(host: HTMLElement, isFirst: boolean): { width: number; height: number } {
-    const width = Math.max(200, host.clientWidth);
-    return { width, height: isFirst ? Math.min(300, Math.max(190, width * 0.42)) : 170 };
+    ctx.stroke(lineOn(plot, time, this.displayed(channel, values), false));
   }
 
   private fit(): void {
-    for (const { plot, panel, figure } of this.drawn) {
-      const size = this.sizeOf(figure.lastElementChild as HTMLElement, panel === this.first);
-      if (size.width !== plot.width || size.height !== plot.height) plot.setSize(size);
-    }
+    const sizes = this.drawn.map(({ host, panel }) => sizeOf(host.clientWidth, panel === this.first));
+    this.drawn.forEach(({ plot }, place) => {
+      const size = sizes[place];
+      if (plot !== null && size !== undefined && (size.width !== plot.width || size.height !== plot.height)) plot.setSize(size);
+    });
   }
+}
+
+function sizeOf(hostWidth: number, isFirst: boolean): { width: number; height: number } {
+  const width = Math.max(200, Math.round(hostWidth));
+  return { width, height: isFirst ? Math.min(300, Math.max(190, width * 0.42)) : 170 };
 }
 
 function sameClock(a: Float64Array, b: Float64Array): boolean {

@@ -1,7 +1,7 @@
 /** A configuration as a scenario file that `ppafo simulate` runs to the same bits. */
 
 import { type Content, type Json, programNamed, type Setting, type Table } from "./content";
-import { type Configuration, valuesOf } from "./settings";
+import { type Configuration, normalText, valuesOf } from "./settings";
 
 const SI_PRESSURE = "Pa_a";
 const HOW_TO_RUN = { scenario: "simulate THIS-FILE.toml", walk: "walk THIS-FILE.toml --minutes " };
@@ -9,7 +9,7 @@ const HOW_TO_RUN = { scenario: "simulate THIS-FILE.toml", walk: "walk THIS-FILE.
 const NOT_OF_WALKS = ["run.duration", "run.output_interval"];
 const SECOND_NAMES: Readonly<Record<string, string>> = { "controller.period": "rate" };
 
-/** TOML of a configuration. What was typed stands there as it was typed. */
+/** TOML of a configuration. What was typed stands there with the unit it was typed in; a bare number has that which is shown. */
 export function scenarioFile(content: Content, configuration: Configuration): string {
   const program = programNamed(content, configuration.program);
   const texts = writtenTexts(content, configuration);
@@ -37,9 +37,11 @@ function writtenTexts(content: Content, configuration: Configuration): [Setting,
   const found: [Setting, string][] = [];
   for (const setting of program.settings) {
     if (program.kind === "walk" && NOT_OF_WALKS.includes(setting.key)) continue;
+    // What has to stay 0 is 0 in the scenario too, and a file may not say so.
+    if (setting.kept === "zero") continue;
     const value = values.get(setting.key) ?? setting.value;
     const typed = configuration.changes[setting.key];
-    if (typed !== undefined) found.push([setting, typed]);
+    if (typed !== undefined) found.push([setting, setting.unit === "" ? String(value) : normalText(setting, typed)]);
     else if (isPinned(setting) || value !== setting.value || (isLevelChanged && setting.unit === SI_PRESSURE)) {
       found.push([setting, `${String(value)} ${setting.unit}`.trim()]);
     }
@@ -58,7 +60,15 @@ function put(document: Record<string, Json>, setting: Setting, text: string): vo
   }
   const second = SECOND_NAMES[setting.key];
   if (second !== undefined) delete table[second];
+  forget(document, [setting.key, `${parts.join(".")}.${second ?? ""}`]);
   table[name] = setting.unit === "" || name === "seed" ? Number(text) : text;
+}
+
+/** Why a value was assumed is not said of another one. */
+function forget(document: Record<string, Json>, keys: readonly string[]): void {
+  const assumed = document["assumed"];
+  if (assumed === undefined || !isTable(assumed)) return;
+  document["assumed"] = Object.fromEntries(Object.entries(assumed).filter(([key]) => !keys.includes(key)));
 }
 
 function tables(document: Table, path: readonly string[] = []): string {

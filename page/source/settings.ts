@@ -26,8 +26,18 @@ export function settingsByKey(program: Program): ReadonlyMap<string, Setting> {
   return found;
 }
 
+const reckoned = new WeakMap<Configuration, Values>();
+
 /** All numbers of a configuration in SI, in the order of the program. Throws InputError for a text that is no such number. */
 export function valuesOf(content: Content, configuration: Configuration): Values {
+  const known = reckoned.get(configuration);
+  if (known !== undefined) return known;
+  const values = valuesFrom(content, configuration);
+  reckoned.set(configuration, values);
+  return values;
+}
+
+function valuesFrom(content: Content, configuration: Configuration): Values {
   const program = programNamed(content, configuration.program);
   const { changes } = configuration;
   const settings = settingsByKey(program);
@@ -99,12 +109,18 @@ export function shownNumber(content: Content, setting: Setting, value: number, a
 
 /** The first pair of settings that contradict each other, as one line; empty where there is none. */
 export function contradiction(program: Program, values: Values): string {
-  for (const { key, relation, other, slack } of program.relations) {
+  for (const { key, relation, other, factor, slack } of program.relations) {
     const [left, right] = [values.get(key), values.get(other)];
     if (left === undefined || right === undefined) continue;
-    if (!holds(relation, left, right, slack)) return `${key} must be ${relation} ${other}`;
+    if (!holds(relation, left, factor * right, slack)) return `${key} must be ${relation} ${factor < 1.01 ? "" : `${factor} times `}${other}`;
   }
-  return program.kind === "walk" ? "" : contradictionOfTimes(values);
+  return program.kind === "walk" ? contradictionOfProfile(values) : contradictionOfTimes(values);
+}
+
+/** A torque over the stride must have ended with it. */
+function contradictionOfProfile(values: Values): string {
+  const [peak, fall] = [values.get("controller.peak_time") ?? 0, values.get("controller.fall_time") ?? 0];
+  return peak + fall > 1 ? "controller.peak_time: with controller.fall_time the torque would end after the stride" : "";
 }
 
 /** What a scenario file may not have either: samples that do not divide the run, a step longer than a sample of the controller. */

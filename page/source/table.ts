@@ -2,9 +2,11 @@
 
 import { InputError, short } from "./units";
 
+/** Names of columns with their units, empty where the header names none. */
+export type Heads = readonly { readonly name: string; readonly unit: string }[];
+
 export interface RecordedTable {
-  /** Names of the columns with their units, empty where the header names none. */
-  readonly heads: readonly { readonly name: string; readonly unit: string }[];
+  readonly heads: Heads;
   readonly columns: readonly Float64Array[];
 }
 

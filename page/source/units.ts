@@ -32,6 +32,9 @@ export function normalUnit(unit: string): string {
   return SPELLINGS.reduce((text, [pattern, other]) => text.replace(pattern, other), unit.trim());
 }
 
+/** Scales by unit, of the lists that were asked: the page asks some hundred times a frame. */
+const known = new WeakMap<readonly UnitScale[], Map<string, UnitScale>>();
+
 export interface Quantity {
   readonly number: number;
   readonly unit: string;
@@ -48,11 +51,15 @@ export function splitQuantity(text: string): Quantity {
 
 /** The scale of a unit among those that fit, or an error that names them. */
 export function scaleOf(unit: string, scales: readonly UnitScale[]): UnitScale {
-  const wanted = normalUnit(unit);
-  const found = scales.find((scale) => normalUnit(scale.unit) === wanted);
+  let byUnit = known.get(scales);
+  if (byUnit === undefined) {
+    byUnit = new Map([...scales].reverse().flatMap((scale) => [[normalUnit(scale.unit), scale] as const, [scale.unit, scale] as const]));
+    known.set(scales, byUnit);
+  }
+  const found = byUnit.get(unit) ?? byUnit.get(normalUnit(unit));
   if (found !== undefined) return found;
-  const known = scales.map((scale) => scale.unit || "a plain number").join(", ");
-  throw new InputError(`unit '${short(unit)}' does not fit here; known: ${known}`);
+  const names = scales.map((scale) => scale.unit || "a plain number").join(", ");
+  throw new InputError(`unit '${short(unit)}' does not fit here; known: ${names}`);
 }
 
 /** A number of some unit in SI; gauge pressure counts from the atmosphere (Pa absolute). */

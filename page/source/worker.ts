@@ -2,19 +2,25 @@
 
 import { Engine } from "./engine";
 import type { Program } from "./content";
+import { compare, drawnOf, type Overlay, recordingOf } from "./agreement";
 import { type Job, type Reply, RunsJob } from "./jobs";
-import { TableReading } from "./table";
+import { type RecordedTable, TableReading } from "./table";
 import { InputError } from "./units";
 
 const engines = new Map<string, Promise<Engine>>();
 const readings = new Map<number, TableReading>();
+/** The last table that was read, until it is a recording, and the last recording. */
+let table: { readonly reading: number; readonly columns: RecordedTable["columns"] } | null = null;
+let recorded: Overlay | null = null;
 
 self.onmessage = async (event: MessageEvent<Job>) => {
   const job = event.data;
   try {
     if (job.kind === "program") engines.set(job.program.name, engineOf(job.program, job.bytes));
     else if (job.kind === "runs") await runMany(job);
-    else read(job);
+    else if (job.kind === "table") read(job);
+    else if (job.kind === "recording") answer({ number: job.number, drawn: take(job) }, []);
+    else answer({ number: job.number, errors: recorded === null ? [] : compare(recorded, job.run, job.values, job.isHeld) }, []);
   } catch (error) {
     if (!(error instanceof InputError || error instanceof RangeError)) throw error;
     if (job.kind === "table") readings.delete(job.reading);
@@ -27,11 +33,24 @@ async function engineOf(program: Program, bytes: ArrayBuffer): Promise<Engine> {
 }
 
 function read({ number, reading, bytes, isLast }: Job & { kind: "table" }): void {
-  const table = readings.get(reading) ?? new TableReading();
-  readings.set(reading, table);
-  table.take(bytes, isLast);
-  if (isLast) readings.delete(reading);
-  answer(isLast ? { number, table: table.end() } : { number }, []);
+  const begun = readings.get(reading) ?? new TableReading();
+  readings.set(reading, begun);
+  begun.take(bytes, isLast);
+  if (!isLast) {
+    answer({ number }, []);
+    return;
+  }
+  readings.delete(reading);
+  const { heads, columns } = begun.end();
+  table = { reading, columns };
+  answer({ number, heads }, []);
+}
+
+function take({ reading, columns }: Job & { kind: "recording" }): Overlay {
+  if (table?.reading !== reading) throw new InputError("another file was read meanwhile; choose it again");
+  recorded = recordingOf(table.columns, columns);
+  table = null;
+  return drawnOf(recorded);
 }
 
 async function runMany(job: RunsJob): Promise<void> {

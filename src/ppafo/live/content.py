@@ -23,6 +23,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.units import conversion, from_si, to_si
 from ppafo.version import __version__
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.contradictions import COMPRESSION
 from ppafo.walking.loading import load_walk
 
 Interval = tuple[float, float]
@@ -51,6 +52,13 @@ _UNITS: dict[str, tuple[str, ...]] = {
 _GAUGES = ("psi_g", "kPa_g", "bar_g", "Pa_g")
 _OTHER_ATMOSPHERE = 90000.0
 _FIRST_STRIDE = "controller.first_stride_time"
+_OF_FILES = (
+    ("controller.highest_pressure", "supply.pressure", COMPRESSION),
+    ("controller.highest_pressure", "supply.dorsiflexion_pressure", COMPRESSION),
+    ("controller.frozen_time", "controller.period", 2.0),
+    ("controller.fill_time", "valve.delay", 1.0),
+    ("controller.vent_time", "valve.delay", 1.0),
+)
 _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
@@ -85,13 +93,30 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
         ),
         "settings": [_setting(_as_in_files(entry, item.scenario), gauge, intervals) for entry in told["settings"]],
         "relations": [
-            {"key": one["key"], "relation": one["relation"], "other": one["other"], "slack": one["tolerance"]}
+            {
+                "key": one["key"],
+                "relation": one["relation"],
+                "other": one["other"],
+                "factor": 1.0 + one["tolerance"] * one["is_share"],
+                "slack": 0.0 if one["is_share"] else one["tolerance"],
+            }
             for one in told["relations"]
-        ],
+        ]
+        + _relations_of_files(told),
         "channels": [_shown(entry) for entry in told["channels"] if entry["name"] != "time"],
         "metrics": [_shown(entry) for entry in told["metrics"]],
         "module": module,
     }
+
+
+def _relations_of_files(told: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Contradictions that the file of a walk refuses and its program does not."""
+    keys = {entry["key"] for entry in told["settings"]}
+    return [
+        {"key": key, "relation": "above", "other": other, "factor": factor, "slack": 0.0}
+        for key, other, factor in _OF_FILES
+        if told["kind"] == "walk" and {key, other} <= keys
+    ]
 
 
 def _as_in_files(entry: Mapping[str, Any], item: Scenario | Configuration) -> dict[str, Any]:
@@ -152,7 +177,7 @@ def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapp
         "key": key,
         "label": words()["labels"].get(key, _called(entry["group"], entry["name"])),
         "unit": _bare(entry["unit"]),
-        "shown": _bare(entry["display"]["unit"]),
+        "shown": _typed(_bare(entry["display"]["unit"]), entry["unit"]),
         "low": entry["minimum"],
         "high": entry["maximum"],
         "isLowAllowed": entry["is_minimum_allowed"],
