@@ -269,8 +269,8 @@ def compare_arithmetics() -> None:
         print(
             f"{valve}: {seen.size} runs, {seen.sum()} found with floats and {found.sum()} on whole numbers, neither "
             f"found nor harmless {bad[0].sum()} and {bad[1].sum()}; later by {later.max():.2f} strides at most, within "
-            f"{NEAR * 1.0e3:g} ms of each other in {near}; floats with the converter's steps find {coarse.sum()}, of the "
-            f"{(seen & ~found).sum()} that only floats find {(seen & ~found & coarse).sum()}, of the "
+            f"{NEAR * 1.0e3:g} ms of each other in {near}; floats with the converter's steps find {coarse.sum()}, of "
+            f"the {(seen & ~found).sum()} that only floats find {(seen & ~found & coarse).sum()}, of the "
             f"{(found & ~seen).sum()} that only whole numbers find {(found & ~seen & coarse).sum()}"
         )
         for row, what in enumerate(every):
