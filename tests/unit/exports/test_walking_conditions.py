@@ -6,16 +6,19 @@ between two numbers: the average lies between both strides, so that neither limi
 
 from pathlib import Path
 
-import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from ppafo.control.fixed.arithmetic import fraction_of
-from ppafo.control.fixed.walking.phases import HALVES, LONGEST_STRIDE
+from ppafo.control.fixed.arithmetic import FRACTION_BITS, HALF, LARGEST_FRACTION, nearest_fraction_of
+from ppafo.control.fixed.walking.phases import HALVES, LONGEST, LONGEST_STRIDE, next_stride
+from ppafo.control.fixed.walking.readings import TOP
 from ppafo.exports.firmware.walking import walk_chip, walk_firmware
 from ppafo.exports.firmware.walking.drawn import gait_readings
 from ppafo.exports.firmware.walking.lock_step import PythonWalkChip
 from ppafo.exports.firmware.walking.made import SAMPLES
 from ppafo.walking.loading import load_walk
+from tests.unit.control.test_fixed_walking import RULES
 from tests.unit.exports.test_firmware_conditions import TOOLS, reached
 
 WALK = ("solenoid", ("controller.arithmetic=fixed",))
@@ -51,23 +54,24 @@ def shown(code: list[str], missing: str) -> str:
     return f"{function.rpartition('phases_')[2]}: {begins}: {what}"
 
 
-def test_a_part_of_a_number_lies_between_zero_and_the_number_whatever_the_fraction() -> None:
-    # Each of its fifteen turns makes (t + v) >> 1 or t >> 1 of t: both grow with t, so that the ends of the range tell.
-    values = np.arange(-HALVES, HALVES + 2)
-    lowest, highest = np.minimum(values, 0), np.maximum(values - 1, 0)
-    for ends in (lowest, highest):
-        for after in (ends + values >> 1, ends >> 1):
-            assert np.all((lowest <= after) & (after <= highest))
-    drawn = np.random.default_rng(1).integers(0, 2**15, values.size)
-    parts = [fraction_of(int(value), int(share)) for value, share in zip(values[::16], drawn[::16], strict=True)]
-    assert np.all((lowest[::16] <= parts) & (parts <= highest[::16]))
+@given(st.integers(-TOP, TOP), st.integers(0, LARGEST_FRACTION))
+def test_the_nearest_fraction_is_that_of_exact_arithmetic(value: int, fraction: int) -> None:
+    assert nearest_fraction_of(value, fraction) == value * fraction + HALF >> FRACTION_BITS
 
 
-def test_the_average_of_two_strides_is_never_beyond_its_range() -> None:
-    known = np.append(np.arange(0, HALVES, 13), HALVES)[:, None]
-    halves = 2 * np.append(np.arange(0, LONGEST_STRIDE, 13), LONGEST_STRIDE)[None, :]
-    ahead = halves - known + 1
-    assert ahead.min() >= -HALVES
-    assert ahead.max() <= HALVES + 1
-    assert (known + np.minimum(ahead, 0)).min() >= 0
-    assert (known + np.maximum(ahead - 1, 0)).max() <= HALVES
+def test_the_nearest_fraction_of_a_number_lies_between_zero_and_the_number() -> None:
+    # It grows or falls with the fraction, so that the smallest and the largest one tell of all.
+    for value in range(-TOP, TOP + 1, 3):
+        assert nearest_fraction_of(value, 0) == 0
+        assert min(value, 0) <= nearest_fraction_of(value, LARGEST_FRACTION) <= max(value, 0)
+
+
+def test_so_the_average_of_two_strides_is_never_beyond_its_range() -> None:
+    # known + part of (halves - known): between both, whichever is the longer one.
+    assert 2 * LONGEST_STRIDE == HALVES
+    for known in range(0, HALVES + 1, 1489):
+        for since in (0, 1, known // 4, known // 4 + 1, known - 1, known, LONGEST_STRIDE, LONGEST):
+            halves = 2 * min(max(since, 0), LONGEST_STRIDE)
+            for weight in (0, 9830, LARGEST_FRACTION):
+                found = next_stride(RULES._replace(stride_weight=weight), known, max(since, 0))
+                assert min(known, halves) <= found <= max(known, halves)
