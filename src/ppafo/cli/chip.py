@@ -99,9 +99,9 @@ def _one(parsed: argparse.Namespace) -> _Told:
     from ppafo.simulation.scenario import Scenario
 
     every = [load_exportable(name, parsed.overrides) for name in parsed.scenarios]
-    scenarios = [chosen for chosen in every if isinstance(chosen, Scenario)]
     if len(every) == 1:
-        return _scenario(scenarios[0], parsed) if scenarios else _walk(every[0], parsed)
+        return _scenario(every[0], parsed) if isinstance(every[0], Scenario) else _walk(every[0], parsed)
+    scenarios = [chosen for chosen in every if isinstance(chosen, Scenario)]
     if parsed.plant or parsed.samples is not None or len(scenarios) < len(every):
         raise ScenarioError(
             "several SCENARIOs: are run in turn and drawn in one figure; give one for a walk, --samples or --plant"

@@ -120,7 +120,7 @@ def steps(readings: tuple[int, ...]) -> GaitMeasurement:
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed: int) -> None:
     drawn, command, both = DrawnGait(CONVERTER, seed), 0, Both()
-    levels, other_commands, other_signs, samples = set(), 0, 0, 15_000
+    levels, other_commands, other_signs, samples, differed = set(), 0, 0, 15_000, False
     for _ in range(samples):
         readings, begins = drawn.next(command)
         both = Both() if begins else both
@@ -129,14 +129,13 @@ def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed:
         levels.add(both.fixed_state.safety.level)
         other_commands += wanted != found
         wanted_safety, found_safety = both.float_state.safety, both.fixed_state.safety
-        other_signs += (wanted_safety.level, wanted_safety.finding.sign) != (
-            found_safety.level,
-            found_safety.finding.sign,
-        )
+        differs = (wanted_safety.level, wanted_safety.finding.sign) != (found_safety.level, found_safety.finding.sign)
+        # Floats add up times, and so pass a limit a sample earlier or later.
+        assert not (differs and differed)
+        other_signs, differed = other_signs + differs, differs
     assert {0.0, 3.0} <= levels
-    # A threshold that is crossed by less than a count or a sample moves a change by a sample or two.
-    assert other_commands < 0.001 * samples
-    assert other_signs < 0.001 * samples
+    assert other_commands < 0.0005 * samples
+    assert other_signs < 0.0002 * samples
 
 
 @pytest.mark.parametrize(
