@@ -6,7 +6,8 @@ mid-swing than without the device, or more than 1 N m against the foot's way (pl
 mid-swing, dorsiflexion on the toes). It prints the table of docs/walking-faults.md.
 
 ``python scripts/walking_faults.py fixed`` runs the controller ``event_on_off`` with floats and on whole numbers through
-the same faults instead, and prints those in which they differ: in the verdict, or in the time until found.
+the same faults instead, and prints those in which they differ: in the verdict, or in the time until found. Floats that
+see the steps of the same converter run through them too: what these miss as well is the converter's, not the law's.
 """
 
 import sys
@@ -27,6 +28,7 @@ from ppafo.model.plant import chamber_pressures
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking.comparison import with_device_off
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.fixed_point import converter_of_walk
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
@@ -256,23 +258,37 @@ def compare_arithmetics() -> None:
     for valve in ("solenoid", "proportional"):
         own = ("controller.kind=event_on_off", f"device.valve={valve}")
         walks = [load_walk("solenoid", (*own, *further)) for further in ((), ("controller.arithmetic=fixed",))]
+        walks.append(load_walk("solenoid", (*own, *steps_of_converter(walks[1]))))
         both = [run(configuration, list(every.values()), begins) for configuration in walks]
-        seen, found = (np.isfinite(one.found) for one in both)
+        seen, found, coarse = (np.isfinite(one.found) for one in both)
         later = np.zeros(seen.shape)
         later[seen & found] = both[1].found[seen & found] - both[0].found[seen & found]
         floor = toes_of_bare(walks[0]) - CLEARANCE
         bad = [neither(one, floor) for one in both]
+        near = (np.abs(later[seen & found]) * stride < NEAR).sum()
         print(
             f"{valve}: {seen.size} runs, {seen.sum()} found with floats and {found.sum()} on whole numbers, neither "
             f"found nor harmless {bad[0].sum()} and {bad[1].sum()}; later by {later.max():.2f} strides at most, within "
-            f"{NEAR * 1.0e3:g} ms of each other in {(np.abs(later[seen & found]) * stride < NEAR).sum()}"
+            f"{NEAR * 1.0e3:g} ms of each other in {near}; floats with the converter's steps find {coarse.sum()}, of "
+            f"the {(seen & ~found).sum()} that only floats find {(seen & ~found & coarse).sum()}, of the "
+            f"{(found & ~seen).sum()} that only whole numbers find {(found & ~seen & coarse).sum()}"
         )
         for row, what in enumerate(every):
             if (seen[row] != found[row]).any() or np.abs(later[row]).max() > LATER:
-                counts = f"{seen[row].sum()} and {found[row].sum()} of {PHASES} found"
-                ends = [np.where(np.isfinite(one.found[row]), one.found[row], 0.0).max() for one in both]
+                counts = f"{seen[row].sum()} and {found[row].sum()} of {PHASES} found, with steps {coarse[row].sum()}"
+                ends = [np.where(np.isfinite(one.found[row]), one.found[row], 0.0).max() for one in both[:2]]
                 harm = f"neither found nor harmless {bad[0][row].sum()} and {bad[1][row].sum()}"
                 print(f"  {what}: {counts}, within {ends[0]:.2f} and {ends[1]:.2f} strides, {harm}")
+
+
+def steps_of_converter(configuration: Configuration) -> tuple[str, ...]:
+    """Overrides that give the sensors of a walk the steps of its converter."""
+    converter = converter_of_walk(configuration)
+    return (
+        f"sensors.force_resolution={converter.force_step!r} N",
+        f"sensors.angle_resolution={converter.angle_step!r} rad",
+        f"sensors.pressure_resolution={converter.pressure_step!r} Pa_d",
+    )
 
 
 def neither(runs: Runs, floor: float) -> NDArray[np.bool_]:

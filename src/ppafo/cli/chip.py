@@ -1,7 +1,8 @@
 """``ppafo chip``: a scenario or a walk with its controller on the simulator of a small processor."""
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
@@ -16,6 +17,8 @@ from ppafo.control.fixed.kind import PLANT_TARGETS, TARGETS, WALK_TARGETS
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ppafo.exports.firmware.lock_step import ChipRun, Comparison, Cost
     from ppafo.exports.firmware.two_boards import BoardsRun
     from ppafo.exports.firmware.walking.lock_step import WalkOnChip
@@ -31,7 +34,9 @@ SAMPLES_OF_TABLE = 1000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help="name of a scenario or a walk, or a .toml file")
+    parser.add_argument(
+        "scenarios", metavar="SCENARIO", nargs="*", help="name of a scenario or a walk, or a .toml file; or scenarios"
+    )
     parser.add_argument(
         "--target",
         choices=(*TARGETS, *WALK_TARGETS),
@@ -64,52 +69,87 @@ def run(parsed: argparse.Namespace) -> int:
     """Run a scenario with the chip's simulator in charge of the valve; 1 where any decision differs."""
     if parsed.samples is not None and not 1 <= parsed.samples <= MOST_SAMPLES:
         raise ScenarioError(f"--samples {parsed.samples}: must be 1 to {MOST_SAMPLES}")
-    if parsed.table and (parsed.scenario is not None or parsed.overrides or parsed.plant or parsed.minutes is not None):
+    if parsed.table and (parsed.scenarios or parsed.overrides or parsed.plant or parsed.minutes is not None):
         raise ScenarioError("--table: takes no SCENARIO, --set, --plant or --minutes; its scenarios are given")
     if parsed.table and parsed.target in WALK_TARGETS:
         raise ScenarioError(f"--table: its scenarios run on {', '.join(TARGETS)}; {parsed.target} is for walks")
     if parsed.plant and parsed.samples is not None:
         raise ScenarioError("--plant and --samples: give one of them; drawn samples have no plant")
-    if not parsed.table and parsed.scenario is None:
+    if not parsed.table and not parsed.scenarios:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo chip --help'")
     check_output(parsed)
     load_compiler()
-    text, document, agrees = _table(parsed) if parsed.table else _one(parsed)
-    deliver("chip", text, document, parsed)
-    return EXIT_GOOD if agrees else EXIT_CHECK_FAILED
+    told = _table(parsed) if parsed.table else _one(parsed)
+    deliver("chip", told.text, told.document, parsed, told.draw)
+    return EXIT_GOOD if told.agrees else EXIT_CHECK_FAILED
 
 
-def _one(parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
-    """One scenario or walk on one target: text, document, and whether all decisions are the same."""
+class _Told(NamedTuple):
+    """What came of a command: text, document, whether all decisions are the same, and a figure of runs over time."""
+
+    text: str
+    document: dict[str, Any]
+    agrees: bool
+    draw: "Callable[[], Figure] | None" = None
+
+
+def _one(parsed: argparse.Namespace) -> _Told:
+    """Scenarios or one walk on one target."""
     from ppafo.exports.loading import load_exportable
     from ppafo.simulation.scenario import Scenario
 
-    chosen = load_exportable(parsed.scenario, parsed.overrides)
-    return _scenario(chosen, parsed) if isinstance(chosen, Scenario) else _walk(chosen, parsed)
+    every = [load_exportable(name, parsed.overrides) for name in parsed.scenarios]
+    if len(every) == 1:
+        return _scenario(every[0], parsed) if isinstance(every[0], Scenario) else _walk(every[0], parsed)
+    scenarios = [chosen for chosen in every if isinstance(chosen, Scenario)]
+    if parsed.plant or parsed.samples is not None or len(scenarios) < len(every):
+        raise ScenarioError(
+            "several SCENARIOs: are run in turn and drawn in one figure; give one for a walk, --samples or --plant"
+        )
+    return _runs(scenarios, parsed)
 
 
-def _scenario(scenario: "Scenario", parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
-    """A scenario on the chip: text, document, and whether all decisions are the same."""
-    from ppafo.exports.firmware.lock_step import compare_drawn, run_on_chip
-    from ppafo.exports.firmware.two_boards import run_on_two_boards
-
-    target = parsed.target or TARGETS[0]
+def _target_of(scenario: "Scenario", parsed: argparse.Namespace) -> str:
+    target: str = parsed.target or TARGETS[0]
     if target not in TARGETS or parsed.minutes is not None:
         raise ScenarioError(f"{scenario.name}: {', '.join(WALK_TARGETS)} and --minutes are for walks")
+    return target
+
+
+def _runs(scenarios: "Sequence[Scenario]", parsed: argparse.Namespace) -> _Told:
+    """Scenarios with the chip in charge, one after the other, and their figure."""
+    from ppafo.exports.firmware.figure import chip_figure
+    from ppafo.exports.firmware.lock_step import run_on_chip
+
+    found = [run_on_chip(scenario, _target_of(scenario, parsed)) for scenario in scenarios]
+    documents = [{"scenario": one.scenario.name, "target": one.cost.target.name, **_run_document(one)} for one in found]
+    return _Told(
+        "\n\n".join(map(_of_run, found)),
+        documents[0] if len(documents) == 1 else {"runs": documents},
+        all(one.same_bits and not one.differences for one in found),
+        lambda: chip_figure(found),
+    )
+
+
+def _scenario(scenario: "Scenario", parsed: argparse.Namespace) -> _Told:
+    """A scenario on the chip."""
+    from ppafo.exports.firmware.lock_step import compare_drawn
+    from ppafo.exports.firmware.two_boards import run_on_two_boards
+
+    target = _target_of(scenario, parsed)
     if parsed.plant:
         both = run_on_two_boards(scenario, target, parsed.plant)
         text, document, agrees = _of_boards(both, target), _boards_document(both), not both.differences
     elif parsed.samples is None:
-        found = run_on_chip(scenario, target)
-        text, document, agrees = _of_run(found), _run_document(found), found.same_bits and not found.differences
+        return _runs((scenario,), parsed)
     else:
         drawn = compare_drawn(scenario, parsed.samples, target=target)
         text, document, agrees = _of_drawn(scenario, drawn), _drawn_document(drawn), not drawn.differences
-    return text, {"scenario": scenario.name, "target": target, **document}, agrees
+    return _Told(text, {"scenario": scenario.name, "target": target, **document}, agrees)
 
 
-def _walk(configuration: "Configuration", parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
-    """A walk on the chip: text, document, and whether all decisions are the same."""
+def _walk(configuration: "Configuration", parsed: argparse.Namespace) -> _Told:
+    """A walk on the chip."""
     from ppafo.exports.firmware.walking.lock_step import compare_drawn_walk, walk_on_chip
 
     name, target = configuration.name, parsed.target or WALK_TARGETS[0]
@@ -128,7 +168,7 @@ def _walk(configuration: "Configuration", parsed: argparse.Namespace) -> tuple[s
     else:
         found = walk_on_chip(configuration, WALK_MINUTES if parsed.minutes is None else parsed.minutes)
         text, document, agrees = _of_walk(found, configuration), _walk_document(found), found.same_bits
-    return text, {"walk": name, "target": target, **document}, agrees
+    return _Told(text, {"walk": name, "target": target, **document}, agrees)
 
 
 def _of_walk(found: "WalkOnChip", configuration: "Configuration") -> str:
@@ -154,8 +194,8 @@ def _walk_document(found: "WalkOnChip") -> dict[str, Any]:
     return {**told, **_cost_document(found.cost), "level": found.level, "gas": found.gas}
 
 
-def _table(parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
-    """Every controller on every target: the table, its document, and whether all decisions are the same."""
+def _table(parsed: argparse.Namespace) -> _Told:
+    """Every controller on every target, as a table."""
     from ppafo.exports.firmware.table import rows
 
     lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
@@ -176,7 +216,7 @@ def _table(parsed: argparse.Namespace) -> tuple[str, dict[str, Any], bool]:
         )
         documents.append({**own, **_drawn_document(found)})
         agrees = agrees and not found.differences
-    return "\n".join(lines), {"rows": documents}, agrees
+    return _Told("\n".join(lines), {"rows": documents}, agrees)
 
 
 def _of_run(found: "ChipRun") -> str:

@@ -79,10 +79,16 @@ def run(parsed: argparse.Namespace) -> int:
     """Run the plant to its end; 1 where it was vented or diverged, 130 where Ctrl-C stopped it."""
     check_patience(parsed.patience)
     from ppafo.exports.hil.pace import stop_by_interrupt
-    from ppafo.simulation.loading import load_scenario
+    from ppafo.exports.loading import load_exportable
+    from ppafo.simulation.scenario import Scenario
     from ppafo.storage import check_result_folder
 
-    scenario = load_scenario(parsed.scenario, parsed.overrides)
+    scenario = load_exportable(parsed.scenario, parsed.overrides)
+    if not isinstance(scenario, Scenario):
+        raise ScenarioError(
+            f"'{scenario.name}' is a walk, and the wire carries no forces under the foot: give a scenario, or let a "
+            f"simulated chip walk with 'ppafo chip {scenario.name} --set controller.arithmetic=fixed'"
+        )
     folder = parsed.out if parsed.out is not None else Path("out") / f"{scenario.name}-hil"
     with blame_out_option():
         check_result_folder(folder)

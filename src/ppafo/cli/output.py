@@ -4,7 +4,7 @@ import argparse
 import contextlib
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,8 @@ from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, reason
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ppafo.answers import Answer
 
 EXIT_GOOD = 0
@@ -71,11 +73,26 @@ def _command(parsed: argparse.Namespace) -> str:
     return " ".join(word for word in (parsed.command, getattr(parsed, "action", None)) if word)
 
 
-def deliver(name: str, text: str, document: Mapping[str, Any], parsed: argparse.Namespace) -> None:
-    """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where requested, and print one of them."""
+def deliver(
+    name: str,
+    text: str,
+    document: Mapping[str, Any],
+    parsed: argparse.Namespace,
+    draw: "Callable[[], Figure] | None" = None,
+) -> None:
+    """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where requested, and print one of them.
+
+    A figure, which is drawn only then, is written beside them.
+    """
     if parsed.out is not None:
         contents = {f"{name}.txt": text, f"{name}.json": json_text(document)}
-        write_files(parsed, {file: f"{content}\n".encode() for file, content in contents.items()})
+        files = {file: f"{content}\n".encode() for file, content in contents.items()}
+        if draw is not None:
+            load_drawing()
+            from ppafo.answers.style import render_figure
+
+            files |= {f"{name}.{form}": content for form, content in render_figure(draw(), ("png", "svg")).items()}
+        write_files(parsed, files)
     print_result(text, document, parsed.json)
 
 

@@ -58,17 +58,18 @@ def test_readings_are_counts_of_fourteen_bits_and_stay_in_their_range() -> None:
 
 
 @given(st.integers(0, HALVES), st.floats(0.0, 1.999))
-def test_a_fraction_of_the_stride_is_at_most_two_samples_below_the_exact_one(stride: int, fraction: float) -> None:
-    exact = 0.5 * stride * fraction
-    assert exact - 2.0 <= part_of(stride, int(fraction * 2.0**14 + 0.5)) <= exact + 0.5
+def test_a_fraction_of_the_stride_is_the_exact_one_rounded_down(stride: int, fraction: float) -> None:
+    share = int(fraction * 2.0**14 + 0.5)
+    # So a whole number of samples passes it exactly where it passes the whole one.
+    assert part_of(stride, share) == stride * share >> 15
 
 
 @given(st.integers(600, 4000), st.integers(0, LONGEST))
-def test_the_moving_average_is_that_of_floats_to_a_sample(known: int, since: int) -> None:
+def test_the_moving_average_is_that_of_floats_to_a_third_of_a_sample(known: int, since: int) -> None:
     usual = 0.25 * known < since < known
     exact = 0.5 * known + 0.3 * (since - 0.5 * known) if usual else 0.5 * known
     near = abs(since - 0.25 * known) <= 1.0 or abs(since - known) <= 1.0
-    assert near or abs(0.5 * next_stride(RULES, known, since) - exact) <= 1.0
+    assert near or abs(0.5 * next_stride(RULES, known, since) - exact) <= 0.3
 
 
 @given(st.integers(0, 3), st.booleans(), st.booleans(), st.booleans())
@@ -119,7 +120,7 @@ def steps(readings: tuple[int, ...]) -> GaitMeasurement:
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed: int) -> None:
     drawn, command, both = DrawnGait(CONVERTER, seed), 0, Both()
-    levels, other_commands, other_signs, samples = set(), 0, 0, 15_000
+    levels, other_commands, other_signs, samples, differed = set(), 0, 0, 15_000, False
     for _ in range(samples):
         readings, begins = drawn.next(command)
         both = Both() if begins else both
@@ -128,14 +129,13 @@ def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed:
         levels.add(both.fixed_state.safety.level)
         other_commands += wanted != found
         wanted_safety, found_safety = both.float_state.safety, both.fixed_state.safety
-        other_signs += (wanted_safety.level, wanted_safety.finding.sign) != (
-            found_safety.level,
-            found_safety.finding.sign,
-        )
+        differs = (wanted_safety.level, wanted_safety.finding.sign) != (found_safety.level, found_safety.finding.sign)
+        # Floats add up times, and so pass a limit a sample earlier or later.
+        assert not (differs and differed)
+        other_signs, differed = other_signs + differs, differs
     assert {0.0, 3.0} <= levels
-    # A threshold that is crossed by less than a count or a sample moves a change by a sample or two.
-    assert other_commands < 0.001 * samples
-    assert other_signs < 0.001 * samples
+    assert other_commands < 0.0005 * samples
+    assert other_signs < 0.0002 * samples
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from ppafo.exports.firmware.simulator import UNTOUCHED, Console, depth_of_stack
 from ppafo.exports.firmware.target import Decision, Image, Target
 
 _CYCLES = re.compile(rb"MCLK:\s+(\d+)")
+_ASKED = "asked.txt"
 _OUTPUTS = "simio info counter\nmd simulated_outputs 4"
 
 
@@ -17,7 +18,8 @@ class MspdebugSimulator:
 
     def __init__(self, target: Target, image: Image) -> None:
         self._cycles = 0
-        self._console = Console(["mspdebug", "-n", "-q", "sim"], image.file.parent)
+        self._folder = image.file.parent
+        self._console = Console(["mspdebug", "-n", "-q", "sim"], self._folder)
         self._start = target.ram.start + image.sizes.data
         self._free = target.ram.size - image.sizes.data
         self._say(f"prog {image.file.name}\nfill {self._start} {self._free} {UNTOUCHED:x}")
@@ -39,9 +41,13 @@ class MspdebugSimulator:
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
         """What it decides for some samples in turn, at most 50: asked at once, so that neither waits for the other."""
+        asked = []
         for readings in every:
             given = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
-            self._say(f"mw simulated_readings {given}\nrun\n{_OUTPUTS}")
+            asked.append(f"mw simulated_readings {given}\nrun\n{_OUTPUTS}\n")
+        # mspdebug asks the system for every byte of its console, and for a file at once.
+        (self._folder / _ASKED).write_text("".join(asked), encoding="ascii")
+        self._say(f"read {_ASKED}")
         return [self._decision() for _ in every]
 
     def _decision(self) -> Decision:

@@ -39,7 +39,7 @@ def wanted_side(numbers: WalkNumbers, phase: PhaseCounts, lifting: int) -> int:
     """Side of the valve that the law wants: 1 plantarflexion, -1 dorsiflexion, 0 for free motion."""
     if phase.phase <= LANDING:
         return -1 if lifting == 1 or phase.phase == LANDING else 0
-    in_time = phase.since_strike < part_of(phase.stride, numbers.push_off_end)
+    in_time = phase.since_strike <= part_of(phase.stride, numbers.push_off_end)
     return 1 if phase.phase == PUSH_OFF and in_time else 0
 
 

@@ -56,7 +56,7 @@ NUMBERS = (
     _stride_share("flat_from", "from here on heel and toes are both loaded"),
     _stride_share("flat_to", "and until here"),
     _stride_share("shortest_swing", "shortest swing of a steady stride"),
-    _stride_share("steady", "by how much a usual stride is longer or shorter"),
+    _share("steady", "by how much a usual stride is longer or shorter"),
     _strides("most_toe_strides", "strides in a row that may be on the toes alone"),
     _strides("resume_strides", "good strides in a row after which a pause ends"),
     _count("lowest_flat_angle", "no ankle has less while the foot stands flat"),
@@ -100,7 +100,7 @@ def whole_numbers(settings: Mapping[str, float], period: float, converter: GaitC
         for name in ("push_off_end", "push_off_start", "longest_phase", "flat_from", "flat_to", "shortest_swing")
     }
     shares = {
-        "steady": safety.STEADY * STRIDE_SHARE,
+        "steady": safety.STEADY * SHARE,
         "dwells": readings.DWELLS * STRIDE_SHARE,
         "turns_back": readings.TURNS_BACK * STRIDE_SHARE,
         "lands": readings.LANDS * STRIDE_SHARE,

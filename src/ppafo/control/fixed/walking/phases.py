@@ -6,7 +6,7 @@ worked out: a fraction of up to two strides has 15 bits then, and nothing takes 
 
 from typing import NamedTuple
 
-from ppafo.control.fixed.arithmetic import FRACTION_BITS, fraction_of
+from ppafo.control.fixed.arithmetic import FRACTION_BITS, fraction_of, nearest_fraction_of
 from ppafo.control.walking import phases
 
 LONGEST: int = 2**14 - 1
@@ -98,8 +98,7 @@ def next_stride(numbers: PhaseNumbers, known: int, since: int) -> int:
     halves = taken + taken
     if halves <= known >> 1 or taken >= known:
         return known
-    # The one more rounds to the nearest: without it the average would lie below.
-    return max(min(known + fraction_of(halves - known + 1, numbers.stride_weight), HALVES), 0)
+    return max(min(known + nearest_fraction_of(halves - known, numbers.stride_weight), HALVES), 0)
 
 
 def next_phase_state(numbers: PhaseNumbers, state: PhaseCounts, heel_force: int, toe_force: int) -> PhaseCounts:
@@ -108,7 +107,7 @@ def next_phase_state(numbers: PhaseNumbers, state: PhaseCounts, heel_force: int,
     toe = next_switch(numbers, state.toe, toe_force)
     since = counted(state.since_strike)
     known = state.stride if state.stride > 0 else numbers.first_stride
-    late = since >= part_of(known, numbers.push_off_start)
+    late = since > part_of(known, numbers.push_off_start)
     phase = next_phase(state.phase, heel.loaded, toe.loaded, late)
     strikes = state.phase == SWING and phase != SWING
     stays = (state.phase == SWING) == (phase == SWING) and (heel.loaded + toe.loaded == SEVERAL) == (

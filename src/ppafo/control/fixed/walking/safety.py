@@ -1,6 +1,7 @@
 """Pause, stop and return of help on whole numbers, and what the signs remember: ``control.walking.safety``."""
 
-from ppafo.control.fixed.walking.phases import PUSH_OFF, SWING, PhaseCounts, counted, part_of
+from ppafo.control.fixed.arithmetic import fraction_of
+from ppafo.control.fixed.walking.phases import PUSH_OFF, SWING, PhaseCounts, counted
 from ppafo.control.fixed.walking.readings import GaitReadings
 from ppafo.control.fixed.walking.signs import (
     ENDLESS_PHASE,
@@ -25,9 +26,9 @@ def remembered(
     double = before.since_strike + before.since_strike
     steady, good_strides, toe_strides = state.steady, state.good_strides, state.toe_strides
     if enters:
-        apart = part_of(phase.stride, numbers.stride.steady)
+        apart = fraction_of(phase.stride, numbers.stride.steady)
         ahead = double - phase.stride
-        steady = 1 if ahead < apart + apart and -ahead < apart + apart else 0
+        steady = 1 if ahead <= apart and -ahead <= apart else 0
         usual = double > phase.stride >> 1 and before.since_strike < phase.stride
         good = usual and state.heel_seen == 1 and state.toe_seen == 1
         good_strides = min(good_strides + 1, MOST_STRIDES) if good else 0

@@ -248,14 +248,14 @@ def gait_sign(numbers: StrideNumbers, before: PhaseCounts, phase: PhaseCounts) -
 
 def steady_sign(numbers: StrideNumbers, before: PhaseCounts, phase: PhaseCounts, angle: int) -> int:
     """The sign of forces or an angle [counts] that do not fit a stride after one that took the usual time."""
-    flat = phase.since_strike > part_of(phase.stride, numbers.flat_from) and phase.since_strike < part_of(
+    flat = phase.since_strike > part_of(phase.stride, numbers.flat_from) and phase.since_strike <= part_of(
         phase.stride, numbers.flat_to
     )
     if flat and phase.toe.loaded == 0:
         return NOT_FLAT
     if flat and phase.heel.loaded == 1 and (angle < numbers.lowest_flat_angle or angle > numbers.highest_flat_angle):
         return FLAT_ANGLE
-    if before.phase == SWING and phase.phase != SWING and before.spell < part_of(phase.stride, numbers.shortest_swing):
+    if before.phase == SWING and phase.phase != SWING and before.spell <= part_of(phase.stride, numbers.shortest_swing):
         return SHORT_SWING
     return NO_HEEL if flat and phase.heel.loaded == 0 else NO_SIGN
 

@@ -6,7 +6,7 @@ other begins. The valve only knows three commands, so that one count and the com
 
 from typing import NamedTuple
 
-from ppafo.control.fixed.arithmetic import fraction_of
+from ppafo.control.fixed.arithmetic import nearest_fraction_of
 from ppafo.control.fixed.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseCounts, counted, part_of
 from ppafo.control.fixed.walking.readings import TOP, GaitReadings
 
@@ -86,7 +86,7 @@ MOST_LATE = 2
 
 def followed(slow: int, reading: int, share: int) -> int:
     """A slow reading after a sample [counts]."""
-    return max(0, min(TOP, slow + fraction_of(reading - slow, share)))
+    return max(0, min(TOP, slow + nearest_fraction_of(reading - slow, share)))
 
 
 def has_moved(reading: int, slow: int, limit: int) -> bool:
@@ -107,7 +107,7 @@ def next_sensors(numbers: TraceNumbers, last: SensorCounts, given: GaitReadings,
     toe = given.toe if begins else followed(last.toe.slow, given.toe, numbers.slow_share)
     angle = given.angle if begins else followed(last.angle.slow, given.angle, numbers.slow_share)
     # A landing begins with the strike, so that one count stands for the time in both.
-    lands = phase.phase == LANDING and phase.since_strike < part_of(phase.stride, numbers.lands)
+    lands = phase.phase == LANDING and phase.since_strike <= part_of(phase.stride, numbers.lands)
     steps = phase.heel.loaded == 0 or lands
     heel_moves = has_moved(given.heel, heel, numbers.moves)
     toe_moves = has_moved(given.toe, toe, numbers.moves)

@@ -88,7 +88,7 @@ def walk_firmware(configuration: Configuration, target: str = WALK_TARGETS[0]) -
     texts = {
         name: _MARK.sub(lambda found: words[found[1]], _template("walking/templates", name)) for name in _TEMPLATES
     }
-    texts["start_msp430.c"] = _template("templates", "start_msp430.c")
+    texts |= {name: _template("templates", name) for name in ("msp430.h", "start_msp430.c")}
     texts["LICENSE"] = files("ppafo.exports.c_library").joinpath("templates", "LICENSE").read_text(encoding="utf-8")
     texts["controller.c"] = walk_source(chip.law)
     texts["parameters.h"] = _parameters(configuration, chip)

@@ -6,15 +6,15 @@ model of anybody: it is made to reach every phase, every level and most signs.
 
 import math
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from typing import NamedTuple
 
 from ppafo.control.fixed.walking.readings import TOP, GaitConverter, GaitReadings, read_gait
+from ppafo.exports.firmware.walking.made import ROOM, SAMPLES, UPRIGHT, made_readings, next_pressures
 from ppafo.model.gait_sensors import GaitMeasurement
 
 EPISODES = (1200, 3600)
 """Samples from one reset to the next, at least and at most."""
-_FILLED, _ROOM, _UPRIGHT = 4.4e5, 1.013e5, 1.57
 _ENDS = ("low end", "high end", "noise", "edges")
 _FAULTS = (
     "none",
@@ -43,6 +43,18 @@ _ODD = (
     "bent",
     "turns down",
 )
+
+
+def gait_readings(converter: GaitConverter, samples: int, seed: int) -> Generator[tuple[GaitReadings, bool], int, None]:
+    """Readings without end, and whether an episode begins with them; is sent the command [steps] that they led to.
+
+    Those that are made come first, where there is room for them in so many ``samples``, and then drawn ones.
+    """
+    if samples >= SAMPLES:
+        yield from made_readings(converter)
+    drawn, command = DrawnGait(converter, seed), 0
+    while True:
+        command = yield drawn.next(command)
 
 
 class Manner(NamedTuple):
@@ -89,7 +101,7 @@ class DrawnGait:
     def begin(self, manner: Manner, samples: int) -> None:
         """Begin an episode of some manner and so many samples."""
         self._manner, self._left, self._sample = manner, samples, 0
-        self._pressures = [_ROOM, _ROOM]
+        self._pressures = (ROOM, ROOM)
         self._shown: tuple[int, ...] = (0,) * 5
         self._stride()
 
@@ -141,11 +153,9 @@ class DrawnGait:
             turned = 0.55
         if self._odd == _LATE:
             turned = 0.15 * math.sin(2.0 * math.pi * (part + 0.08))
-        for chamber, feeds in enumerate((command > 0, command < 0)):
-            target, lag = (_FILLED, 12.0) if feeds else (_ROOM, 25.0)
-            self._pressures[chamber] += (target - self._pressures[chamber]) / lag
+        self._pressures = next_pressures(self._pressures, command)
         return GaitMeasurement(
-            angle=_UPRIGHT + turned + 1.0e-3 * moves,
+            angle=UPRIGHT + turned + 1.0e-3 * moves,
             pressure_1=self._pressures[0],
             pressure_2=self._pressures[1],
             torque=0.0,
@@ -179,7 +189,7 @@ class DrawnGait:
     def _room(self) -> GaitReadings:
         """Nothing on the foot, and no gas in the chambers."""
         seen = GaitMeasurement(
-            angle=_UPRIGHT, pressure_1=_ROOM, pressure_2=_ROOM, torque=0.0, heel_force=0.0, toe_force=0.0
+            angle=UPRIGHT, pressure_1=ROOM, pressure_2=ROOM, torque=0.0, heel_force=0.0, toe_force=0.0
         )
         return read_gait(self._converter, seen)
 

@@ -15,7 +15,7 @@ from ppafo.exports.firmware.lock_step import Comparison, Cost, cost_of
 from ppafo.exports.firmware.simulator import chip_simulator
 from ppafo.exports.firmware.target import ChipSimulator, Decision
 from ppafo.exports.firmware.walking import WalkChip, walk_chip, walk_firmware
-from ppafo.exports.firmware.walking.drawn import DrawnGait
+from ppafo.exports.firmware.walking.drawn import gait_readings
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 from ppafo.simulation.sampled import state_row_numbers
@@ -115,13 +115,13 @@ def walk_on_chip(configuration: Configuration, minutes: float | None = None) -> 
 def compare_drawn_walk(configuration: Configuration, samples: int, seed: int = 1) -> Comparison:
     """Give drawn readings of a gait to the chip's simulator and to Python, with a reset before every episode."""
     chip = walk_chip(configuration)
-    reference, drawn, command = PythonWalkChip(chip), DrawnGait(chip.converter, seed), 0
+    reference, given = PythonWalkChip(chip), gait_readings(chip.converter, samples, seed)
     decisions: list[Decision] = []
     wanted: list[tuple[int, int]] = []
     asked: list[GaitReadings] = []
     with chip_simulator(walk_firmware(configuration), MSP430G2553) as (simulator, image):
+        readings, begins = next(given)
         for _ in range(samples):
-            readings, begins = drawn.next(command)
             if begins or len(asked) == TURN:
                 decisions += simulator.samples(asked)
                 asked = []
@@ -130,7 +130,7 @@ def compare_drawn_walk(configuration: Configuration, samples: int, seed: int = 1
                 simulator.begin()
             asked.append(readings)
             wanted.append(reference.sample(readings))
-            command = wanted[-1][0]
+            readings, begins = given.send(wanted[-1][0])
         decisions += simulator.samples(asked)
         cost = cost_of(MSP430G2553, image, simulator.stack(), decisions)
     differ = [place for place, found in enumerate(decisions) if found[:2] != wanted[place]]
