@@ -38,7 +38,7 @@ FLAWED_WALK_SENSORS = (
     *(
         f"faults.{sensor}.{setting}"
         for sensor in ("heel", "toe", "angle", "pressure_1", "pressure_2")
-        for setting in ("time=0 s", "delay=3 ms")
+        for setting in ("kind=distorted", "time=0 s", "delay=3 ms")
     ),
 )
 """Late from the beginning, which is a fault with a delay and nothing else."""
