@@ -11,9 +11,10 @@ from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement, measure
 
 gymnasium = pytest.importorskip("gymnasium")
-import ppafo.worlds.gym  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
+
+import ppafo.worlds.gym  # noqa: E402
 from ppafo.worlds.gym.environments import PneumaticEnv, PneumaticVectorEnv  # noqa: E402
 from ppafo.worlds.gym.tasks import BAR, TASKS, reward_of, within  # noqa: E402
 

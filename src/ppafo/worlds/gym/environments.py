@@ -12,7 +12,6 @@ from gymnasium.vector.utils import batch_space
 
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, SimulationError, nearest_name
-from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
 from ppafo.simulation.loading import load_scenario
 from ppafo.walking.loading import load_walk
@@ -161,7 +160,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
     input.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own declaration
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own declaration
 
     def __init__(
         self,
@@ -184,7 +183,10 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._lanes = self.world.lanes(1)
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | None = None,
+        options: dict[str, Any] | None = None,  # noqa: ARG002 - Gymnasium's own signature
     ) -> tuple[Observations, dict[str, Any]]:
         """Begin an episode; return what is observed at its start, and nothing else. There are no ``options``."""
         super().reset(seed=seed)
@@ -252,6 +254,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         self._lanes = self.world.lanes(num_envs)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._ended = np.zeros(num_envs, dtype=np.bool_)
+        self._last: Observations = np.zeros(self.observation_space.shape, dtype=np.float32)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -267,7 +270,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         if seeds is not None and len(seeds) != self.num_envs:
             raise ScenarioError(f"{len(seeds)} seeds for {self.num_envs} environments; give one for each, or a number")
         places = np.flatnonzero(mask)
-        for place in places:
+        for place in places.tolist():
             own = None if seeds is None else seeds[place]
             if own is not None or self._generators[place] is None:
                 self._generators[place] = seeding.np_random(own)[0]

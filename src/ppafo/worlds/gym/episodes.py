@@ -73,7 +73,7 @@ class FromOutside:
     def reset(self) -> None:
         """Do nothing."""
 
-    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
         """Refuse: an agent is asked through its environment."""
         raise ScenarioError("the commands of an environment come from its agent; give the scenario a controller")
 
@@ -82,7 +82,7 @@ class FromOutside:
 class ScenarioEpisodes:
     """Episodes of a scenario; ``ranges`` in SI by path are drawn evenly, and so is the angle to turn to, ``targets``.
 
-    Without ``ranges`` each episode is the scenario as it stands, noise included, and turns to the middle of ``targets``.
+    Without ``ranges`` each is the scenario as it stands, noise included, and turns to the middle of ``targets``.
     """
 
     base: Scenario
@@ -109,7 +109,7 @@ class ScenarioEpisodes:
             return columns, values
         left, reason = np.arange(count), ""
         for _ in range(MOST_DRAWS):
-            for place in left:
+            for place in left.tolist():
                 values[:, place], columns.goals[0, place] = self._one(generators[place])
             left, reason = self._plan(columns, values, left)
             if not left.size:
@@ -140,9 +140,7 @@ class ScenarioEpisodes:
         return left[left >= 0], reason
 
 
-def scenario_episodes(
-    base: Scenario, randomise: bool, vary: Ranges, targets: tuple[str, str]
-) -> ScenarioEpisodes:
+def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tuple[str, str]) -> ScenarioEpisodes:
     """Return the episodes of a scenario: what its parameter set has an interval for, ``vary`` and the seed are drawn.
 
     ScenarioError for a path or range that cannot be.
@@ -241,7 +239,9 @@ def walk_episodes(configuration: Configuration, randomise: bool, seconds: float)
     settings = configuration.settings
     if not set(TorqueProfile._fields) <= set(settings):
         kind = configuration.controller.name
-        raise ScenarioError(f"{configuration.file}: controller.kind = '{kind}' has no torque profile; event_pid has one")
+        raise ScenarioError(
+            f"{configuration.file}: controller.kind = '{kind}' has no torque profile; event_pid has one"
+        )
     goal = Goal(angle=0.0, profile=TorqueProfile(**{name: settings[name] for name in TorqueProfile._fields}))
     planned = plan_walk(plan_of(configuration, seconds))
     run = replace(planned, program=replace(planned.program, controller=None), controller=())

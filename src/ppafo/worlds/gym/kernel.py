@@ -32,10 +32,12 @@ OWN_PATHS = [path for name, row in OWN.items() for path in leaf_paths(row, name)
 REWARD, ERROR, SUPPLIED = range(3)
 """Rows of the outcomes: reward, error, gas since the episode began [kg]."""
 
-_CUBE, _TABLE, _LINE = "float64[:, :, ::1]", "float64[:, ::1]", "float64[::1]"
+_CUBE, _TABLE = "float64[:, :, ::1]", "float64[:, ::1]"
 _SIGNATURE = ", ".join(
-    [_CUBE, _CUBE, "float64[:, :, :, ::1]", _CUBE, _CUBE, _CUBE, _CUBE, _TABLE, _TABLE, "boolean[::1]"]
-    + ["float32[:, ::1]", _TABLE, "boolean[:, ::1]", "float64", "float64", *["int64"] * 6]
+    [
+        *(_CUBE, _CUBE, "float64[:, :, :, ::1]", _CUBE, _CUBE, _CUBE, _CUBE, _TABLE, _TABLE, "boolean[::1]"),
+        *("float32[:, ::1]", _TABLE, "boolean[:, ::1]", "float64", "float64", *["int64"] * 6),
+    ]
 )
 ARGUMENTS = (
     "all_states, all_parameters, all_signals, all_commands, record, trace, all_own, actions, bounds, chosen, "
@@ -105,7 +107,8 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
     held = [f"chambers = {add(held_chambers)}(plant, state.angle)"] if program.keeps_volumes else []
     reference = add(program.reference.value)
     view, error, kept = (f"{add(function)}({given})" for function, given in (task.observed, task.error, task.kept))
-    fields = task.view._fields  # type: ignore[attr-defined]
+    fields: tuple[str, ...] = task.view._fields  # type: ignore[attr-defined]
+    observation = "observations[first + lane, {0}] = {1}(view.{2}, bounds[0, {0}], bounds[1, {0}])"
     pressures = f"true_1, true_2 = {pressures_of(rows, 'state')}"
     weights = "error_weight, gas_weight, timing.period"
     return [
@@ -128,10 +131,7 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
         *[f"{rows.cells[path]} = {path}" for path in leaf_paths(Memory, "memory")],
         f"view = {view}",
         f"error = {error}",
-        *[
-            f"observations[first + lane, {column}] = {add(within)}(view.{name}, bounds[0, {column}], bounds[1, {column}])"
-            for column, name in enumerate(fields)
-        ],
+        *[observation.format(column, add(within), name) for column, name in enumerate(fields)],
         f"outcomes[{REWARD}, first + lane] = {add(reward_of)}(error, gas, {weights})",
         f"outcomes[{ERROR}, first + lane] = error",
         f"outcomes[{SUPPLIED}, first + lane] = state.supplied_mass",
