@@ -1,7 +1,7 @@
-"""``python -m benchmarks.environments``: steps of the environments of Gymnasium in a second of a core, and resets.
+"""``python -m benchmarks.environments``: steps of the environments in a second of one core, and resets.
 
-A step has the gas, the valve, delay, noise and steps of the sensors, observation and reward. The actions are drawn once:
-an agent's own time is not in it.
+A step has the gas, the valve, delay, noise and steps of the sensors, observation and reward. The actions are drawn
+once: an agent's own time is not in it.
 """
 
 import argparse

@@ -142,7 +142,7 @@ def observed_bounds(task: Task, device: Device) -> Floats:
         "since_strike": (0.0, LONGEST_SINCE),
         "command": (-1.0, 2.0),
     }
-    names: tuple[str, ...] = task.view._fields  # type: ignore[attr-defined]
+    names = [path.rpartition(".")[2] for path in task.observed_paths]
     # Rounded as the space has them, so that what is cut off at a bound lies within it.
     return np.array([known[name] for name in names], dtype=np.float32).T.astype(np.float64, order="C")
 

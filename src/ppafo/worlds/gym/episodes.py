@@ -131,7 +131,7 @@ class ScenarioEpisodes:
         """Write the columns of some episodes; return the places of those that do not fit, and why one does not."""
         given = dict(zip(self.ranges, values[:, left], strict=True))
         plan = plan_ensemble(check_columns(self.base, given))
-        reason = next(iter(plan.reasons.values()), "another length of step")
+        reason = next(iter(plan.reasons.values()), "another program, step or delay")
         for members, batch in plan.batches:
             if episode_program(batch) == (self.program, self.clock):
                 columns.parameters[:, left[members]] = batch.parameters

@@ -107,8 +107,7 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
     held = [f"chambers = {add(held_chambers)}(plant, state.angle)"] if program.keeps_volumes else []
     reference = add(program.reference.value)
     view, error, kept = (f"{add(function)}({given})" for function, given in (task.observed, task.error, task.kept))
-    fields: tuple[str, ...] = task.view._fields  # type: ignore[attr-defined]
-    observation = "observations[first + lane, {0}] = {1}(view.{2}, bounds[0, {0}], bounds[1, {0}])"
+    observation = "observations[first + lane, {0}] = {1}({2}, bounds[0, {0}], bounds[1, {0}])"
     pressures = f"true_1, true_2 = {pressures_of(rows, 'state')}"
     weights = "error_weight, gas_weight, timing.period"
     return [
@@ -131,7 +130,7 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
         *[f"{rows.cells[path]} = {path}" for path in leaf_paths(Memory, "memory")],
         f"view = {view}",
         f"error = {error}",
-        *[observation.format(column, add(within), name) for column, name in enumerate(fields)],
+        *[observation.format(column, add(within), path) for column, path in enumerate(task.observed_paths)],
         f"outcomes[{REWARD}, first + lane] = {add(reward_of)}(error, gas, {weights})",
         f"outcomes[{ERROR}, first + lane] = error",
         f"outcomes[{SUPPLIED}, first + lane] = state.supplied_mass",
@@ -209,7 +208,7 @@ class Environments:
         self._actions = np.zeros((count, 1 + task.walks))
         self._everyone = np.ones(count, dtype=np.bool_)
         self._now = 0
-        self._observed = len(task.view._fields)  # type: ignore[attr-defined]
+        self._observed = len(task.observed_paths)
 
     @property
     def actions(self) -> Floats:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
+from ppafo.engine.rows import leaf_paths
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 from ppafo.model.sensors import Measurement
@@ -42,77 +43,66 @@ class Requested(NamedTuple):
     rate: float
 
 
-class TorqueView(NamedTuple):
-    """Angle [rad], absolute pressures [bar], torque and requested torque [N m], its rate [N m/s], last command [-]."""
+class Sensed(NamedTuple):
+    """What every task shows: angle [rad], absolute pressures [bar], and the torque worked out from them [N m]."""
 
     angle: float
     pressure_1: float
     pressure_2: float
     torque: float
+
+
+class TorqueView(NamedTuple):
+    """What the sensors show, requested torque [N m], its rate [N m/s], last command [-]."""
+
+    sensed: Sensed
     requested: float
     requested_rate: float
     command: float
 
 
 class AngleView(NamedTuple):
-    """Angle [rad], absolute pressures [bar], torque [N m], requested angle [rad], last command [-]."""
+    """What the sensors show, requested angle [rad], last command [-]."""
 
-    angle: float
-    pressure_1: float
-    pressure_2: float
-    torque: float
+    sensed: Sensed
     requested: float
     command: float
 
 
 class WalkView(NamedTuple):
-    """Angle [rad], absolute pressures [bar], torque [N m], forces of heel and toe [N].
+    """What the sensors show, forces of heel and toe [N], time since the heel was loaded [s], last command [-].
 
-    Time since the heel was loaded [s], as the heel sensor shows it, and the last command: -1 to 1, 2 for venting.
+    The time is that of the heel sensor; a command is -1 to 1, or 2 for venting.
     """
 
-    angle: float
-    pressure_1: float
-    pressure_2: float
-    torque: float
+    sensed: Sensed
     heel_force: float
     toe_force: float
     since_strike: float
     command: float
 
 
+def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
+    """What every task shows of a measurement."""
+    return Sensed(
+        angle=seen.angle, pressure_1=seen.pressure_1 / BAR, pressure_2=seen.pressure_2 / BAR, torque=seen.torque
+    )
+
+
 def view_torque(seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float) -> TorqueView:
     """What is observed while a torque is followed."""
-    return TorqueView(
-        angle=seen.angle,
-        pressure_1=seen.pressure_1 / BAR,
-        pressure_2=seen.pressure_2 / BAR,
-        torque=seen.torque,
-        requested=wanted.torque,
-        requested_rate=wanted.rate,
-        command=command,
-    )
+    return TorqueView(sensed=sensed_of(seen), requested=wanted.torque, requested_rate=wanted.rate, command=command)
 
 
 def view_angle(seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float) -> AngleView:
     """What is observed while the vane turns to an angle."""
-    return AngleView(
-        angle=seen.angle,
-        pressure_1=seen.pressure_1 / BAR,
-        pressure_2=seen.pressure_2 / BAR,
-        torque=seen.torque,
-        requested=goal.angle,
-        command=command,
-    )
+    return AngleView(sensed=sensed_of(seen), requested=goal.angle, command=command)
 
 
 def view_walk(seen: GaitMeasurement, goal: Goal, memory: Memory, time: float, command: float) -> WalkView:
     """What is observed at a time [s] of a walk."""
     return WalkView(
-        angle=seen.angle,
-        pressure_1=seen.pressure_1 / BAR,
-        pressure_2=seen.pressure_2 / BAR,
-        torque=seen.torque,
+        sensed=sensed_of(seen),
         heel_force=seen.heel_force,
         toe_force=seen.toe_force,
         since_strike=time - memory.strike,
@@ -173,7 +163,8 @@ class Task:
     """A task: what is observed, and the source text of what differs in the kernel.
 
     ``view`` has the observed numbers. ``observed`` makes one of them, ``error`` the error, ``kept`` the memory; each
-    is a function, and the names in the kernel that it gets. ``unit`` is that of the error. A ``walks`` is a walk.
+    is a function, and the names in the kernel that it gets. ``unit`` is that of the error. One that ``walks`` is on a
+    leg that walks.
     """
 
     name: str
@@ -185,6 +176,11 @@ class Task:
     error_weight: float
     gas_weight: float
     walks: bool = False
+
+    @property
+    def observed_paths(self) -> list[str]:
+        """Paths of the observed numbers, in order, such as ``view.sensed.angle``."""
+        return leaf_paths(self.view, "view")
 
 
 _SUPPLIED = "memory, state.supplied_mass"
