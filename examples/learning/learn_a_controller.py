@@ -39,7 +39,7 @@ GENERATIONS = 60
 PAIRS = 48  # of candidates to either side of the mean
 EPISODES = 4  # of each candidate, the same for all of a generation
 SECONDS = 2.5  # of an episode
-PID_DRAWS = 200  # of gains, in each of three rounds
+PID_DRAWS = 200  # of gains, in each of four rounds
 DRAWS = 100  # of devices and noise in the league
 STEP, RATE = 0.08, 0.05  # of the search: spread of the candidates, and how far the mean moves
 
@@ -107,10 +107,10 @@ def train() -> tuple[np.ndarray, list[float]]:
 # %% A PID controller that is tuned for the same cost: drawn gains, then gains around the best
 PID = {
     "proportional_gain": (0.02, 2.0, "1/(N m)"),
-    "integral_gain": (0.02, 200.0, "1/(N m s)"),
-    "derivative_gain": (0.0002, 0.2, "s/(N m)"),
+    "integral_gain": (0.02, 20.0, "1/(N m s)"),
+    "derivative_gain": (0.0002, 0.02, "s/(N m)"),
     "derivative_filter": (0.001, 0.05, "s"),
-    "anti_windup": (0.1, 200.0, "1/s"),
+    "anti_windup": (0.1, 20.0, "1/s"),
 }
 
 
@@ -121,11 +121,11 @@ def cost_of(result: ppafo.Result) -> float:
 
 
 def tuned_pid() -> tuple[str, ...]:
-    """Return the overrides of the PID controller with the lowest cost of three rounds of draws."""
+    """Return the overrides of the PID controller with the lowest cost of four rounds of draws."""
     random = np.random.default_rng(SEED)
     centre, best = np.full(len(PID), 0.5), (np.inf, ())
-    for spread in (0.5, 0.15, 0.05):
-        places = np.clip(centre + spread * random.uniform(-1.0, 1.0, (PID_DRAWS, len(PID))), 0.0, 1.0)
+    for spread, end in ((0.5, 1.0), (0.15, 1.0), (0.1, 1.5), (0.05, 1.5)):  # later ones may go beyond the ranges
+        places = np.clip(centre + spread * random.uniform(-1.0, 1.0, (PID_DRAWS, len(PID))), 0.0, end)
         words = [
             tuple(
                 f"controller.{name}={low * (high / low) ** place:.4g} {unit}"
@@ -153,7 +153,7 @@ def play(weights: np.ndarray) -> ppafo.League:
     net = tuple(f"controller.weight_{number}={value!r}" for number, value in enumerate(weights.tolist()))
     mine = (
         entrant("learnt_policy", "learnt_policy:KIND", net, f"{GENERATIONS} generations, seed {SEED}"),
-        entrant("pid-for-this", "pid", tuned_pid(), f"{3 * PID_DRAWS} draws of gains, seed {SEED}"),
+        entrant("pid-for-this", "pid", tuned_pid(), f"{4 * PID_DRAWS} draws of gains, seed {SEED}"),
     )
     others = tuple(item for item in ENTRANTS if item.valve == "proportional" and not item.learns)
     return ppafo.league(SCENARIO, HARDWARE, draws=DRAWS, entrants=(*others, *mine))
