@@ -63,7 +63,7 @@ class LaneRows:
         lines = []
         for path in leaf_paths(self.program.state_rows()[group], group):
             value = (name or group) + path.removeprefix(group)
-            lines.append(f"x[{self.state_at[path]}, lane] = {value}" + (f" if {flag} else {path}" if flag else ""))
+            lines.append(f"{self.cells[path]} = {value}" + (f" if {flag} else {path}" if flag else ""))
         return lines
 
     def keep(self, *names: str) -> list[str]:

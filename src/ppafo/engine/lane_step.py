@@ -39,7 +39,14 @@ def opening(rows: LaneRows) -> list[str]:
     names += ["leg", "share", "gait_timing", "walk"] if rows.program.walks else []
     names += ["lines", "line_state"] if rows.program.has_lines else []
     names += ["held"] if rows.program.keeps_volumes else []
-    return [*[rows.load(name) for name in names], "time = step_index * timing.step", "command = result.command"]
+    names += ["start"] if rows.program.starts_apart else []
+    return [*[rows.load(name) for name in names], time_of_step(rows), "command = result.command"]
+
+
+def time_of_step(rows: LaneRows) -> str:
+    """Line that finds the time [s] at the begin of a step, from the start of the run."""
+    step = "(step_index - start.step)" if rows.program.starts_apart else "step_index"
+    return f"time = {step} * timing.step"
 
 
 def step_in_parts(rows: LaneRows) -> list[str]:
@@ -72,7 +79,8 @@ def give_up(rows: LaneRows) -> list[str]:
     failure, cause = rows.cells["result.failure_time"], rows.cells["result.too_many_parts"]
     return [
         rows.load("timing"),
-        f"time = step_index * timing.step + {rows.before}",
+        *([rows.load("start")] if rows.program.starts_apart else []),
+        f"{time_of_step(rows)} + {rows.before}",
         f"gives_up = {rows.remaining} > 0.0 and {failure} > time",
         f"{cause} = 1.0 if gives_up else {cause}",
         f"{failure} = time if gives_up else {failure}",

@@ -51,6 +51,12 @@ class LaneResult(NamedTuple):
     too_many_parts: float
 
 
+class LaneStart(NamedTuple):
+    """Step of the block at which the run of a lane began, a whole number [-]."""
+
+    step: float
+
+
 class NoParameters(NamedTuple):
     """Stands where a program has no such piece."""
 
@@ -69,7 +75,8 @@ class Program:
     walking stride after equal stride. ``has_lines`` True feeds the device from lines behind regulators instead of
     constant pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded
     samples lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names
-    channels that are kept at some of them.
+    channels that are kept at some of them. ``starts_apart`` True lets the run of each lane begin at a step of its own,
+    while others of the block are under way.
     """
 
     valve: ValveModel
@@ -89,6 +96,7 @@ class Program:
     samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
     traced: tuple[str, ...] = ()
+    starts_apart: bool = False
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
@@ -122,6 +130,7 @@ class Program:
             **({"sensor_state": SensorState} if self.slow_sensors else {}),
             "course": Course if self.follows_reference else NoParameters,
             **{group: kind.state for group, kind in self.meter_groups.items()},
+            **({"start": LaneStart} if self.starts_apart else {}),
         }
 
     @property

@@ -1,6 +1,7 @@
 """How NamedTuples of floats lie in the rows of a lane block: one row for each number, nested ones flattened."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -8,18 +9,19 @@ import numpy as np
 from ppafo.engine.composed_names import is_row
 
 
-def members(row: Any) -> list[tuple[str, Any]]:
+@cache
+def members(row: Any) -> tuple[tuple[str, Any], ...]:
     """What a NamedTuple class or a tuple of a fixed length is made of: how each is got at (``.name``, ``[3]``), and it.
 
     A field that is such a tuple is declared as ``Annotated[tuple[float, ...], 16]``, of floats or of NamedTuples.
     """
     if is_row(row):
         hints = get_type_hints(row, include_extras=True)
-        return [(f".{name}", hints[name]) for name in row._fields]
+        return tuple((f".{name}", hints[name]) for name in row._fields)
     if get_origin(row) is Annotated:
         items, length = get_args(row)
-        return [(f"[{number}]", get_args(items)[0]) for number in range(length)]
-    return []
+        return tuple((f"[{number}]", get_args(items)[0]) for number in range(length))
+    return ()
 
 
 def is_number(row: Any) -> bool:

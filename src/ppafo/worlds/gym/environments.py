@@ -1,0 +1,334 @@
+"""The environments as Gymnasium has them: one, or many side by side."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from ppafo.engine.lanes import Floats
+from ppafo.errors import ScenarioError, SimulationError, nearest_name
+from ppafo.parameters.device import Device
+from ppafo.simulation.loading import load_scenario
+from ppafo.walking.loading import load_walk
+from ppafo.walking.walk import walk_duration
+from ppafo.worlds.gym.episodes import Episodes, Ranges, scenario_episodes, walk_episodes
+from ppafo.worlds.gym.kernel import Environments, Flags, Judging, Places, Seen
+from ppafo.worlds.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
+
+CONSISTENT = "device.set=ppafo2011-consistent"
+"""The shipped set that has intervals."""
+FLAWED_SENSORS = (
+    "sensors.delay=3 ms",
+    "sensors.angle_noise=0.2 deg",
+    "sensors.pressure_noise=0.1 psi_d",
+    "sensors.angle_resolution=0.1 deg",
+    "sensors.pressure_resolution=0.05 psi_d",
+)
+"""Those of the scenario torque-task-slow-valve."""
+FLAWED_WALK_SENSORS = (
+    *FLAWED_SENSORS[1:],
+    "sensors.force_noise=5 N",
+    "sensors.force_resolution=1 N",
+    *(
+        f"faults.{sensor}.{setting}"
+        for sensor in ("heel", "toe", "angle", "pressure_1", "pressure_2")
+        for setting in ("kind=distorted", "time=0 s", "delay=3 ms")
+    ),
+)
+"""Late from the beginning, which is a fault with a delay and nothing else."""
+DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "torque": ("torque-task-proportional", (CONSISTENT, *FLAWED_SENSORS)),
+    "angle": ("step-response", (CONSISTENT, "controller.rate=1 kHz", "run.duration=1 s", *FLAWED_SENSORS)),
+    "walk": ("proportional", FLAWED_WALK_SENSORS),
+}
+"""Scenario or walk of each task where none is given, and the overrides that make it."""
+VARIED: Mapping[str, Ranges] = {"torque": {"reference.level": ("1 N m", "4.5 N m")}}
+"""What is drawn in these beside what the parameter set has intervals for."""
+TARGETS = ("40 deg", "110 deg")
+WALKING_TIME = 6.0
+"""Length of an episode on a leg that walks [s]."""
+CONTINUOUS, ON_OFF = "continuous", "on_off"
+COMMANDS = 3
+"""Of a pair of on/off valves: -1, 0 and 1."""
+LARGEST_RATE, LARGEST_FORCE = 1.0e3, 5.0e3
+"""Bounds of the requested rate [N m/s] and of the forces [N] that are observed."""
+HEADROOM = 2.0
+"""Largest pressure that is observed, over the highest supply pressure: a vane that is turned compresses its gas."""
+
+Observations = np.ndarray[Any, np.dtype[np.float32]]
+
+
+class World:
+    """What one environment and many have in common: episodes, spaces, and lanes for as many as are asked for."""
+
+    def __init__(
+        self,
+        task: str,
+        scenario: str | Path | None,
+        overrides: Sequence[str],
+        actions: str,
+        randomise: bool,
+        vary: Ranges | None,
+        targets: tuple[str, str],
+        duration: float | None,
+        error_weight: float | None,
+        gas_weight: float | None,
+    ) -> None:
+        self.task = TASKS[task]
+        if actions not in (CONTINUOUS, ON_OFF):
+            hint = nearest_name(actions, (CONTINUOUS, ON_OFF))
+            raise ScenarioError(f"actions = {actions!r}: must be '{CONTINUOUS}' or '{ON_OFF}'{hint}")
+        usual, flaws = DEFAULTS[task]
+        file, words = (usual, (*flaws, *overrides)) if scenario is None else (scenario, tuple(overrides))
+        varied = VARIED.get(task, {}) if vary is None and scenario is None else vary or {}
+        self.episodes: Episodes
+        if self.task.walks:
+            if varied:
+                raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
+            walk = load_walk(file, words)
+            seconds = walk_duration(walk, (WALKING_TIME if duration is None else duration) / 60.0)
+            self.episodes = walk_episodes(walk, randomise, seconds)
+        else:
+            words = words if duration is None else (*words, f"run.duration={duration!r} s")
+            self.episodes = scenario_episodes(load_scenario(file, words), randomise, varied, targets)
+        bounds = observed_bounds(self.task, self.episodes.device)
+        self.judging = Judging(
+            error_weight=self.task.error_weight if error_weight is None else error_weight,
+            gas_weight=self.task.gas_weight if gas_weight is None else gas_weight,
+            bounds=bounds,
+        )
+        self.observation_space = gymnasium.spaces.Box(*bounds.astype(np.float32), dtype=np.float32)
+        self.is_continuous = actions == CONTINUOUS
+        self.action_space: Any = gymnasium.spaces.Discrete(COMMANDS)
+        if self.is_continuous:
+            self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1 + self.task.walks,), np.float32)
+
+    def lanes(self, count: int) -> Environments:
+        """Return lanes for some environments."""
+        return Environments(self.episodes.program, self.episodes.clock, self.task, count, self.judging)
+
+    def take(self, lanes: Environments, actions: Any) -> Seen:
+        """Return what follows from actions; SimulationError for one that is no finite number."""
+        given = lanes.actions
+        if self.is_continuous:
+            given[:] = np.reshape(actions, given.shape)
+        else:
+            given[:, -1] = 0.0
+            given[:, 0] = np.subtract(actions, 1)
+        if not np.isfinite(given).all():
+            bad = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
+            raise SimulationError(f"the action of environment {bad} is {given[bad]}; it must be finite")
+        return lanes.step()
+
+
+def observed_bounds(task: Task, device: Device) -> Floats:
+    """Lowest and highest value (2, observed) of each observed number, in the units of the task's view."""
+    pressure = HEADROOM * max(device.supply.pressure, device.supply.dorsiflexion_pressure)
+    torque = device.actuator.torque_constant * pressure
+    known = {
+        "angle": (-np.pi, np.pi),
+        "pressure_1": (0.0, pressure / BAR),
+        "pressure_2": (0.0, pressure / BAR),
+        "torque": (-torque, torque),
+        "requested": (-torque, torque) if task.unit == "N m" else (-np.pi, np.pi),
+        "requested_rate": (-LARGEST_RATE, LARGEST_RATE),
+        "heel_force": (0.0, LARGEST_FORCE),
+        "toe_force": (0.0, LARGEST_FORCE),
+        "since_strike": (0.0, LONGEST_SINCE),
+        "command": (-1.0, 2.0),
+    }
+    names = [path.rpartition(".")[2] for path in task.observed_paths]
+    # Rounded as the space has them, so that what is cut off at a bound lies within it.
+    return np.array([known[name] for name in names], dtype=np.float32).T.astype(np.float64, order="C")
+
+
+class PneumaticEnv(gymnasium.Env[Observations, Any]):
+    """One device that an agent commands, one step every sample period of its scenario or walk.
+
+    ``task`` is 'torque', 'angle' or 'walk'; ``scenario`` the name or file of a scenario, or of a walk, and
+    ``overrides`` change it: of the task's own, with late, noisy sensors with steps, unless one is given. ``actions``
+    are 'continuous', a command from -1 to 1 (and on a leg that walks one above 0 for the dump valve), or 'on_off', 0
+    to 2 for commands of -1, 0 and 1. ``randomise`` draws each episode: what the parameter set has an interval for,
+    what ``vary`` gives lowest and highest values for, by path, the seed of the noise, an angle in ``targets``; or the
+    wearer and the gait of a walk. ``duration`` of an episode [s]. The reward of a sample is
+    -(error_weight error^2 period + gas_weight gas), in N m or rad, s and g. ScenarioError or ParameterError for bad
+    input.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own declaration
+
+    def __init__(
+        self,
+        task: str,
+        scenario: str | Path | None = None,
+        overrides: Sequence[str] = (),
+        actions: str = CONTINUOUS,
+        randomise: bool = True,
+        vary: Ranges | None = None,
+        targets: tuple[str, str] = TARGETS,
+        duration: float | None = None,
+        error_weight: float | None = None,
+        gas_weight: float | None = None,
+    ) -> None:
+        self.world = World(
+            task, scenario, overrides, actions, randomise, vary, targets, duration, error_weight, gas_weight
+        )
+        self.observation_space, self.action_space = self.world.observation_space, self.world.action_space
+        self._drawn = np.zeros(0)
+        self._lanes = self.world.lanes(1)
+
+    def reset(
+        self,
+        *,
+        seed: int | None = None,
+        options: dict[str, Any] | None = None,  # noqa: ARG002 - Gymnasium's own signature
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Begin an episode; return what is observed at its start, and nothing else. There are no ``options``."""
+        super().reset(seed=seed)
+        columns, drawn = self.world.episodes.draw([self.np_random])
+        self._drawn = drawn[:, 0]
+        return self._lanes.begin(np.zeros(1, dtype=np.intp), columns).observations[0], {}
+
+    def step(self, action: Any) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
+        """Return observation, reward, whether the run failed, whether it is over, error and gas [kg] after an action.
+
+        SimulationError for one that is not finite.
+        """
+        seen = self.world.take(self._lanes, action)
+        info = {"error": float(seen.errors[0]), "supplied_mass": float(seen.supplied[0])}
+        return (
+            seen.observations[0],
+            float(seen.rewards[0]),
+            bool(seen.terminated[0]),
+            bool(seen.truncated[0]),
+            info,
+        )
+
+    def episode(self) -> Any:
+        """Return the scenario of this episode with what was drawn, or the walk before anything is drawn."""
+        return self.world.episodes.shown(self._drawn)
+
+    def numbers(self) -> dict[str, float]:
+        """Return the true state in SI units, by path such as ``state.angle`` [rad]."""
+        return self._lanes.numbers(0)
+
+
+class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
+    """Many such devices on the lanes of one program; each goes as it would alone with its seed.
+
+    The arguments are those of ``PneumaticEnv``; ``autoreset_mode`` is one of Gymnasium's, or its name.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        task: str,
+        scenario: str | Path | None = None,
+        overrides: Sequence[str] = (),
+        actions: str = CONTINUOUS,
+        randomise: bool = True,
+        vary: Ranges | None = None,
+        targets: tuple[str, str] = TARGETS,
+        duration: float | None = None,
+        error_weight: float | None = None,
+        gas_weight: float | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    ) -> None:
+        self.world = World(
+            task, scenario, overrides, actions, randomise, vary, targets, duration, error_weight, gas_weight
+        )
+        self.num_envs = num_envs
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.single_observation_space, self.single_action_space = (
+            self.world.observation_space,
+            self.world.action_space,
+        )
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._lanes = self.world.lanes(num_envs)
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._ended = np.zeros(num_envs, dtype=np.bool_)
+        self._last: Observations = np.zeros(self.observation_space.shape, dtype=np.float32)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Begin episodes of all, or of those that are true in ``options["reset_mask"]`` (environments,).
+
+        A number as ``seed`` is that of the first; the others count up from it.
+        """
+        mask = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise ScenarioError(f"reset_mask must be {self.num_envs} truth values in an array")
+        seeds = [seed + place for place in range(self.num_envs)] if isinstance(seed, int) else seed
+        if seeds is not None and len(seeds) != self.num_envs:
+            raise ScenarioError(f"{len(seeds)} seeds for {self.num_envs} environments; give one for each, or a number")
+        places = np.flatnonzero(mask)
+        for place in places.tolist():
+            own = None if seeds is None else seeds[place]
+            if own is not None or self._generators[place] is None:
+                self._generators[place] = seeding.np_random(own)[0]
+        observations = self._begin(places).observations
+        if places.size < self.num_envs:
+            observations = np.where(mask[:, None], observations, self._last)
+        self._last = observations
+        self._ended[places] = False
+        return observations.copy(), {}
+
+    def step(self, actions: Any) -> tuple[Observations, Floats, Flags, Flags, dict[str, Any]]:
+        """Return observations, rewards, which runs failed, which are over, errors and gas [kg] after actions.
+
+        SimulationError for one that is not finite, and without autoreset for environments that have to be reset.
+        """
+        before = self._ended
+        if self.autoreset_mode is AutoresetMode.DISABLED and before.any():
+            raise SimulationError(f"environment {int(np.flatnonzero(before)[0])} has ended: reset it by its mask")
+        seen = self.world.take(self._lanes, actions)
+        self._ended = seen.terminated | seen.truncated
+        infos: dict[str, Any] = {}
+        reset = np.zeros(self.num_envs, dtype=np.bool_)
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and before.any():
+            reset = before
+            for values in (seen.rewards, seen.terminated, seen.truncated):
+                values[reset] = 0
+            self._ended = self._ended & ~reset
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
+            reset = self._ended
+            infos |= self._final(seen, reset)
+        if reset.any():
+            begun = self._begin(np.flatnonzero(reset))
+            seen.observations[reset] = begun.observations[reset]
+        infos |= _masked({"error": seen.errors, "supplied_mass": seen.supplied}, ~reset)
+        self._last = seen.observations
+        return seen.observations.copy(), seen.rewards, seen.terminated, seen.truncated, infos
+
+    def numbers(self, place: int) -> dict[str, float]:
+        """Return the true state of one environment in SI units, by path such as ``state.angle`` [rad]."""
+        return self._lanes.numbers(place)
+
+    def _begin(self, places: Places) -> Seen:
+        drawn = [self._generators[place] for place in places]
+        columns, _ = self.world.episodes.draw([generator for generator in drawn if generator is not None])
+        return self._lanes.begin(places, columns)
+
+    def _final(self, seen: Seen, ended: Flags) -> dict[str, Any]:
+        """What environments that begin again at once showed at their end."""
+        last = np.full(self.num_envs, None, dtype=object)
+        for place in np.flatnonzero(ended):
+            last[place] = seen.observations[place].copy()
+        info = _masked({"error": seen.errors, "supplied_mass": seen.supplied}, ended)
+        return {"final_obs": last, "_final_obs": ended.copy(), "final_info": info, "_final_info": ended.copy()}
+
+
+def _masked(values: Mapping[str, Floats], there: Flags) -> dict[str, Any]:
+    """Return numbers (environments,) with the mask of those that have them, as Gymnasium has infos."""
+    if not there.any():
+        return {}
+    found = {name: np.where(there, column, 0.0) for name, column in values.items()}
+    return found | {f"_{name}": there.copy() for name in values}

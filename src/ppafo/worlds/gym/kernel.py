@@ -1,0 +1,273 @@
+"""One compiled call for one step of all environments: commands in; physics, sensors, observations and rewards out.
+
+The lane loop is that of every other run; what stands around it is written from the same pieces. Each environment is a
+lane, whose episode began at a step of its own.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.lane_control import SIGNALS, current_readings, pressures_of, sense, sense_gait
+from ppafo.engine.lane_rows import LaneRows, indent, lanes_of, over_lanes
+from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
+from ppafo.engine.lanes import SIGNAL_ROWS, VECTOR, Batch, Clock, Floats, load_source
+from ppafo.engine.program import LaneStart, Program
+from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
+from ppafo.engine.source_text import SourceCollector
+from ppafo.errors import ScenarioError
+from ppafo.model.vane import actuator_torque
+from ppafo.worlds.gym.tasks import Goal, Memory, Requested, Task, reward_of, valve_command, valve_or_dump, within
+
+Flags = NDArray[np.bool_]
+Places = NDArray[np.intp]
+
+OWN = {"goal": Goal, "memory": Memory}
+"""Rows of an environment beside those of its run."""
+OWN_PATHS = [path for name, row in OWN.items() for path in leaf_paths(row, name)]
+REWARD, ERROR, SUPPLIED = range(3)
+"""Rows of the outcomes: reward, error, gas since the episode began [kg]."""
+
+_CUBE, _TABLE = "float64[:, :, ::1]", "float64[:, ::1]"
+_SIGNATURE = ", ".join(
+    [
+        *(_CUBE, _CUBE, "float64[:, :, :, ::1]", _CUBE, _CUBE, _CUBE, _CUBE, _TABLE, _TABLE, "boolean[::1]"),
+        *("float32[:, ::1]", _TABLE, "boolean[:, ::1]", "float64", "float64", *["int64"] * 6),
+    ]
+)
+ARGUMENTS = (
+    "all_states, all_parameters, all_signals, all_commands, record, trace, all_own, actions, bounds, chosen, "
+    "observations, outcomes, ends, error_weight, gas_weight, "
+    "now, steps, steps_in_all, steps_per_sample, signal_delay, command_delay"
+)
+
+
+@lru_cache(maxsize=16)
+def kernel_source(program: Program, task: Task) -> str:
+    """Source text of the module whose ``go_on`` takes all environments of a program a step further."""
+    collector = SourceCollector(INLINE)
+    loop = lane_loop(program, collector, "advance")
+    step = "\n".join(_step(LaneRows(program, collector), task))
+    return f"{HEADER}\n\n{collector.text()}\n\n\n{loop}\n\n\n{step}\n"
+
+
+def _step(rows: LaneRows, task: Task) -> list[str]:
+    """The function ``go_on``: block by block the commands, the lane loop, and what is observed at its end."""
+    _name_cells(rows)
+    command = rows.add(valve_or_dump if task.walks else valve_command)
+    given = f"{command}(actions[place, 0], actions[place, actions.shape[1] - 1])"
+    call = (
+        "advance(states, parameters, signal_history, command_history, record, trace, "
+        "now - steps, steps, -1, steps_per_sample, 1.0, -1, 0, 0, signal_delay, command_delay)"
+    )
+    return [
+        f'@njit("void({_SIGNATURE})", cache=True, nogil=True, error_model="numpy")',
+        f"def go_on({ARGUMENTS}):",
+        *indent(
+            [
+                "for block in range(all_states.shape[0]):",
+                "    states, parameters, own = all_states[block], all_parameters[block], all_own[block]",
+                "    signal_history, command_history = all_signals[block], all_commands[block]",
+                "    first = block * states.shape[1]",
+                "    width = min(states.shape[1], actions.shape[0] - first)",
+                "    if steps > 0:",
+                "        for lane in range(states.shape[1]):",
+                "            place = min(first + lane, actions.shape[0] - 1)",
+                f"            {rows.cells['result.command']} = {given}",
+                f"        {call}",
+                *indent(_places(rows) + over_lanes(_observed(rows, task))),
+            ]
+        ),
+    ]
+
+
+def _name_cells(rows: LaneRows) -> None:
+    """Let the rows be those of the arrays between two calls of the lane loop, and the held chambers those of now."""
+    rows.cells.update({path: f"states[{row}, lane]" for path, row in rows.state_at.items()})
+    first = len(rows.state_at)
+    rows.cells.update({path: f"parameters[{row - first}, lane]" for path, row in rows.parameter_at.items()})
+    rows.cells.update({path: f"own[{row}, lane]" for row, path in enumerate(OWN_PATHS)})
+    if rows.program.keeps_volumes:
+        rows.cells.update({path: f"chambers{path.removeprefix('held')}" for path in leaf_paths(HeldChambers, "held")})
+
+
+def _places(rows: LaneRows) -> list[str]:
+    late = "late = (now - signal_delay) % signal_history.shape[1]"
+    return [late] if rows.program.late_signals else []
+
+
+def _observed(rows: LaneRows, task: Task) -> list[str]:
+    """Lines that sense, observe and judge one environment, and say whether its episode ends."""
+    program, add = rows.program, rows.add
+    groups = ["timing", "plant", "state", "result", "reference", "start", *(["walk"] if program.walks else [])]
+    held = [f"chambers = {add(held_chambers)}(plant, state.angle)"] if program.keeps_volumes else []
+    reference = add(program.reference.value)
+    view, error, kept = (f"{add(function)}({given})" for function, given in (task.observed, task.error, task.kept))
+    observation = "observations[first + lane, {0}] = {1}({2}, bounds[0, {0}], bounds[1, {0}])"
+    pressures = f"true_1, true_2 = {pressures_of(rows, 'state')}"
+    weights = "error_weight, gas_weight, timing.period"
+    return [
+        "if not chosen[first + lane]:",
+        "    continue",
+        *[rows.load(group) for group in groups],
+        *[f"{name} = {row_expression(row, name, rows.cells, add)}" for name, row in OWN.items()],
+        "step_index = now - int(start.step)",
+        "sample_index = step_index // steps_per_sample",
+        "time = step_index * timing.step",
+        *held,
+        *_signals_at_start(rows),
+        *(sense_gait(rows) if program.walks else sense(rows)),
+        f"wanted, wanted_rate, _ = {reference}(reference, time)",
+        f"requested = {add(Requested)}(wanted, wanted_rate)",
+        pressures,
+        f"torque = {add(actuator_torque)}(true_1, true_2, plant.torque_constant)",
+        "gas = state.supplied_mass - memory.supplied_mass",
+        f"memory = {kept}",
+        *[f"{rows.cells[path]} = {path}" for path in leaf_paths(Memory, "memory")],
+        f"view = {view}",
+        f"error = {error}",
+        *[observation.format(column, add(within), path) for column, path in enumerate(task.observed_paths)],
+        f"outcomes[{REWARD}, first + lane] = {add(reward_of)}(error, gas, {weights})",
+        f"outcomes[{ERROR}, first + lane] = error",
+        f"outcomes[{SUPPLIED}, first + lane] = state.supplied_mass",
+        "ends[0, first + lane] = result.failure_time <= time",
+        "ends[1, first + lane] = step_index >= steps_in_all",
+    ]
+
+
+def _signals_at_start(rows: LaneRows) -> list[str]:
+    """Lines that fill the late signals of an episode that begins with those at its start."""
+    if not rows.program.late_signals:
+        return []
+    stored = [f"signal_history[{row}, slot, lane] = {name}" for row, name in enumerate(SIGNALS)]
+    filled = ["for slot in range(signal_history.shape[1]):", *indent(stored)]
+    return ["if step_index == 0:", *indent([*current_readings(rows), *filled])]
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """Starts of episodes: parameters and states as the program has them, and goals (rows, episodes)."""
+
+    parameters: Floats
+    states: Floats
+    goals: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Judging:
+    """Weights of the reward for squared error and gas, and bounds (2, observed) of what is observed."""
+
+    error_weight: float
+    gas_weight: float
+    bounds: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a step shows of every environment: observations (environments, observed), the rest (environments,)."""
+
+    observations: NDArray[np.float32]
+    rewards: Floats
+    errors: Floats
+    supplied: Floats
+    terminated: Flags
+    truncated: Flags
+
+
+def episode_program(batch: Batch) -> tuple[Program, Clock]:
+    """Program and clock of a run whose commands come from outside; ScenarioError for samples inside a step."""
+    if batch.program.samples_inside:
+        raise ScenarioError("run.output_interval: an environment needs one that is a whole number of steps")
+    return replace(batch.program, controller=None, starts_apart=True), batch.clock
+
+
+@final
+class Environments:
+    """Some environments of one program side by side, each a lane with an episode of its own."""
+
+    def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: Judging) -> None:
+        self.count = count
+        self._clock, self._judging = clock, judging
+        self._go_on = load_source(kernel_source(program, task)).go_on
+        width = min(lanes_of(program), -(-count // VECTOR) * VECTOR)
+        blocks = -(-count // width)
+        state_rows = [path for name, row in program.state_rows().items() for path in leaf_paths(row, name)]
+        parameter_rows = [path for name, row in program.parameter_rows().items() for path in leaf_paths(row, name)]
+        self.rows = {path: row for row, path in enumerate(state_rows)}
+        self._start = self.rows[leaf_paths(LaneStart, "start")[0]]
+        self._states = np.zeros((blocks, len(state_rows), width))
+        self._parameters = np.zeros((blocks, len(parameter_rows), width))
+        self._signals = np.zeros((blocks, SIGNAL_ROWS, clock.signal_delay + 2, width))
+        self._commands = np.zeros((blocks, clock.command_delay + 2, width))
+        self._own = np.zeros((blocks, len(OWN_PATHS), width))
+        self._nothing = np.empty((0, len(state_rows), width)), np.empty((0, 0, width))
+        self._actions = np.zeros((count, 1 + task.walks))
+        self._everyone = np.ones(count, dtype=np.bool_)
+        self._now = 0
+        self._observed = len(task.observed_paths)
+
+    @property
+    def actions(self) -> Floats:
+        """Where the next actions are written (environments, 1 or 2)."""
+        return self._actions
+
+    def begin(self, places: Places, columns: Columns) -> Seen:
+        """Begin episodes of some environments at once; what the others show is not to be used."""
+        lanes = self._states.shape[2]
+        # Lanes without an environment repeat the last one, so that each has a run that goes on.
+        spare = np.arange(self.count, self._states.shape[0] * lanes)
+        last = np.flatnonzero(places == self.count - 1)
+        every = np.concatenate([np.arange(places.size), np.repeat(last, spare.size)])
+        blocks, own = np.divmod(np.concatenate([places, spare[: spare.size * last.size]]), lanes)
+        self._states[blocks, :-1, own] = columns.states.T[every]
+        self._states[blocks, self._start, own] = float(self._now)
+        self._parameters[blocks, :, own] = columns.parameters.T[every]
+        self._own[blocks, :, own] = 0.0
+        self._own[blocks, : columns.goals.shape[0], own] = columns.goals.T[every]
+        self._commands[blocks, :, own] = 0.0
+        chosen = np.zeros(self.count, dtype=np.bool_)
+        chosen[places] = True
+        return self._call(0, chosen)
+
+    def step(self) -> Seen:
+        """Take ``actions`` for a sample period, and show what follows."""
+        return self._call(self._clock.steps_per_sample, self._everyone)
+
+    def numbers(self, place: int) -> dict[str, float]:
+        """The state of one environment as the engine has it, in SI units, by path such as ``state.angle``."""
+        block, lane = divmod(place, self._states.shape[2])
+        return {path: float(self._states[block, row, lane]) for path, row in self.rows.items()}
+
+    def _call(self, steps: int, chosen: Flags) -> Seen:
+        clock = self._clock
+        self._now += steps
+        observations = np.zeros((self.count, self._observed), dtype=np.float32)
+        outcomes, ends = np.zeros((3, self.count)), np.zeros((2, self.count), dtype=np.bool_)
+        self._go_on(
+            self._states,
+            self._parameters,
+            self._signals,
+            self._commands,
+            *self._nothing,
+            self._own,
+            self._actions,
+            self._judging.bounds,
+            chosen,
+            observations,
+            outcomes,
+            ends,
+            self._judging.error_weight,
+            self._judging.gas_weight,
+            self._now,
+            steps,
+            clock.step_count,
+            clock.steps_per_sample,
+            clock.signal_delay,
+            clock.command_delay,
+        )
+        rewards, errors, supplied = outcomes
+        return Seen(observations, rewards, errors, supplied, ends[0], ends[1])

@@ -1,0 +1,223 @@
+"""What an agent is asked to do: what it observes, what its error is, and what a command means.
+
+Pure functions of floats, which the kernel has beside the physics.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
+from ppafo.engine.rows import leaf_paths
+from ppafo.model.command import VENT
+from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import Measurement
+
+BAR = 1.0e5
+GRAM = 1.0e-3
+LOADED, UNLOADED = 60.0, 30.0
+"""Force under the heel [N] above which it counts as loaded and below which it does not: those of the walking laws."""
+LONGEST_SINCE = 10.0
+"""Longest time since a heel strike that is observed [s]."""
+
+
+class Goal(NamedTuple):
+    """What an episode asks for: an angle [rad] to turn to, or the torque of a stride; each task takes its own part."""
+
+    angle: float
+    profile: TorqueProfile
+
+
+class Memory(NamedTuple):
+    """Gas from the supply up to the last sample [kg]; of a walk the time of the last heel strike [s], 1 if loaded."""
+
+    supplied_mass: float
+    strike: float
+    loaded: float
+
+
+class Requested(NamedTuple):
+    """The reference of a scenario at a sample [N m], and how fast it changes [N m/s]."""
+
+    torque: float
+    rate: float
+
+
+class Sensed(NamedTuple):
+    """What every task shows: angle [rad], absolute pressures [bar], and the torque worked out from them [N m]."""
+
+    angle: float
+    pressure_1: float
+    pressure_2: float
+    torque: float
+
+
+class TorqueView(NamedTuple):
+    """What the sensors show, requested torque [N m], its rate [N m/s], last command [-]."""
+
+    sensed: Sensed
+    requested: float
+    requested_rate: float
+    command: float
+
+
+class AngleView(NamedTuple):
+    """What the sensors show, requested angle [rad], last command [-]."""
+
+    sensed: Sensed
+    requested: float
+    command: float
+
+
+class WalkView(NamedTuple):
+    """What the sensors show, forces of heel and toe [N], time since the heel was loaded [s], last command [-].
+
+    The time is that of the heel sensor; a command is -1 to 1, or 2 for venting.
+    """
+
+    sensed: Sensed
+    heel_force: float
+    toe_force: float
+    since_strike: float
+    command: float
+
+
+def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
+    """What every task shows of a measurement."""
+    return Sensed(
+        angle=seen.angle, pressure_1=seen.pressure_1 / BAR, pressure_2=seen.pressure_2 / BAR, torque=seen.torque
+    )
+
+
+def view_torque(seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float) -> TorqueView:
+    """What is observed while a torque is followed."""
+    return TorqueView(sensed=sensed_of(seen), requested=wanted.torque, requested_rate=wanted.rate, command=command)
+
+
+def view_angle(seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float) -> AngleView:
+    """What is observed while the vane turns to an angle."""
+    return AngleView(sensed=sensed_of(seen), requested=goal.angle, command=command)
+
+
+def view_walk(seen: GaitMeasurement, goal: Goal, memory: Memory, time: float, command: float) -> WalkView:
+    """What is observed at a time [s] of a walk."""
+    return WalkView(
+        sensed=sensed_of(seen),
+        heel_force=seen.heel_force,
+        toe_force=seen.toe_force,
+        since_strike=time - memory.strike,
+        command=command,
+    )
+
+
+def remember(memory: Memory, supplied_mass: float) -> Memory:
+    """The memory after a sample, with the gas [kg] that the supply has given by then."""
+    return Memory(supplied_mass, memory.strike, memory.loaded)
+
+
+def remember_strike(memory: Memory, supplied_mass: float, heel_force: float, time: float) -> Memory:
+    """The same of a walk, where the heel sensor shows a force [N] at a time [s]."""
+    strikes = (memory.loaded < 0.5) & (heel_force > LOADED)
+    stays = 0.0 if heel_force < UNLOADED else memory.loaded
+    return Memory(supplied_mass, time if strikes else memory.strike, 1.0 if strikes else stays)
+
+
+def torque_error(wanted: float, torque: float) -> float:
+    """Requested less true torque [N m]."""
+    return wanted - torque
+
+
+def angle_error(goal: Goal, angle: float) -> float:
+    """Requested less true angle [rad]."""
+    return goal.angle - angle
+
+
+def stride_error(goal: Goal, phase: float, torque: float) -> float:
+    """Torque of the profile at a phase of the true stride, in turns, less the true torque [N m]."""
+    return profile_torque(goal.profile, phase) - torque
+
+
+def reward_of(error: float, gas: float, error_weight: float, gas_weight: float, period: float) -> float:
+    """Reward of a sample: less the squared error over a period [s] and gas [kg], each times its weight."""
+    return -(error_weight * error * error * period + gas_weight * (gas / GRAM))
+
+
+def within(value: float, lowest: float, highest: float) -> float:
+    """The value between two bounds, the lowest for what is no number: a converter shows nothing else."""
+    above = value if value >= lowest else lowest
+    return above if above <= highest else highest
+
+
+def valve_command(action: float, other: float) -> float:
+    """Command from -1 to 1 of an action; the other one is not used."""
+    return within(action, -1.0, 1.0)
+
+
+def valve_or_dump(action: float, other: float) -> float:
+    """Command from -1 to 1, or ``VENT`` where the other action is above 0."""
+    return VENT if other > 0.0 else within(action, -1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A task: what is observed, and the source text of what differs in the kernel.
+
+    ``view`` has the observed numbers. ``observed`` makes one of them, ``error`` the error, ``kept`` the memory; each
+    is a function, and the names in the kernel that it gets. ``unit`` is that of the error. One that ``walks`` is on a
+    leg that walks.
+    """
+
+    name: str
+    view: type
+    observed: tuple[Callable[..., Any], str]
+    error: tuple[Callable[..., Any], str]
+    kept: tuple[Callable[..., Any], str]
+    unit: str
+    error_weight: float
+    gas_weight: float
+    walks: bool = False
+
+    @property
+    def observed_paths(self) -> list[str]:
+        """Paths of the observed numbers, in order, such as ``view.sensed.angle``."""
+        return leaf_paths(self.view, "view")
+
+
+_SUPPLIED = "memory, state.supplied_mass"
+TASKS = {
+    task.name: task
+    for task in (
+        Task(
+            "torque",
+            TorqueView,
+            (view_torque, "seen, goal, memory, requested, result.command"),
+            (torque_error, "requested.torque, torque"),
+            (remember, _SUPPLIED),
+            "N m",
+            1.0,
+            1.0,
+        ),
+        Task(
+            "angle",
+            AngleView,
+            (view_angle, "seen, goal, memory, requested, result.command"),
+            (angle_error, "goal, state.angle"),
+            (remember, _SUPPLIED),
+            "rad",
+            10.0,
+            1.0,
+        ),
+        Task(
+            "walk",
+            WalkView,
+            (view_walk, "seen, goal, memory, time, result.command"),
+            (stride_error, "goal, walk.now.phase, torque"),
+            (remember_strike, f"{_SUPPLIED}, seen.heel_force, time"),
+            "N m",
+            1.0,
+            1.0,
+            walks=True,
+        ),
+    )
+}
+"""By the word with which an environment is made."""
