@@ -12,8 +12,11 @@ from ppafo.engine.source_text import SourceCollector
 LANES = 32
 """Most runs of a block."""
 
+VECTOR = 8
+"""Lanes that the widest processors take at once, and the fewest of a block: its columns are a whole number of these."""
+
 FIRST_CACHE = 48 * 1024
-"""Bytes of the first-level data cache of a core; a block that does not fit takes half as many runs."""
+"""Bytes of the first-level data cache of a core; a block that does not fit takes fewer runs."""
 
 
 OWN_ROWS = 4
@@ -28,7 +31,7 @@ def lanes_of(program: Program) -> int:
     """Runs of one block of a program."""
     groups = (program.state_rows(), program.parameter_rows(), program.step_rows())
     rows = sum(len(leaf_paths(row, name)) for group in groups for name, row in group.items())
-    return LANES if 8 * LANES * rows <= FIRST_CACHE else LANES // 2
+    return next((lanes for lanes in (LANES, LANES // 2) if 8 * lanes * rows <= FIRST_CACHE), VECTOR)
 
 
 @final

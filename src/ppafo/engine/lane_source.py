@@ -2,7 +2,7 @@
 
 from ppafo.engine.lane_control import control_loop, remember_commands, signals_before_start
 from ppafo.engine.lane_meters import measure_sample
-from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
+from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, over_lanes
 from ppafo.engine.lane_step import plant_loop
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.pneumatics import held_chambers
@@ -14,8 +14,20 @@ import math
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.core.extending import intrinsic
+
+
+@intrinsic
+def take_widest_vectors(typing):
+    def write(context, builder, signature, arguments):
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        return context.get_dummy_value()
+
+    return types.void(), write
 '''
+"""What a program begins with. Where a processor has vectors of 512 bits the compiler takes half of them, unless a
+function asks for all; C compilers are asked by a flag."""
 INLINE = '@njit(forceinline=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 """How what the loop calls is compiled: into it, and not to be called from Python, which would take a third longer."""
 
@@ -55,8 +67,9 @@ def lane_loop(program: Program, collector: SourceCollector, name: str, lanes: in
         f"def {name}({ARGUMENTS}):",
         *indent(
             [
+                "take_widest_vectors()",
                 f"x = np.empty(({rows.count}, {rows.lanes}))",
-                f"width = {'1' if rows.lanes == 1 else 'states.shape[1]'}",
+                f"width = {rows.lanes if rows.lanes <= VECTOR else 'states.shape[1]'}",
                 *over_rows(len(rows.state_at), "x[row, lane] = states[row, lane]"),
                 *over_rows(len(rows.parameter_at), f"x[{len(rows.state_at)} + row, lane] = parameters[row, lane]"),
                 *hold_chambers(rows),
