@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, final
 
@@ -38,7 +39,8 @@ def lanes_of(program: Program) -> int:
 class LaneRows:
     """Where each number of a program lies in the rows of ``x``: state, parameters, what a step hands on, its parts.
 
-    One array for all of them lets the compiler see that no two rows overlap.
+    One array for all of them lets the compiler see that no two rows overlap. From row ``aside`` on lies what lanes that
+    wait for others keep, where few do: the state, and what was left of the step.
     """
 
     def __init__(self, program: Program, collector: SourceCollector, lanes: int = 0) -> None:
@@ -53,7 +55,8 @@ class LaneRows:
         self.length, self.before, self.remaining, self.error = (
             f"x[{len(numbered) + place}, lane]" for place in range(OWN_ROWS)
         )
-        self.count = len(numbered) + OWN_ROWS
+        self.aside = len(numbered) + OWN_ROWS
+        self.count = self.aside + (len(self.state_at) + 1 if program.parts_are_rare else 0)
 
     def load(self, group: str) -> str:
         """Line that makes the NamedTuple ``group`` from its rows."""
@@ -78,6 +81,22 @@ class LaneRows:
 def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
     return {path: first + number for number, path in enumerate(paths)}
+
+
+@dataclass(frozen=True, slots=True)
+class RarePhase:
+    """Lines of a phase that few lanes need at a time: those whose ``cell`` is above 0. It changes no other lane."""
+
+    lines: list[str]
+    cell: str
+
+
+def count_lanes(name: str, condition: str) -> list[str]:
+    """Lines that count in ``name`` the lanes for which a condition holds.
+
+    A sum of whole numbers is taken of several lanes at once, a largest float is not.
+    """
+    return [f"{name} = 0", "for lane in range(width):", f"    {name} += 1 if {condition} else 0"]
 
 
 def indent(lines: list[str], levels: int = 1) -> list[str]:
