@@ -88,7 +88,7 @@ def step_in_parts(rows: LaneRows) -> list[str]:
 
 
 def put_aside(rows: LaneRows) -> list[str]:
-    """Keeps the state where lanes may wait for others, which is in no first part; a select for each row takes longer."""
+    """Keeps the state in parts in which lanes may wait, never the first: a select for each row takes longer."""
     if not rows.program.parts_are_rare:
         return []
     kept = f"x[{rows.aside} + row, lane] = x[row, lane]"
@@ -244,7 +244,11 @@ def end_motion(rows: LaneRows) -> list[str]:
     if program.walks:
         follow = rows.cells["gait_sensors.follow_rate"]
         given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, ended, held, carried, next_gait, length"
-        lines = [*[rows.load(name) for name in ("ended", "ahead", "carried", "next_gait")], "held = ahead", *rows.keep("held")]
+        lines = [
+            *[rows.load(name) for name in ("ended", "ahead", "carried", "next_gait")],
+            "held = ahead",
+            *rows.keep("held"),
+        ]
         lines += [f"after, walk_after = {add(walking.end_walk)}({given})", *mark_stride(rows)]
         if program.is_thermal:
             assumed = f"{add(walking.next_angle)}(plant, leg, walk, begun)"

@@ -167,7 +167,7 @@ class Program:
 
     @property
     def hands_chambers_on(self) -> bool:
-        """True where the chambers at the begin of a step are at hand: once for all, or from the end of the one before."""
+        """True where the chambers are known as a step begins: once for all, or from the step before."""
         return self.keeps_volumes or self.walks
 
     def step_rows(self) -> dict[str, type]:

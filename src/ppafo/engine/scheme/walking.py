@@ -211,9 +211,7 @@ def end_walk(
     free = ground.is_free(walk.contact, leg.keeps_gait)
     after = with_motion(state, ended.motion.angle, ended.motion.angular_velocity)
     acceleration = (after.angular_velocity - state.angular_velocity) / max(step, 1.0e-30)
-    given = external_torque(
-        plant, leg, share, after, held, ended.torque, -carried.plate, begun.led, acceleration, free
-    )
+    given = external_torque(plant, leg, share, after, held, ended.torque, -carried.plate, begun.led, acceleration, free)
     landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset, leg.keeps_gait)
     height = leg.toe_lever * (ended.foot.sine - now.sine_healthy_foot)
     turned = after.angle - state.angle
