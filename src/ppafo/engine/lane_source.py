@@ -14,7 +14,7 @@ from collections import namedtuple
 
 import numpy as np
 from numba import njit, types
-from numba.core.extending import intrinsic
+from numba.extending import intrinsic
 
 
 @intrinsic(prefer_literal=True)
@@ -24,20 +24,22 @@ def empty_rows(typing, rows, lanes):
     def write(context, builder, signature, arguments):
         from numba.np.arrayobj import make_array, populate_array
 
+        def number(value):
+            return context.get_constant(types.intp, value)
+
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')
-        size = [context.get_constant(types.intp, number) for number in (rows.literal_value, lanes.literal_value)]
-        item, row, whole = (context.get_constant(types.intp, 8 * number) for number in (1, lanes.literal_value,
-                            rows.literal_value * lanes.literal_value))
-        memory = context.nrt.meminfo_alloc_aligned(builder, whole, context.get_constant(types.uint32, 64))
+        height, width = rows.literal_value, lanes.literal_value
+        line = context.get_constant(types.uint32, 64)
+        memory = context.nrt.meminfo_alloc_aligned(builder, number(8 * width * height), line)
         array = make_array(signature.return_type)(context, builder)
         data = builder.bitcast(context.nrt.meminfo_data(builder, memory), array.data.type)
-        populate_array(array, data, size, [row, item], item, memory)
+        populate_array(array, data, [number(height), number(width)], [number(8 * width), number(8)], number(8), memory)
         return array._getvalue()
 
     return types.float64[:, ::1](rows, lanes), write
 '''
-"""What a program begins with. Numba lets arrays begin where a vector of 512 bits reaches over two lines of the cache,
-and takes half of such a vector, unless a function asks for all. C compilers are told both in other words."""
+"""What a program begins with. By itself Numba lets an array begin where a vector of 512 bits lies on two lines of the
+cache, and takes half of such a vector. ``empty_rows`` asks for both; C compilers are told in other words."""
 INLINE = '@njit(forceinline=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 """How what the loop calls is compiled: into it, and not to be called from Python, which would take a third longer."""
 

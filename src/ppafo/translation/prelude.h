@@ -31,6 +31,8 @@
 
 #if defined(PPAFO_ALIGNED)
 /* Said by the file around this. */
+#elif defined(__CUDA_ARCH__)
+#define PPAFO_ALIGNED
 #elif defined(__GNUC__)
 #define PPAFO_ALIGNED __attribute__((aligned(64)))
 #elif defined(_MSC_VER)
