@@ -40,7 +40,7 @@ class LaneRows:
     """Where each number of a program lies in the rows of ``x``: state, parameters, what a step hands on, its parts.
 
     One array for all of them lets the compiler see that no two rows overlap. From row ``aside`` on lies what lanes that
-    wait for others keep, where few do: the state, and what was left of the step.
+    wait for others keep, where few do: the state, what was left of the step, and what it was handed.
     """
 
     def __init__(self, program: Program, collector: SourceCollector, lanes: int = 0) -> None:
@@ -56,7 +56,8 @@ class LaneRows:
             f"x[{len(numbered) + place}, lane]" for place in range(OWN_ROWS)
         )
         self.aside = len(numbered) + OWN_ROWS
-        self.count = self.aside + (len(self.state_at) + 1 if program.parts_are_rare else 0)
+        kept = len(self.state_at) + 1 + len(self.step_at)
+        self.count = self.aside + (kept if program.parts_are_rare else 0)
 
     def load(self, group: str) -> str:
         """Line that makes the NamedTuple ``group`` from its rows."""

@@ -14,6 +14,9 @@ from ppafo.engine.scheme import motion, parts, thermal_gas, walking
 from ppafo.engine.scheme.ankle_torque import carried_foot
 from ppafo.engine.scheme.pneumatics import held_chambers
 
+HANDED = ("held.", "carried.")
+"""Groups of rows that a step is handed by the one before."""
+
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
 MAXIMUM_PARTS = 100_000
@@ -92,8 +95,9 @@ def put_aside(rows: LaneRows) -> list[str]:
     if not rows.program.parts_are_rare:
         return []
     kept = f"x[{rows.aside} + row, lane] = x[row, lane]"
-    left = f"x[{rows.aside + len(rows.state_at)}, lane] = {rows.remaining}"
-    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), kept), *over_lanes([left])])]
+    lines = [f"{cell} = {rows.cells[path]}" for path, cell in handed_aside(rows).items()]
+    lines.append(f"x[{rows.aside + len(rows.state_at)}, lane] = {rows.remaining}")
+    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), kept), *over_lanes(lines)])]
 
 
 def put_back(rows: LaneRows) -> list[str]:
@@ -102,7 +106,16 @@ def put_back(rows: LaneRows) -> list[str]:
         return []
     moves = f"x[{rows.aside + len(rows.state_at)}, lane] > 0.0"
     back = f"x[row, lane] = x[row, lane] if {moves} else x[{rows.aside} + row, lane]"
-    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), back), *find_begin(rows)])]
+    handed = handed_aside(rows).items()
+    lines = [f"{rows.cells[path]} = {rows.cells[path]} if {moves} else {cell}" for path, cell in handed]
+    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), back), *over_lanes(lines)])]
+
+
+def handed_aside(rows: LaneRows) -> dict[str, str]:
+    """Where what a step is handed by the one before lies aside, by its path."""
+    first = rows.aside + len(rows.state_at) + 1
+    paths = [path for path in rows.step_at if path.startswith(HANDED)]
+    return {path: f"x[{first + place}, lane]" for place, path in enumerate(paths)}
 
 
 def over_rows(count: int, line: str) -> list[str]:
