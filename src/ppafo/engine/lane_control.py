@@ -64,14 +64,15 @@ def sense(rows: LaneRows) -> list[str]:
 def current_readings(rows: LaneRows) -> list[str]:
     """Lines that make what the sensors show at the present."""
     if not rows.program.slow_sensors:
-        held = [rows.load("held")] if rows.program.keeps_volumes else []
-        return ["angle = state.angle", *held, f"pressure_1, pressure_2 = {pressures_now(rows)}"]
+        return ["angle = state.angle", *present_pressures(rows)]
     return [rows.load("sensor_state"), *[f"{name} = sensor_state.{name}" for name in SIGNALS]]
 
 
-def pressures_now(rows: LaneRows) -> str:
-    """Expression for both pressures of ``state``."""
-    return f"{rows.add(held_pressures)}(held, state)" if rows.program.keeps_volumes else pressures_of(rows, "state")
+def present_pressures(rows: LaneRows) -> list[str]:
+    """Lines that make both pressures of ``state``."""
+    if rows.program.hands_chambers_on:
+        return [rows.load("held"), f"pressure_1, pressure_2 = {rows.add(held_pressures)}(held, state)"]
+    return [f"pressure_1, pressure_2 = {pressures_of(rows, 'state')}"]
 
 
 def pressures_of(rows: LaneRows, state: str) -> str:
@@ -81,18 +82,18 @@ def pressures_of(rows: LaneRows, state: str) -> str:
 
 def sense_gait(rows: LaneRows) -> list[str]:
     """Lines that make the measurement ``seen`` of a walking leg."""
-    pressures = f"pressure_1, pressure_2 = {pressures_now(rows)}"
+    pressures = present_pressures(rows)
     if rows.program.ideal_sensors:
         return [
             rows.load("walk"),
-            pressures,
+            *pressures,
             f"torque = {rows.add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
             f"seen = {rows.add(GaitMeasurement)}"
             "(state.angle, pressure_1, pressure_2, torque, walk.heel_force, walk.toe_force)",
         ]
     return [
         *[rows.load(group) for group in ("walk", "sensors", "gait_sensors", "gait_seen")],
-        pressures,
+        *pressures,
         f"seen, gait_seen = {rows.add(measure_gait)}(sensors, gait_sensors, gait_seen, state.angle, pressure_1, "
         "pressure_2, walk.heel_force, walk.toe_force, plant.torque_constant, step_index * timing.step, "
         "sample_index)",

@@ -1,6 +1,6 @@
 """What the lanes do for the gas of a step: the valve, the flows of both stages, and the stages themselves."""
 
-from ppafo.engine.lane_control import pressures_now
+from ppafo.engine.lane_control import present_pressures
 from ppafo.engine.lane_rows import LaneRows
 from ppafo.engine.scheme import joined_chambers, pneumatics, stage_flows, supply_lines, thermal_gas
 
@@ -12,7 +12,7 @@ def open_valve(rows: LaneRows) -> list[str]:
     return [
         f"shown, {after} = {add(valve.advance)}(valve, valve_state, command, time, length)",
         *connect(rows, "line_state"),
-        f"pressure_1, pressure_2 = {pressures_now(rows)}",
+        *present_pressures(rows),
         f"flowing = {add(stage_flows.sloped_flows)}"
         f"(plant, pressure_1, pressure_2, port_1, port_2, {add(valve.port_flow_slopes)})",
         *rows.keep("flowing", "shown"),
@@ -70,7 +70,8 @@ def begin_gas(rows: LaneRows) -> str:
         return f"gas = {add(thermal_gas.begin_thermal_gas)}(plant, thermal, state, masses, next_angle, {given})"
     if program.keeps_volumes:
         return f"gas = {add(pneumatics.begin_still_gas)}(state, held, {given})"
-    return f"gas = {add(pneumatics.begin_moving_gas)}(plant, state, next_angle, {given})"
+    held = "held" if program.hands_chambers_on else f"{add(pneumatics.held_chambers)}(plant, state.angle)"
+    return f"gas = {add(pneumatics.begin_moving_gas)}(plant, state, {held}, next_angle, {given})"
 
 
 def feed(rows: LaneRows) -> list[str]:

@@ -4,7 +4,7 @@ Samples are the ones that a recording would have. The course of the reference, o
 once before the first sample, then followed.
 """
 
-from ppafo.engine.lane_control import pressures_now
+from ppafo.engine.lane_control import present_pressures
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
@@ -87,8 +87,7 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     groups = ("walk", "controller_state") if program.walks else ()
     return [
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal, *groups)],
-        *([rows.load("held")] if program.keeps_volumes else []),
-        f"pressure_1, pressure_2 = {pressures_now(rows)}",
+        *present_pressures(rows),
         f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
         f"wanted = {wanted}",
         f"sample = {add(WalkSample if of_walk else Sample)}"

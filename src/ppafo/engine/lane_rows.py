@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, final
 
@@ -12,8 +13,11 @@ from ppafo.engine.source_text import SourceCollector
 LANES = 32
 """Most runs of a block."""
 
+VECTOR = 8
+"""Lanes that the widest processors take at once, and the fewest of a block: its columns are a whole number of these."""
+
 FIRST_CACHE = 48 * 1024
-"""Bytes of the first-level data cache of a core; a block that does not fit takes half as many runs."""
+"""Bytes of the first-level data cache of a core; a block that does not fit takes fewer runs."""
 
 
 OWN_ROWS = 4
@@ -28,14 +32,15 @@ def lanes_of(program: Program) -> int:
     """Runs of one block of a program."""
     groups = (program.state_rows(), program.parameter_rows(), program.step_rows())
     rows = sum(len(leaf_paths(row, name)) for group in groups for name, row in group.items())
-    return LANES if 8 * LANES * rows <= FIRST_CACHE else LANES // 2
+    return next((lanes for lanes in (LANES, LANES // 2) if 8 * lanes * rows <= FIRST_CACHE), VECTOR)
 
 
 @final
 class LaneRows:
     """Where each number of a program lies in the rows of ``x``: state, parameters, what a step hands on, its parts.
 
-    One array for all of them lets the compiler see that no two rows overlap.
+    One array for all of them lets the compiler see that no two rows overlap. From row ``aside`` on lies what lanes that
+    wait for others keep, where few do: the state, what was left of the step, and what it was handed.
     """
 
     def __init__(self, program: Program, collector: SourceCollector, lanes: int = 0) -> None:
@@ -50,7 +55,9 @@ class LaneRows:
         self.length, self.before, self.remaining, self.error = (
             f"x[{len(numbered) + place}, lane]" for place in range(OWN_ROWS)
         )
-        self.count = len(numbered) + OWN_ROWS
+        self.aside = len(numbered) + OWN_ROWS
+        kept = len(self.state_at) + 1 + len(self.step_at)
+        self.count = self.aside + (kept if program.parts_are_rare else 0)
 
     def load(self, group: str) -> str:
         """Line that makes the NamedTuple ``group`` from its rows."""
@@ -75,6 +82,22 @@ class LaneRows:
 def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
     return {path: first + number for number, path in enumerate(paths)}
+
+
+@dataclass(frozen=True, slots=True)
+class RarePhase:
+    """Lines of a phase that few lanes need at a time: those whose ``cell`` is above 0. It changes no other lane."""
+
+    lines: list[str]
+    cell: str
+
+
+def count_lanes(name: str, condition: str) -> list[str]:
+    """Lines that count in ``name`` the lanes for which a condition holds.
+
+    A sum of whole numbers is taken of several lanes at once, a largest float is not.
+    """
+    return [f"{name} = 0", "for lane in range(width):", f"    {name} += 1 if {condition} else 0"]
 
 
 def indent(lines: list[str], levels: int = 1) -> list[str]:

@@ -2,10 +2,9 @@
 
 from ppafo.engine.lane_control import control_loop, remember_commands, signals_before_start
 from ppafo.engine.lane_meters import measure_sample
-from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
-from ppafo.engine.lane_step import plant_loop
+from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, over_lanes
+from ppafo.engine.lane_step import find_begin, over_rows, plant_loop
 from ppafo.engine.program import Program
-from ppafo.engine.scheme.pneumatics import held_chambers
 from ppafo.engine.source_text import SourceCollector
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
@@ -14,8 +13,33 @@ import math
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.extending import intrinsic
+
+
+@intrinsic(prefer_literal=True)
+def empty_rows(typing, rows, lanes):
+    """An array (rows, lanes) that begins on a line of the cache, in a function that takes the widest vectors."""
+
+    def write(context, builder, signature, arguments):
+        from numba.np.arrayobj import make_array, populate_array
+
+        def number(value):
+            return context.get_constant(types.intp, value)
+
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        height, width = rows.literal_value, lanes.literal_value
+        line = context.get_constant(types.uint32, 64)
+        memory = context.nrt.meminfo_alloc_aligned(builder, number(8 * width * height), line)
+        array = make_array(signature.return_type)(context, builder)
+        data = builder.bitcast(context.nrt.meminfo_data(builder, memory), array.data.type)
+        populate_array(array, data, [number(height), number(width)], [number(8 * width), number(8)], number(8), memory)
+        return array._getvalue()
+
+    return types.float64[:, ::1](rows, lanes), write
 '''
+"""What a program begins with. By itself Numba lets an array begin where a vector of 512 bits lies on two lines of the
+cache, and takes half of such a vector. ``empty_rows`` asks for both; C compilers are told in other words."""
 INLINE = '@njit(forceinline=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 """How what the loop calls is compiled: into it, and not to be called from Python, which would take a third longer."""
 
@@ -55,25 +79,17 @@ def lane_loop(program: Program, collector: SourceCollector, name: str, lanes: in
         f"def {name}({ARGUMENTS}):",
         *indent(
             [
-                f"x = np.empty(({rows.count}, {rows.lanes}))",
-                f"width = {'1' if rows.lanes == 1 else 'states.shape[1]'}",
+                f"x = empty_rows({rows.count}, {rows.lanes})",
+                f"width = {rows.lanes if rows.lanes <= VECTOR else 'states.shape[1]'}",
                 *over_rows(len(rows.state_at), "x[row, lane] = states[row, lane]"),
                 *over_rows(len(rows.parameter_at), f"x[{len(rows.state_at)} + row, lane] = parameters[row, lane]"),
-                *hold_chambers(rows),
+                *find_begin(rows),
                 *all_steps(rows),
                 *over_rows(len(rows.state_at), "states[row, lane] = x[row, lane]"),
             ]
         ),
     ]
     return "\n".join(body)
-
-
-def hold_chambers(rows: LaneRows) -> list[str]:
-    """Finds the chambers of a held vane, once for all steps."""
-    if not rows.program.keeps_volumes:
-        return []
-    held = f"held = {rows.add(held_chambers)}(plant, state.angle)"
-    return over_lanes([rows.load("plant"), rows.load("state"), held, *rows.keep("held")])
 
 
 def all_steps(rows: LaneRows) -> list[str]:
@@ -129,8 +145,3 @@ def record_sample(rows: LaneRows) -> list[str]:
         f"    for lane in range({'1' if rows.lanes == 1 else 'record.shape[2]'}):",
         "        record[next_record, row, lane] = x[row, lane]",
     ]
-
-
-def over_rows(count: int, line: str) -> list[str]:
-    """A line for all lanes of the first rows."""
-    return [f"for row in range({count}):", "    for lane in range(width):", f"        {line}"]

@@ -8,9 +8,14 @@ that are through wait, masked, and no lane sees another.
 
 from ppafo.engine.lane_control import sense_end
 from ppafo.engine.lane_gas import begin_gas, feed, open_valve, pass_gas
-from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
-from ppafo.engine.lane_walk import lead_walk, mark_stride
+from ppafo.engine.lane_rows import LaneRows, RarePhase, count_lanes, indent, over_lanes
+from ppafo.engine.lane_walk import lead_walk, mark_stride, reach_end
 from ppafo.engine.scheme import motion, parts, thermal_gas, walking
+from ppafo.engine.scheme.ankle_torque import carried_foot
+from ppafo.engine.scheme.pneumatics import held_chambers
+
+HANDED = ("held.", "carried.")
+"""Groups of rows that a step is handed by the one before."""
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -24,12 +29,19 @@ def plant_loop(rows: LaneRows) -> list[str]:
     return over_phases([*opening(rows), "length = timing.step"], phases(rows))
 
 
-def over_phases(prelude: list[str], all_phases: list[list[str]]) -> list[str]:
+def over_phases(prelude: list[str], all_phases: list[list[str] | RarePhase]) -> list[str]:
     """Each phase in a loop of its own: loops this short let the processor work on several lanes at once.
 
     It looks some hundred instructions ahead, and one lane's division or root waits for the one before.
     """
-    return [line for phase in all_phases for line in over_lanes([*prelude, *phase])]
+    lines: list[str] = []
+    for phase in all_phases:
+        if isinstance(phase, RarePhase):
+            loop = over_lanes([*prelude, *phase.lines])
+            lines += [*count_lanes("wanting", f"{phase.cell} > 0.0"), "if wanting > 0:", *indent(loop)]
+        else:
+            lines += over_lanes([*prelude, *phase])
+    return lines
 
 
 def opening(rows: LaneRows) -> list[str]:
@@ -38,7 +50,6 @@ def opening(rows: LaneRows) -> list[str]:
     names += ["thermal", "masses"] if rows.program.is_thermal else []
     names += ["leg", "share", "gait_timing", "walk"] if rows.program.walks else []
     names += ["lines", "line_state"] if rows.program.has_lines else []
-    names += ["held"] if rows.program.keeps_volumes else []
     names += ["start"] if rows.program.starts_apart else []
     return [*[rows.load(name) for name in names], time_of_step(rows), "command = result.command"]
 
@@ -47,6 +58,18 @@ def time_of_step(rows: LaneRows) -> str:
     """Line that finds the time [s] at the begin of a step, from the start of the run."""
     step = "(step_index - start.step)" if rows.program.starts_apart else "step_index"
     return f"time = {step} * timing.step"
+
+
+def find_begin(rows: LaneRows) -> list[str]:
+    """Finds what a step is handed by the one before, where there was none; of a held vane it lasts for all steps."""
+    if not rows.program.hands_chambers_on:
+        return []
+    held = f"held = {rows.add(held_chambers)}(plant, state.angle)"
+    lines = [rows.load("plant"), rows.load("state"), held, *rows.keep("held")]
+    if rows.program.walks:
+        carried = f"carried = {rows.add(carried_foot)}(leg, share, walk.now, walk.foot)"
+        lines += [*[rows.load(name) for name in ("leg", "share", "walk")], carried, *rows.keep("carried")]
+    return over_lanes(lines)
 
 
 def step_in_parts(rows: LaneRows) -> list[str]:
@@ -62,16 +85,48 @@ def step_in_parts(rows: LaneRows) -> list[str]:
         *places,
         f"for part in range({MAXIMUM_PARTS}):",
         *indent(over_lanes([*part_opening(rows), *measure(rows)])),
+        *indent(put_aside(rows)),
         *indent(over_phases(inside, phases(rows))),
-        # A sum of whole numbers is taken of several lanes at once, a largest float is not.
-        "    waiting = 0",
-        "    for lane in range(width):",
-        f"        waiting += 1 if {rows.remaining} > 0.0 else 0",
+        *indent(put_back(rows)),
+        *indent(count_lanes("waiting", f"{rows.remaining} > 0.0")),
         "    if waiting == 0:",
         "        break",
         "else:",
         *indent(over_lanes(give_up(rows))),
     ]
+
+
+def put_aside(rows: LaneRows) -> list[str]:
+    """Keeps the state in parts in which lanes may wait, never the first: a select for each row takes longer."""
+    if not rows.program.parts_are_rare:
+        return []
+    kept = f"x[{rows.aside} + row, lane] = x[row, lane]"
+    lines = [f"{cell} = {rows.cells[path]}" for path, cell in handed_aside(rows).items()]
+    lines.append(f"x[{rows.aside + len(rows.state_at)}, lane] = {rows.remaining}")
+    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), kept), *over_lanes(lines)])]
+
+
+def put_back(rows: LaneRows) -> list[str]:
+    """Gives lanes that waited their state again."""
+    if not rows.program.parts_are_rare:
+        return []
+    moves = f"x[{rows.aside + len(rows.state_at)}, lane] > 0.0"
+    back = f"x[row, lane] = x[row, lane] if {moves} else x[{rows.aside} + row, lane]"
+    handed = handed_aside(rows).items()
+    lines = [f"{rows.cells[path]} = {rows.cells[path]} if {moves} else {cell}" for path, cell in handed]
+    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), back), *over_lanes(lines)])]
+
+
+def handed_aside(rows: LaneRows) -> dict[str, str]:
+    """Where what a step is handed by the one before lies aside, by its path."""
+    first = rows.aside + len(rows.state_at) + 1
+    paths = [path for path in rows.step_at if path.startswith(HANDED)]
+    return {path: f"x[{first + place}, lane]" for place, path in enumerate(paths)}
+
+
+def over_rows(count: int, line: str) -> list[str]:
+    """A line for all lanes of the first rows."""
+    return [f"for row in range({count}):", "    for lane in range(width):", f"        {line}"]
 
 
 def give_up(rows: LaneRows) -> list[str]:
@@ -125,7 +180,7 @@ def measure(rows: LaneRows) -> list[str]:
     return [*lines, f"{rows.length} = until", f"{rows.remaining} = remaining"]
 
 
-def phases(rows: LaneRows) -> list[list[str]]:
+def phases(rows: LaneRows) -> list[list[str] | RarePhase]:
     """Both stages of the gas over ``length`` [s] from ``time`` [s], what leads to them, and the state at the end."""
     program = rows.program
     is_free = program.angle is None
@@ -137,14 +192,20 @@ def phases(rows: LaneRows) -> list[list[str]]:
     error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
     loaded = [rows.load("begun"), rows.load("change")]
     loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
-    return [*before, [*feed(rows), *rows.keep("change"), *error], [*loaded, *finish(rows)]]
+    reached = reach_end(rows, with_gas(rows)) if program.walks else []
+    return [*before, [*feed(rows), *rows.keep("change"), *error], *reached, [*loaded, *finish(rows)]]
 
 
 def lead(rows: LaneRows) -> list[str]:
     """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
     program, add = rows.program, rows.add
     if program.walks:
-        return [rows.load("begun"), f"next_angle = {add(walking.next_angle)}(plant, leg, walk, begun)"]
+        return [
+            rows.load("begun"),
+            f"next_angle = {add(walking.next_angle)}(plant, leg, walk, begun)",
+            f"ahead = {add(held_chambers)}(plant, next_angle)",
+            *rows.keep("ahead"),
+        ]
     if program.angle is None:
         return [rows.load("begun"), "next_angle = begun.next_angle"]
     if program.is_held:
@@ -164,7 +225,8 @@ def finish(rows: LaneRows) -> list[str]:
         return [*lines, *store_all(rows, ""), *judge(rows), *sense_end(rows)]
     lines += [rows.load("next_valve"), *([rows.load("next_lines")] if program.has_lines else [])]
     if not program.is_adaptive:
-        stored = [*store_all(rows, "taken"), *judge(rows, "taken"), *sense_end(rows, "taken")]
+        flag = "" if program.parts_are_rare else "taken"
+        stored = [*store_all(rows, flag), *judge(rows, flag), *sense_end(rows, flag)]
         return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *add_up(rows)]
     return [
         *lines,
@@ -201,8 +263,13 @@ def end_motion(rows: LaneRows) -> list[str]:
     program, add = rows.program, rows.add
     if program.walks:
         follow = rows.cells["gait_sensors.follow_rate"]
-        given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, next_gait, length"
-        lines = [rows.load("next_gait"), f"after, walk_after = {add(walking.end_walk)}({given})", *mark_stride(rows)]
+        given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, ended, held, carried, next_gait, length"
+        lines = [
+            *[rows.load(name) for name in ("ended", "ahead", "carried", "next_gait")],
+            "held = ahead",
+            *rows.keep("held"),
+        ]
+        lines += [f"after, walk_after = {add(walking.end_walk)}({given})", *mark_stride(rows)]
         if program.is_thermal:
             assumed = f"{add(walking.next_angle)}(plant, leg, walk, begun)"
             lines.append(f"after = {add(thermal_gas.after_motion)}(plant, thermal, after, {assumed}, after.angle)")

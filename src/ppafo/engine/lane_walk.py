@@ -1,6 +1,6 @@
 """What a walking leg adds to a step of the lanes: the gait at its end, and what marks a stride of a course."""
 
-from ppafo.engine.lane_rows import LaneRows
+from ppafo.engine.lane_rows import LaneRows, RarePhase
 from ppafo.engine.scheme import walking
 from ppafo.model.course import gait_on_course, shown_toe_force, stands_on_toes
 from ppafo.model.gait import GaitMeasured, GaitNow, gait_of, measured_at, place_at
@@ -10,10 +10,26 @@ def lead_walk(rows: LaneRows) -> list[list[str]]:
     """Phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
     if not rows.program.walks:
         return []
-    foot = f"{rows.add(walking.begin_walk)}(plant, leg, share, gait_timing, state, walk, next_gait, length)"
+    foot = f"{rows.add(walking.begin_walk)}(plant, leg, gait_timing, state, held, walk, carried, next_gait, length)"
     return [
         *next_gait(rows),
-        [rows.load("next_gait"), f"begun = {foot}", *rows.keep("begun")],
+        [rows.load("next_gait"), rows.load("carried"), f"begun = {foot}", *rows.keep("begun")],
+    ]
+
+
+def reach_end(rows: LaneRows, fed: list[str]) -> list[list[str] | RarePhase]:
+    """Phases that find where the step ends, from the lines that add its gas; few feet depart from where they slide."""
+    add = rows.add
+    loads = [rows.load(name) for name in ("begun", "change", "ahead")]
+    given = "plant, leg, share, gait_timing, fed, walk, begun, next_gait, ahead, length"
+    reached = f"ended, carried = {add(walking.reach_end)}({given})"
+    departs = f"ended, ahead = {add(walking.depart_in_walk)}(plant, fed, begun, ended, ahead, length)"
+    return [
+        [*loads, rows.load("next_gait"), *fed, reached, *rows.keep("ended", "carried")],
+        RarePhase(
+            [*loads, rows.load("ended"), *fed, departs, *rows.keep("ended", "ahead")],
+            rows.cells["ended.motion.departs"],
+        ),
     ]
 
 

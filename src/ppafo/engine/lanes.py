@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ppafo.engine.cache import load_all, load_generated
 from ppafo.engine.compilers import Compiler, chosen_compiler
-from ppafo.engine.lane_rows import lanes_of
+from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.lane_source import INLINE, SAME_MOMENT, write_lanes
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
@@ -29,10 +29,6 @@ Floats = NDArray[np.float64]
 
 STEPS_PER_CALL = 10_000
 """Steps in one call of compiled code: some hundredths of a second, seconds where each step takes hundreds of parts."""
-
-VECTOR = 8
-"""Lanes that the widest processors take at once; a block is a whole number of these."""
-
 
 SIGNAL_ROWS = 5
 """Readings that may come late: angle and pressures, and in a walk two forces."""

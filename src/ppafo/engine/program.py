@@ -6,7 +6,7 @@ from typing import NamedTuple, get_type_hints
 from ppafo.control.controllers import constant as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
-from ppafo.engine.scheme.ankle_torque import DeviceShare
+from ppafo.engine.scheme.ankle_torque import CarriedFoot, DeviceShare
 from ppafo.engine.scheme.motion import FreePart, PrescribedStep
 from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, MovingGas, StillGas
@@ -14,7 +14,7 @@ from ppafo.engine.scheme.stage_flows import SlopedFlows, StageFlows
 from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
 from ppafo.engine.scheme.thermal_flows import ThermalFlows
 from ppafo.engine.scheme.thermal_gas import ThermalGas
-from ppafo.engine.scheme.walking import WalkState, WalkStep
+from ppafo.engine.scheme.walking import WalkEnd, WalkState, WalkStep
 from ppafo.model.course import Course as WalkCourse
 from ppafo.model.course import Marks
 from ppafo.model.gait import GaitNow, GaitPlace, GaitSeries, GaitTiming
@@ -159,6 +159,12 @@ class Program:
         return self.is_adaptive or self.samples_inside or self.late_commands or self.late_signals or self.valve.jumps
 
     @property
+    def parts_are_rare(self) -> bool:
+        """True where a step is in parts only when a valve jumps inside it: lanes hardly ever wait for others then."""
+        others = self.is_adaptive or self.samples_inside or self.late_commands or self.late_signals
+        return self.valve.jumps and not others
+
+    @property
     def is_held(self) -> bool:
         """True where the angle is prescribed by a profile that never changes."""
         return self.angle is CONSTANT
@@ -167,6 +173,11 @@ class Program:
     def keeps_volumes(self) -> bool:
         """True where the chambers of a held vane are worked out once; gas of lines or with heat counts as moving."""
         return self.is_held and not (self.is_thermal or self.has_lines)
+
+    @property
+    def hands_chambers_on(self) -> bool:
+        """True where the chambers are known as a step begins: once for all, or from the step before."""
+        return self.keeps_volumes or self.walks
 
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that a phase of a step hands to the later ones, in order."""
@@ -180,13 +191,15 @@ class Program:
             **({"place": GaitPlace} if self.walks and not self.takes_course else {}),
             **({"next_gait": GaitNow} if self.walks else {}),
             **({"marks": Marks} if self.takes_course else {}),
-            **({"held": HeldChambers} if self.keeps_volumes else {}),
+            **({"held": HeldChambers} if self.hands_chambers_on else {}),
+            **({"carried": CarriedFoot} if self.walks else {}),
             "begun": begun,
             "flowing": SlopedFlows,
             "gas": gas,
             "passing": StageFlows,
             "shown": shown,
             **({"change": change} if self.angle is None else {}),
+            **({"ahead": HeldChambers, "ended": WalkEnd} if self.walks else {}),
             **({"next_valve": self.valve.state} if self.is_parted else {}),
             **({"next_lines": LineState} if self.is_parted and self.has_lines else {}),
         }

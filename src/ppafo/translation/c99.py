@@ -237,7 +237,7 @@ class _Body:
 
     def write_reserve(self, item: typed.Reserve, level: int) -> Iterator[str]:
         extents = "".join(f"[{extent}]" for extent in item.type.shape)
-        yield from self.line(f"double {self.name(item.name)}{extents};", level)
+        yield from self.line(f"PPAFO_ALIGNED double {self.name(item.name)}{extents};", level)
 
     def write_store(self, item: typed.Store, level: int) -> Iterator[str]:
         yield from self.line(f"{self.terms.term(item.element)} = {self.terms.term(item.value)};", level)

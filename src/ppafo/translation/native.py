@@ -26,6 +26,7 @@ from ppafo.translation.walk import walk_module
 FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "sra-max-scalarization-size-Ospeed=4096")
 """What lets gcc take lanes side by side: without them it makes jumps of choices first. The bits stay as they are."""
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
+_WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("-march") else ()
 _LIBRARY = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
 _HOW_TO_INSTALL = (
     "install gcc or clang, or 'pip install ppafo[native]', which brings zig; PPAFO_BACKEND=numba needs none"
@@ -58,7 +59,7 @@ class CCompiler:
     @property
     def flags(self) -> tuple[str, ...]:
         """Those for the bits, and those for this processor."""
-        return (*FLAGS, _THIS_PROCESSOR, *(FOR_GCC if self.name == "gcc" else ()))
+        return (*FLAGS, _THIS_PROCESSOR, *_WIDEST_VECTORS, *(FOR_GCC if self.name == "gcc" else ()))
 
     def identity(self) -> str:
         """Version of the compiler, flags, what the processor can do, and the translator itself."""

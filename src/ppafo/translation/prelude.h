@@ -29,6 +29,18 @@
 #define PPAFO_SIDE_BY_SIDE
 #endif
 
+#if defined(PPAFO_ALIGNED)
+/* Said by the file around this. */
+#elif defined(__CUDA_ARCH__)
+#define PPAFO_ALIGNED
+#elif defined(__GNUC__)
+#define PPAFO_ALIGNED __attribute__((aligned(64)))
+#elif defined(_MSC_VER)
+#define PPAFO_ALIGNED __declspec(align(64))
+#else
+#define PPAFO_ALIGNED
+#endif
+
 #if defined(PPAFO_ENTRY)
 /* Said by the file around this. */
 #elif defined(__cplusplus)

@@ -282,7 +282,7 @@ class _FunctionWalk:
 
     def reserve(self, name: str, node: ast.Call) -> Statement:
         """A local array, whose shape is a literal."""
-        kind = Array(2, ast.literal_eval(node.args[0]))
+        kind = Array(2, tuple(ast.literal_eval(extent) for extent in node.args))
         self.note_type(name, kind, node)
         return typed.Reserve(name, kind)
 
@@ -328,5 +328,5 @@ class _FunctionWalk:
 
 
 def _is_empty_array(node: ast.Call) -> bool:
-    """True for ``np.empty(...)``."""
-    return isinstance(node.func, ast.Attribute) and node.func.attr == "empty"
+    """True for ``empty_rows(...)``."""
+    return isinstance(node.func, ast.Name) and node.func.id == "empty_rows"

@@ -11,7 +11,14 @@ from scipy.integrate import solve_ivp
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.engine.scheme.motion import with_gas
-from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, begin_moving_gas, moving_change, second_moving_stage
+from ppafo.engine.scheme.pneumatics import (
+    GasChange,
+    MovingGas,
+    begin_moving_gas,
+    held_chambers,
+    moving_change,
+    second_moving_stage,
+)
 from ppafo.engine.scheme.stage_flows import SlopedFlows, sloped_flows, stage_flows
 from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, plant_at_line_pressures
 from ppafo.model.orifice import orifice_flow
@@ -155,7 +162,8 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
     plant, step = device(), 2.5e-4
     ports, state = open_ports(plant), vented_state(plant, ANGLE, 0.0)
     for _ in range(round(DURATION / step)):
-        begun = begin_moving_gas(plant, state, ANGLE, flowing_now(plant, state, ports), step)
+        held, flowing = held_chambers(plant, ANGLE), flowing_now(plant, state, ports)
+        begun = begin_moving_gas(plant, state, held, ANGLE, flowing, step)
         state = with_gas(state, end_of(plant, begun, ports, step))
     ideal = np.array(chamber_pressures(plant, ANGLE, state.mass_1, state.mass_2))
     away = []

@@ -28,6 +28,13 @@ class Direction(NamedTuple):
     cosine: float
 
 
+class CarriedFoot(NamedTuple):
+    """Torques [N m] that shank, knee and weight ask of the ankle: for the foot, for foot plate and vane."""
+
+    foot: float
+    plate: float
+
+
 def foot_direction(shank: float, angle: float) -> Direction:
     """Direction of the foot at a shank angle and an ankle angle [rad]."""
     sine, cosine = sine_and_cosine(ground.foot_angle(shank, angle) * TURNS_OF_RADIAN)
@@ -50,19 +57,27 @@ def leg_torque(
     the measured moment less tissue, so that a wearer who has all of them and no device walks the measured gait.
     ``ground_angle`` [rad] is that of a flat foot.
     """
+    return torque_with_carried(leg, contact, now, ground_angle, angle, carried_foot(leg, share, now, foot))
+
+
+def torque_with_carried(
+    leg: LegParameters, contact: float, now: GaitNow, ground_angle: float, angle: float, carried: CarriedFoot
+) -> float:
+    """As ``leg_torque`` [N m], where it is known what foot and foot plate ask."""
     heel = ground.heel_torque(contact, now, leg, ground_angle, angle)
     active = now.moment if contact == ground.HEEL else now.healthy_torque
     muscles = active - passive_torque(leg, now.ankle)
     wearer = leg.residual_share * muscles + passive_torque(leg, angle)
-    carried = torque_of_body_on_foot(
-        leg, leg.foot_mass * leg.foot_mass_centre, foot_inertia_about_ankle(leg), now, foot
+    return wearer + heel + -carried.plate - carried.foot
+
+
+def carried_foot(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> CarriedFoot:
+    """What foot and foot plate ask of the ankle in a direction of the foot."""
+    mass_moment = leg.foot_mass * leg.foot_mass_centre
+    return CarriedFoot(
+        torque_of_body_on_foot(leg, mass_moment, foot_inertia_about_ankle(leg), now, foot),
+        torque_of_body_on_foot(leg, share.mass_moment, share.inertia, now, foot),
     )
-    return wearer + heel + plate_torque(leg, share, now, foot) - carried
-
-
-def plate_torque(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> float:
-    """Torque [N m] of foot plate and vane by their weight and the shank's motion, positive in plantarflexion."""
-    return -torque_of_body_on_foot(leg, share.mass_moment, share.inertia, now, foot)
 
 
 def torque_of_body_on_foot(

@@ -9,9 +9,9 @@ from there with a torque that runs linearly.
 import math
 from typing import NamedTuple
 
-from ppafo.engine.scheme.pneumatics import GasChange
+from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, held_pressures
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, driving_torque
-from ppafo.model.vane import holds_still
+from ppafo.model.vane import actuator_torque, holds_still
 
 ALLOWED_OF_ANGLE = 2.0e-6
 """Error of one part over the range of the angle; with it a run keeps to 2e-4 of the range."""
@@ -38,6 +38,18 @@ class FreeStep(NamedTuple):
     free_angle: float
     acceleration: float
     torque: float
+
+
+class FreeEnd(NamedTuple):
+    """Second stage of a free step: driving torque [N m], angle [rad] and angular velocity [rad/s] at its end.
+
+    ``departs`` is 1 where an event inside the step leads elsewhere: a stop, a reversal, or a vane at rest.
+    """
+
+    torque: float
+    angle: float
+    angular_velocity: float
+    departs: float
 
 
 class FreePart(NamedTuple):
@@ -215,15 +227,17 @@ def first_event(
     return Departure(fraction, angle, rebound if hits_first else 0.0)
 
 
-def begin_free(plant: PlantParameters, state: PlantState, added_torque: float, step: float) -> FreeStep:
+def begin_free(
+    plant: PlantParameters, state: PlantState, held: HeldChambers, added_torque: float, step: float
+) -> FreeStep:
     """Where one step [s] would lead a vane that is free between its stops. Equations (1), (2), (10).
 
-    ``added_torque`` [N m] drives the vane beside the plant's own torques at the beginning of the step.
+    ``added_torque`` [N m] drives the vane beside the actuator at the beginning of the step, gravity in it.
     """
     velocity = state.angular_velocity
     way = direction_of(velocity)
-    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
-    torque = driving_torque(plant, state.angle, pressure_1, pressure_2) + added_torque
+    pressure_1, pressure_2 = held_pressures(held, state)
+    torque = actuator_torque(pressure_1, pressure_2, plant.torque_constant) + added_torque
     sliding = (torque - way * plant.dynamic_torque - plant.viscous_damping * velocity) / plant.inertia
     acceleration = sliding if way != 0.0 else 0.0
     free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
@@ -231,28 +245,41 @@ def begin_free(plant: PlantParameters, state: PlantState, added_torque: float, s
 
 
 def end_free(
-    plant: PlantParameters, state: PlantState, begun: FreeStep, added_torque: float, step: float
-) -> PlantState:
-    """State at the end of the step [s] of a free vane, from ``state`` with the new gas and the angle of the begin.
+    plant: PlantParameters,
+    state: PlantState,
+    ahead: HeldChambers,
+    begun: FreeStep,
+    added_torque: float,
+    step: float,
+) -> FreeEnd:
+    """The end of the step [s] of a vane that slides through, from ``state`` with the new gas and the old motion.
 
-    ``added_torque`` [N m] drives the vane beside the plant's own torques at the end of the step.
+    ``ahead`` is of the chambers at the angle to which it slides; ``added_torque`` [N m] drives the vane beside the
+    actuator at the end of the step, gravity in it.
     """
     velocity = state.angular_velocity
     way = direction_of(velocity)
-    moving = way != 0.0
     predicted = clamp_angle(plant, begun.free_angle)
-    next_1, next_2 = chamber_pressures(plant, predicted, state.mass_1, state.mass_2)
-    next_torque = driving_torque(plant, predicted, next_1, next_2) + added_torque
+    next_1, next_2 = held_pressures(ahead, state)
+    next_torque = actuator_torque(next_1, next_2, plant.torque_constant) + added_torque
     sliding_torque = next_torque - way * plant.dynamic_torque
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
+    slides_through = (way != 0.0) & (full_velocity * way > 0.0) & (begun.free_angle == predicted)
+    return FreeEnd(
+        torque=next_torque,
+        angle=predicted,
+        angular_velocity=full_velocity,
+        departs=0.0 if slides_through else 1.0,
+    )
 
-    departure = first_event(plant, state, begun.free_angle, begun.acceleration, full_velocity, step)
-    departure_torque = begun.torque + departure.fraction * (next_torque - begun.torque)
-    left_angle, left_velocity = depart(plant, departure, departure_torque, next_torque, step)
-    slides_through = moving and full_velocity * way > 0.0 and begun.free_angle == predicted
-    next_angle = predicted if slides_through else left_angle
-    next_rate = full_velocity if slides_through else left_velocity
-    return with_motion(state, next_angle, next_rate)
+
+def depart_free(
+    plant: PlantParameters, state: PlantState, begun: FreeStep, ended: FreeEnd, step: float
+) -> tuple[float, float]:
+    """Angle [rad] and angular velocity [rad/s] at the end of the step [s] of a vane that does not slide through."""
+    departure = first_event(plant, state, begun.free_angle, begun.acceleration, ended.angular_velocity, step)
+    departure_torque = begun.torque + departure.fraction * (ended.torque - begun.torque)
+    return depart(plant, departure, departure_torque, ended.torque, step)
 
 
 def with_motion(state: PlantState, angle: float, angular_velocity: float) -> PlantState:

@@ -64,20 +64,20 @@ class StillGas(NamedTuple):
 
 
 class HeldChambers(NamedTuple):
-    """Pressures over masses [Pa/kg] of both chambers of a vane that never moves."""
+    """Pressures over masses [Pa/kg] of both chambers at an angle."""
 
     per_mass_1: float
     per_mass_2: float
 
 
 def held_chambers(plant: PlantParameters, angle: float) -> HeldChambers:
-    """Both chambers of a vane that is held at an angle [rad]. Equation (3)."""
+    """Both chambers of a vane at an angle [rad]. Equation (3)."""
     per_mass_1, per_mass_2 = pressures_per_mass(plant, angle)
     return HeldChambers(per_mass_1, per_mass_2)
 
 
 def held_pressures(held: HeldChambers, state: PlantState) -> tuple[float, float]:
-    """Absolute pressures [Pa], as ``chamber_pressures`` has them."""
+    """Absolute pressures [Pa] of the gas of a state, as ``chamber_pressures`` has them."""
     return state.mass_1 * held.per_mass_1, state.mass_2 * held.per_mass_2
 
 
@@ -151,32 +151,36 @@ def begin_still_gas(state: PlantState, held: HeldChambers, flowing: SlopedFlows,
 
 
 def begin_moving_gas(
-    plant: PlantParameters, state: PlantState, next_angle: float, flowing: SlopedFlows, step: float
+    plant: PlantParameters,
+    state: PlantState,
+    held: HeldChambers,
+    next_angle: float,
+    flowing: SlopedFlows,
+    step: float,
 ) -> MovingGas:
     """First stage of one step [s] in which the volumes run linearly to those of ``next_angle`` [rad]."""
-    per_mass_1, per_mass_2 = pressures_per_mass(plant, state.angle)
-    linear, flows = linearise(per_mass_1, per_mass_2, flowing, step)
-    return begin_moving_stage(plant, state, next_angle, linear, flows, step)
+    linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
+    return begin_moving_stage(plant, state, held, next_angle, linear, flows, step)
 
 
 def begin_moving_stage(
     plant: PlantParameters,
     state: PlantState,
+    held: HeldChambers,
     next_angle: float,
     linear: Linearisation,
     flows: Flows,
     step: float,
 ) -> MovingGas:
     """First stage of one step [s] with moving volumes, from all flows at its beginning and their linearisation."""
-    per_mass_1, per_mass_2 = pressures_per_mass(plant, state.angle)
     volumes = chamber_volumes(plant, state.angle)
     next_volumes = chamber_volumes(plant, next_angle)
     # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
     per_duration = 1.0 / (plant.gas_product * max(step, SHORTEST))
     drift = response(
         linear,
-        state.mass_1 * per_mass_1 * (volumes[0] - next_volumes[0]) * per_duration,
-        state.mass_2 * per_mass_2 * (volumes[1] - next_volumes[1]) * per_duration,
+        state.mass_1 * held.per_mass_1 * (volumes[0] - next_volumes[0]) * per_duration,
+        state.mass_2 * held.per_mass_2 * (volumes[1] - next_volumes[1]) * per_duration,
     )
     first = solve_stage(
         linear,

@@ -16,6 +16,7 @@ from ppafo.engine.scheme.pneumatics import (
     Linearisation,
     MovingGas,
     begin_moving_stage,
+    held_chambers,
     linearise,
     pressure_that_matters,
 )
@@ -29,7 +30,6 @@ from ppafo.model.plant import (
     ThermalState,
     chamber_volumes,
     plant_with,
-    pressures_per_mass,
 )
 from ppafo.model.ports import PortFlowSlopes
 from ppafo.model.regulator import LineState, LineStep, SupplyLines, line_pressures, step_lines
@@ -90,11 +90,11 @@ def begin_fed_gas(
     step: float,
 ) -> FedGas:
     """First stage of one step [s] with volumes that run to those of ``next_angle`` [rad]; ports at line pressures."""
-    per_mass_1, per_mass_2 = pressures_per_mass(plant, state.angle)
-    linear, flows = linearise(per_mass_1, per_mass_2, flowing, step)
+    held = held_chambers(plant, state.angle)
+    linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
     volumes = chamber_volumes(plant, state.angle)
     linear = with_lines(linear, volumes[0] / lines.volume_1, volumes[1] / lines.volume_2)
-    chambers = begin_moving_stage(plant, state, next_angle, linear, flows, step)
+    chambers = begin_moving_stage(plant, state, held, next_angle, linear, flows, step)
     first = chambers.still.first
     # What of the sums is line 2's: the same stage once more, for one number.
     growth = (volumes[1] - chamber_volumes(plant, next_angle)[1]) / (volumes[1] * max(step, SHORTEST))

@@ -2,15 +2,31 @@
 
 from typing import NamedTuple
 
-from ppafo.engine.scheme.ankle_torque import DeviceShare, Direction, foot_direction, leg_torque, plate_torque
-from ppafo.engine.scheme.motion import FreeStep, begin_free, clamp_angle, end_free, with_motion
+from ppafo.engine.scheme.ankle_torque import (
+    CarriedFoot,
+    DeviceShare,
+    Direction,
+    carried_foot,
+    foot_direction,
+    torque_with_carried,
+)
+from ppafo.engine.scheme.motion import (
+    FreeEnd,
+    FreeStep,
+    begin_free,
+    clamp_angle,
+    depart_free,
+    end_free,
+    with_motion,
+)
+from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
 from ppafo.model import contact as ground
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import (
     LegParameters,
     foot_inertia_about_ankle,
 )
-from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures
+from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.vane import actuator_torque
 
 
@@ -50,22 +66,34 @@ class WalkStep(NamedTuple):
     offset: float
 
 
+class WalkEnd(NamedTuple):
+    """Second stage: torque of the leg with the foot plate [N m], direction of the foot, and how the vane moved.
+
+    ``motion.departs`` is 1 only where the foot is free.
+    """
+
+    torque: float
+    foot: Direction
+    motion: FreeEnd
+
+
 NO_CLEARANCE = 1.0e3
 
 
 def begin_walk(
     plant: PlantParameters,
     leg: LegParameters,
-    share: DeviceShare,
     timing: GaitTiming,
     state: PlantState,
+    held: HeldChambers,
     walk: WalkState,
+    carried: CarriedFoot,
     next_gait: GaitNow,
     step: float,
 ) -> WalkStep:
-    """Where one step [s] leads the foot, by its own dynamics and by the ground."""
-    torque = leg_torque(leg, share, walk.contact, walk.now, timing.ground_angle, state.angle, walk.foot)
-    free = begin_free(plant, state, torque, step)
+    """Where one step [s] leads the foot, by its own dynamics and by the ground; ``carried`` is at its beginning."""
+    torque = torque_with_carried(leg, walk.contact, walk.now, timing.ground_angle, state.angle, carried)
+    free = begin_free(plant, state, held, torque, step)
     offset = walk.offset / (1.0 + step / ground.FADING_TIME)
     prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle, leg.keeps_gait)
     led = ground.Ankle(
@@ -87,6 +115,7 @@ def external_torque(
     leg: LegParameters,
     share: DeviceShare,
     state: PlantState,
+    held: HeldChambers,
     torque: float,
     plate: float,
     led: ground.Ankle,
@@ -100,12 +129,64 @@ def external_torque(
     speed = state.angular_velocity
     passive_damping = leg.ankle_damping * speed
     needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - plate)
-    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
+    pressure_1, pressure_2 = held_pressures(held, state)
     actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
     moving = way * plant.dynamic_torque + share.viscous_damping * speed + share.inertia * led.acceleration
     given = actuator + plate - moving
     return needed if angle_is_free else given
+
+
+def reach_end(
+    plant: PlantParameters,
+    leg: LegParameters,
+    share: DeviceShare,
+    timing: GaitTiming,
+    state: PlantState,
+    walk: WalkState,
+    begun: WalkStep,
+    now: GaitNow,
+    ahead: HeldChambers,
+    step: float,
+) -> tuple[WalkEnd, CarriedFoot]:
+    """Where the step [s] ends, unless an event inside it leads elsewhere; arguments as ``end_walk`` has them.
+
+    ``ahead`` is of the chambers where the gas took the vane to be then.
+    """
+    free = ground.is_free(walk.contact, leg.keeps_gait)
+    predicted = clamp_angle(plant, begun.free.free_angle)
+    # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
+    foot = foot_direction(now.shank, predicted if free else begun.led.angle)
+    carried = carried_foot(leg, share, now, foot)
+    torque = torque_with_carried(leg, walk.contact, now, timing.ground_angle, predicted, carried)
+    slid = end_free(plant, state, ahead, begun.free, torque, step)
+    moved = FreeEnd(
+        torque=slid.torque,
+        angle=slid.angle if free else begun.led.angle,
+        angular_velocity=slid.angular_velocity if free else begun.led.rate,
+        departs=slid.departs if free else 0.0,
+    )
+    return WalkEnd(torque, foot, moved), carried
+
+
+def depart_in_walk(
+    plant: PlantParameters, state: PlantState, begun: WalkStep, ended: WalkEnd, ahead: HeldChambers, step: float
+) -> tuple[WalkEnd, HeldChambers]:
+    """End and chambers of a step [s] inside which an event leads the foot elsewhere; of any other foot as they are."""
+    angle, rate = depart_free(plant, state, begun.free, ended.motion, step)
+    departs, slid = ended.motion.departs > 0.5, ended.motion
+    there = held_chambers(plant, angle)
+    held = HeldChambers(
+        there.per_mass_1 if departs else ahead.per_mass_1,
+        there.per_mass_2 if departs else ahead.per_mass_2,
+    )
+    moved = FreeEnd(
+        torque=slid.torque,
+        angle=angle if departs else slid.angle,
+        angular_velocity=rate if departs else slid.angular_velocity,
+        departs=slid.departs,
+    )
+    return WalkEnd(ended.torque, ended.foot, moved), held
 
 
 def end_walk(
@@ -117,28 +198,24 @@ def end_walk(
     state: PlantState,
     walk: WalkState,
     begun: WalkStep,
+    ended: WalkEnd,
+    held: HeldChambers,
+    carried: CarriedFoot,
     now: GaitNow,
     step: float,
 ) -> tuple[PlantState, WalkState]:
-    """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin; ``now`` is then."""
+    """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin.
+
+    ``now``, ``held`` and ``carried`` are gait, chambers and what the foot asks at the end.
+    """
     free = ground.is_free(walk.contact, leg.keeps_gait)
-    predicted = clamp_angle(plant, begun.free.free_angle)
-    # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
-    foot = foot_direction(now.shank, predicted if free else begun.led.angle)
-    torque = leg_torque(leg, share, walk.contact, now, timing.ground_angle, predicted, foot)
-    moved = end_free(plant, state, begun.free, torque, step)
-    after = with_motion(
-        state,
-        moved.angle if free else begun.led.angle,
-        moved.angular_velocity if free else begun.led.rate,
-    )
+    after = with_motion(state, ended.motion.angle, ended.motion.angular_velocity)
     acceleration = (after.angular_velocity - state.angular_velocity) / max(step, 1.0e-30)
-    plate = plate_torque(leg, share, now, foot)
-    given = external_torque(plant, leg, share, after, torque, plate, begun.led, acceleration, free)
+    given = external_torque(plant, leg, share, after, held, ended.torque, -carried.plate, begun.led, acceleration, free)
     landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset, leg.keeps_gait)
-    height = leg.toe_lever * (foot.sine - now.sine_healthy_foot)
+    height = leg.toe_lever * (ended.foot.sine - now.sine_healthy_foot)
     turned = after.angle - state.angle
-    return after, advance_walk(timing, walk, after, now, foot, landed, given, height, follow_rate, turned, step)
+    return after, advance_walk(timing, walk, after, now, ended.foot, landed, given, height, follow_rate, turned, step)
 
 
 def advance_walk(

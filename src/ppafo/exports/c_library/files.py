@@ -47,8 +47,9 @@ OUTPUTS = {
 _ALONE = """#if !defined(PPAFO_ENTRY)
 #define PPAFO_ENTRY static
 #endif
-/* Loops over lanes have one turn here. */
+/* Loops over lanes have one turn here, and an array of one lane may begin anywhere. */
 #define PPAFO_SIDE_BY_SIDE
+#define PPAFO_ALIGNED
 
 """
 """What the functions are told that stand in the file of a library."""

@@ -91,7 +91,7 @@ def _name_cells(rows: LaneRows) -> None:
     first = len(rows.state_at)
     rows.cells.update({path: f"parameters[{row - first}, lane]" for path, row in rows.parameter_at.items()})
     rows.cells.update({path: f"own[{row}, lane]" for row, path in enumerate(OWN_PATHS)})
-    if rows.program.keeps_volumes:
+    if rows.program.hands_chambers_on:
         rows.cells.update({path: f"chambers{path.removeprefix('held')}" for path in leaf_paths(HeldChambers, "held")})
 
 
@@ -104,7 +104,7 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
     """Lines that sense, observe and judge one environment, and say whether its episode ends."""
     program, add = rows.program, rows.add
     groups = ["timing", "plant", "state", "result", "reference", "start", *(["walk"] if program.walks else [])]
-    held = [f"chambers = {add(held_chambers)}(plant, state.angle)"] if program.keeps_volumes else []
+    held = [f"chambers = {add(held_chambers)}(plant, state.angle)"] if program.hands_chambers_on else []
     reference = add(program.reference.value)
     view, error, kept = (f"{add(function)}({given})" for function, given in (task.observed, task.error, task.kept))
     observation = "observations[first + lane, {0}] = {1}({2}, bounds[0, {0}], bounds[1, {0}])"
