@@ -21,7 +21,7 @@ PAGE = (ROOT / "docs" / "how-to" / "learn-a-controller.md").read_text(encoding="
 @pytest.fixture
 def example(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
     """The example with a budget of nearly nothing, on the task whose model other tests have compiled."""
-    monkeypatch.syspath_prepend(ROOT / "examples" / "learning")
+    monkeypatch.syspath_prepend(ROOT / "src" / "ppafo" / "examples" / "learn-a-controller")
     monkeypatch.chdir(tmp_path)
     module = importlib.import_module("learn_a_controller")
     small = {"GENERATIONS": 2, "PAIRS": 2, "EPISODES": 2, "SECONDS": 0.02}

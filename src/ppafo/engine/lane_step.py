@@ -50,6 +50,7 @@ def opening(rows: LaneRows) -> list[str]:
     names += ["thermal", "masses"] if rows.program.is_thermal else []
     names += ["leg", "share", "gait_timing", "walk"] if rows.program.walks else []
     names += ["lines", "line_state"] if rows.program.has_lines else []
+    names += ["held"] if rows.program.hands_chambers_on else []
     names += ["start"] if rows.program.starts_apart else []
     return [*[rows.load(name) for name in names], time_of_step(rows), "command = result.command"]
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lane_control import SIGNALS, current_readings, pressures_of, sense, sense_gait
-from ppafo.engine.lane_rows import LaneRows, indent, lanes_of, over_lanes
+from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, lanes_of, over_lanes
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
-from ppafo.engine.lanes import SIGNAL_ROWS, VECTOR, Batch, Clock, Floats, load_source
+from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats, load_source
 from ppafo.engine.program import LaneStart, Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers

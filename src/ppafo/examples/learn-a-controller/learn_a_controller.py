@@ -5,7 +5,7 @@ The task: follow a torque while the wearer moves the ankle, through a slow spool
 (``learnt_policy.py``) on many environments at once; the PID controller gets as many runs to find its gains.
 
     pip install 'ppafo[gym]'
-    cd examples && python learn_a_controller.py
+    python learn_a_controller.py
 
 Everything is drawn from one seed: the same numbers come out each time. The results go to ``out/learn-a-controller``.
 """
