@@ -103,6 +103,11 @@ def format_quantity(value: float, unit: str) -> str:
     return f"{repr(float(value)).removesuffix('.0')} {unit}".rstrip()
 
 
+def percentage(fraction: float, digits: int) -> str:
+    """Return a fraction [-] as a percentage of so many digits, in which hundreds are no powers of ten: ``120 %``."""
+    return f"{float(f'{100.0 * fraction:.{digits}g}'):.12g} %"
+
+
 def check_unit(unit: str) -> None:
     """Refuse a unit that does not exist or is not written as ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``."""
     _parse_unit(unit)

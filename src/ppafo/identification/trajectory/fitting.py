@@ -26,7 +26,6 @@ from ppafo.identification.trajectory.result import (
 from ppafo.identification.trajectory.search import Optimum, optimum
 from ppafo.identification.trajectory.uncertainty import Evidence, Uncertainty, estimate_of, uncertainty_of
 from ppafo.identification.trajectory.weighing import weigh
-from ppafo.identification.trajectory.whitening import Drift
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.channels import CHANNELS
@@ -196,20 +195,7 @@ def _remarks(
         *([] if found.has_converged else [stopped]),
         *([misfit, *predictions(channels)] if evidence.misfit else _noise_remarks(channels, uncertainty)),
         *([broken] if broken else []),
-        *_narrow_intervals(uncertainty),
     )
-
-
-def _narrow_intervals(uncertainty: Uncertainty) -> list[str]:
-    """Return what is known of intervals under a drift with heavy tails, where a sensor has one."""
-    sensors = [one for one in uncertainty.sensors if one.noise.is_heavy and isinstance(one.noise.shape, Drift)]
-    if not sensors:
-        return []
-    names = ", ".join(dict.fromkeys(one.channel for one in sensors))
-    return [
-        f"noise of {names}: a drift under heavy tails, for which intervals come out about a tenth too narrow "
-        f"(95 % ones held some 92 % of planted values)"
-    ]
 
 
 def _noise_remarks(channels: Sequence[ChannelFit], uncertainty: Uncertainty) -> list[str]:

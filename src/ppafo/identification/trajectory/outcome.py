@@ -21,6 +21,7 @@ from ppafo.identification.trajectory.search import is_at_bound
 from ppafo.identification.trajectory.section import Setting, TrajectorySection, name_in_refusals
 from ppafo.identification.trajectory.uncertainty import FROM_PRIOR, STRONG, interval_factor, relative_to_number
 from ppafo.progress import Progress, Report
+from ppafo.units import percentage
 
 EXCITED = 5.0
 """Range of a channel over its noise below which nothing happens in it."""
@@ -98,7 +99,7 @@ def _number(item: Range, error: float, prior: float, partners: str, search: Sear
     if error > FROM_PRIOR * prior:
         return Prospect(item.name, False, "the recordings add little to its prior")
     if fraction <= search.weak:
-        return Prospect(item.name, True, f"with white noise alone it would be known to {100.0 * fraction:.2g} %")
+        return Prospect(item.name, True, f"with white noise alone it would be known to {percentage(fraction, 2)}")
     against = f"it trades off against {partners}" if partners else "the recordings are hardly sensitive to it"
     return Prospect(item.name, False, f"{against}; fix it, give it a prior, or record something else")
 
@@ -187,7 +188,7 @@ def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list
 
 def _checks(found: TrajectoryFit) -> tuple[Check, ...]:
     worst = max(found.channels, key=lambda channel: channel.fraction)
-    left, good = f"{100.0 * worst.fraction:.2g} %", f"{100.0 * ACCEPTABLE_FRACTION:g} %"
+    left, good = percentage(worst.fraction, 2), f"{100.0 * ACCEPTABLE_FRACTION:g} %"
     description = f"RMS at most {left} of the range in {worst.channel} of {worst.experiment}; {good} is good"
     broken = next((text for text in (broken_rule(item.device) for item in found.scenarios) if text), "")
     settled = found.optimum.has_converged

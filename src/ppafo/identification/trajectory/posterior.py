@@ -170,15 +170,18 @@ def _numbers_of(shape: Shape) -> Floats:
     return np.arctanh(last) if 0 < shape.order <= _FEW else np.zeros(0)
 
 
-def _shape_of(numbers: Floats, before: Shape, longest: float) -> tuple[Shape, float] | None:
+def _shape_of(numbers: Floats, noise: SensorNoise, longest: float) -> tuple[Shape, float] | None:
     """Return the shape with these numbers and the logarithm of its prior, None where the prior is 0.
 
-    The prior is even in the standard deviation of the steps of a drift and in the logarithm of its memory, and in the
-    reflection coefficients of an autoregression. One even in the logarithm of the former has drifts too small.
+    The prior is even in the reflection coefficients of an autoregression, and in the logarithm of the memory of a
+    drift; then in the standard deviation of its steps or, where heavy tails hide more of it, in its whole variance.
+    Priors that favour smaller drifts make intervals too narrow.
     """
-    if isinstance(before, Drift):
-        is_inside = LOG_RATIO[0] <= numbers[0] <= LOG_RATIO[1] and 0.0 <= numbers[1] <= longest
-        return (drift_of(numbers, before.is_zeroed), 0.5 * float(numbers[0])) if is_inside else None
+    if isinstance(noise.shape, Drift):
+        if not (LOG_RATIO[0] <= numbers[0] <= LOG_RATIO[1] and 0.0 <= numbers[1] <= longest):
+            return None
+        drift = drift_of(numbers, noise.shape.is_zeroed)
+        return drift, math.log(drift.stationary) if noise.is_heavy else 0.5 * float(numbers[0])
     reflections = np.tanh(numbers)
     if np.abs(reflections).max() > _LARGEST:
         return None
@@ -243,12 +246,12 @@ def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random
         if not state.numbers.size:
             continue
         others = np.sum([one.products for place, one in enumerate(found) if place != sensor], axis=0)
-        longest = longest_memory(model.segments(model.residuals, sensor))
-        here = _shape_of(state.numbers, state.noise.shape, longest)
+        longest = longest_memory(model.segments(model.residuals, sensor), state.noise.is_heavy)
+        here = _shape_of(state.numbers, state.noise, longest)
         likelihood = _without_columns(model, others + state.products) - state.spread + (here[1] if here else 0.0)
         for _ in range(_PROPOSALS):
             numbers = state.numbers + state.step @ random.standard_normal(len(state.numbers))
-            tried = _shape_of(numbers, state.noise.shape, longest)
+            tried = _shape_of(numbers, state.noise, longest)
             if tried is None:
                 continue
             noise = replace(state.noise, shape=tried[0])

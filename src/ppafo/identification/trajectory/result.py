@@ -135,7 +135,10 @@ def predictions(channels: Sequence[ChannelFit]) -> tuple[str, ...]:
             for channel in channels
             if channel.experiment == label
         ]
-        found.append(f"95 % of the samples of a new recording like '{label}' lie within {', '.join(widths)} of its run")
+        found.append(
+            f"95 % of the samples of a new recording like '{label}', by sensors whose zeros have not moved since, lie "
+            f"within {', '.join(widths)} of its run"
+        )
     return tuple(found)
 
 

@@ -135,9 +135,9 @@ def drift_of(numbers: Floats | tuple[float, float], is_zeroed: bool) -> Drift:
     return Drift(math.exp(float(numbers[0])), math.exp(-math.exp(-float(numbers[1]))), is_zeroed)
 
 
-def longest_memory(segments: Sequence[Floats]) -> float:
-    """Return the logarithm of the longest memory [samples] of a drift that is tried."""
-    return math.log(50.0 * max(len(one) for one in segments))
+def longest_memory(segments: Sequence[Floats], is_heavy: bool) -> float:
+    """Return the logarithm of the longest memory [samples] of a drift that is tried, with heavy tails or without."""
+    return math.log((1.0 if is_heavy else 50.0) * max(len(one) for one in segments))
 
 
 def _criterion(likelihood: float, numbers: int, count: int) -> float:
@@ -187,7 +187,7 @@ def _drift(segments: list[Floats], is_zeroed: bool) -> SensorNoise:
     """Return the drift of greatest likelihood, with white normal noise upon it."""
     from scipy.optimize import minimize
 
-    ones, longest = [np.ones(len(one)) for one in segments], longest_memory(segments)
+    ones, longest = [np.ones(len(one)) for one in segments], longest_memory(segments, is_heavy=False)
 
     def cost(numbers: Floats) -> float:
         inside, away = _within(numbers, longest)
@@ -296,7 +296,7 @@ def _heavy_drift(segments: list[Floats], normal: SensorNoise) -> SensorNoise:
     """Return the drift upon which white noise has a t distribution, by a filter that sums normal distributions."""
     from scipy.optimize import minimize
 
-    longest, white = longest_memory(segments), normal.shape
+    longest, white = longest_memory(segments, is_heavy=True), normal.shape
     assert isinstance(white, Drift)
 
     def cost(numbers: Floats) -> float:

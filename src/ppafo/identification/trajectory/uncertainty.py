@@ -15,6 +15,7 @@ from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.problem import Range, Search
 from ppafo.identification.trajectory.search import is_at_bound
 from ppafo.identification.trajectory.weighing import Sensor, WhitenedFit
+from ppafo.units import percentage
 
 STRONG = 0.8
 """Correlation from which two numbers are reported as trading off against each other."""
@@ -181,7 +182,7 @@ def _names(others: Sequence[tuple[str, float]]) -> str:
 
 
 def _percent(fraction: float) -> str:
-    return f"{100.0 * fraction:.2g} %" if fraction < 10.0 else "no useful precision"
+    return percentage(fraction, 2) if fraction < 10.0 else "no useful precision"
 
 
 _TOLD = 1.5

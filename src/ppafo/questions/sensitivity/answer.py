@@ -9,6 +9,7 @@ from ppafo.answers.display_units import change_text, display_difference, display
 from ppafo.answers.shown_metrics import metric_quantity
 from ppafo.questions.sensitivity.analyse import OfMetric, Sensitivity
 from ppafo.questions.sensitivity.figure import sensitivity_figure
+from ppafo.questions.sensitivity.methods import Indices
 from ppafo.simulation.document import plain
 
 _TITLES = {
@@ -88,9 +89,17 @@ def remarks(found: Sensitivity, metric: OfMetric) -> list[str]:
         pairs = ", ".join(f"{first} and {second}" for first, second in unsettled)
         said.append(f"not converged at this size, their bands overlap: {pairs}")
     if "first" in metric.indices.values:
-        alone = float(np.sum(metric.indices.values["first"]))
-        said.append(f"first-order indices sum to {alone:.3f}; the rest comes from interactions")
+        said.append(_interactions(metric.indices))
     return said
+
+
+def _interactions(indices: Indices) -> str:
+    """Return what is left for interactions; a rest within the error of the sum may be none."""
+    alone = float(np.sum(indices.values["first"]))
+    error = float(np.linalg.norm(indices.bands["first"]))
+    if alone + error < 1.0:
+        return f"first-order indices sum to {alone:.3f} ± {error:.2g}; the rest comes from interactions"
+    return f"first-order indices sum to {alone:.3f} ± {error:.2g}: interactions, if any, are within this error"
 
 
 def _data(found: Sensitivity) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from ppafo.questions.tune.search import agreement, keeps
 from ppafo.questions.tune.solve import FRESH_DRAWS, Setting, Tuning
 from ppafo.simulation.document import plain
 from ppafo.studies.intervals import fraction_text
+from ppafo.units import percentage
 
 _DIFFERENT = 0.1
 """Fraction of the way between the bounds from which on two starts are said to have ended in different places."""
@@ -44,7 +45,7 @@ def verdict(tuning: Tuning) -> str:
     """Return the result in a sentence."""
     before, after, name = tuning.before, tuning.after, tuning.problem.name
     if not after.is_feasible_in_search:
-        broken = f"the best found exceed the limits by {100.0 * after.violation[0]:.3g} %"
+        broken = f"the best found exceed the limits by {percentage(after.violation[0], 3)}"
         return f"{name}: no gains within the bounds satisfy all constraints; {broken}{_by_ceiling(tuning)}"
     if not after.is_feasible:
         return (
@@ -67,7 +68,7 @@ def _by_ceiling(tuning: Tuning) -> str:
     ceiling = tuning.after.ceiling
     if not ceiling.explains:
         return ""
-    where = "" if tuning.problem.spread is None else f" in {100.0 * ceiling.fraction:.2g} % of the draws"
+    where = "" if tuning.problem.spread is None else f" in {percentage(ceiling.fraction, 2)} of the draws"
     return (
         "; the torque ceiling is the cause: the reference requires more than the torque constant times the gauge "
         f"pressure of the supply{where}, which no gains can change"
@@ -142,7 +143,7 @@ def _violations_on_fresh(tuning: Tuning) -> list[str]:
         for item in tuning.problem.constraints
         if item.metric in values and not keeps(item, values[item.metric])
     ]
-    return [*broken, *([f"{100.0 * lacking:.2g} % of the runs fail or lack a metric"] if values and lacking else [])]
+    return [*broken, *([f"{percentage(lacking, 2)} of the runs fail or lack a metric"] if values and lacking else [])]
 
 
 def _options(tuning: Tuning) -> str:

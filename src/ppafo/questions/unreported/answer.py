@@ -100,7 +100,8 @@ def conclusion_rows(found: Sequence[Conclusion]) -> list[tuple[str, str, str, st
 
 
 def _percent(fraction: float, error: float, digits: int) -> str:
-    reach = f"{100.0 * error:.2g}" if error >= 0.01 else f"{100.0 * error:.2f}"
+    # No fraction is off by more than all of it.
+    reach = f"{100.0 * min(error, 1.0):.{0 if error >= 0.1 else 1 if error >= 0.01 else 2}f}"
     return f"{100.0 * fraction:.{digits}f} ± {reach} %"
 
 

@@ -50,7 +50,7 @@ def test_a_dead_volume_wrong_by_one_percent_caps_every_verdict(wrong: list[Traje
         assert not any(estimate.is_identified for estimate in found.estimates)
         assert found.estimate("foot_plate.inertia").verdict == "holds for this model only"
         assert any("holds for this model only" in remark for remark in found.remarks)
-        assert sum("95 % of the samples of a new recording like" in remark for remark in found.remarks) == 2
+        assert sum("sensors whose zeros have not moved" in remark for remark in found.remarks) == 2
 
 
 def test_the_right_model_raises_no_alarm(right: list[TrajectoryFit]) -> None:
@@ -177,7 +177,10 @@ def test_the_posterior_is_a_tree_that_arviz_reads(right: list[TrajectoryFit]) ->
 def test_a_bench_richer_than_the_model_identifies_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("sksundae", reason="the virtual rig needs the extra 'reference'")
     monkeypatch.chdir(tmp_path)
-    record = ["rig", "record", "step-response", "--preset", "paper-bench", "--set", "run.duration=0.5 s"]
+    # Each seed is a bench with zeros of its own; a prediction is for the sensors as they are.
+    settings = ("run.duration=0.5 s", "rig.angle_sensor.offset=0 deg", "rig.pressure_sensor.offset=0 Pa_d")
+    changed = [word for setting in settings for word in ("--set", setting)]
+    record = ["rig", "record", "step-response", "--preset", "paper-bench", *changed]
     for seed in ("1", "2"):
         assert main([*record, "--seed", seed, "--out", seed]) == 0
     paths = "".join(f"[[trajectory.parameters]]\npath = '{path}'\n" for path in FIVE_PARAMETERS)
@@ -195,7 +198,7 @@ def test_a_bench_richer_than_the_model_identifies_nothing(tmp_path: Path, monkey
         float(np.mean(np.abs(np.interp(run.time, new.time, new[one.channel]) - run[one.channel]) <= one.prediction))
         for one in outcome.fit.channels
     ]
-    assert 0.90 <= float(np.mean(held)) <= 0.98
+    assert all(0.90 <= one <= 0.98 for one in held)
 
 
 def test_heavy_tails_are_no_misfit() -> None:

@@ -231,39 +231,47 @@ def test_with_white_noise_the_posterior_is_that_of_least_squares() -> None:
     assert found.quantile(0, 0.975) - found.quantile(0, 0.025) == pytest.approx(2.0 * 1.965 * error, rel=0.02)
 
 
-def step_of_a_drift(segments: list[Floats], longest: float) -> tuple[float, float]:
-    """Mean and standard deviation of the logarithm of a drift's steps, from a sum with dense covariances.
+def drift_summed(segments: list[Floats], is_heavy: bool) -> tuple[Floats, Floats]:
+    """Means and deviations of the logarithms of a drift's steps and of its size, from a sum with dense covariances.
 
-    The prior is even in the standard deviation of the steps and in the logarithm of the memory; each level and an
-    offset of all samples are integrated out.
+    The prior is even in the logarithm of the memory, and in the standard deviation of the steps or, with tails that may
+    be heavy, in the variance of the drift; each level and an offset of all samples are integrated out.
     """
     count = len(segments[0])
     ones, lags = np.ones(count), np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    steps, logarithms = np.linspace(0.005, 2.5, 100), []
-    for step in steps:
-        for timescale in np.exp(np.linspace(0.0, longest, 20)):
+    logarithms, numbers = [], []
+    for step in np.linspace(0.005, 2.5, 100):
+        for timescale in np.exp(np.linspace(0.0, math.log((1.0 if is_heavy else 50.0) * count), 20)):
             memory = math.exp(-1.0 / timescale)
-            root = np.linalg.cholesky(np.eye(count) + step**2 / (1.0 - memory**2) * memory**lags)
+            variance = step**2 / (1.0 - memory**2)
+            root = np.linalg.cholesky(np.eye(count) + variance * memory**lags)
             white = [np.linalg.solve(root, np.column_stack([ones, one])) for one in segments]
             products = np.sum([one.T @ one for one in white], axis=0)
             left = products[1, 1] - products[0, 1] ** 2 / products[0, 0]
             spread = len(segments) * np.sum(np.log(np.diag(root))) + 0.5 * math.log(products[0, 0])
-            logarithms.append(-spread - 0.5 * (count * len(segments) - 1) * math.log(left))
-    chances = np.exp(np.array(logarithms) - max(logarithms)).reshape(len(steps), -1).sum(axis=1)
-    mean = float(np.average(np.log(steps), weights=chances))
-    return mean, math.sqrt(np.average((np.log(steps) - mean) ** 2, weights=chances))
+            prior = math.log(variance / step) if is_heavy else 0.0
+            logarithms.append(prior - spread - 0.5 * (count * len(segments) - 1) * math.log(left))
+            numbers.append([math.log(step), 0.5 * math.log(variance)])
+    chances = np.exp(np.array(logarithms) - max(logarithms))
+    mean = np.average(numbers, weights=chances, axis=0)
+    return mean, np.sqrt(np.average((np.array(numbers) - mean) ** 2, weights=chances, axis=0))
 
 
-def test_a_drift_is_drawn_as_a_sum_over_all_drifts_says() -> None:
-    random, count = np.random.default_rng(23), 60
+@pytest.mark.parametrize(("seed", "is_heavy"), [(23, False), (25, True)])
+def test_a_drift_is_drawn_as_a_sum_over_all_drifts_says(seed: int, is_heavy: bool) -> None:
+    random, count = np.random.default_rng(seed), 60
     segments = [NOISE_KINDS["drift"].draw(count, number, random) for number in range(2)]
     columns = np.column_stack([np.ones(2 * count), -np.concatenate(segments)])
     model = LinearModel(columns, ((slice(0, count), slice(count, 2 * count)),), np.zeros(1), np.zeros((1, 1)))
-    _, shown = draw_posterior(model, [SensorNoise(Drift(0.01, 0.95), np.ones(2))], 1, 1, chains=2, count=800)
-    drawn_steps = [0.5 * math.log(one.noises[0].shape.ratio) for one in shown]  # type: ignore[union-attr]
-    mean, deviation = step_of_a_drift(segments, math.log(50.0 * count))
+    # Tails that are called heavy but are not nearly: the sum is that of normal ones.
+    start = SensorNoise(Drift(0.01, 0.95), np.ones(2), 100.0 if is_heavy else math.inf)
+    _, shown = draw_posterior(model, [start], 1, 1, chains=2, count=800)
+    shapes = [one.noises[0].shape for one in shown]
+    found = [[math.log(one.ratio), math.log(one.stationary)] for one in shapes]  # type: ignore[union-attr]
+    mean, deviation = drift_summed(segments, is_heavy)
     # With a prior even in the logarithm they came out ten times as small, for no recording tells none from very little.
-    assert np.mean(drawn_steps) == pytest.approx(mean, abs=0.4 * deviation)
+    # With heavy tails and the prior of normal ones, steps were smaller and memories many times those of the recordings.
+    assert np.all(np.abs(0.5 * np.mean(found, axis=0) - mean) < 0.4 * deviation)
 
 
 def test_bounds_cut_the_interval_and_a_direction_that_nothing_fixes_stays_finite() -> None:

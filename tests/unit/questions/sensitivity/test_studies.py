@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
+from ppafo.questions.sensitivity.answer import remarks
 from ppafo.questions.sensitivity.solve import sensitivity
 
 pytest.importorskip("SALib")
@@ -20,6 +21,14 @@ def test_what_matters_for_the_error_and_what_for_the_gas() -> None:
     assert max(gas, key=lambda path: gas[path]) == "actuator.leak.area"
     assert np.sum(found.metrics[0].indices.values["first"]) == pytest.approx(1.0, abs=0.1)
     assert found.runs == 256 * 10
+
+
+def test_few_base_points_are_not_taken_for_interactions() -> None:
+    found = sensitivity(STUDY, metrics=["gas_supplied"], samples=64, configuration="proportional", independent=True)
+    (metric,) = found.metrics
+    # The indices happen to sum to more than 1, of which no rest can be left.
+    assert np.sum(metric.indices.values["first"]) > 1.0
+    assert "interactions, if any, are within this error" in remarks(found, metric)[-1]
 
 
 def test_the_study_of_the_package_with_its_correlation_gets_shapley_effects() -> None:
