@@ -20,6 +20,9 @@ FIRST_CACHE = 48 * 1024
 """Bytes of the first-level data cache of a core; a block that does not fit takes fewer runs."""
 
 
+HANDED = ("held.", "carried.")
+"""Groups of rows that a step is handed by the one before."""
+
 OWN_ROWS = 4
 """Rows of the parts of a step: length of a part, time before it and after its begin [s], error of its gas [-]."""
 
@@ -56,7 +59,7 @@ class LaneRows:
             f"x[{len(numbered) + place}, lane]" for place in range(OWN_ROWS)
         )
         self.aside = len(numbered) + OWN_ROWS
-        kept = len(self.state_at) + 1 + len(self.step_at)
+        kept = len(self.state_at) + 1 + sum(path.startswith(HANDED) for path in self.step_at)
         self.count = self.aside + (kept if program.parts_are_rare else 0)
 
     def load(self, group: str) -> str:

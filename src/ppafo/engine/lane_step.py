@@ -8,14 +8,11 @@ that are through wait, masked, and no lane sees another.
 
 from ppafo.engine.lane_control import sense_end
 from ppafo.engine.lane_gas import begin_gas, feed, open_valve, pass_gas
-from ppafo.engine.lane_rows import LaneRows, RarePhase, count_lanes, indent, over_lanes
+from ppafo.engine.lane_rows import HANDED, LaneRows, RarePhase, count_lanes, indent, over_lanes
 from ppafo.engine.lane_walk import lead_walk, mark_stride, reach_end
 from ppafo.engine.scheme import motion, parts, thermal_gas, walking
 from ppafo.engine.scheme.ankle_torque import carried_foot
 from ppafo.engine.scheme.pneumatics import held_chambers
-
-HANDED = ("held.", "carried.")
-"""Groups of rows that a step is handed by the one before."""
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from ppafo.engine.lane_meters import REQUEST, TRACED, walk_traces
-from ppafo.engine.lane_rows import indent
+from ppafo.engine.lane_rows import HANDED, indent
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
@@ -170,9 +170,15 @@ def c_text(
 
 
 def _stepping(program: Program, prefix: str) -> list[str]:
-    """Names of the places of what a step hands on, and of its parts."""
+    """Names of the places of what a step hands on, of its parts, and of what lies aside while lanes wait."""
     handed = [name.removeprefix("AT_") for name in places_of(program.step_rows()).values()]
-    return [f"{prefix}_{name}" for name in (*handed, "PART_LENGTH", "PART_BEFORE", "PART_REMAINING", "PART_ERROR")]
+    states = [name.removeprefix("AT_") for name in places_of(program.state_rows()).values()]
+    kept = [
+        name.removeprefix("AT_") for path, name in places_of(program.step_rows()).items() if path.startswith(HANDED)
+    ]
+    aside = [f"ASIDE_{name}" for name in (*states, "PART_REMAINING", *kept)] if program.parts_are_rare else []
+    parts = ("PART_LENGTH", "PART_BEFORE", "PART_REMAINING", "PART_ERROR")
+    return [f"{prefix}_{name}" for name in (*handed, *parts, *aside)]
 
 
 def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
