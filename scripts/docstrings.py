@@ -1,0 +1,76 @@
+"""What Sphinx is taught about this package: its docstrings are plain text, and dotted names in the pages are links.
+
+An extension of Sphinx, named in ``docs/conf.py``.
+"""
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.transforms.post_transforms import SphinxPostTransform
+from sphinx.util.nodes import make_refnode
+
+_CODE = re.compile(r"``(.+?)``|`([^`\n]+?)`", re.DOTALL)
+_MARKS = re.compile(r"([\\*|])|(?<=\w)(_)(?!\w)")
+_ALIAS = re.compile(r"Alias for field number \d+")
+_DOTTED = re.compile(r"(ppafo(?:\.\w+)+)(?:\(.*\))?")
+
+
+def restructured(lines: Iterable[str]) -> list[str]:
+    """Return a plain docstring as reStructuredText: code in backticks, indented blocks as they stand, marks as text."""
+    text: list[str] = []
+    for block in re.split(r"\n{2,}", "\n".join(lines).strip("\n")):
+        if block.startswith("    "):
+            text += ["::", block]
+        elif not _ALIAS.fullmatch(block):
+            text.append(_with_code(block))
+    return "\n\n".join(text).split("\n")
+
+
+def _with_code(block: str) -> str:
+    written, end = "", 0
+    for found in _CODE.finditer(block):
+        code = " ".join((found[1] or found[2]).split())
+        written += _escaped(block[end : found.start()]) + f"``{code}``" + _gap(block, found.end())
+        end = found.end()
+    return written + _escaped(block[end:])
+
+
+def _escaped(text: str) -> str:
+    return _MARKS.sub(lambda found: "\\" + found[0], text)
+
+
+def _gap(block: str, end: int) -> str:
+    """What ends a literal where a word goes on."""
+    return "\\ " if block[end : end + 1].isalnum() else ""
+
+
+class LinkNames(SphinxPostTransform):
+    """Lets a dotted name of the package in code lead to its description, where there is one."""
+
+    default_priority = 5
+
+    def run(self, **_: Any) -> None:
+        """Go through all code of a page."""
+        known = self.env.domains.python_domain.objects
+        for node in list(self.document.findall(nodes.literal)):
+            found = _DOTTED.fullmatch(node.astext())
+            if found is None or found[1] not in known or isinstance(node.parent, nodes.reference):
+                continue
+            entry = known[found[1]]
+            node.replace_self(
+                make_refnode(self.app.builder, self.env.docname, entry.docname, entry.node_id, node.deepcopy())
+            )
+
+
+def _plain(_: Sphinx, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
+    lines[:] = restructured(lines)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Add both to Sphinx."""
+    app.connect("autodoc-process-docstring", _plain)
+    app.add_post_transform(LinkNames)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
