@@ -29,7 +29,7 @@ python_use_unqualified_type_names = True
 python_display_short_literal_types = True
 python_maximum_signature_line_length = 100
 
-# Every reference must lead somewhere, but for types that have no page: those of other packages, and inner ones in signatures.
+# Every reference must lead somewhere, but for types in signatures: those of other packages and inner ones have no page.
 nitpicky = True
 nitpick_ignore_regex = [("py:(class|obj|data|exc|attr)", r".*")]
 

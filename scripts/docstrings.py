@@ -7,11 +7,6 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from docutils import nodes
-from sphinx.application import Sphinx
-from sphinx.transforms.post_transforms import SphinxPostTransform
-from sphinx.util.nodes import make_refnode
-
 _CODE = re.compile(r"``(.+?)``|`([^`\n]+?)`", re.DOTALL)
 _MARKS = re.compile(r"([\\*|])|(?<=\w)(_)(?!\w)")
 _ALIAS = re.compile(r"Alias for field number \d+")
@@ -47,30 +42,27 @@ def _gap(block: str, end: int) -> str:
     return "\\ " if block[end : end + 1].isalnum() else ""
 
 
-class LinkNames(SphinxPostTransform):
-    """Lets a dotted name of the package in code lead to its description, where there is one."""
+def link_names(app: Any, page: Any, name: str) -> None:
+    """Let each dotted name of the package in the code of a page lead to its description, where there is one."""
+    from docutils import nodes
+    from sphinx.util.nodes import make_refnode
 
-    default_priority = 5
-
-    def run(self, **_: Any) -> None:
-        """Go through all code of a page."""
-        known = self.env.domains.python_domain.objects
-        for node in list(self.document.findall(nodes.literal)):
-            found = _DOTTED.fullmatch(node.astext())
-            if found is None or found[1] not in known or isinstance(node.parent, nodes.reference):
-                continue
-            entry = known[found[1]]
-            node.replace_self(
-                make_refnode(self.app.builder, self.env.docname, entry.docname, entry.node_id, node.deepcopy())
-            )
+    known = app.env.domains.python_domain.objects
+    for node in list(page.findall(nodes.literal)):
+        found = _DOTTED.fullmatch(node.astext())
+        if found is None or found[1] not in known or isinstance(node.parent, nodes.reference):
+            continue
+        entry = known[found[1]]
+        node.replace_self(make_refnode(app.builder, name, entry.docname, entry.node_id, node.deepcopy()))
 
 
-def _plain(_: Sphinx, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
+def _plain(*given: Any) -> None:
+    lines = given[-1]
     lines[:] = restructured(lines)
 
 
-def setup(app: Sphinx) -> dict[str, bool]:
+def setup(app: Any) -> dict[str, bool]:
     """Add both to Sphinx."""
     app.connect("autodoc-process-docstring", _plain)
-    app.add_post_transform(LinkNames)
+    app.connect("doctree-resolved", link_names)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

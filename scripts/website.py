@@ -2,9 +2,9 @@
 
     python scripts/website.py out/site
 
-Sphinx (``docs/conf.py``) builds it from ``out/site.source``, where this script puts the Markdown pages as they are, with
-links into the repository turned into pages of the site, and pages of the interface made from the package. Warnings are
-errors. No other host is asked, neither here nor by the pages.
+Sphinx (``docs/conf.py``) builds it from ``out/site.source``. This script puts the Markdown pages there as they are,
+with links into the repository turned into pages of the site, and makes the pages of the interface from the package.
+Warnings are errors. No other host is asked, neither here nor by the pages.
 """
 
 import argparse
@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from urllib.parse import unquote, urlsplit
 
 import ppafo
+from scripts.docstrings import restructured
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -30,7 +31,7 @@ FRONT = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
 LONG = 10
 """A section of the index with more pages than this has a page of its own in the table of contents."""
 ROOMS = ("control", "control.controllers", "control.profiles", "control.walking", "metrics", "model", "model.valves")
-"""Rooms that users extend or look equations up in; each module has its functions described."""
+"""Rooms that users extend or look equations up in; all functions of their modules are described."""
 LANGUAGES = {".py": "python", ".toml": "toml", ".cff": "yaml"}
 
 _LINK = re.compile(r"(?<=\]\()([^)\s#]+)")
@@ -66,9 +67,9 @@ def stage(folder: Path) -> None:
     files: set[str] = set()
     for page in documents():
         text = (ROOT / page).read_text(encoding="utf-8")
-        _write(folder / page.replace("README.md", "index.md", page == "README.md"), _linked(text, page, files))
+        _write(folder / ("index.md" if page == "README.md" else page), _linked(text, page, files))
     with (folder / "index.md").open("a", encoding="utf-8") as front:
-        front.write("".join(_toctree(folder, section) for section in contents()))
+        front.write(_hidden("", ["docs/README"]) + "".join(_toctree(folder, section) for section in contents()))
         front.write("\n```{toctree}\n:hidden:\n:caption: Reference\n\napi/index\napi/kinds\napi/rooms\n```\n")
     for file in sorted(files):
         text = (ROOT / file).read_text(encoding="utf-8")
@@ -81,15 +82,16 @@ def stage(folder: Path) -> None:
 
 def _linked(text: str, page: str, files: set[str]) -> str:
     """A page with its links as they are on the site; files of the repository that it leads to are noted."""
+    here = Path(page).parent.as_posix()
 
     def led(found: re.Match[str]) -> str:
-        target = found[1]
-        place = os.path.normpath(f"{os.path.dirname(page)}/{target}").lstrip("/")
-        if "://" in target or place.startswith("docs/") or place in FRONT[1:]:
-            return target
-        if place not in FRONT:
-            files.add(place)
-        return os.path.relpath("index.md" if place == "README.md" else f"files/{place}.md", os.path.dirname(page) or ".")
+        place = os.path.normpath(f"{here}/{found[1]}")
+        if "://" in found[1] or place.startswith("docs/") or place in FRONT[1:]:
+            return found[1]
+        if place == "README.md":
+            return os.path.relpath("index.md", here)
+        files.add(place)
+        return os.path.relpath(f"files/{place}.md", here)
 
     text = _LINK.sub(led, text)
     if page == "docs/gallery.md":
@@ -121,12 +123,11 @@ def interface() -> dict[str, str]:
         homes.setdefault(getattr(ppafo, name).__module__.split(".")[1], []).append(name)
     pages = {f"public/{room}": _public(room, names) for room, names in sorted(homes.items())}
     pages["index"] = _index(homes)
-    modules = [module for room in ROOMS for module in _modules(f"ppafo.{room}")]
-    pages |= {f"rooms/{module.__name__}": _module(module) for module in modules}
-    described = {module.__name__ for module in modules}
-    pages["rooms/equations"] = _equations(described)
+    rooms = {room: list(_modules(f"ppafo.{room}")) for room in ROOMS}
+    pages |= {f"rooms/{room}": _room(room, modules) for room, modules in rooms.items()}
+    pages["rooms/equations"] = _equations({module.__name__ for modules in rooms.values() for module in modules})
     pages["rooms"] = _titled("Inside, by room", "Pure functions of floats, each with unit, sign and equation.") + _tree(
-        ["rooms/equations", *(f"rooms/{module.__name__}" for module in modules)], shown=True
+        ["rooms/equations", *(f"rooms/{room}" for room in ROOMS)], shown=True
     )
     pages["kinds"] = kinds()
     return pages
@@ -185,9 +186,13 @@ def _modules(room: str) -> Iterator[ModuleType]:
             yield importlib.import_module(f"{room}.{path.stem}")
 
 
-def _module(module: ModuleType) -> str:
-    name = module.__name__
-    return _titled(name.removeprefix("ppafo.")) + f".. automodule:: {name}\n{_MEMBERS}"
+def _room(room: str, modules: Iterable[ModuleType]) -> str:
+    """The modules of a room, one after the other."""
+    text = _titled(room.replace(".", ": "), _plain(_first_line(importlib.import_module(f"ppafo.{room}"))))
+    for module in modules:
+        name = module.__name__
+        text += _titled(name, line="-") + f".. automodule:: {name}\n{_MEMBERS}\n"
+    return text
 
 
 def _equations(described: set[str]) -> str:
@@ -244,8 +249,6 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def _plain(text: str) -> str:
-    from scripts.docstrings import restructured
-
     return " ".join(restructured([text]))
 
 
@@ -299,7 +302,19 @@ def build(site: Path) -> int:
     for folder in (source, site):
         shutil.rmtree(folder, ignore_errors=True)
     stage(source)
-    options = ["-q", "-b", "html", "-W", "--keep-going", "-c", str(DOCS), "-d", str(site.with_suffix(".doctrees"))]
+    options = [
+        "-q",
+        "-b",
+        "html",
+        "-W",
+        "--keep-going",
+        "-j",
+        "auto",
+        "-c",
+        str(DOCS),
+        "-d",
+        str(site.with_suffix(".doctrees")),
+    ]
     failed = build_main([*options, "-E", str(source), str(site)])
     for name, page in gallery().items():
         _write(site / "gallery" / name, page.decode("utf-8"))
