@@ -302,25 +302,14 @@ def build(site: Path) -> int:
     for folder in (source, site):
         shutil.rmtree(folder, ignore_errors=True)
     stage(source)
-    options = [
-        "-q",
-        "-b",
-        "html",
-        "-W",
-        "--keep-going",
-        "-j",
-        "auto",
-        "-c",
-        str(DOCS),
-        "-d",
-        str(site.with_suffix(".doctrees")),
-    ]
-    failed = build_main([*options, "-E", str(source), str(site)])
+    options = ["-q", "-E", "-W", "--keep-going", "-j", "auto", "-b", "html", "-c", str(DOCS)]
+    if build_main([*options, "-d", str(site.with_suffix(".doctrees")), str(source), str(site)]) != 0:
+        return 1
     for name, page in gallery().items():
         _write(site / "gallery" / name, page.decode("utf-8"))
     found = faults(site)
-    print("\n".join(found))
-    return 1 if failed or found else 0
+    print("".join(f"{line}\n" for line in found), end="")
+    return 1 if found else 0
 
 
 def _write(file: Path, text: str) -> None:
@@ -333,7 +322,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="?", type=Path, default=Path("out/site"))
     site = parser.parse_args().folder.resolve()
-    # The kernel of the tutorial finds the command, and zig compiles the models where it is here: the same bits, sooner.
+    # The tutorial runs with a profile of its own, not the user's; that its kernel listens on this computer is known.
+    profile = site.with_suffix(".ipython")
+    _write(profile / "profile_default" / "ipython_kernel_config.py", "get_config().IPKernelApp.log_level = 40\n")
+    os.environ["IPYTHONDIR"] = str(profile)
+    # Its kernel finds the command, and zig compiles the models where it is here: the same bits, sooner.
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     if find_spec("ziglang"):
         os.environ.setdefault("PPAFO_BACKEND", "zig")
