@@ -40,4 +40,5 @@ html_title = "ppafo"
 html_copy_source = False
 html_show_sourcelink = False
 html_show_search_summary = False
+html_show_copyright = False
 html_domain_indices = False

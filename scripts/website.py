@@ -108,7 +108,7 @@ def _toctree(folder: Path, section: Section) -> str:
     inner = [os.path.relpath(page, "docs") for page in listed]
     text = _linked(section.text, "docs/README.md", set())
     _write(folder / f"{name}.md", f"# {section.title}\n\n{text}\n{_hidden('', inner)}")
-    return _hidden("", [name])
+    return _hidden(section.title, [name])
 
 
 def _hidden(caption: str, pages: Sequence[str]) -> str:
