@@ -62,7 +62,10 @@ def _plain(*given: Any) -> None:
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Add both to Sphinx."""
+    """Add both to Sphinx, and a language that forges know and Pygments does not."""
+    from pygments.lexers.special import TextLexer
+
     app.connect("autodoc-process-docstring", _plain)
     app.connect("doctree-resolved", link_names)
+    app.add_lexer("csv", TextLexer)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
