@@ -18,6 +18,7 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 600
 nb_execution_in_temp = True
 nb_output_stderr = "remove"
+nb_merge_streams = True
 
 # The interface, in the order of the source and with its types as they are written there.
 autodoc_member_order = "bysource"

@@ -30,7 +30,7 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Any]:
                 words = ["sh", "-e", "-c", cell.removeprefix("%%sh\n")]
                 found["printed"] += subprocess.run(words, check=True, capture_output=True, text=True).stdout
             else:
-                exec(cell, found)
+                exec(cell.removeprefix("%matplotlib inline\n"), found)
     return found
 
 
