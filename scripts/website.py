@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 from urllib.parse import unquote, urlsplit
 
 import ppafo
-from scripts.docstrings import restructured
+from scripts.docstrings import KERNEL, restructured
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -165,8 +165,7 @@ def _public(room: str, names: Iterable[str]) -> str:
     text = _titled(_heading(room))
     for name in names:
         value = getattr(ppafo, name)
-        is_error = isinstance(value, type) and issubclass(value, Exception)
-        if is_error:
+        if isinstance(value, type) and issubclass(value, Exception):
             text += f".. autoexception:: ppafo.{name}\n   :show-inheritance:\n\n"
         elif isinstance(value, type):
             text += f".. autoclass:: ppafo.{name}\n{_CLASS}\n"
@@ -323,9 +322,10 @@ def main() -> int:
     parser.add_argument("folder", nargs="?", type=Path, default=Path("out/site"))
     site = parser.parse_args().folder.resolve()
     # The tutorial runs with a profile of its own, not the user's; that its kernel listens on this computer is known.
-    profile = site.with_suffix(".ipython")
-    _write(profile / "profile_default" / "ipython_kernel_config.py", "get_config().IPKernelApp.log_level = 40\n")
-    os.environ["IPYTHONDIR"] = str(profile)
+    profile = site.with_suffix(".ipython") / "profile_default"
+    for name, text in KERNEL.items():
+        _write(profile / name, text)
+    os.environ["IPYTHONDIR"] = str(profile.parent)
     # Its kernel finds the command, and zig compiles the models where it is here: the same bits, sooner.
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     if find_spec("ziglang"):
