@@ -3,6 +3,7 @@
 An extension of Sphinx, named in ``docs/conf.py``.
 """
 
+import importlib
 import re
 from collections.abc import Iterable
 from typing import Any
@@ -67,16 +68,25 @@ def link_names(app: Any, page: Any, name: str) -> None:
         node.replace_self(make_refnode(app.builder, name, entry.docname, entry.node_id, node.deepcopy()))
 
 
+def home_of_builtins(_: Any, module: str, name: str) -> str | None:
+    """Return the module that names a value whose own module is Python's ``builtins``, which has no source to show."""
+    value: Any = importlib.import_module(module)
+    for part in name.split("."):
+        value = getattr(value, part, None)
+    return module if getattr(value, "__module__", "") == "builtins" else None
+
+
 def _plain(*given: Any) -> None:
     lines = given[-1]
     lines[:] = restructured(lines)
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Add both to Sphinx, and a language that forges know and Pygments does not."""
+    """Add these to Sphinx, and a language that forges know and Pygments does not."""
     from pygments.lexers.special import TextLexer
 
     app.connect("autodoc-process-docstring", _plain)
     app.connect("doctree-resolved", link_names)
+    app.connect("viewcode-follow-imported", home_of_builtins)
     app.add_lexer("csv", TextLexer)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
