@@ -7,7 +7,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce gallery validation test coverage quick check format bench bits dist page lock clean
+.PHONY: reproduce gallery validation test coverage quick check format bench bits dist page site lock clean
 
 reproduce: $(READY)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -57,6 +57,11 @@ dist: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-release.lock
 	$(BIN)/python scripts/dist.py
 
+# The documents as a site that opens from its folder: out/site/index.html; warnings are errors, links are checked.
+site: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-docs.lock
+	$(BIN)/python -m scripts.website out/site
+
 # Script and style of the page that simulates, from page/ into the package; needs node, which nobody else does.
 page:
 	npm ci --prefix page --no-audit --no-fund
@@ -75,6 +80,7 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra dev --output-file requirements.lock pyproject.toml
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra dev --extra bench --constraint requirements.lock --output-file requirements-bench.lock pyproject.toml
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra dev --extra release --constraint requirements.lock --output-file requirements-release.lock pyproject.toml
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra dev --extra docs --constraint requirements.lock --output-file requirements-docs.lock pyproject.toml
 
 clean:
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .coverage

@@ -1,0 +1,92 @@
+"""What Sphinx is taught about this package: its docstrings are plain text, and dotted names in the pages are links.
+
+An extension of Sphinx, named in ``docs/conf.py``.
+"""
+
+import importlib
+import re
+from collections.abc import Iterable
+from typing import Any
+
+KERNEL = {
+    "ipython_kernel_config.py": "get_config().IPKernelApp.log_level = 40\n",
+    "startup/shell.py": """import subprocess
+def sh(line, cell):
+    print(subprocess.run(["sh", "-e", "-c", cell], check=True, stdout=subprocess.PIPE, text=True).stdout, end="")
+get_ipython().register_magic_function(sh, "cell")
+""",
+}
+"""Files of the IPython profile in which the tutorial runs. IPython's own %%sh hands on what is printed by the hundred
+bytes, which the page would show torn apart."""
+
+_CODE = re.compile(r"``(.+?)``|`([^`\n]+?)`", re.DOTALL)
+_MARKS = re.compile(r"([\\*|])|(?<=\w)(_)(?!\w)")
+_ALIAS = re.compile(r"Alias for field number \d+")
+_DOTTED = re.compile(r"(ppafo(?:\.\w+)+)(?:\(.*\))?")
+
+
+def restructured(lines: Iterable[str]) -> list[str]:
+    """Return a plain docstring as reStructuredText: code in backticks, indented blocks as they stand, marks as text."""
+    text: list[str] = []
+    for block in re.split(r"\n{2,}", "\n".join(lines).strip("\n")):
+        if block.startswith("    "):
+            text += ["::", block]
+        elif not _ALIAS.fullmatch(block):
+            text.append(_with_code(block))
+    return "\n\n".join(text).split("\n")
+
+
+def _with_code(block: str) -> str:
+    written, end = "", 0
+    for found in _CODE.finditer(block):
+        code = " ".join((found[1] or found[2]).split())
+        written += _escaped(block[end : found.start()]) + f"``{code}``" + _gap(block, found.end())
+        end = found.end()
+    return written + _escaped(block[end:])
+
+
+def _escaped(text: str) -> str:
+    return _MARKS.sub(lambda found: "\\" + found[0], text)
+
+
+def _gap(block: str, end: int) -> str:
+    """What ends a literal where a word goes on."""
+    return "\\ " if block[end : end + 1].isalnum() else ""
+
+
+def link_names(app: Any, page: Any, name: str) -> None:
+    """Let each dotted name of the package in the code of a page lead to its description, where there is one."""
+    from docutils import nodes
+    from sphinx.util.nodes import make_refnode
+
+    known = app.env.domains.python_domain.objects
+    for node in list(page.findall(nodes.literal)):
+        found = _DOTTED.fullmatch(node.astext())
+        if found is None or found[1] not in known or isinstance(node.parent, nodes.reference):
+            continue
+        entry = known[found[1]]
+        node.replace_self(make_refnode(app.builder, name, entry.docname, entry.node_id, node.deepcopy()))
+
+
+def home_of_builtins(_: Any, module: str, name: str) -> str | None:
+    """Return the module that names a value whose own module is Python's ``builtins``, which has no source to show."""
+    value: Any = importlib.import_module(module)
+    for part in name.split("."):
+        value = getattr(value, part, None)
+    return module if getattr(value, "__module__", "") == "builtins" else None
+
+
+def _plain(*given: Any) -> None:
+    lines = given[-1]
+    lines[:] = restructured(lines)
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Add these to Sphinx, and a language that forges know and Pygments does not."""
+    from pygments.lexers.special import TextLexer
+
+    app.connect("autodoc-process-docstring", _plain)
+    app.connect("doctree-resolved", link_names)
+    app.connect("viewcode-follow-imported", home_of_builtins)
+    app.add_lexer("csv", TextLexer)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
