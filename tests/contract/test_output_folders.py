@@ -76,7 +76,14 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_every_command_is_here() -> None:
-    assert {name.partition(" ")[0] for name in (*FOLDERS, *FILES)} == set(COMMANDS)
+    assert {name.partition(" ")[0] for name in (*FOLDERS, *FILES)} == set(COMMANDS) - {"examples"}
+
+
+def test_an_example_takes_only_a_folder_that_is_absent(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["examples", "tune", "--out", str(tmp_path / "tune")]) == 0
+    before = contents(tmp_path)
+    assert main(["examples", "tune", "--out", str(tmp_path / "tune")]) == 2
+    assert contents(tmp_path) == before
 
 
 @pytest.mark.parametrize("theirs", ["notes.txt", "report.html", "run.json", MARK])
