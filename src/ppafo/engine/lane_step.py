@@ -112,7 +112,7 @@ def put_back(rows: LaneRows) -> list[str]:
     back = f"x[row, lane] = x[row, lane] if {moves} else x[{rows.aside} + row, lane]"
     handed = handed_aside(rows).items()
     lines = [f"{rows.cells[path]} = {rows.cells[path]} if {moves} else {cell}" for path, cell in handed]
-    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), back), *over_lanes(lines)])]
+    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), back), *(over_lanes(lines) if lines else [])])]
 
 
 def handed_aside(rows: LaneRows) -> dict[str, str]:
