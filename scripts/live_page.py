@@ -1,11 +1,11 @@
 """Checks and measures the page that simulates in a headless Chromium: bits of Python, damaged files, speed, pictures.
 
+It needs Playwright (``pip install playwright``) and a Chromium (``chromium`` on the path).
+
     python scripts/live_page.py bits --states 1000
     python scripts/live_page.py damage --files 1000
     python scripts/live_page.py speed
     python scripts/live_page.py pictures docs/images
-
-It needs Playwright (``pip install playwright``) and a Chromium (``chromium`` on the path).
 """
 
 import argparse
@@ -55,11 +55,9 @@ def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-        try:
+        launch = playwright.chromium.launch
+        with contextlib.closing(launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])) as found:
             yield found
-        finally:
-            found.close()
 
 
 def opened(chromium: Any, file: Path, address: str = "", **context: Any) -> Any:
@@ -302,19 +300,17 @@ PICTURES: Sequence[tuple[str, dict[str, Any], str]] = (
 )
 
 
-def take_pictures(chromium: Any, file: Path, folder: Path) -> list[Path]:
-    """Write the pictures of the documentation into a folder, small; returns their paths."""
+def take_pictures(chromium: Any, file: Path, folder: Path) -> Iterator[Path]:
+    """Write the pictures of the documentation into a folder, small; gives their paths."""
     from PIL import Image
 
-    written = []
     for name, context, address in PICTURES:
         page = opened(chromium, file, address, **context)
         page.wait_for_timeout(600)
         path = folder / f"{name}.png"
         page.screenshot(path=str(path))
         Image.open(path).convert("RGB").quantize(128).save(path, optimize=True)
-        written.append(path)
-    return written
+        yield path
 
 
 def main() -> int:

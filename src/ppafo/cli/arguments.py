@@ -4,10 +4,13 @@ import argparse
 import re
 from collections.abc import Mapping, Sequence
 from itertools import takewhile
-from typing import NoReturn, final
+from typing import TYPE_CHECKING, NoReturn, final
 
-from ppafo.cli.output import flush_output
+from ppafo.cli.output import flush_output, printing
 from ppafo.errors import PpafoError, nearest_name
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
 """What argparse makes of an ArgumentTypeError."""
@@ -43,6 +46,11 @@ class CommandParser(argparse.ArgumentParser):
         if bad_value is not None:
             raise UsageError(f"{bad_value[1]} {bad_value[2]}")
         raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
+
+    def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
+        """Print a help text; some versions of Python leave it to the caller that it cannot be written."""
+        with printing():
+            super()._print_message(message, file)
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
         """End the process after ``--help`` or ``--version``, once their text has really been written."""

@@ -2,7 +2,8 @@
 
 import argparse
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
@@ -84,7 +85,8 @@ def run(parsed: argparse.Namespace) -> int:
     return EXIT_GOOD if told.agrees else EXIT_CHECK_FAILED
 
 
-class _Told(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class _Told:
     """What came of a command: text, document, whether all decisions are the same, and a figure of runs over time."""
 
     text: str

@@ -121,7 +121,7 @@ def deliver_answer(answer: "Answer", parsed: argparse.Namespace, filled: str | N
 
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
     """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``ppafo sets | head``."""
-    with _printing():
+    with printing():
         shown = json_text(document) if as_json else text
         encoding = sys.stdout.encoding or "utf-8"
         print(shown.encode(encoding, "backslashreplace").decode(encoding), flush=True)
@@ -129,12 +129,13 @@ def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
 
 def flush_output() -> None:
     """Write what was printed so far, such as a help text, with the same errors as ``print_result``."""
-    with _printing():
+    with printing():
         print(end="", flush=True)
 
 
 @contextlib.contextmanager
-def _printing() -> Iterator[None]:
+def printing() -> Iterator[None]:
+    """Print with one line of error where standard output cannot be written, and none where its reader has gone."""
     try:
         yield
     except BrokenPipeError:

@@ -7,13 +7,14 @@ what they have learnt and where they stand. What then differs is the fall alone.
 """
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import factorial
 from pathlib import Path
 
 import numpy as np
 
+from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Floats, LaneBlock, load_program
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
@@ -203,31 +204,37 @@ def falls_of(configuration: Configuration, strikes: Sequence[Strike]) -> Falls:
     stride = configuration.gait.stride_time
     plan = plan_of(configuration, (FIRST_STRIKE + STRIKES) * stride)
     run = plan_walk(replace(plan, record_interval=stride))
-    batch = batch_of(run)
-    width = STRIKES + 1
-    parameters, states = (np.repeat(values, width, axis=1) for values in (batch.parameters, batch.states))
+    others = lanes_of(batch_of(run).program) - 1
+    groups = [range(first, min(first + others, STRIKES)) for first in range(0, STRIKES, others)]
+    falls = [fall for group in groups for fall in _falls_of_block(run, stride, group, strikes)]
+    if any(fall is None for fall in falls):
+        raise SimulationError(f"{configuration.name} diverged as its foot came down; {REMEDY}")
+    imposed, walked, drops = (float(np.mean([fall[place] for fall in falls if fall])) for place in range(3))
+    return Falls(imposed, walked, drops, tuple(fall[3] for fall in falls if fall))
+
+
+def _falls_of_block(
+    run: Run, stride: float, group: Sequence[int], strikes: Sequence[Strike]
+) -> Iterator[tuple[float, float, float, Strike] | None]:
+    """Imposed and walked rate [rad/s], drop [rad] and state of some strikes, a lane for each; None where one failed."""
+    batch, last = batch_of(run), len(group)
+    parameters, states = (np.repeat(values, last + 1, axis=1) for values in (batch.parameters, batch.states))
     block = LaneBlock(load_program(batch.program), batch.clock, parameters, states)
     rows = row_numbers(batch.program.state_rows())
-    own: list[Strike] = []
-    imposed, walked, drops = [], [], []
     done, reach = 0, round(REACH * stride / run.step)
-    for lane in range(STRIKES):
-        before = round((FIRST_STRIKE + lane) * stride / run.step) - 2
+    for lane, number in enumerate(group):
+        before = round((FIRST_STRIKE + number) * stride / run.step) - 2
         block.advance(before - done)
         done = before + _to_strike(block, rows["walk.strides"])
-        own.append(_state(run, block.states[:, STRIKES], rows))
-        drops.append(_tilt(run, block.states[:, STRIKES], rows))
+        own, drop = _state(run, block.states[:, last], rows), _tilt(run, block.states[:, last], rows)
         if strikes:
-            _impose(run, block.states[:, lane], rows, strikes[lane])
+            _impose(run, block.states[:, lane], rows, strikes[number])
         landings = block.states[rows["walk.landings"]].copy()
         block.advance(reach)
         done += reach
         slaps = np.where(block.states[rows["walk.landings"]] > landings, block.states[rows["walk.slap_rate"]], np.nan)
-        imposed.append(float(slaps[lane]))
-        walked.append(float(slaps[STRIKES]))
-    if (block.states[rows["result.failure_time"]] < NEVER_FAILED).any():
-        raise SimulationError(f"{configuration.name} diverged as its foot came down; {REMEDY}")
-    return Falls(float(np.mean(imposed)), float(np.mean(walked)), float(np.mean(drops)), tuple(own))
+        failed = (block.states[rows["result.failure_time"]] < NEVER_FAILED).any()
+        yield None if failed else (float(slaps[lane]), float(slaps[last]), drop, own)
 
 
 def _to_strike(block: LaneBlock, strides: int) -> int:

@@ -5,7 +5,7 @@ With them every condition of the controller in C is reached both ways, and each 
 
 import math
 from collections.abc import Generator, Iterator
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 from ppafo.control.fixed.walking.readings import TOP, GaitConverter, GaitReadings, read_gait
 from ppafo.model.gait_sensors import GaitMeasurement
@@ -21,7 +21,8 @@ _LOAD = 250.0
 """Force [N] that may be gone at once."""
 
 
-class Part(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Part:
     """So many samples: forces [N], angle from the upright one at the start and at the end [rad], pressures [Pa].
 
     A pressure of 0 follows the command. Forces and angle tremble from sample to sample, as those of sound sensors do;
@@ -72,7 +73,7 @@ def made_readings(converter: GaitConverter) -> Generator[tuple[GaitReadings, boo
     """Readings, and whether an episode begins with them; is sent the command [steps] that they led to."""
     for end in (TOP, 0):
         for begins in (True, False):
-            yield GaitReadings(end, end, end, end, end), begins
+            yield GaitReadings._make([end] * len(GaitReadings._fields)), begins
     for episode in EPISODES:
         pressures, command, begins = (ROOM, ROOM), 0, True
         for seen in _measurements(episode):
@@ -104,8 +105,8 @@ def _leaves(angle: float) -> Episode:
 def _rises(samples: int, start: float, end: float, pressure: float, lasts: int = 2) -> Episode:
     """Who stands at one angle [rad] with vented chambers, then at another with a pressure 2 [Pa] for some samples."""
     still = Part(20 + samples, _LOAD, _LOAD, start, start, ROOM, ROOM, "angle")
-    shown = still._replace(samples=lasts, start=end, end=end, pressure_2=pressure)
-    return (Part(10, _LOAD, _LOAD, start, start), still, shown, still._replace(samples=20))
+    shown = replace(still, samples=lasts, start=end, end=end, pressure_2=pressure)
+    return (Part(10, _LOAD, _LOAD, start, start), still, shown, replace(still, samples=20))
 
 
 def _stands(pressure_1: float, pressure_2: float) -> Episode:
@@ -152,7 +153,7 @@ def _of_signs() -> Iterator[Episode]:
     yield (Part(600, 0.0, _LOAD), _AIR)
     for still in ("heel", "toe"):
         alone = Part(300, *((_LOAD, 0.0) if still == "heel" else (0.0, _LOAD)), still=still)
-        yield (_AIR, alone, alone._replace(samples=50, heel=_LOAD, toe=_LOAD), _AIR)
+        yield (_AIR, alone, replace(alone, samples=50, heel=_LOAD, toe=_LOAD), _AIR)
     forces = ((100, _LOAD, 0.0), (150, _LOAD, _LOAD), (200, 0.0, _LOAD), (550, 0.0, 0.0), (100, _LOAD, 0.0))
     yield tuple(Part(*force, still="angle") for force in forces)
 
