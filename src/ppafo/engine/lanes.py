@@ -248,6 +248,15 @@ class LaneBlock:
         return BatchResult(self.states[:, : self._width].copy(), record)
 
 
+def begin_block(batch: Batch) -> LaneBlock:
+    """One block of all runs of a batch, not begun; ValueError for more than its program takes at once."""
+    runs, most = batch.states.shape[1], lanes_of(batch.program)
+    if runs > most:
+        raise ValueError(f"{runs} runs do not fit a block of {most}; the others would stand still")
+    module, traced = load_program(batch.program), len(batch.program.traced)
+    return LaneBlock(module, batch.clock, batch.parameters, batch.states, traced)
+
+
 def _pad_columns(columns: Floats) -> Floats:
     """A contiguous copy with a whole number of vectors of columns; the last one repeated where there are fewer."""
     missing = -columns.shape[1] % VECTOR

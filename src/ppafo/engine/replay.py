@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.control.kind import ProfileKind
 from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lanes import Batch, BatchResult, Floats, LaneBlock, join_results, load_program
+from ppafo.engine.lanes import Batch, BatchResult, Floats, begin_block, join_results
 from ppafo.engine.program import Program
 from ppafo.engine.rows import row_numbers
 
@@ -74,7 +74,7 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
 
 def _replay_block(batch: Batch, inputs: StepInputs, runs: slice) -> BatchResult:
     program, parameters, command = batch.program, inputs.parameters, inputs.command
-    block = LaneBlock(load_program(program), batch.clock, batch.parameters[:, runs], batch.states[:, runs])
+    block = begin_block(replace(batch, parameters=batch.parameters[:, runs], states=batch.states[:, runs]))
     command_row = row_numbers(program.state_rows())[COMMAND]
     numbered = row_numbers(program.parameter_rows())
     rows = [numbered[path] for path in parameters]

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.engine.lanes import BatchResult, Floats, LaneBlock, load_program
+from ppafo.engine.lanes import BatchResult, Floats, begin_block
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.model.cold_gas import DRY_ICE, SupplyNow, SupplyState, advance_supply, open_share
@@ -138,7 +138,7 @@ def run_on_bottle(
     """
     batch = batch_of(run)
     count = batch.clock.step_count
-    block = LaneBlock(load_program(batch.program), batch.clock, batch.parameters, batch.states)
+    block = begin_block(batch)
     states = row_numbers(batch.program.state_rows())
     regulated, line = states["line_state.regulated_mass"], states["line_state.mass_1"]
     every = max(1, round(supply.coupling / run.step))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Protocol
 
-from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, load_program
+from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, begin_block
 from ppafo.engine.metering import group_of
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
@@ -35,7 +35,7 @@ def run_sampled_walk(run: Run, controller: GaitController) -> BatchResult:
     alone = replace(run, program=replace(run.program, controller=None), controller=())
     batch = batch_of(alone)
     clock = batch.clock
-    block = LaneBlock(load_program(batch.program), clock, batch.parameters, batch.states)
+    block = begin_block(batch)
     see = _measurements(batch, block, float(run.step))
     command_row = row_numbers(batch.program.state_rows())["result.command"]
     controller.reset()

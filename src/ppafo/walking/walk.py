@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, LaneBlock, load_program
+from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, begin_block
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, batch_of
 from ppafo.errors import ScenarioError
@@ -173,7 +173,7 @@ def walk_duration(configuration: Configuration, minutes: float | None = None) ->
 
 def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
     """Run in parts short enough for an interrupt to be seen and for progress to be told."""
-    block = LaneBlock(load_program(batch.program), batch.clock, batch.parameters, batch.states)
+    block = begin_block(batch)
     count = batch.clock.step_count
     for done in range(0, count, STEPS_PER_CALL):
         block.advance(min(STEPS_PER_CALL, count - done))

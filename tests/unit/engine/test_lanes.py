@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ppafo.engine.lanes import Batch, run_batch
+from ppafo.engine.lane_rows import lanes_of
+from ppafo.engine.lanes import Batch, begin_block, run_batch
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -143,6 +144,13 @@ def test_batch_is_plain_data_of_rows_and_runs() -> None:
     batch = batch_of(run)
     assert isinstance(batch, Batch)
     assert batch.parameters.shape[1] == batch.states.shape[1] == 1
+
+
+def test_a_block_takes_no_more_runs_than_its_program_has_lanes() -> None:
+    batch = batch_of(different_runs("torque-task-solenoid", 1)[0])
+    wide = [np.repeat(values, lanes_of(batch.program) + 1, axis=1) for values in (batch.parameters, batch.states)]
+    with pytest.raises(ValueError, match=r"runs do not fit a block of"):
+        begin_block(dataclasses.replace(batch, parameters=wide[0], states=wide[1]))
 
 
 def test_noise_depends_on_the_seed_and_not_on_the_place() -> None:

@@ -143,8 +143,7 @@ def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
     chosen = load_walk(WALK, bottle=BOTTLE)
     run = plan_walk(plan_of(chosen, 12.0))
     rows = row_numbers(run.program.state_rows())
-    monkeypatch.setattr(on_bottle, "load_program", lambda _: None)
-    monkeypatch.setattr(on_bottle, "LaneBlock", lambda *given: Breaking(wrong, good, rows, given[-1]))
+    monkeypatch.setattr(on_bottle, "begin_block", lambda batch: Breaking(wrong, good, rows, batch.states))
     assert chosen.bottle is not None
     _, course = on_bottle.run_on_bottle(run, chosen.bottle, 1.1, lambda *_: None)
     assert course.ending.kind == "diverged"

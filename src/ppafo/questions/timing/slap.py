@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lanes import Floats, LaneBlock, load_program
+from ppafo.engine.lanes import Floats, LaneBlock, begin_block
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.engine.scheme.ankle_torque import foot_direction
@@ -219,7 +219,7 @@ def _falls_of_block(
     """Imposed and walked rate [rad/s], drop [rad] and state of some strikes, a lane for each; None where one failed."""
     batch, last = batch_of(run), len(group)
     parameters, states = (np.repeat(values, last + 1, axis=1) for values in (batch.parameters, batch.states))
-    block = LaneBlock(load_program(batch.program), batch.clock, parameters, states)
+    block = begin_block(replace(batch, parameters=parameters, states=states))
     rows = row_numbers(batch.program.state_rows())
     done, reach = 0, round(REACH * stride / run.step)
     for lane, number in enumerate(group):
