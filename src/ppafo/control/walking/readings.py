@@ -224,7 +224,8 @@ def still_sign(rules: SafetyRules, readings: LastReadings, before: PhaseState, p
     longest = max(rules.frozen_time, DWELLS * phase.stride_time)
     heel = (readings.heel_unchanged > longest) & (phase.heel.loaded > 0.5)
     toe = (readings.toe_unchanged > longest) & (phase.toe.loaded > 0.5)
-    angle = readings.angle_unchanged > max(rules.frozen_time, TURNS_BACK * phase.stride_time)
+    # A slow swing lets a held foot hang at one angle for long, so only the time since the strike counts.
+    angle = min(readings.angle_unchanged, phase.since_strike) > max(rules.frozen_time, TURNS_BACK * phase.stride_time)
     whole = (before.phase == SWING) & (phase.phase != SWING)
     whole = whole & (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)
     found = signs.STILL_ANGLE if angle & (not lifts(phase.phase)) else NO_SIGN

@@ -228,7 +228,8 @@ def still_sign(numbers: StillNumbers, seen: SensorCounts, phase: PhaseCounts) ->
         return STILL_HEEL
     if phase.toe.loaded == 1 and is_still(numbers, seen.toe.still, phase.stride, numbers.dwells):
         return STILL_TOE
-    if phase.phase > LANDING and is_still(numbers, seen.angle.still, phase.stride, numbers.turns_back):
+    in_stance = min(seen.angle.still, phase.since_strike)
+    if phase.phase > LANDING and is_still(numbers, in_stance, phase.stride, numbers.turns_back):
         return STILL_ANGLE
     return NO_SIGN
 
