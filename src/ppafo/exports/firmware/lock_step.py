@@ -1,9 +1,9 @@
 """A controller on the chip's simulator beside the same in Python: drawn samples, or a run with the lanes as plant."""
 
 import random
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,22 @@ from ppafo.simulation.simulate import simulate
 
 EPISODE = 200
 """Drawn samples from one reset to the next."""
+
+TURN = 50
+"""Drawn samples that the chip is asked at once."""
+
+Shown = TypeVar("Shown", bound=tuple[int, ...], contravariant=True)
+"""What the converter shows at a sample."""
+
+
+class Reference(Protocol[Shown]):
+    """A controller in Python, as the chip computes it."""
+
+    def begin(self) -> None:
+        """Forget everything."""
+
+    def sample(self, readings: Shown, /) -> tuple[int, int]:
+        """Command in steps, and the word that the chip tells with it."""
 
 
 class PythonChip:
@@ -124,21 +140,50 @@ class Comparison:
 
 def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str = TARGETS[0]) -> Comparison:
     """Give drawn readings to the chip's simulator and to Python, with a reset after every ``EPISODE`` of them."""
-    chip = chip_controller(scenario)
-    reference, decisions = PythonChip(chip), []
-    differences, first = 0, ""
-    with chip_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
-        for number, readings in enumerate(drawn_readings(int(chip.converter.top), samples, seed)):
-            if number % EPISODE == 0 and number:
+    chip, chosen = chip_controller(scenario), target_of(target)
+    given = _in_episodes(drawn_readings(int(chip.converter.top), samples, seed))
+    return compare_with(PythonChip(chip), given, samples, firmware(scenario, target), chosen)
+
+
+def compare_with(
+    reference: Reference[Shown],
+    given: Generator[tuple[Shown, bool], int, None],
+    samples: int,
+    contents: Mapping[str, bytes],
+    target: Target,
+) -> Comparison:
+    """Give readings to a firmware in its simulator and to the same in Python.
+
+    ``given`` yields readings, and whether both are reset before them; it gets the command that they led to [steps].
+    """
+    wanted: list[tuple[int, int]] = []
+    asked: list[Shown] = []
+    decisions: list[Decision] = []
+    with chip_simulator(contents, target) as (simulator, image):
+        readings, begins = next(given)
+        for number in range(samples):
+            if begins or len(asked) == TURN:
+                decisions += simulator.samples(asked)
+                asked = []
+            if begins:
                 reference.begin()
                 simulator.begin()
-            wanted, found = reference.sample(readings), simulator.sample(readings)
-            decisions.append(found)
-            if wanted != found[:2]:
-                differences += 1
-                first = first or f"sample {number}, {tuple(readings)}: {found[:2]} on the chip, {wanted} in Python"
-        cost = cost_of(target_of(target), image, simulator.stack(), decisions)
-    return Comparison(samples, differences, first, cost)
+            asked.append(readings)
+            wanted.append(reference.sample(readings))
+            if number + 1 < samples:
+                readings, begins = given.send(wanted[-1][0])
+        decisions += simulator.samples(asked)
+        cost = cost_of(target, image, simulator.stack(), decisions)
+    differ = [place for place, found in enumerate(decisions) if found[:2] != wanted[place]]
+    first = ""
+    if differ:
+        first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the chip, {wanted[differ[0]]} in Python"
+    return Comparison(samples, len(differ), first, cost)
+
+
+def _in_episodes(given: Iterator[Readings]) -> Generator[tuple[Readings, bool], int, None]:
+    for number, readings in enumerate(given):
+        yield readings, number % EPISODE == 0
 
 
 def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:

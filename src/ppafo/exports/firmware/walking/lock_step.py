@@ -11,7 +11,7 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.exports.firmware.catalog import MSP430G2553
-from ppafo.exports.firmware.lock_step import Comparison, Cost, cost_of
+from ppafo.exports.firmware.lock_step import Comparison, Cost, compare_with, cost_of
 from ppafo.exports.firmware.simulator import chip_simulator
 from ppafo.exports.firmware.target import ChipSimulator, Decision
 from ppafo.exports.firmware.walking import WalkChip, walk_chip, walk_firmware
@@ -27,9 +27,6 @@ from ppafo.walking.walk import plan_of, walk_duration
 
 _INSIDE = ("controller_state.", "gait_seen.")
 """What only the lanes keep: state of their controller, and the last readings."""
-
-TURN = 50
-"""Drawn samples that the chip is asked at once."""
 
 SIGN_BITS = 8
 """A chip tells its level above these bits of a word, and its sign in them."""
@@ -115,26 +112,5 @@ def walk_on_chip(configuration: Configuration, minutes: float | None = None) -> 
 def compare_drawn_walk(configuration: Configuration, samples: int, seed: int = 1) -> Comparison:
     """Give drawn readings of a gait to the chip's simulator and to Python, with a reset before every episode."""
     chip = walk_chip(configuration)
-    reference, given = PythonWalkChip(chip), gait_readings(chip.converter, samples, seed)
-    decisions: list[Decision] = []
-    wanted: list[tuple[int, int]] = []
-    asked: list[GaitReadings] = []
-    with chip_simulator(walk_firmware(configuration), MSP430G2553) as (simulator, image):
-        readings, begins = next(given)
-        for _ in range(samples):
-            if begins or len(asked) == TURN:
-                decisions += simulator.samples(asked)
-                asked = []
-            if begins:
-                reference.begin()
-                simulator.begin()
-            asked.append(readings)
-            wanted.append(reference.sample(readings))
-            readings, begins = given.send(wanted[-1][0])
-        decisions += simulator.samples(asked)
-        cost = cost_of(MSP430G2553, image, simulator.stack(), decisions)
-    differ = [place for place, found in enumerate(decisions) if found[:2] != wanted[place]]
-    first = ""
-    if differ:
-        first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the chip, {wanted[differ[0]]} in Python"
-    return Comparison(samples, len(differ), first, cost)
+    given = gait_readings(chip.converter, samples, seed)
+    return compare_with(PythonWalkChip(chip), given, samples, walk_firmware(configuration), MSP430G2553)
