@@ -26,17 +26,17 @@ EPISODE = 200
 TURN = 50
 """Drawn samples that the chip is asked at once."""
 
-Shown = TypeVar("Shown", bound=tuple[int, ...], contravariant=True)
+Shown_contra = TypeVar("Shown_contra", bound=tuple[int, ...], contravariant=True)
 """What the converter shows at a sample."""
 
 
-class Reference(Protocol[Shown]):
+class Reference(Protocol[Shown_contra]):
     """A controller in Python, as the chip computes it."""
 
     def begin(self) -> None:
         """Forget everything."""
 
-    def sample(self, readings: Shown, /) -> tuple[int, int]:
+    def sample(self, readings: Shown_contra, /) -> tuple[int, int]:
         """Command in steps, and the word that the chip tells with it."""
 
 
@@ -146,8 +146,8 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
 
 
 def compare_with(
-    reference: Reference[Shown],
-    given: Generator[tuple[Shown, bool], int, None],
+    reference: Reference[Shown_contra],
+    given: Generator[tuple[Shown_contra, bool], int, None],
     samples: int,
     contents: Mapping[str, bytes],
     target: Target,
@@ -157,7 +157,7 @@ def compare_with(
     ``given`` yields readings, and whether both are reset before them; it gets the command that they led to [steps].
     """
     wanted: list[tuple[int, int]] = []
-    asked: list[Shown] = []
+    asked: list[Shown_contra] = []
     decisions: list[Decision] = []
     with chip_simulator(contents, target) as (simulator, image):
         readings, begins = next(given)
