@@ -208,7 +208,8 @@ static void store(const device *item, double *state, double angle)
     memcpy(state, run->samples[sample % 2], sizeof(run->samples[0]));
     state[AT_STEPS_DONE] = (double)run->steps_done;
     state[AT_ANGLE] = angle;
-    memcpy(state + AT_RUN, run->states, (size_t)run->bytes - sizeof(*run) + sizeof(run->states));
+    memcpy(state + AT_RUN, run->states, sizeof(run->states));
+    memcpy(state + AT_HISTORY, run + 1, (size_t)run->bytes - sizeof(*run));
 }
 
 static void restore(const device *item, const double *state)
