@@ -72,7 +72,10 @@ def load_plugin(folder: str | Path) -> Plugin:
     path = (Path(folder) / library).resolve()
     if not path.is_file():
         raise ScenarioError(f"{folder}: {library} is missing: run 'ppafo export mujoco' again")
-    mujoco.mj_loadPluginLibrary(str(path))
+    try:
+        mujoco.mj_loadPluginLibrary(str(path))
+    except mujoco.FatalError as error:
+        raise ScenarioError(f"{folder}: {error}: a process takes one plugin of a name; change its attributes") from error
     return plugin
 
 

@@ -21,9 +21,11 @@
 #endif
 
 enum {
+    AT_TORQUE = @torque@, /* of the outputs */
     AT_STEPS_DONE = OUTPUTS,
-    AT_ANGLE, /* where the vane stands [rad] */
-    AT_RUN,   /* states of the run, then late signals and commands */
+    AT_ANGLE,  /* where the vane stands [rad] */
+    AT_BEFORE, /* torque one step before [N m] */
+    AT_RUN,    /* states of the run, then late signals and commands */
     AT_HISTORY = AT_RUN + STATES
 };
 
@@ -205,6 +207,7 @@ static void store(const device *item, double *state, double angle)
 {
     const @name@_run *run = item->run;
     const int64_t sample = run->samples_shown - 1;
+    state[AT_BEFORE] = run->steps_done > 0 ? state[AT_TORQUE] : run->samples[0][AT_TORQUE];
     memcpy(state, run->samples[sample % 2], sizeof(run->samples[0]));
     state[AT_STEPS_DONE] = (double)run->steps_done;
     state[AT_ANGLE] = angle;
@@ -358,7 +361,8 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
     const double *state = d->plugin_state + m->plugin_stateadr[instance];
     int sensor;
     if (capability == mjPLUGIN_ACTUATOR) {
-        d->actuator_force[item->force] = state[@torque@];
+        /* The mean over the step that comes, from the slope of the last one: the work into the joint is then the gas'. */
+        d->actuator_force[item->force] = state[AT_TORQUE] + 0.5 * (state[AT_TORQUE] - state[AT_BEFORE]);
         return;
     }
     for (sensor = 0; sensor < m->nsensor; ++sensor) {
