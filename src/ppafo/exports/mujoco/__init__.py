@@ -91,8 +91,8 @@ def plugin_files(scenario: Scenario, platforms: Sequence[str], mujoco: Headers) 
         },
         NUMBERS: f"{json.dumps(numbers, indent=2)}\n".encode(),
         **{
-            name: filled(files(__name__).joinpath("templates", name).read_text(encoding="utf-8"), words).encode()
-            for name in ("example.xml", "README.md")
+            path: filled(files(__name__).joinpath("templates", path.rpartition("/")[2]).read_text("utf-8"), words).encode()
+            for path in ("example.xml", "README.md", "assist_sim/L1config.yaml", "assist_sim/L1model.xml")
         },
         **{f"sources/{name}": content for name, content in sources.items()},
     }

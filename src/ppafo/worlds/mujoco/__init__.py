@@ -94,7 +94,7 @@ def add_device(
     at 0 [rad], ``settings`` change attributes [SI]. The joint keeps its limits, and gets the inertia and friction of
     the device on top of its own. ScenarioError for a name that is not known, or a gear other than 1 and -1.
     """
-    found = _joint(spec, joint)
+    _joint(spec, joint)
     if gear not in (1.0, -1.0):
         raise ScenarioError(f"gear {gear:g}: must be 1 or -1, for the vane sits on the joint")
     given = {**(settings or {}), **({} if neutral is None else {"neutral": neutral})}
@@ -119,9 +119,22 @@ def add_device(
         item.plugin.plugin_name = plugin.name
         item.plugin.name = name
         item.plugin.active = True
+    add_friction(spec, plugin, joint)
+
+
+def add_friction(spec: Any, plugin: Plugin, joint: str) -> None:
+    """Give a hinge joint of an ``MjSpec`` the inertia and friction of the device on top of its own; no actuator.
+
+    ``add_device`` does it; alone it is for an ideal actuator on the same joint.
+    """
+    found = _joint(spec, joint)
     found.armature += plugin.joint["armature"]
     found.frictionloss += plugin.joint["frictionloss"]
-    _add_damping(found, plugin.joint["damping"])
+    if isinstance(found.damping, float):
+        found.damping += plugin.joint["damping"]
+    else:
+        # Of newer versions of MuJoCo it is the first of several coefficients.
+        found.damping[0] += plugin.joint["damping"]
 
 
 def _joint(spec: Any, name: str) -> Any:
@@ -133,14 +146,6 @@ def _joint(spec: Any, name: str) -> Any:
     if found.type != mujoco.mjtJoint.mjJNT_HINGE:
         raise ScenarioError(f"joint '{name}' is no hinge: the vane turns about one axis")
     return found
-
-
-def _add_damping(joint: Any, damping: float) -> None:
-    """Add viscous damping [N m s/rad]; of newer versions of MuJoCo it is the first of several coefficients."""
-    if isinstance(joint.damping, float):
-        joint.damping += damping
-    else:
-        joint.damping[0] += damping
 
 
 def outputs_of(model: Any, data: Any, plugin: Plugin, name: str) -> dict[str, float]:
