@@ -56,7 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(parsed: argparse.Namespace) -> int:
     """Write the files of a scenario for another tool, and say what to do next."""
     check_output(parsed)
-    contents, following = {"c": _library, "controller": _controller, "fmu": _unit, "mujoco": _plugin}[parsed.action](parsed)
+    contents, following = {"c": _library, "controller": _controller, "fmu": _unit, "mujoco": _plugin}[parsed.action](
+        parsed
+    )
     write_files(parsed, contents)
     document = {"folder": str(parsed.out), "files": list(contents), "next": following}
     print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)

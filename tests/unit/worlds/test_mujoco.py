@@ -1,8 +1,10 @@
 """The plugin of MuJoCo: bits of the lanes on the angle that the joint took, restored states, work, refusals."""
 
 import math
-from collections.abc import Iterator
+import re
+import runpy
 from dataclasses import dataclass, replace
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -231,6 +233,19 @@ def test_what_cannot_be_put_at_a_joint_is_refused(solenoid: Folder, tmp_path: Pa
     )
     with pytest.raises(ScenarioError, match="built for MuJoCo 3.0.0"):
         load_plugin(tmp_path)
+
+
+def test_the_example_tells_what_an_ideal_motor_hides(
+    proportional: Folder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = resources.files("ppafo") / "examples" / "mujoco" / "push_off.py"
+    monkeypatch.setattr("sys.argv", ["push_off.py", str(proportional.path)])
+    runpy.run_path(str(script))
+    ideal, gas = capsys.readouterr().out.splitlines()
+    assert "error 0.00 N m (root mean square), 0 ms late, gas 0.000 g" in ideal
+    late, grams = re.search(r"(\d+) ms late, gas (\S+) g", gas).groups()  # type: ignore[union-attr]
+    assert int(late) > 5
+    assert float(grams) > 0.1
 
 
 def test_a_joint_that_is_no_hinge_is_refused_by_the_plugin(solenoid: Folder) -> None:

@@ -91,7 +91,9 @@ def plugin_files(scenario: Scenario, platforms: Sequence[str], mujoco: Headers) 
         },
         NUMBERS: f"{json.dumps(numbers, indent=2)}\n".encode(),
         **{
-            path: filled(files(__name__).joinpath("templates", path.rpartition("/")[2]).read_text("utf-8"), words).encode()
+            path: filled(
+                files(__name__).joinpath("templates", path.rpartition("/")[2]).read_text("utf-8"), words
+            ).encode()
             for path in ("example.xml", "README.md", "assist_sim/L1config.yaml", "assist_sim/L1model.xml")
         },
         **{f"sources/{name}": content for name, content in sources.items()},
@@ -161,9 +163,7 @@ def _sources(library: Library, mujoco: Headers) -> dict[str, bytes]:
     }
 
 
-def _numbers(
-    scenario: Scenario, library: Library, mujoco: Headers, binaries: Mapping[str, str]
-) -> dict[str, object]:
+def _numbers(scenario: Scenario, library: Library, mujoco: Headers, binaries: Mapping[str, str]) -> dict[str, object]:
     """What programs may want to know of a plugin: its names, and numbers in SI units."""
     device = scenario.device
     return {
@@ -185,7 +185,14 @@ def _numbers(
             }
             for item in attributes_of(library)
         ]
-        + [{"name": NEUTRAL, "unit": "rad", "summary": "angle of the device with the joint at 0", "value": _NEUTRAL_ANGLE}],
+        + [
+            {
+                "name": NEUTRAL,
+                "unit": "rad",
+                "summary": "angle of the device with the joint at 0",
+                "value": _NEUTRAL_ANGLE,
+            }
+        ],
         "joint": {
             "lowest_angle": device.actuator.angle_min,
             "highest_angle": device.actuator.angle_max,
@@ -196,9 +203,7 @@ def _numbers(
     }
 
 
-def _page_words(
-    scenario: Scenario, library: Library, mujoco: Headers, numbers: Mapping[str, object]
-) -> dict[str, str]:
+def _page_words(scenario: Scenario, library: Library, mujoco: Headers, numbers: Mapping[str, object]) -> dict[str, str]:
     """What fills the example and the page."""
     device = scenario.device
     low, high = (angle - _NEUTRAL_ANGLE for angle in (device.actuator.angle_min, device.actuator.angle_max))

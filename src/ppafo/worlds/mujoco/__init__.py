@@ -75,7 +75,9 @@ def load_plugin(folder: str | Path) -> Plugin:
     try:
         mujoco.mj_loadPluginLibrary(str(path))
     except mujoco.FatalError as error:
-        raise ScenarioError(f"{folder}: {error}: a process takes one plugin of a name; change its attributes") from error
+        raise ScenarioError(
+            f"{folder}: {error}: a process takes one plugin of a name; change its attributes"
+        ) from error
     return plugin
 
 

@@ -38,7 +38,7 @@ enum { ATTRIBUTE_COUNT = sizeof(ATTRIBUTES) / sizeof(ATTRIBUTES[0]) };
 static const int PLACES[ATTRIBUTE_COUNT] = {@places@, -1};
 #define NEUTRAL "neutral"
 
-/* Since MuJoCo 3.11 or so controls and forces of an actuator have addresses of their own; @apart@ where they have. */
+/* In newer versions of MuJoCo controls and forces of an actuator have addresses of their own. */
 #if @apart@
 #define CONTROL_OF(m, number) (m)->actuator_ctrladr[number]
 #define FORCE_OF(m, number) (m)->actuator_outadr[number]
