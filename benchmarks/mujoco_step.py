@@ -32,7 +32,8 @@ TIMED = 1000
 HELD = 25
 """Steps in all, and steps for which a command holds."""
 _FOOT = """<body name="{side}" pos="0 {place} 0"><joint name="{side}" type="hinge" axis="0 1 0" range="-1.2 0.69"
-limited="true"/><geom type="box" pos="0.06 0 -0.06" size="0.12 0.04 0.02" mass="1" contype="0" conaffinity="0"/></body>"""
+limited="true"/>
+<geom type="box" pos="0.06 0 -0.06" size="0.12 0.04 0.02" mass="1" contype="0" conaffinity="0"/></body>"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

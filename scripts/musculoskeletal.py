@@ -1,10 +1,10 @@
-"""Puts the device of a folder of ``ppafo export mujoco`` on the four musculoskeletal models of assist_sim, and runs them.
+"""Puts the device of ``ppafo export mujoco`` on the four musculoskeletal models of assist_sim, and runs them.
 
     pip install assist_sim
     ppafo export mujoco torque-task-proportional --out out/plugin
     python scripts/musculoskeletal.py out/plugin
 
-Each model stands at its first keyframe and falls, both valves open for 0.1 s: what is shown is that it is built and runs.
+Each model begins at its first keyframe, both valves open for 0.1 s: what is shown is that it is built and runs.
 """
 
 import sys

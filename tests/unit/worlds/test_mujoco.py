@@ -1,5 +1,6 @@
 """The plugin of MuJoCo: bits of the lanes on the angle that the joint took, restored states, work, refusals."""
 
+import copy
 import math
 import re
 import runpy
@@ -16,8 +17,8 @@ from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
-from ppafo.exports.mujoco import attributes_of, installed_headers, plugin_files, plugin_library
 from ppafo.exports.fmu.binaries import host_platform
+from ppafo.exports.mujoco import attributes_of, installed_headers, plugin_files, plugin_library
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.inputs import with_prescribed_angle
@@ -28,7 +29,8 @@ mujoco: Any = pytest.importorskip("mujoco", reason="MuJoCo is not installed (pip
 pytestmark = pytest.mark.skipif(host_platform() != "linux64", reason="plugins are run in the tests on linux64 alone")
 STEPS = 600
 STEP = 2.0e-3
-LEG = """<mujoco><compiler angle="radian"/><option timestep="{step}"><flag warmstart="disable"/></option><worldbody><body name="foot">
+LEG = """<mujoco><compiler angle="radian"/><option timestep="{step}"><flag warmstart="disable"/></option>
+<worldbody><body name="foot">
 <joint name="ankle" type="hinge" axis="0 1 0" range="-1.2 0.69" limited="true"/>
 <geom type="box" pos="0.06 0 -0.06" size="0.12 0.04 0.02" mass="1"/></body></worldbody></mujoco>"""
 ROWS = {"mass_1": "state.mass_1", "mass_2": "state.mass_2", "supplied_mass": "state.supplied_mass"}
@@ -139,6 +141,16 @@ def test_a_restored_state_goes_on_with_the_same_bits(name: str, request: pytest.
     assert all(np.array_equal(*pair) for pair in zip(*outcomes, strict=True))
 
 
+def test_copied_data_go_on_alone_with_the_same_bits(proportional: Folder) -> None:
+    model, commands = model_of(proportional), commands_of(proportional)
+    data = mujoco.MjData(model)
+    driven(model, data, commands[:200], proportional)
+    copied = copy.copy(data)
+    first = driven(model, data, commands[200:], proportional)
+    del data
+    assert all(np.array_equal(*pair) for pair in zip(first, driven(model, copied, commands[200:], proportional)))
+
+
 def test_work_into_the_joint_is_that_of_the_gas(solenoid: Folder) -> None:
     model = model_of(solenoid)
     data = mujoco.MjData(model)
@@ -187,6 +199,17 @@ def test_the_example_of_the_folder_runs_and_is_reset(solenoid: Folder) -> None:
     assert np.array_equal(data.plugin_state, first)
 
 
+def test_a_command_that_is_no_number_is_none_and_an_angle_beyond_the_stops_is_a_stop(solenoid: Folder) -> None:
+    model = model_of(solenoid)
+    data = mujoco.MjData(model)
+    data.qpos[0] = 9.0
+    data.ctrl[0] = math.nan
+    mujoco.mj_step(model, data)
+    assert data.plugin_state[0] == solenoid.plugin.joint["highest_angle"]
+    assert list(solenoid.plugin.outputs)[5] == "command"
+    assert data.plugin_state[5] == 0.0
+
+
 def test_a_finer_step_of_mujoco_is_taken_between_two_runs(solenoid: Folder) -> None:
     model = model_of(solenoid)
     data = mujoco.MjData(model)
@@ -231,7 +254,7 @@ def test_what_cannot_be_put_at_a_joint_is_refused(solenoid: Folder, tmp_path: Pa
     (tmp_path / "device.json").write_text(
         (solenoid.path / "device.json").read_text().replace(f'"mujoco": "{mujoco.__version__}"', '"mujoco": "3.0.0"')
     )
-    with pytest.raises(ScenarioError, match="built for MuJoCo 3.0.0"):
+    with pytest.raises(ScenarioError, match=r"built for MuJoCo 3\.0\.0"):
         load_plugin(tmp_path)
 
 

@@ -1,4 +1,4 @@
-"""A scenario's device as an engine plugin of MuJoCo: the library, an example model, its numbers, no Python in the step."""
+"""A scenario's device as an engine plugin of MuJoCo: library, example model, numbers; no Python in the step."""
 
 import importlib.util
 import json
@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ppafo.engine.replay import prescribe_recorded_angle
-from ppafo.errors import ProgramError, ScenarioError, nearest_name
+from ppafo.errors import ScenarioError, nearest_name
 from ppafo.exports.c_library import commanded, scenario_library
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, filled, library_files, steps_source
 from ppafo.exports.c_library.preparation import preparation_of
@@ -108,13 +108,13 @@ def plugin_library(scenario: Scenario) -> Library:
     return replace(
         library,
         title=scenario.name,
-        program=ExportedProgram(program, library.program.metrics[:1]),
+        program=ExportedProgram(program, tuple(kind for kind in library.program.metrics if not kind.meters)),
         further=lambda collector: preparation_of(chosen, program, collector),
     )
 
 
 def attributes_of(library: Library) -> tuple[Setting, ...]:
-    """Settings that a model may give to the plugin, in SI units; the others are MuJoCo's, or the gas has no use for them."""
+    """Settings that a model may give to the plugin, in SI units; others are MuJoCo's, or of no use to the gas."""
     unused = (*_NOT_OF_THE_GAS, *_OF_THE_JOINT)
     return tuple(item for item in library.settings if not item.path.startswith(unused))
 

@@ -226,7 +226,8 @@ static void restore(const device *item, const double *state)
 static void lead(const device *item, double command, double time, double angle, double rate)
 {
     double *rows = item->run->parameters;
-    rows[PARAMETER_CONTROLLER_COMMAND] = command < -1.0 ? -1.0 : (command > 1.0 ? 1.0 : command);
+    const double known = command == command ? command : 0.0; /* so does MuJoCo itself, which warns */
+    rows[PARAMETER_CONTROLLER_COMMAND] = known < -1.0 ? -1.0 : (known > 1.0 ? 1.0 : known);
     rows[PARAMETER_PATH_START] = time;
     rows[PARAMETER_PATH_LEVEL] = angle;
     rows[PARAMETER_PATH_RATE] = rate;
@@ -301,6 +302,26 @@ static void destroy(mjData *d, int instance)
         free(item);
         d->plugin_data[instance] = 0;
     }
+}
+
+/* Data that are copied get a device of their own; MuJoCo has put the pointer of the first into new ones. */
+static void copy(mjData *to, const mjModel *m, const mjData *from, int instance)
+{
+    const device *first = (const device *)from->plugin_data[instance];
+    @name@_run *run = (@name@_run *)malloc((size_t)first->run->bytes);
+    device *made = (device *)malloc(sizeof(device));
+    (void)m;
+    if (run == NULL || made == NULL) {
+        of_mujoco.error("%s: no memory", PLUGIN);
+        return;
+    }
+    if (to->plugin_data[instance] != from->plugin_data[instance]) {
+        destroy(to, instance);
+    }
+    memcpy(run, first->run, (size_t)first->run->bytes);
+    *made = *first;
+    made->run = run;
+    to->plugin_data[instance] = (uintptr_t)made;
 }
 
 static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
@@ -424,6 +445,7 @@ __attribute__((constructor)) static void offer(void)
     plugin.nsensordata = count_outputs;
     plugin.init = make;
     plugin.destroy = destroy;
+    plugin.copy = copy;
     plugin.reset = reset;
     plugin.compute = compute;
     plugin.advance = advance_device;
