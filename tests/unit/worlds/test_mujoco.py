@@ -148,7 +148,9 @@ def test_copied_data_go_on_alone_with_the_same_bits(proportional: Folder) -> Non
     copied = copy.copy(data)
     first = driven(model, data, commands[200:], proportional)
     del data
-    assert all(np.array_equal(*pair) for pair in zip(first, driven(model, copied, commands[200:], proportional)))
+    assert all(
+        np.array_equal(*pair) for pair in zip(first, driven(model, copied, commands[200:], proportional), strict=True)
+    )
 
 
 def test_work_into_the_joint_is_that_of_the_gas(solenoid: Folder) -> None:
