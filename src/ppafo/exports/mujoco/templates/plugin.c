@@ -72,11 +72,6 @@ static struct {
 } of_mujoco;
 
 @steps@
-static bool same_name(const char *one, const char *other)
-{
-    return strcmp(one, other) == 0;
-}
-
 /* A number of the model's configuration; what is not given stays as it is. False where it is none. */
 static bool read_number(const mjModel *m, int instance, const char *name, double *value)
 {
@@ -334,12 +329,13 @@ static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
     store(item, state, angle);
 }
 
-/* What a step of MuJoCo comes to, and whether the run can take it. */
+/* What another step of MuJoCo comes to, and whether the run can take it: delays are kept in steps. */
 static bool takes_step(device *item, double timestep)
 {
     const int64_t bytes = item->run->bytes;
     divide(item, timestep);
-    return @name@_bad_setting(&item->settings) == NULL && (int64_t)@name@_size(&item->settings) == bytes;
+    return item->run->signal_delay + item->run->command_delay == 0 && @name@_bad_setting(&item->settings) == NULL
+        && (int64_t)@name@_size(&item->settings) == bytes;
 }
 
 static void advance_device(const mjModel *m, mjData *d, int instance)
@@ -354,10 +350,12 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
         return; /* MuJoCo resets a state that is no number */
     }
     if (m->opt.timestep != item->timestep) {
+        const double time = state[AT_STEPS_DONE] * item->settings.run_step;
         if (!takes_step(item, m->opt.timestep)) {
             of_mujoco.error("%s: delays of its valve fix the timestep with which the model is compiled", PLUGIN);
         }
         begin(item, start);
+        state[AT_STEPS_DONE] = floor(time / item->settings.run_step + 0.5);
     }
     if (state[AT_STEPS_DONE] == 0.0) {
         /* The joint may have been put elsewhere since the reset. */
