@@ -16,6 +16,7 @@ from ppafo.cli.output import (
 
 _C = "write a scenario or a walk as a library in C: header, source, example, make files"
 _UNIT = "write a scenario or a walk as a functional mock-up unit (FMU) for co-simulation"
+_MUJOCO = "write a scenario's device as an engine plugin of MuJoCo, with an example model"
 _CONTROLLER = "write a scenario's integer controller in C behind the protocol of 'ppafo hil'"
 
 
@@ -39,8 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="LIST",
         help="what it is to run on, separated by commas: linux64, win64, ... (default: this computer)",
     )
+    plugin = actions.add_parser("mujoco", help=_MUJOCO, description=f"{_MUJOCO[:1].upper()}{_MUJOCO[1:]}.")
+    plugin.add_argument(
+        "--platforms", metavar="LIST", help="linux64, win64 or both, separated by commas (default: this computer)"
+    )
     either = "name of a scenario or a walk, or a .toml file"
-    for parser_of_one, said in ((library, either), (controller, "name of a scenario, or a .toml file"), (unit, either)):
+    scenario = "name of a scenario, or a .toml file"
+    for parser_of_one, said in ((library, either), (controller, scenario), (unit, either), (plugin, scenario)):
         parser_of_one.add_argument("scenario", metavar="SCENARIO", help=said)
         add_override_argument(parser_of_one)
         add_json_argument(parser_of_one)
@@ -50,7 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(parsed: argparse.Namespace) -> int:
     """Write the files of a scenario for another tool, and say what to do next."""
     check_output(parsed)
-    contents, following = {"c": _library, "controller": _controller, "fmu": _unit}[parsed.action](parsed)
+    contents, following = {"c": _library, "controller": _controller, "fmu": _unit, "mujoco": _plugin}[parsed.action](
+        parsed
+    )
     write_files(parsed, contents)
     document = {"folder": str(parsed.out), "files": list(contents), "next": following}
     print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)
@@ -75,12 +83,26 @@ def _controller(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 
 def _unit(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.fmu import closed_loop, functional_unit
-    from ppafo.exports.fmu.binaries import host_platform
     from ppafo.exports.fmu.plant import plant_alone
     from ppafo.exports.loading import load_exportable
 
-    chosen = [host_platform()] if parsed.platforms is None else parsed.platforms.split(",")
-    platforms = list(dict.fromkeys(name.strip() for name in chosen if name is not None))
+    platforms = _platforms(parsed)
     interface = {"loop": closed_loop, "plant": plant_alone}[parsed.interface]
     contents = functional_unit(interface(load_exportable(parsed.scenario, parsed.overrides)), parsed.fmi, platforms)
     return contents, f"fmpy simulate {shlex.quote(str(parsed.out / next(iter(contents))))} --show-plot"
+
+
+def _plugin(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
+    from ppafo.exports.mujoco import installed_headers, plugin_files
+    from ppafo.simulation.loading import load_scenario
+
+    contents = plugin_files(load_scenario(parsed.scenario, parsed.overrides), _platforms(parsed), installed_headers())
+    return contents, f"see {shlex.quote(str(parsed.out / 'README.md'))}"
+
+
+def _platforms(parsed: argparse.Namespace) -> list[str]:
+    """The platforms that are asked for, once each; this computer where none is named."""
+    from ppafo.exports.fmu.binaries import host_platform
+
+    chosen = [host_platform()] if parsed.platforms is None else parsed.platforms.split(",")
+    return list(dict.fromkeys(name.strip() for name in chosen if name is not None))

@@ -14,8 +14,8 @@ from ppafo.cli.main import build_parser, main
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = load_examples()
-SCRIPTS = ("first-steps", "compare-controllers", "learn-a-controller")
-"""Examples that are no part of a page: scripts, which tests/acceptance runs."""
+SCRIPTS = ("first-steps", "compare-controllers", "learn-a-controller", "mujoco")
+"""Examples that are no part of a page: scripts, which tests of their own run."""
 
 
 @pytest.fixture(autouse=True)

@@ -89,9 +89,9 @@ def test_what_no_test_here_runs_is_marked_in_the_unit(monkeypatch: pytest.Monkey
     ("script", "line"),
     [
         ("#!/no/such/interpreter\n", "cannot be run: no such file or directory"),
-        ("#!/bin/sh\nexit 0\n", "says that all is well, but made no unit for linux64"),
-        ("#!/bin/sh\nkill -9 $$\n", "does not build the unit for linux64: it ended with -9"),
-        ("#!/bin/sh\nprintf '\\377\\n' >&2\nexit 1\n", "does not build the unit for linux64: \ufffd"),
+        ("#!/bin/sh\nexit 0\n", "says that all is well, but made no library for linux64"),
+        ("#!/bin/sh\nkill -9 $$\n", "does not build the library for linux64: it ended with -9"),
+        ("#!/bin/sh\nprintf '\\377\\n' >&2\nexit 1\n", "does not build the library for linux64: \ufffd"),
     ],
 )
 def test_a_compiler_that_fails_halfway_is_said_in_one_line(

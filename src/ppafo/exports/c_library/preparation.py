@@ -6,6 +6,7 @@ from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.program import Program
+from ppafo.engine.replay import RECORDED_ANGLE, Segment
 from ppafo.engine.run import sensors_at_start
 from ppafo.engine.source_text import SourceCollector
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
@@ -116,7 +117,9 @@ def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
     if program.controller is not None:
         yield f"controller = {_kind(writing, 'controller', CONTROLLERS[scenario.control.kind])}"
     yield f"reference = {_reference(scenario, writing)}"
-    if isinstance(scenario.motion, PrescribedMotion):
+    if program.angle is RECORDED_ANGLE:
+        yield f"path = {writing.add(Segment)}(0.0, motion_angle, 0.0)"
+    elif isinstance(scenario.motion, PrescribedMotion):
         held = {"level": "motion_angle"} if program.is_held else {}
         yield f"path = {_kind(writing, 'motion.profile', PROFILES[scenario.motion.profile.kind], held)}"
     if program.slow_sensors:

@@ -57,11 +57,12 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
     """The library of a unit for a platform. ProgramError where no compiler is there for it, or it refuses."""
     if name == "wasm32":
         around = component.sources_of_component(sources, main)
-        return component.component_of(_built(name, around, component.SOURCE, component.FLAGS))
-    return _built(name, sources, main, HIDDEN)
+        return component.component_of(build_library(name, around, component.SOURCE, component.FLAGS))
+    return build_library(name, sources, main, HIDDEN)
 
 
-def _built(name: str, sources: Mapping[str, bytes], main: str, flags: Sequence[str]) -> bytes:
+def build_library(name: str, sources: Mapping[str, bytes], main: str, flags: Sequence[str]) -> bytes:
+    """A library of some sources for a platform; ProgramError as of a unit."""
     command = [*compiler_for(name), *FLAGS, *flags]
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
@@ -70,9 +71,9 @@ def _built(name: str, sources: Mapping[str, bytes], main: str, flags: Sequence[s
         mathematics = [] if name in ("win64", "wasm32") else ["-lm"]
         done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder)
         if done.returncode != 0:
-            raise ProgramError(f"{command[0]} does not build the unit for {name}: {complaint(done)}")
+            raise ProgramError(f"{command[0]} does not build the library for {name}: {complaint(done)}")
         if not library.is_file():
-            raise ProgramError(f"{command[0]} says that all is well, but made no unit for {name}; {_ANOTHER}")
+            raise ProgramError(f"{command[0]} says that all is well, but made no library for {name}; {_ANOTHER}")
         return library.read_bytes()
 
 

@@ -1,0 +1,451 @@
+/* An actuator and a sensor for MuJoCo @mujoco@: @title@, by ppafo @version@.
+ *
+ * The gas goes on in advance(), once for each step of MuJoCo, along the motion that the joint made in it. All that
+ * changes lies in plugin_state: the outputs first, then what the run is made of.
+ */
+#if !defined(_GNU_SOURCE)
+#define _GNU_SOURCE /* dl_iterate_phdr */
+#endif
+#include "@name@.c"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <mujoco/mujoco.h>
+
+#if defined(_WIN32)
+#include <windows.h>
+#else
+#include <dlfcn.h>
+#include <link.h>
+#endif
+
+enum {
+    AT_TORQUE = @torque@, /* of the outputs */
+    AT_STEPS_DONE = OUTPUTS,
+    AT_ANGLE,  /* where the vane stands [rad] */
+    AT_BEFORE, /* torque one step before [N m] */
+    AT_RUN,    /* states of the run, then late signals and commands */
+    AT_HISTORY = AT_RUN + STATES
+};
+
+static const char PLUGIN[] = "@plugin@";
+static const char *const ATTRIBUTES[] = {
+@attributes@
+};
+enum { ATTRIBUTE_COUNT = sizeof(ATTRIBUTES) / sizeof(ATTRIBUTES[0]) };
+/* Which settings these are; the last one is none. */
+static const int PLACES[ATTRIBUTE_COUNT] = {@places@, -1};
+#define NEUTRAL "neutral"
+
+/* In newer versions of MuJoCo controls and forces of an actuator have addresses of their own. */
+#if @apart@
+#define CONTROL_OF(m, number) (m)->actuator_ctrladr[number]
+#define FORCE_OF(m, number) (m)->actuator_outadr[number]
+#define ACTUATORS(m) (m)->nactuator
+#else
+#define CONTROL_OF(m, number) (number)
+#define FORCE_OF(m, number) (number)
+#define ACTUATORS(m) (m)->nu
+#endif
+
+/* One actuator of a model, with room for its run. */
+typedef struct {
+    @name@_settings settings;
+    @name@_run *run;
+    double timestep; /* of MuJoCo, for which the run was prepared [s] */
+    double longest;  /* step of the engine that is allowed [s] */
+    double neutral;  /* angle of the device where the joint is at 0 [rad] */
+    int64_t parts;   /* steps of the engine in one of MuJoCo */
+    int control;     /* places in ctrl, in actuator_force, and of its joint in qpos */
+    int force;
+    int place;
+} device;
+
+/* What is called of MuJoCo. Found in the library that is loaded already, so that nothing is linked. */
+static struct {
+    int (*version)(void);
+    const char *(*version_text)(void);
+    int (*plugin)(const mjpPlugin *);
+    const char *(*config)(const mjModel *, int, const char *);
+    void (*error)(const char *, ...);
+} of_mujoco;
+
+@steps@
+/* A number of the model's configuration; what is not given stays as it is. False where it is none. */
+static bool read_number(const mjModel *m, int instance, const char *name, double *value)
+{
+    const char *text = of_mujoco.config(m, instance, name);
+    char *end = NULL;
+    if (text == NULL || text[0] == '\0') {
+        return true;
+    }
+    *value = strtod(text, &end);
+    while (*end == ' ') {
+        ++end;
+    }
+    return end != text && *end == '\0' && *value - *value == 0.0;
+}
+
+/* The path of a setting by its name in C. */
+static const char *path_of(const char *name)
+{
+    int place;
+    for (place = 0; place < ATTRIBUTE_COUNT; ++place) {
+        const char *path = ATTRIBUTES[place];
+        size_t at = 0;
+        while (name[at] != '\0' && (name[at] == path[at] || (name[at] == '_' && path[at] == '.'))) {
+            ++at;
+        }
+        if (name[at] == '\0' && path[at] == '\0') {
+            return path;
+        }
+    }
+    return name;
+}
+
+/* The settings under a step of MuJoCo, which is divided into the fewest equal steps of the engine. */
+static void divide(device *item, double timestep)
+{
+    item->timestep = timestep;
+    item->parts = (int64_t)(timestep / item->longest + 1.0 - 1.0e-9);
+    item->parts = item->parts < 1 ? 1 : item->parts;
+    item->settings.run_step = timestep / (double)item->parts;
+    item->settings.controller_period = item->settings.run_step;
+    item->settings.run_output_interval = item->settings.run_step;
+    item->settings.run_duration = 1000.0 * item->settings.run_step;
+}
+
+/* Read the configuration of an instance; NULL where it is good, else what is wrong, in memory of the caller. */
+static const char *configure(const mjModel *m, int instance, device *item, char *said, size_t room)
+{
+    double *settings = (double *)&item->settings;
+    const char *bad;
+    int place;
+    item->neutral = @neutral@;
+    @name@_defaults(&item->settings);
+    if (!read_number(m, instance, NEUTRAL, &item->neutral)) {
+        (void)snprintf(said, room, "%s: " NEUTRAL " is no number", PLUGIN);
+        return said;
+    }
+    for (place = 0; place < ATTRIBUTE_COUNT; ++place) {
+        if (PLACES[place] >= 0 && !read_number(m, instance, ATTRIBUTES[place], &settings[PLACES[place]])) {
+            (void)snprintf(said, room, "%s: %s is no number", PLUGIN, ATTRIBUTES[place]);
+            return said;
+        }
+    }
+    item->longest = item->settings.run_step;
+    if (!(item->longest > 0.0)) {
+        (void)snprintf(said, room, "%s: run.step must be above 0", PLUGIN);
+        return said;
+    }
+    divide(item, m->opt.timestep);
+    bad = @name@_bad_setting(&item->settings);
+    if (bad != NULL) {
+        (void)snprintf(said, room, "%s: %s is out of range or contradicts another", PLUGIN, path_of(bad));
+        return said;
+    }
+    if (@name@_size(&item->settings) == 0) {
+        (void)snprintf(said, room,
+            "%s: these numbers need other functions than the plugin has: export it from ppafo with them", PLUGIN);
+        return said;
+    }
+    return NULL;
+}
+
+static int state_count(const device *item)
+{
+    const size_t bytes = @name@_size(&item->settings) - sizeof(@name@_run);
+    return (int)(AT_HISTORY + bytes / sizeof(double));
+}
+
+/* The actuator of an instance, and where its joint is; NULL where they are good. */
+static const char *find_joint(const mjModel *m, int instance, device *item, char *said, size_t room)
+{
+    int number;
+    int joint;
+    int own = -1;
+    for (number = 0; number < ACTUATORS(m); ++number) {
+        if (m->actuator_plugin[number] == instance) {
+            if (own >= 0) {
+                (void)snprintf(said, room, "%s: one instance cannot move two actuators", PLUGIN);
+                return said;
+            }
+            own = number;
+        }
+    }
+    if (own < 0) {
+        (void)snprintf(said, room, "%s: the instance moves no actuator", PLUGIN);
+        return said;
+    }
+    joint = m->actuator_trnid[2 * own];
+    if (m->actuator_trntype[own] != mjTRN_JOINT || m->jnt_type[joint] != mjJNT_HINGE) {
+        (void)snprintf(said, room, "%s: the actuator must move a hinge joint", PLUGIN);
+        return said;
+    }
+    item->control = CONTROL_OF(m, own);
+    item->force = FORCE_OF(m, own);
+    item->place = m->jnt_qposadr[joint];
+    return NULL;
+}
+
+/* The angle of the vane for a length of the actuator; beyond its stops it stands at them. */
+static double vane_angle(const device *item, double length)
+{
+    const double angle = item->neutral + length;
+    const double low = item->settings.actuator_angle_min;
+    const double high = item->settings.actuator_angle_max;
+    return angle < low ? low : (angle > high ? high : angle);
+}
+
+static void store(const device *item, double *state, double angle)
+{
+    const @name@_run *run = item->run;
+    const int64_t sample = run->samples_shown - 1;
+    state[AT_BEFORE] = run->steps_done > 0 ? state[AT_TORQUE] : run->samples[0][AT_TORQUE];
+    memcpy(state, run->samples[sample % 2], sizeof(run->samples[0]));
+    state[AT_STEPS_DONE] = (double)run->steps_done;
+    state[AT_ANGLE] = angle;
+    memcpy(state + AT_RUN, run->states, sizeof(run->states));
+    memcpy(state + AT_HISTORY, run + 1, (size_t)run->bytes - sizeof(*run));
+}
+
+static void restore(const device *item, const double *state)
+{
+    item->run->steps_done = (int64_t)state[AT_STEPS_DONE];
+    memcpy(item->run->states, state + AT_RUN, sizeof(item->run->states));
+    memcpy(item->run + 1, state + AT_HISTORY, (size_t)item->run->bytes - sizeof(*item->run));
+}
+
+/* The vane on a straight line from a time on, under a command. */
+static void lead(const device *item, double command, double time, double angle, double rate)
+{
+    double *rows = item->run->parameters;
+    const double known = command == command ? command : 0.0; /* so does MuJoCo itself, which warns */
+    rows[PARAMETER_CONTROLLER_COMMAND] = known < -1.0 ? -1.0 : (known > 1.0 ? 1.0 : known);
+    rows[PARAMETER_PATH_START] = time;
+    rows[PARAMETER_PATH_LEVEL] = angle;
+    rows[PARAMETER_PATH_RATE] = rate;
+}
+
+/* A run at its start, the vane at rest at an angle. */
+static void begin(device *item, double angle)
+{
+    item->settings.motion_angle = angle;
+    if (@name@_initialise(item->run, &item->settings) != @NAME@_GOING_ON) {
+        of_mujoco.error("%s: the run cannot begin with a step of %g s", PLUGIN, item->timestep);
+    }
+    lead(item, 0.0, 0.0, angle, 0.0);
+    (void)advance_steps(item->run, 0);
+}
+
+static int count_states(const mjModel *m, int instance)
+{
+    device item;
+    char said[256];
+    const char *bad;
+    memset(&item, 0, sizeof(item));
+    if (of_mujoco.version() != mjVERSION_HEADER) {
+        of_mujoco.error("%s was built for MuJoCo @mujoco@, this is %s: run 'ppafo export mujoco' where that is installed",
+            PLUGIN, of_mujoco.version_text());
+        return 0;
+    }
+    bad = configure(m, instance, &item, said, sizeof(said));
+    if (bad != NULL) {
+        of_mujoco.error("%s", bad);
+        return 0;
+    }
+    return state_count(&item);
+}
+
+static int count_outputs(const mjModel *m, int instance, int sensor)
+{
+    (void)m;
+    (void)instance;
+    (void)sensor;
+    return OUTPUTS;
+}
+
+static int make(const mjModel *m, mjData *d, int instance)
+{
+    char said[256];
+    device *item = (device *)calloc(1, sizeof(device));
+    const char *bad = item == NULL ? "no memory" : configure(m, instance, item, said, sizeof(said));
+    bad = bad != NULL ? bad : find_joint(m, instance, item, said, sizeof(said));
+    if (bad == NULL && state_count(item) != m->plugin_statenum[instance]) {
+        (void)snprintf(said, sizeof(said), "%s: delays of its valve fix the timestep with which the model is compiled", PLUGIN);
+        bad = said;
+    }
+    if (bad == NULL) {
+        item->run = (@name@_run *)malloc(@name@_size(&item->settings));
+        bad = item->run == NULL ? "no memory" : NULL;
+    }
+    if (bad != NULL) {
+        free(item);
+        of_mujoco.error("%s", bad);
+        return -1;
+    }
+    d->plugin_data[instance] = (uintptr_t)item;
+    return 0;
+}
+
+static void destroy(mjData *d, int instance)
+{
+    device *item = (device *)d->plugin_data[instance];
+    if (item != NULL) {
+        free(item->run);
+        free(item);
+        d->plugin_data[instance] = 0;
+    }
+}
+
+/* Data that are copied get a device of their own; MuJoCo has put the pointer of the first into new ones. */
+static void copy(mjData *to, const mjModel *m, const mjData *from, int instance)
+{
+    const device *first = (const device *)from->plugin_data[instance];
+    @name@_run *run = (@name@_run *)malloc((size_t)first->run->bytes);
+    device *made = (device *)malloc(sizeof(device));
+    (void)m;
+    if (run == NULL || made == NULL) {
+        of_mujoco.error("%s: no memory", PLUGIN);
+        return;
+    }
+    if (to->plugin_data[instance] != from->plugin_data[instance]) {
+        destroy(to, instance);
+    }
+    memcpy(run, first->run, (size_t)first->run->bytes);
+    *made = *first;
+    made->run = run;
+    to->plugin_data[instance] = (uintptr_t)made;
+}
+
+static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
+{
+    device *item = (device *)data;
+    const double length = m->actuator_gear[6 * item->force] * m->qpos0[item->place];
+    const double angle = vane_angle(item, length);
+    (void)instance;
+    begin(item, angle);
+    store(item, state, angle);
+}
+
+/* What another step of MuJoCo comes to, and whether the run can take it: delays are kept in steps. */
+static bool takes_step(device *item, double timestep)
+{
+    const int64_t bytes = item->run->bytes;
+    divide(item, timestep);
+    return item->run->signal_delay + item->run->command_delay == 0 && @name@_bad_setting(&item->settings) == NULL
+        && (int64_t)@name@_size(&item->settings) == bytes;
+}
+
+static void advance_device(const mjModel *m, mjData *d, int instance)
+{
+    device *item = (device *)d->plugin_data[instance];
+    double *state = d->plugin_state + m->plugin_stateadr[instance];
+    const double end = vane_angle(item, m->actuator_gear[6 * item->force] * d->qpos[item->place]);
+    double start = state[AT_ANGLE];
+    double now;
+    double then;
+    if (end - end != 0.0) {
+        return; /* MuJoCo resets a state that is no number */
+    }
+    if (m->opt.timestep != item->timestep) {
+        const double time = state[AT_STEPS_DONE] * item->settings.run_step;
+        if (!takes_step(item, m->opt.timestep)) {
+            of_mujoco.error("%s: delays of its valve fix the timestep with which the model is compiled", PLUGIN);
+        }
+        begin(item, start);
+        state[AT_STEPS_DONE] = floor(time / item->settings.run_step + 0.5);
+    }
+    if (state[AT_STEPS_DONE] == 0.0) {
+        /* The joint may have been put elsewhere since the reset. */
+        start = vane_angle(item, d->actuator_length[item->force]);
+        begin(item, start);
+    } else {
+        restore(item, state);
+    }
+    now = state[AT_STEPS_DONE] * item->run->parameters[PARAMETER_TIMING_PERIOD];
+    then = (state[AT_STEPS_DONE] + (double)item->parts) * item->run->parameters[PARAMETER_TIMING_PERIOD];
+    lead(item, d->ctrl[item->control], now, start, (end - start) / (then - now));
+    if (!advance_steps(item->run, item->parts)) {
+        of_mujoco.error("%s: the run left what is possible at %g s: try a smaller timestep, and check volumes and areas",
+            PLUGIN, d->time);
+    }
+    store(item, state, end);
+}
+
+static void compute(const mjModel *m, mjData *d, int instance, int capability)
+{
+    const device *item = (const device *)d->plugin_data[instance];
+    const double *state = d->plugin_state + m->plugin_stateadr[instance];
+    int sensor;
+    if (capability == mjPLUGIN_ACTUATOR) {
+        /* The mean over the step that comes, from the slope of the last one: the work into the joint is then the gas'. */
+        d->actuator_force[item->force] = state[AT_TORQUE] + 0.5 * (state[AT_TORQUE] - state[AT_BEFORE]);
+        return;
+    }
+    for (sensor = 0; sensor < m->nsensor; ++sensor) {
+        if (m->sensor_type[sensor] == mjSENS_PLUGIN && m->sensor_plugin[sensor] == instance) {
+            memcpy(d->sensordata + m->sensor_adr[sensor], state, OUTPUTS * sizeof(double));
+        }
+    }
+}
+
+#if defined(_WIN32)
+static void *symbol(const char *name)
+{
+    return (void *)GetProcAddress(GetModuleHandleA("mujoco.dll"), name);
+}
+#else
+static int find_library(struct dl_phdr_info *found, size_t size, void *kept)
+{
+    const char *last = strrchr(found->dlpi_name, '/');
+    (void)size;
+    if (strncmp(last != NULL ? last + 1 : found->dlpi_name, "libmujoco.so", 12) != 0) {
+        return 0;
+    }
+    *(void **)kept = dlopen(found->dlpi_name, RTLD_LAZY | RTLD_NOLOAD);
+    return 1;
+}
+
+static void *symbol(const char *name)
+{
+    void *library = NULL;
+    (void)dl_iterate_phdr(find_library, &library);
+    return dlsym(library != NULL ? library : RTLD_DEFAULT, name);
+}
+#endif
+
+/* One symbol, into the place of a pointer to a function. */
+static bool take(void *place, const char *name)
+{
+    void *found = symbol(name);
+    memcpy(place, &found, sizeof(found));
+    return found != NULL;
+}
+
+__attribute__((constructor)) static void offer(void)
+{
+    mjpPlugin plugin;
+    if (!take(&of_mujoco.version, "mj_version") || !take(&of_mujoco.version_text, "mj_versionString")
+        || !take(&of_mujoco.plugin, "mjp_registerPlugin") || !take(&of_mujoco.config, "mj_getPluginConfig")
+        || !take(&of_mujoco.error, "mju_error")) {
+        (void)fprintf(stderr, "%s: MuJoCo is not loaded; load this library by mj_loadPluginLibrary\n", PLUGIN);
+        return;
+    }
+    memset(&plugin, 0, sizeof(plugin));
+    plugin.name = PLUGIN;
+    plugin.nattribute = ATTRIBUTE_COUNT;
+    plugin.attributes = ATTRIBUTES;
+    plugin.capabilityflags = mjPLUGIN_ACTUATOR | mjPLUGIN_SENSOR;
+    plugin.needstage = mjSTAGE_POS;
+    plugin.nstate = count_states;
+    plugin.nsensordata = count_outputs;
+    plugin.init = make;
+    plugin.destroy = destroy;
+    plugin.copy = copy;
+    plugin.reset = reset;
+    plugin.compute = compute;
+    plugin.advance = advance_device;
+    (void)of_mujoco.plugin(&plugin);
+}

@@ -1,0 +1,307 @@
+"""The plugin of MuJoCo: bits of the lanes on the angle that the joint took, restored states, work, refusals."""
+
+import copy
+import math
+import re
+import runpy
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.engine.replay import StepInputs, replay
+from ppafo.engine.rows import row_numbers
+from ppafo.engine.run import batch_of
+from ppafo.errors import ScenarioError
+from ppafo.exports.fmu.binaries import host_platform
+from ppafo.exports.mujoco import attributes_of, installed_headers, plugin_files, plugin_library
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.recorded.inputs import with_prescribed_angle
+from ppafo.simulation.recorded.scenario import held_vane
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario, Sensors
+
+mujoco: Any = pytest.importorskip("mujoco", reason="MuJoCo is not installed (pip install 'ppafo[mujoco]')")
+pytestmark = pytest.mark.skipif(host_platform() != "linux64", reason="plugins are run in the tests on linux64 alone")
+STEPS = 600
+STEP = 2.0e-3
+LEG = """<mujoco><compiler angle="radian"/><option timestep="{step}"><flag warmstart="disable"/></option>
+<worldbody><body name="foot">
+<joint name="ankle" type="hinge" axis="0 1 0" range="-1.2 0.69" limited="true"/>
+<geom type="box" pos="0.06 0 -0.06" size="0.12 0.04 0.02" mass="1"/></body></worldbody></mujoco>"""
+ROWS = {"mass_1": "state.mass_1", "mass_2": "state.mass_2", "supplied_mass": "state.supplied_mass"}
+
+
+@dataclass(frozen=True)
+class Folder:
+    """A folder that was written, its scenario, and the plugin that was loaded from it."""
+
+    path: Path
+    scenario: Scenario
+    plugin: Any
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo writes its warnings into a file where it is."""
+    monkeypatch.chdir(tmp_path)
+
+
+def written(path: Path, name: str, overrides: tuple[str, ...] = ()) -> Folder:
+    """Write and load the plugin of a scenario."""
+    from ppafo.worlds.mujoco import load_plugin
+
+    words = [word for item in overrides for word in ("--set", item)]
+    assert main(["export", "mujoco", name, "--out", str(path), *words]) == 0
+    return Folder(path, load_scenario(name, overrides), load_plugin(path))
+
+
+@pytest.fixture(scope="module")
+def proportional(tmp_path_factory: pytest.TempPathFactory) -> Folder:
+    """A plugin with a slow valve: its commands come late, and it needs finer steps than MuJoCo's."""
+    return written(tmp_path_factory.mktemp("slow") / "plugin", "torque-task-slow-valve")
+
+
+@pytest.fixture(scope="module")
+def solenoid(tmp_path_factory: pytest.TempPathFactory) -> Folder:
+    """One with valves that are on or off; its volumes are those that its torque wants."""
+    same = ("actuator.volume_per_angle=14.51 cm^3/rad",)
+    return written(tmp_path_factory.mktemp("pair") / "plugin", "torque-task-solenoid", same)
+
+
+def model_of(folder: Folder, **given: Any) -> Any:
+    """A foot on a hinge with the device, compiled."""
+    from ppafo.worlds.mujoco import add_device
+
+    spec = mujoco.MjSpec.from_string(LEG.format(step=STEP))
+    add_device(spec, folder.plugin, "device", joint="ankle", **given)
+    return spec.compile()
+
+
+def driven(model: Any, data: Any, commands: np.ndarray, folder: Folder) -> tuple[np.ndarray, np.ndarray]:
+    """Angles of the device before each step and after the last one, and its outputs after each."""
+    angles, found, count = [], [], len(folder.plugin.outputs)
+    low, high = folder.plugin.joint["lowest_angle"], folder.plugin.joint["highest_angle"]
+    for command in commands:
+        angles.append(math.pi / 2 + data.qpos[0])
+        data.ctrl[0] = command
+        mujoco.mj_step(model, data)
+        found.append(data.plugin_state[:count].copy())
+    return np.clip([*angles, math.pi / 2 + data.qpos[0]], low, high), np.array(found)
+
+
+def commands_of(folder: Folder) -> np.ndarray:
+    """Commands that hold for some steps each, drawn once."""
+    drawn = np.repeat(np.random.default_rng(3).uniform(-1.0, 1.0, STEPS // 100), 100)
+    return np.round(drawn) if folder.scenario.device.valve.kind != "proportional" else drawn
+
+
+@pytest.mark.parametrize("name", ["proportional", "solenoid"])
+def test_the_lanes_have_the_same_bits_on_the_angle_that_the_joint_took(
+    name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", "c")
+    folder = request.getfixturevalue(name)
+    model, commands = model_of(folder), commands_of(folder)
+    data = mujoco.MjData(model)
+    data.qpos[0] = -0.2
+    angles, found = driven(model, data, commands, folder)
+    assert np.ptp(angles) > 0.5
+
+    parts = math.ceil(STEP / folder.plugin.attributes["run.step"] - 1e-9)
+    step = STEP / parts
+    chosen = replace(
+        folder.scenario,
+        motion=held_vane(angles[0]),
+        duration=STEPS * STEP,
+        time_step=step,
+        output_interval=step,
+        control=Control(PYTHON_CONTROLLER, {}, step),
+        sensors=Sensors(),
+    )
+    run = with_prescribed_angle(plan_run(chosen), angles[0])
+    assert (run.step, run.step_count) == (step, STEPS * parts)
+    times = np.arange(STEPS + 1) * parts * step
+    path = {"path.start": times[:-1], "path.level": angles[:-1], "path.rate": np.diff(angles) / np.diff(times)}
+    inputs = StepInputs(np.repeat(commands, parts), {key: np.repeat(item, parts) for key, item in path.items()})
+    record = replay(batch_of(run), inputs).record[parts::parts, :, 0]
+    rows, names = row_numbers(run.program.state_rows()), list(folder.plugin.outputs)
+    for output, row in ROWS.items():
+        assert np.array_equal(found[:, names.index(output)], record[:, rows[row]]), output
+
+
+@pytest.mark.parametrize("name", ["proportional", "solenoid"])
+def test_a_restored_state_goes_on_with_the_same_bits(name: str, request: pytest.FixtureRequest) -> None:
+    folder = request.getfixturevalue(name)
+    model, commands = model_of(folder), commands_of(folder)
+    data, other = mujoco.MjData(model), mujoco.MjData(model)
+    driven(model, data, commands[:311], folder)
+    kept = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    mujoco.mj_getState(model, data, kept, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    mujoco.mj_setState(model, other, kept, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    outcomes = [driven(model, item, commands[311:], folder) for item in (data, other)]
+    assert all(np.array_equal(*pair) for pair in zip(*outcomes, strict=True))
+
+
+def test_copied_data_go_on_alone_with_the_same_bits(proportional: Folder) -> None:
+    model, commands = model_of(proportional), commands_of(proportional)
+    data = mujoco.MjData(model)
+    driven(model, data, commands[:200], proportional)
+    copied = copy.copy(data)
+    first = driven(model, data, commands[200:], proportional)
+    del data
+    assert all(
+        np.array_equal(*pair) for pair in zip(first, driven(model, copied, commands[200:], proportional), strict=True)
+    )
+
+
+def test_work_into_the_joint_is_that_of_the_gas(solenoid: Folder) -> None:
+    model = model_of(solenoid)
+    data = mujoco.MjData(model)
+    names = list(solenoid.plugin.outputs)
+    commands = np.repeat(np.tile([1.0, -1.0], 6), 60)
+    into_joint, difference, turned = 0.0, [0.0], []
+    for command in commands:
+        data.ctrl[0] = command
+        before = data.qpos[0]
+        mujoco.mj_step(model, data)
+        turned.append(data.qpos[0] - before)
+        into_joint += data.qfrc_actuator[0] * turned[-1]
+        difference.append(data.plugin_state[names.index("pressure_1")] - data.plugin_state[names.index("pressure_2")])
+    mean = 0.5 * (np.array(difference)[1:] + np.array(difference)[:-1])
+    of_gas = float((mean * turned).sum()) * solenoid.scenario.device.actuator.volume_per_angle
+    assert of_gas > 1.0
+    assert into_joint == pytest.approx(of_gas, rel=0.01)
+
+
+def test_a_joint_that_counts_the_other_way_round_moves_the_other_way(solenoid: Folder) -> None:
+    from ppafo.worlds.mujoco import outputs_of
+
+    ends = []
+    for gear in (1.0, -1.0):
+        model = model_of(solenoid, gear=gear, neutral=math.pi / 2)
+        model.opt.gravity[:] = 0.0
+        data = mujoco.MjData(model)
+        data.ctrl[0] = 1.0
+        mujoco.mj_step(model, data, 20)
+        ends.append(float(data.qpos[0]))
+        assert outputs_of(model, data, solenoid.plugin, "device")["torque"] > 0.5
+        mujoco.mj_forward(model, data)
+        assert data.sensor("device").data[2] == outputs_of(model, data, solenoid.plugin, "device")["pressure_1"]
+    assert ends[0] > 0.01
+    assert ends[1] == pytest.approx(-ends[0], rel=1e-9)
+
+
+def test_the_example_of_the_folder_runs_and_is_reset(solenoid: Folder) -> None:
+    model = mujoco.MjModel.from_xml_path(str(solenoid.path / "example.xml"))
+    data = mujoco.MjData(model)
+    first = data.plugin_state.copy()
+    data.ctrl[0] = 1.0
+    mujoco.mj_step(model, data, 300)
+    assert data.sensor("device").data[2] > 3.0e5
+    mujoco.mj_resetData(model, data)
+    assert np.array_equal(data.plugin_state, first)
+
+
+def test_a_command_that_is_no_number_is_none_and_an_angle_beyond_the_stops_is_a_stop(solenoid: Folder) -> None:
+    model = model_of(solenoid)
+    data = mujoco.MjData(model)
+    data.qpos[0] = 9.0
+    data.ctrl[0] = math.nan
+    mujoco.mj_step(model, data)
+    assert data.plugin_state[0] == solenoid.plugin.joint["highest_angle"]
+    assert list(solenoid.plugin.outputs)[5] == "command"
+    assert data.plugin_state[5] == 0.0
+
+
+def test_a_finer_step_of_mujoco_is_taken_between_two_runs(solenoid: Folder) -> None:
+    model = model_of(solenoid)
+    data = mujoco.MjData(model)
+    data.ctrl[0] = 1.0
+    mujoco.mj_step(model, data, 100)
+    high = data.plugin_state[2]
+    assert high > 3.0e5
+    model.opt.timestep = 1.0e-4
+    data.ctrl[0] = -1.0
+    mujoco.mj_step(model, data, 600)
+    # The pair switches at most every 50 ms of a time that went on.
+    assert data.plugin_state[2] < 0.8 * high
+
+
+def test_a_valve_with_a_delay_keeps_the_step_that_its_model_was_compiled_with(proportional: Folder) -> None:
+    model = model_of(proportional)
+    data = mujoco.MjData(model)
+    model.opt.timestep = 1.0e-4
+    with pytest.raises(mujoco.FatalError, match="delays of its valve fix the timestep"):
+        mujoco.mj_step(model, data)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"supply.pressure": -5.0}, "supply.pressure is out of range"),
+        ({"supply.pressure": math.nan}, "supply.pressure is no number"),
+        ({"run.step": 0.0}, "run.step must be above 0"),
+        ({"valve.switching_interval": 9e9}, "valve.switching_interval is out of range"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused_by_name(settings: dict[str, float], said: str, solenoid: Folder) -> None:
+    with pytest.raises((ValueError, mujoco.FatalError), match=said):
+        model_of(solenoid, settings=settings)
+
+
+def test_what_cannot_be_put_at_a_joint_is_refused(solenoid: Folder, tmp_path: Path) -> None:
+    from ppafo.worlds.mujoco import add_device, load_plugin, outputs_of
+
+    spec = mujoco.MjSpec.from_string(LEG.format(step=STEP))
+    for words, said in (
+        ({"joint": "ankel"}, "no joint 'ankel', did you mean 'ankle'"),
+        ({"joint": "ankle", "gear": 2.0}, "must be 1 or -1"),
+        ({"joint": "ankle", "settings": {"supply.presure": 1.0}}, "did you mean 'supply.pressure'"),
+    ):
+        with pytest.raises(ScenarioError, match=said):
+            add_device(spec, solenoid.plugin, "device", **words)
+    model = model_of(solenoid)
+    with pytest.raises(ScenarioError, match="did you mean 'device'"):
+        outputs_of(model, mujoco.MjData(model), solenoid.plugin, "devise")
+    with pytest.raises(ScenarioError, match="no folder of 'ppafo export mujoco'"):
+        load_plugin(tmp_path)
+    (tmp_path / "device.json").write_text(
+        (solenoid.path / "device.json").read_text().replace(f'"mujoco": "{mujoco.__version__}"', '"mujoco": "3.0.0"')
+    )
+    with pytest.raises(ScenarioError, match=r"built for MuJoCo 3\.0\.0"):
+        load_plugin(tmp_path)
+
+
+def test_the_example_tells_what_an_ideal_motor_hides(
+    proportional: Folder, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = resources.files("ppafo") / "examples" / "mujoco" / "push_off.py"
+    monkeypatch.setattr("sys.argv", ["push_off.py", str(proportional.path)])
+    runpy.run_path(str(script))
+    ideal, gas = capsys.readouterr().out.splitlines()
+    assert "error 0.00 N m (root mean square), 0 ms late, gas 0.000 g" in ideal
+    late, grams = re.search(r"(\d+) ms late, gas (\S+) g", gas).groups()  # type: ignore[union-attr]
+    assert int(late) > 5
+    assert float(grams) > 0.1
+
+
+def test_a_joint_that_is_no_hinge_is_refused_by_the_plugin(solenoid: Folder) -> None:
+    text = (solenoid.path / "example.xml").read_text().replace('type="hinge"', 'type="slide"')
+    with pytest.raises(ValueError, match="must move a hinge joint"):
+        mujoco.MjModel.from_xml_string(text)
+
+
+def test_a_platform_that_is_none_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="platform 'linux65' is not known, did you mean 'linux64'"):
+        plugin_files(load_scenario("step-response"), ["linux65"], installed_headers())
+
+
+def test_friction_is_the_joints_and_no_attribute() -> None:
+    paths = [item.path for item in attributes_of(plugin_library(load_scenario("step-response")))]
+    assert "valve.area" in paths
+    assert not [path for path in paths if path.startswith(("friction", "foot_plate", "run.duration"))]
