@@ -1,9 +1,11 @@
 """``ppafo export``: what leaves the package for other tools."""
 
 import argparse
+import math
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from ppafo.cli.output import (
     EXIT_GOOD,
@@ -13,10 +15,13 @@ from ppafo.cli.output import (
     print_result,
     write_files,
 )
+from ppafo.errors import DataError
+from ppafo.questions.question import minutes
 
 _C = "write a scenario or a walk as a library in C: header, source, example, make files"
 _UNIT = "write a scenario or a walk as a functional mock-up unit (FMU) for co-simulation"
 _MUJOCO = "write a scenario's device as an engine plugin of MuJoCo, with an example model"
+_TORQUE = "write the torque of a walk for OpenSim, and a script that puts it into a model"
 _CONTROLLER = "write a scenario's integer controller in C behind the protocol of 'ppafo hil'"
 
 
@@ -44,21 +49,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     plugin.add_argument(
         "--platforms", metavar="LIST", help="linux64, win64 or both, separated by commas (default: this computer)"
     )
+    torque = _add_torque(actions)
     either = "name of a scenario or a walk, or a .toml file"
-    scenario = "name of a scenario, or a .toml file"
-    for parser_of_one, said in ((library, either), (controller, scenario), (unit, either), (plugin, scenario)):
-        parser_of_one.add_argument("scenario", metavar="SCENARIO", help=said)
+    scenario, walking = "name of a scenario, or a .toml file", "name of a walk configuration, or a .toml file"
+    parsers = ((library, either), (controller, scenario), (unit, either), (plugin, scenario), (torque, walking))
+    for parser_of_one, said in parsers:
+        noun = "WALK" if parser_of_one is torque else "SCENARIO"
+        parser_of_one.add_argument("scenario", metavar=noun, help=said)
         add_override_argument(parser_of_one)
         add_json_argument(parser_of_one)
         parser_of_one.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
 
 
+def _add_torque(actions: Any) -> argparse.ArgumentParser:
+    torque: argparse.ArgumentParser = actions.add_parser(
+        "opensim", help=_TORQUE, description=f"{_TORQUE[:1].upper()}{_TORQUE[1:]}."
+    )
+    torque.add_argument("--gait", metavar="GAIT", help="name of a gait, or a gait file; default: that of the walk")
+    torque.add_argument("--minutes", metavar="N", type=minutes, default=0.2, help="time to walk; default 0.2")
+    torque.add_argument("--side", choices=("right", "left"), default="right", help="which foot; default right")
+    torque.add_argument(
+        "--strikes",
+        metavar="T1,T2,...",
+        help="heel strikes of your motion [s], to put the mean stride on; default: the walk as it is, from 0 s on",
+    )
+    return torque
+
+
 def run(parsed: argparse.Namespace) -> int:
     """Write the files of a scenario for another tool, and say what to do next."""
     check_output(parsed)
-    contents, following = {"c": _library, "controller": _controller, "fmu": _unit, "mujoco": _plugin}[parsed.action](
-        parsed
-    )
+    ways = {"c": _library, "controller": _controller, "fmu": _unit, "mujoco": _plugin, "opensim": _torque}
+    contents, following = ways[parsed.action](parsed)
     write_files(parsed, contents)
     document = {"folder": str(parsed.out), "files": list(contents), "next": following}
     print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)
@@ -106,3 +128,27 @@ def _platforms(parsed: argparse.Namespace) -> list[str]:
 
     chosen = [host_platform()] if parsed.platforms is None else parsed.platforms.split(",")
     return list(dict.fromkeys(name.strip() for name in chosen if name is not None))
+
+
+def _torque(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
+    from ppafo.exports.opensim import check_strikes, opensim_files
+    from ppafo.walking.walk import walk
+
+    strikes = () if parsed.strikes is None else _times(parsed.strikes)
+    if parsed.strikes is not None:
+        check_strikes(strikes)
+    result = walk(parsed.scenario, parsed.minutes, parsed.overrides, parsed.gait)
+    contents = opensim_files(result, parsed.side, strikes)
+    following = f"python {shlex.quote(str(parsed.out / 'add_device.py'))} MODEL.osim --out with-device.osim"
+    return contents, following
+
+
+def _times(text: str) -> tuple[float, ...]:
+    """Return times [s] that are separated by commas; DataError for anything else."""
+    try:
+        times = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        times = (math.nan,)
+    if not all(map(math.isfinite, times)):
+        raise DataError(f"--strikes {text!r}: must be times in seconds, separated by commas, such as 0.63,1.86")
+    return times

@@ -4,11 +4,13 @@ What the lanes step and what is differentiated here are the same functions: port
 energy balance, vane. Only the sums of equation (9) and the state of the vane, which stands or slides, are said here.
 """
 
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from ppafo.engine.reference.derivative import free_motion
 from ppafo.engine.scheme.thermal_flows import ThermalFlows, thermal_flows
+from ppafo.errors import SimulationError
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import (
     Openings,
@@ -24,6 +26,14 @@ from ppafo.model.ports import PortFlow, blended_port_flow
 from ppafo.translation.symbolic import Compare, both_sides, symbolic
 
 Around = Mapping[Any, Callable[..., Any]]
+
+
+def check_without_opensim() -> None:
+    """Refuse to load CasADi where OpenSim is, which brings another one; SimulationError."""
+    if "opensim" in sys.modules:
+        raise SimulationError(
+            "opensim is loaded in this process, and its CasADi breaks this one: use OpenSim in a process of its own"
+        )
 
 
 class GasFlows(NamedTuple):

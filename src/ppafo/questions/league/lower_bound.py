@@ -25,6 +25,7 @@ from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, Scenario
+from ppafo.translation.plant_rates import check_without_opensim
 
 MISSING_EXTRA = "the lower bound needs CasADi: pip install ppafo[optimal]"
 FIRST_INTERVALS = 75
@@ -83,6 +84,7 @@ def check_bounded(scenario: Scenario) -> None:
     """Refuse a scenario that the bound cannot be computed for, with the reason; SimulationError."""
     if find_spec("casadi") is None:
         raise SimulationError(MISSING_EXTRA)
+    check_without_opensim()
     if not isinstance(scenario.motion, PrescribedMotion):
         raise SimulationError(f"{scenario.name}: the lower bound needs a fixed or prescribed ankle, not a free one")
     if scenario.thermal is not None:

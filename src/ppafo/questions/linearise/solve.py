@@ -20,6 +20,7 @@ from ppafo.questions.linearise.point import Point, equilibrium, openings_at, poi
 from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
+from ppafo.translation.plant_rates import check_without_opensim
 
 MISSING_CASADI = "a linear model needs CasADi: pip install ppafo[control]"
 MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
@@ -139,6 +140,7 @@ def linearise(
     """
     if find_spec("casadi") is None:
         raise ScenarioError(MISSING_CASADI)
+    check_without_opensim()
     chosen = scenario_or_load(scenario, overrides)
     run = plan_run(chosen)
     _check(chosen, run)

@@ -24,6 +24,7 @@ from ppafo.questions.league.walking.playing import ideal_plan
 from ppafo.questions.league.walking.solver import FREE, Guess, StrideOptimum, StrideSolver, guess_from_walk
 from ppafo.questions.league.walking.stride import stride_of
 from ppafo.questions.league.walking.task import WalkingTask
+from ppafo.translation.plant_rates import check_without_opensim
 from ppafo.walking.planning import plan_walk
 
 CLEAR = 0.0
@@ -143,6 +144,7 @@ def check_bounded(valve: str) -> None:
     """Refuse a valve that the bound cannot be computed for, with the reason; SimulationError."""
     if find_spec("casadi") is None:
         raise SimulationError(MISSING_EXTRA)
+    check_without_opensim()
     if valve not in BOUNDED_VALVES:
         raise SimulationError(f"no lower bound for valve '{valve}', only {', '.join(BOUNDED_VALVES)}")
 

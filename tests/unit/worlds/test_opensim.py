@@ -1,0 +1,150 @@
+"""A device in OpenSim: its torque there, its gas under OpenSim's ankle, and muscles by OpenSim's own tools."""
+
+import multiprocessing
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError, SimulationError
+from tests.unit.worlds import opensim_process as apart
+
+needs_opensim = pytest.mark.skipif(find_spec("opensim") is None, reason="needs the extra 'opensim' (Python up to 3.13)")
+Run = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def run() -> Iterator[Run]:
+    """Calls a function in a process that has OpenSim and no CasADi."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        yield lambda function, *given: pool.submit(function, *given).result()
+
+
+@pytest.fixture
+def run_alone() -> Iterator[Run]:
+    """The same in a process of its own."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        yield lambda function, *given: pool.submit(function, *given).result()
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@pytest.fixture(scope="module")
+def replayed(run: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """A shipped walk whose ankle OpenSim leads."""
+    found: dict[str, Any] = run(apart.replay, "solenoid", tmp_path_factory.mktemp("replay"))
+    return found
+
+
+@needs_opensim
+def test_the_joint_torque_of_a_shipped_walk_is_within_a_percent(replayed: dict[str, Any]) -> None:
+    found = replayed
+    gas, torque = found["gas"], found["torque"]
+    assert np.abs(torque).max() > 4.0
+    assert rms(gas - torque) < 1.0e-3 * rms(torque)
+    assert np.abs(gas - torque).max() < 1.0e-2 * np.abs(torque).max()
+    assert found["supplied"][0] == pytest.approx(found["supplied"][1], rel=1.0e-3)
+    # OpenSim's own inverse dynamics of leg, plate and actuator leaves what the wearer gives: T_ex, all terms of it.
+    moment, external = found["moment"][50:], found["external"][50:]
+    assert rms(moment - external) < 1.0e-2 * rms(external)
+    assert rms(found["gas"][50:] - external) > 5.0e-2 * rms(external)
+
+
+@needs_opensim
+def test_the_actuator_gives_what_is_exchanged_half_a_step_ahead(replayed: dict[str, Any]) -> None:
+    acts, samples = replayed["acts"], replayed["samples"]
+    assert acts[2:] == pytest.approx(1.5 * samples[1:-1] - 0.5 * samples[:-2], abs=1.0e-12)
+
+
+@needs_opensim
+def test_a_free_foot_swings_as_without_opensim(run: Run) -> None:
+    coarse, fine = (run(apart.swing, period) for period in (2.0e-3, 1.0e-3))
+    errors = [float(np.abs(here - there).max()) for here, there in (coarse, fine)]
+    assert np.ptp(fine[1]) > np.radians(30.0)
+    assert errors[1] < np.radians(0.1)
+    assert errors[1] < 0.5 * errors[0]
+
+
+@needs_opensim
+def test_an_ankle_beyond_the_stops_is_an_error_with_time_and_angle(run: Run) -> None:
+    with pytest.raises(SimulationError, match=r"solenoid: at 0\.\d+ s the ankle goes to -\S+ deg, beyond the stops"):
+        run(apart.beyond_the_stops)
+
+
+@needs_opensim
+def test_muscles_and_device_come_to_the_moment_of_inverse_dynamics(run: Run, tmp_path: Path) -> None:
+    found = run(apart.muscles, tmp_path)
+    assert found["moment"]["without"] - found["moment"]["with"] == pytest.approx(found["device"], abs=1.0e-4)
+    assert found["moment"]["without"][0] == pytest.approx(-apart.FORCE * apart.LEVER, rel=0.2)
+    for way, forces in found["forces"].items():
+        given = sum(forces[name] * found["arms"][name] for name in forces) + found["reserve"][way]
+        assert given == pytest.approx(found["moment"][way], abs=0.02 * apart.FORCE * apart.LEVER)
+    spared = found["forces"]["without"]["soleus_r"] - found["forces"]["with"]["soleus_r"]
+    assert spared == pytest.approx(found["device"] / found["arms"]["soleus_r"], rel=0.1)
+    assert "soleus_r" in found["said"]
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+
+
+@needs_opensim
+@pytest.mark.parametrize(
+    ("what", "said"),
+    [
+        ("no-model", "no.osim: there is no such file; give a model of OpenSim"),
+        ("broken-model", "broken.osim: "),
+        ("other-model", "other.osim: "),
+        ("motion", "shank.sto: has no column 'ankle_angle_r'"),
+        ("loads", "no.xml: there is no such file; give external loads"),
+        ("loads-body", "has no body 'foot', did you mean 'foot_r'?"),
+        ("loads-table", "there is no data file"),
+        ("coordinate", "has no coordinate 'ankle_angle', did you mean 'ankle_angle_r'?"),
+        ("no-muscle", "no muscle crosses 'shank_angle'"),
+        ("late", "goes from 0 to 0.5 s, and the torque from 0.1 to 4 s"),
+    ],
+)
+def test_files_that_do_not_fit_are_refused_in_one_line(run: Run, tmp_path: Path, what: str, said: str) -> None:
+    with pytest.raises(DataError) as error:
+        run(apart.refused, what, tmp_path)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@needs_opensim
+def test_the_script_puts_the_same_torque_into_a_model_in_both_forms(run: Run, tmp_path: Path) -> None:
+    rows = run(apart.with_script, tmp_path)
+    assert np.ptp(rows[:, 1]) > 1.0
+    # OpenSim writes six digits into a model.
+    assert rows[:, 0] == pytest.approx(rows[:, 1], rel=1.0e-5)
+    assert rows[:, 2] == pytest.approx(rows[:, 3], rel=1.0e-6)
+
+
+@needs_opensim
+def test_the_example_without_a_model_runs(tmp_path: Path) -> None:
+    script = Path(apart.ppafo.__file__).parent / "examples" / "opensim" / "co_simulation.py"
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = [line for line in done.stdout.splitlines() if "ankle" in line]
+    assert len(rows) == 8
+    assert list(tmp_path.iterdir()) == []
+
+
+@needs_opensim
+@pytest.mark.skipif(find_spec("casadi") is None, reason="needs the extra 'control'")
+@pytest.mark.parametrize(
+    ("first", "second", "said"),
+    [
+        ("casadi", "opensim", "ImportError: ppafo.worlds.opensim: casadi is loaded in this process"),
+        ("opensim", "casadi", "SimulationError: opensim is loaded in this process"),
+    ],
+)
+def test_casadi_and_opensim_are_kept_apart(run_alone: Run, first: str, second: str, said: str) -> None:
+    line = run_alone(apart.meet, first, second)
+    assert line.startswith(said)
+    assert "process of its own" in line
