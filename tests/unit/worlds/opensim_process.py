@@ -166,7 +166,6 @@ def muscles(folder: Path) -> dict[str, Any]:
         coordinate.setValue(state, 0.1 * math.sin(6.0 * moment))
         paths = {name: model.getMuscles().get(name).getGeometryPath() for name in found.forces["with"]}
         arms.append({name: path.computeMomentArm(state, coordinate) for name, path in paths.items()})
-    (folder / "figure.png").write_bytes(b"")
     found.plot().savefig(folder / "figure.png")
     return {
         "time": found.time,
