@@ -252,6 +252,10 @@ def drag(page: Any, seconds: float) -> dict[str, float]:
     }
 
 
+_BESIDE_THE_MAP = ".control[data-key='reference.level'] input[type=range]"
+"""A slider that the map does not go over, so that all its runs are made anew."""
+
+
 def measure(chromium: Any, file: Path, seconds: float = 10.0) -> dict[str, float]:
     """Return the figures of speed of a page, by name."""
     found: dict[str, float] = {"size of the page, kB": file.stat().st_size / 1e3}
@@ -263,10 +267,13 @@ def measure(chromium: Any, file: Path, seconds: float = 10.0) -> dict[str, float
     page.evaluate(_FRAMES)
     times = []
     for key in ("ArrowRight", "ArrowLeft") * 4:
-        page.locator("canvas.map").press(key)
-        page.wait_for_timeout(700)
-        times.append(float(page.evaluate("document.querySelector('canvas.map').dataset.milliseconds")))
-    found["map of 1,024 runs, median, ms"] = float(np.median(times))
+        page.locator(_BESIDE_THE_MAP).press(key)
+        page.wait_for_timeout(1500)
+        data = page.evaluate("({...document.querySelector('canvas.map').dataset})")
+        times.append((float(data["first"]), float(data["milliseconds"])))
+    first, whole = np.median(times, axis=0)
+    found["map, the first 256 runs are drawn after, ms"] = float(first)
+    found["map of 1,024 runs, median, ms"] = float(whole)
     found["longest frame while the map is made, ms"] = float(np.max(np.diff(page.evaluate("frames_seen"))))
     found["first curve dragged, 390 px, four times slower, ms"] = _first_curve(chromium, file)
     return found

@@ -9,15 +9,21 @@ import { InputError } from "./units";
 
 declare const WORKER_SCRIPT: string;
 
-export interface RunsJob {
+/** Samples that are wanted of many runs: of one channel, or of none, each so many-th, and how many. */
+export interface Trace {
+  readonly channel: string | null;
+  readonly every: number;
+  readonly places: number;
+}
+
+export const NO_TRACE: Trace = { channel: null, every: 1, places: 0 };
+
+export interface RunsJob extends Trace {
   readonly kind: "runs";
   readonly number: number;
   readonly program: string;
   /** Settings of the program, run after run. */
   readonly rows: Float64Array<ArrayBuffer>;
-  readonly channel: string | null;
-  readonly every: number;
-  readonly places: number;
 }
 
 export type Job =
@@ -39,8 +45,8 @@ export interface Reply {
 const MOST_WORKERS = 4;
 /** Bytes of a file that are read at once. */
 const PIECE = 4_000_000;
-/** Pieces of work for each worker: some runs take longer than others, and who is done takes the next piece. */
-const PIECES = 4;
+/** Pieces of work for each worker: some runs take longer than others, who is done takes the next piece, and what is no longer wanted ends with one. */
+const PIECES = 16;
 /** Runs that a program does side by side. */
 const TOGETHER = 8;
 
@@ -57,31 +63,33 @@ export class Workers {
     return this.crew.length;
   }
 
-  /** Many runs of a program, settings run after run, shared out among the workers. */
-  async runMany(program: Program, rows: Float64Array<ArrayBuffer>, channel: string | null = null, every = 1, places = 0): Promise<Ensemble> {
+  /**
+   * Many runs of a program, settings run after run, shared out among the workers. `goesOn` is told of the first runs, all of
+   * which are done, whenever there are more of them, and may end it: then only those are given.
+   */
+  async runMany(program: Program, rows: Float64Array<ArrayBuffer>, trace: Trace = NO_TRACE, goesOn: (first: readonly Ensemble[]) => boolean = () => true): Promise<Ensemble> {
     this.start();
     const bytes = await this.bytesOf(program);
     const width = program.settings.length;
     const size = Math.ceil(rows.length / width / this.crew.length / PIECES / TOGETHER) * TOGETHER * width;
     const found: Ensemble[] = [];
-    let next = 0;
+    let [next, done, isWanted] = [0, 0, true];
     const work = async (place: number) => {
       this.introduce(place, program, bytes);
-      while (next * size < rows.length) {
+      while (isWanted && next * size < rows.length) {
         const piece = next;
         next += 1;
         const part = rows.slice(piece * size, (piece + 1) * size);
-        const { runs } = await this.ask(place, (number) => ({ kind: "runs", number, program: program.name, rows: part, channel, every, places }), [part.buffer]);
+        const { runs } = await this.ask(place, (number) => ({ kind: "runs", number, program: program.name, rows: part, ...trace }), [part.buffer]);
         if (runs !== undefined) found[piece] = runs;
+        const before = done;
+        while (found[done] !== undefined) done += 1;
+        if (done > before && isWanted) isWanted = goesOn(found.slice(0, done));
       }
     };
     // Two pieces wait at each worker, so that it does not wait for a page that is drawing.
     await Promise.all([...this.crew.keys(), ...this.crew.keys()].map(work));
-    return {
-      metrics: joined(found.map((runs) => runs.metrics)),
-      ended: Int32Array.from(found.flatMap((runs) => [...runs.ended])),
-      traces: joined(found.map((runs) => runs.traces)),
-    };
+    return together(found.slice(0, done));
   }
 
   /** Read the table in a file, which a worker keeps. The page reads it, piece by piece: in WebKit a worker of a page from a file may not. */
@@ -149,6 +157,15 @@ export class Workers {
 export function refuseFile(error: unknown): never {
   if (error instanceof DOMException) throw new InputError("the file could not be read");
   throw error;
+}
+
+/** Runs of several ensembles as one. */
+export function together(parts: readonly Ensemble[]): Ensemble {
+  return {
+    metrics: joined(parts.map(({ metrics }) => metrics)),
+    ended: Int32Array.from(parts.flatMap(({ ended }) => [...ended])),
+    traces: joined(parts.map(({ traces }) => traces)),
+  };
 }
 
 function joined(parts: readonly Float64Array[]): Float64Array {

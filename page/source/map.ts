@@ -8,7 +8,7 @@ import type { Workers } from "./jobs";
 import { shownMetric } from "./outcome";
 import { ATMOSPHERE, type Configuration, settingsByKey, shownNumber, valuesOf } from "./settings";
 import { plain, readableUnit, telling } from "./units";
-import { type Landscape, landscapeOf, SIDE } from "./variation";
+import { type Axes, type Landscape, landscapeOf, SIDE } from "./variation";
 
 const SIZE = 320;
 
@@ -24,6 +24,9 @@ export class MapView {
   private configurations: readonly Configuration[] = [];
   private program = "";
   private landscape: Landscape | null = null;
+  private readonly cells = element("canvas");
+  /** What the map is of that is shown or under way; where the page stands on it is not part of that. */
+  private wish = "";
   private isBusy = false;
   private isDue = false;
 
@@ -78,7 +81,7 @@ export class MapView {
     fillIn(this.metric, program.metrics.map((metric) => [metric.name, metric.label] as const), program.metrics[0]?.name);
   }
 
-  private get chosen(): { configuration: Configuration; across: Setting; up: Setting; metric: Metric } | null {
+  private get chosen(): (Axes & { configuration: Configuration }) | null {
     const configuration = this.configurations[Math.max(0, this.of.selectedIndex)];
     if (configuration === undefined) return null;
     const program = programNamed(this.content, configuration.program);
@@ -88,24 +91,27 @@ export class MapView {
     return across === undefined || up === undefined || metric === undefined ? null : { configuration, across, up, metric };
   }
 
-  /** Run the map anew; while one is under way only the last wish counts. */
+  /** Run the map anew where it has to be; while one is under way only the last wish counts. */
   private update(): void {
-    if (this.isBusy) {
-      this.isDue = true;
-      return;
-    }
     const { chosen } = this;
     if (chosen === null) return;
     if (chosen.across === chosen.up) {
       say(this.words, "Choose two different settings.");
       return;
     }
+    say(this.words, "");
+    const wish = wishOf(chosen);
+    this.isDue = this.isBusy && wish !== this.wish;
+    if (wish === this.wish && this.landscape !== null) this.draw(this.landscape);
+    if (wish === this.wish || this.isBusy) return;
     this.isBusy = true;
+    this.wish = wish;
     const began = performance.now();
     const show = (landscape: Landscape) => {
       this.landscape = landscape;
-      this.canvas.dataset["milliseconds"] = String(Math.round(performance.now() - began));
-      this.draw(chosen.configuration, landscape);
+      this.draw(landscape);
+      if (landscape.side === SIDE) this.canvas.dataset["milliseconds"] = String(Math.round(performance.now() - began));
+      else this.canvas.dataset["first"] = String(Math.round(performance.now() - began));
     };
     const end = () => {
       this.isBusy = false;
@@ -113,23 +119,28 @@ export class MapView {
       this.isDue = false;
       this.update();
     };
-    void landscapeOf(this.content, this.workers, chosen.configuration, chosen.across, chosen.up, chosen.metric).then(show).catch(telling((words) => say(this.words, words))).then(end);
+    const isWanted = () => {
+      if (this.isDue) this.wish = "";
+      return !this.isDue;
+    };
+    const fail = telling((words) => {
+      this.wish = "";
+      say(this.words, words);
+    });
+    void landscapeOf(this.content, this.workers, chosen.configuration, chosen, show, isWanted).catch(fail).then(end);
   }
 
-  private draw(configuration: Configuration, { across, up, metric, values }: Landscape): void {
+  private draw({ across, up, metric, side, values }: Landscape): void {
     const context = this.canvas.getContext("2d");
-    if (context === null) return;
+    const configuration = this.configurations[Math.max(0, this.of.selectedIndex)];
+    if (context === null || configuration === undefined) return;
     const good = values.filter((value) => Number.isFinite(value));
     const [low, high] = [good.reduce((a, b) => Math.min(a, b), Infinity), good.reduce((a, b) => Math.max(a, b), -Infinity)];
-    const cell = this.canvas.width / SIDE;
-    values.forEach((value, place) => {
-      const [x, y] = [place % SIDE, SIDE - 1 - Math.floor(place / SIDE)];
-      context.fillStyle = Number.isFinite(value) ? `rgb(${shade(high > low ? (value - low) / (high - low) : 0).join()})` : colour("line");
-      context.fillRect(Math.floor(x * cell), Math.floor(y * cell), Math.ceil(cell), Math.ceil(cell));
-    });
+    this.paint(context, values, side, low, high);
     const here = this.present(configuration, across, up);
-    const level = sampleAt(values, here[0], here[1]);
-    contour(context, values, level, cell);
+    const [scale, cell] = [side / SIDE, this.canvas.width / SIDE];
+    const level = sampleAt(values, side, here[0] * scale, here[1] * scale);
+    contour(context, values, side, level, cell);
     const [x, y] = [(here[0] + 0.5) * cell, (SIDE - 0.5 - here[1]) * cell];
     for (const [width, stroke] of [[7, "#000"], [3, "#fff"]] as const) {
       context.lineWidth = width;
@@ -139,6 +150,23 @@ export class MapView {
       context.stroke();
     }
     this.label(across, up, metric, low, high, level);
+  }
+
+  /** Fill the map with colours, one dot a run on a small canvas that is then enlarged. */
+  private paint(context: CanvasRenderingContext2D, values: Float64Array, side: number, low: number, high: number): void {
+    const small = this.cells.getContext("2d");
+    if (small === null) return;
+    if (this.cells.width !== side) this.cells.width = this.cells.height = side;
+    const dots = small.createImageData(side, side);
+    values.forEach((value, place) => {
+      const at = 4 * ((side - 1 - Math.floor(place / side)) * side + (place % side));
+      if (Number.isFinite(value)) dots.data.set([...shade(high > low ? (value - low) / (high - low) : 0), 255], at);
+    });
+    small.putImageData(dots, 0, 0);
+    context.fillStyle = colour("line");
+    context.fillRect(0, 0, this.canvas.width, this.canvas.height);
+    context.imageSmoothingEnabled = false;
+    context.drawImage(this.cells, 0, 0, this.canvas.width, this.canvas.height);
   }
 
   private label(across: Setting, up: Setting, metric: Metric, low: number, high: number, level: number): void {
@@ -192,25 +220,33 @@ export class MapView {
   }
 }
 
-
+/** What decides the runs of a map: the configuration, but for the two settings that the map goes over. */
+function wishOf({ configuration, across, up, metric }: Axes & { configuration: Configuration }): string {
+  const { [across.key]: _, [up.key]: __, ...others } = configuration.changes;
+  return JSON.stringify([configuration.program, across.key, up.key, metric.name, others]);
+}
 
 /** The value between four cells. */
-function sampleAt(values: Float64Array, x: number, y: number): number {
-  const [left, below] = [Math.min(SIDE - 2, Math.floor(x)), Math.min(SIDE - 2, Math.floor(y))];
-  const at = (column: number, row: number) => values[row * SIDE + column] ?? NaN;
-  const [u, v] = [x - left, y - below];
+function sampleAt(values: Float64Array, side: number, x: number, y: number): number {
+  const [left, below] = [Math.min(side - 2, Math.floor(x)), Math.min(side - 2, Math.floor(y))];
+  const at = (column: number, row: number) => values[row * side + column] ?? NaN;
+  const [u, v] = [Math.min(1, x - left), Math.min(1, y - below)];
   const lower = at(left, below) * (1 - u) + at(left + 1, below) * u;
   const upper = at(left, below + 1) * (1 - u) + at(left + 1, below + 1) * u;
   return lower * (1 - v) + upper * v;
 }
 
-/** The line of one value, by marching squares. */
-function contour(context: CanvasRenderingContext2D, values: Float64Array, level: number, cell: number): void {
-  const at = (column: number, row: number) => (values[row * SIDE + column] ?? NaN) - level;
-  const point = (column: number, row: number) => [(column + 0.5) * cell, (SIDE - 0.5 - row) * cell] as const;
+/** The line of one value, by marching squares; `cell` is the size of one of a full map. */
+function contour(context: CanvasRenderingContext2D, values: Float64Array, side: number, level: number, cell: number): void {
+  const apart = SIDE / side;
+  const at = (column: number, row: number) => (values[row * side + column] ?? NaN) - level;
+  const point = (column: number, row: number) => [(apart * column + 0.5) * cell, (SIDE - 0.5 - apart * row) * cell] as const;
   context.beginPath();
-  for (let row = 0; row < SIDE - 1; row += 1) {
-    for (let column = 0; column < SIDE - 1; column += 1) {
+  for (let row = 0; row < side - 1; row += 1) {
+    for (let column = 0; column < side - 1; column += 1) {
+      // Most cells have all their corners on one side of the line.
+      const above = +(at(column, row) >= 0) + +(at(column + 1, row) >= 0) + +(at(column + 1, row + 1) >= 0) + +(at(column, row + 1) >= 0);
+      if (above === 0 || above === 4) continue;
       const corners = [[column, row], [column + 1, row], [column + 1, row + 1], [column, row + 1]] as const;
       const crossed = corners.flatMap(([x0, y0], place) => {
         const [x1, y1] = corners[(place + 1) % 4] ?? [0, 0];

@@ -2,42 +2,69 @@
 
 import type { Content, Metric, Program, Setting } from "./content";
 import { programNamed, scalesOf } from "./content";
-import type { Run } from "./engine";
-import type { Workers } from "./jobs";
+import type { Ensemble, Run } from "./engine";
+import { NO_TRACE, together, type Workers } from "./jobs";
 import type { Band } from "./panels";
 import { ATMOSPHERE, changed, type Configuration, isInside, settingsByKey, type Values, valuesOf } from "./settings";
 import { scaleOf, toSi } from "./units";
 
+/** Values of each of both settings of a map. */
 export const SIDE = 32;
+/** A map is run on every second line and column first, which shows where it goes while the others are under way. */
+const COARSE = 2;
+const isOfFirst = (cell: number) => cell % COARSE === 0 && Math.floor(cell / SIDE) % COARSE === 0;
+const CELLS = Array.from({ length: SIDE * SIDE }, (_, cell) => cell);
+/** Cells of a map in the order in which they are run. */
+const ORDER = [...CELLS.filter(isOfFirst), ...CELLS.filter((cell) => !isOfFirst(cell))];
+const FIRST = CELLS.filter(isOfFirst).length;
 const DRAWS = 200;
 const BAND_PLACES = 300;
 const OUTSIDE = 5;
 const BANDED = ["torque", "pressure_1", "pressure_2", "supplied_mass", "angle"];
 
-/** A metric over two settings, row by row from the lowest of the second; NaN where a run failed. */
-export interface Landscape {
+/** What a map shows over what. */
+export interface Axes {
   readonly across: Setting;
   readonly up: Setting;
   readonly metric: Metric;
+}
+
+/** A metric over two settings, line by line from the lowest of the second, `side` values each; NaN where a run failed. */
+export interface Landscape extends Axes {
+  readonly side: number;
   readonly values: Float64Array;
 }
 
+/** Run a map; it is shown when a quarter of its runs is done, and if it is still wanted then, when all are. */
 export async function landscapeOf(
   content: Content,
   workers: Workers,
   configuration: Configuration,
-  across: Setting,
-  up: Setting,
-  metric: Metric,
-): Promise<Landscape> {
+  axes: Axes,
+  show: (landscape: Landscape) => void,
+  isWanted: () => boolean,
+): Promise<void> {
+  // What the present frame shows is drawn first.
+  await new Promise((resolve) => setTimeout(resolve, 0));
   const program = programNamed(content, configuration.program);
   const base = valuesOf(content, configuration);
-  const [columns, lines] = [across, up].map((setting) => placesOf(setting).map((place) => differences(content, configuration, base, setting, place)));
-  const runs = await workers.runMany(program, rowsOf(program, base, (lines ?? []).flatMap((line) => (columns ?? []).map((column) => [...column, ...line]))));
+  const changesOf = (setting: Setting) => placesOf(setting).map((place) => differences(content, configuration, base, setting, place));
+  const [columns, lines] = [changesOf(axes.across), changesOf(axes.up)];
+  const rows = rowsOf(program, base, ORDER.map((cell) => [...(columns[cell % SIDE] ?? []), ...(lines[Math.floor(cell / SIDE)] ?? [])]));
   const width = program.metrics.length;
-  const at = program.metrics.indexOf(metric);
-  const values = Float64Array.from(runs.ended, (ended, place) => (ended === 0 ? (runs.metrics[place * width + at] ?? NaN) : NaN));
-  return { across, up, metric, values };
+  const at = program.metrics.indexOf(axes.metric);
+  const valuesOfRuns = (runs: Ensemble) => Float64Array.from(runs.ended, (ended, place) => (ended === 0 ? (runs.metrics[place * width + at] ?? NaN) : NaN));
+  let isShown = false;
+  const all = await workers.runMany(program, rows, NO_TRACE, (first) => {
+    if (!isShown && first.reduce((count, { ended }) => count + ended.length, 0) < FIRST) return true;
+    if (!isShown) show({ ...axes, side: SIDE / COARSE, values: valuesOfRuns(together(first)).slice(0, FIRST) });
+    isShown = true;
+    return isWanted();
+  });
+  if (all.ended.length < ORDER.length) return;
+  const values = new Float64Array(ORDER.length);
+  valuesOfRuns(all).forEach((value, place) => (values[ORDER[place] ?? 0] = value));
+  show({ ...axes, side: SIDE, values });
 }
 
 /** The numbers of a slider's range in the unit that is shown, from left to right. */
@@ -85,7 +112,7 @@ export async function bandOf(content: Content, workers: Workers, configuration: 
   const places = Math.floor((run.time.length - 1) / every) + 1;
   const time = Float64Array.from({ length: places }, (_, place) => run.time[place * every] ?? 0);
   const channels = BANDED.filter((name) => run.channels.has(name));
-  const found = await Promise.all(channels.map((channel) => workers.runMany(program, rows, channel, every, places)));
+  const found = await Promise.all(channels.map((channel) => workers.runMany(program, rows, { channel, every, places })));
   return new Map(found.map(({ traces, ended }, place) => [channels[place] ?? "", { time, ...ends(traces, ended, places) }]));
 }
 
