@@ -3,6 +3,7 @@
 It needs Playwright (``pip install playwright``) and a Chromium (``chromium`` on the path).
 
     python scripts/live_page.py bits --states 1000
+    python scripts/live_page.py refusals --scenarios torque-task-solenoid off
     python scripts/live_page.py damage --files 1000
     python scripts/live_page.py speed
     python scripts/live_page.py pictures docs/images
@@ -23,6 +24,8 @@ from typing import Any
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 from ppafo.errors import PpafoError
 from ppafo.live.workbench import DEFAULT, workbench
 from ppafo.simulation.loading import load_scenario
@@ -30,6 +33,7 @@ from ppafo.simulation.result import Result
 from ppafo.simulation.simulate import simulate
 from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import WalkResult, walk
+from scripts.page_states import address_of, disagreements, hard_states, mutated, random_changes
 
 READY = '[data-ready="true"]'
 METRICS = 1.0e-12
@@ -77,30 +81,6 @@ def programs_by_tab(page: Any) -> list[tuple[int, Mapping[str, Any]]]:
     content = page.evaluate("workbench.content")
     by_name = {program["name"]: program for program in content["programs"]}
     return [(place, by_name[name]) for place, tab in enumerate(content["tabs"], 1) for name in tab["programs"]]
-
-
-def random_changes(program: Mapping[str, Any], rng: random.Random) -> dict[str, str]:
-    """Return texts for some settings, anywhere on their sliders; times so that samples divide the run."""
-    changes = {}
-    share = rng.choice((0.1, 0.3, 0.8))
-    for setting in program["settings"]:
-        key, (low, high) = setting["key"], setting["slider"]
-        if setting["kept"] == "zero" or rng.random() > share:
-            continue
-        value = rng.uniform(low, high)
-        number = f"{int(value)}" if key.endswith(".seed") else f"{value:.{rng.randint(6, 12)}g}"
-        changes[key] = f"{number} {setting['shown']}".strip()
-    for key in ("run.step", "run.output_interval", "controller.period"):
-        changes.pop(key, None)
-    shortest, longest = (50, 1500) if program["kind"] == "scenario" else (6000, 9000)
-    changes["run.duration"] = f"{rng.randint(shortest, longest)} ms"
-    return changes
-
-
-def address_of(tab: int, program: str, changes: Mapping[str, str]) -> str:
-    """Return the address of a state with one configuration."""
-    texts = ";".join([program, *(f"{key}={text}" for key, text in changes.items())])
-    return f"tab={tab}&{tab}={texts.replace('%', '%25').replace('+', '%2B').replace('&', '%26')}"
 
 
 def differences(
@@ -175,23 +155,17 @@ def check_bits(page: Any, states: int, seed: int, folder: Path) -> tuple[list[st
     return found, runs
 
 
-def mutated(text: str, rng: random.Random) -> str:
-    """Return a text with some damage: cut, doubled, letters changed, lines moved."""
-    kind = rng.randrange(6)
-    at = rng.randrange(len(text))
-    if kind == 0:
-        return text[:at]
-    if kind == 1:
-        return text[:at] + text[at + rng.randint(1, 30) :]
-    if kind == 2:
-        return text[:at] + rng.choice("\0\"'{}[],;:=%#é\n\t-e9") * rng.randint(1, 5) + text[at:]
-    if kind == 3:
-        lines = text.split("\n")
-        rng.shuffle(lines)
-        return "\n".join(lines)
-    if kind == 4:
-        return text.replace(rng.choice(text), rng.choice("0aZ,;\n[]"), rng.randint(1, 8))
-    return text * 2
+def check_refusals(page: Any, draws: int, seed: int, folder: Path, most: int | None = None) -> tuple[list[str], int]:
+    """Return hard states that only page or Python refuses, and how many were tried; ``most`` of each program."""
+    rng = random.Random(seed)
+    units = page.evaluate("workbench.content")["units"]
+    found, tried = [], 0
+    for tab, program in programs_by_tab(page):
+        given = list(hard_states(program, units, draws, rng))
+        given = given if most is None or most >= len(given) else rng.sample(given, most)
+        found += disagreements(page, tab, program, given, folder)
+        tried += len(given)
+    return found, tried
 
 
 def check_damage(page: Any, files: int, seed: int) -> list[str]:
@@ -323,9 +297,11 @@ def take_pictures(chromium: Any, file: Path, folder: Path) -> Iterator[Path]:
 def main() -> int:
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("bits", "damage", "speed", "pictures"))
+    parser.add_argument("what", choices=("bits", "refusals", "damage", "speed", "pictures"))
     parser.add_argument("folder", nargs="?", type=Path, default=Path("docs/images"), help="where pictures go")
     parser.add_argument("--states", type=int, default=1000, help="random states of each scenario")
+    parser.add_argument("--draws", type=int, default=300, help="hard draws of times, and of several settings at once")
+    parser.add_argument("--most", type=int, help="hard states of each scenario (default: all)")
     parser.add_argument("--files", type=int, default=1000, help="damaged files")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenarios", nargs="+", default=list(DEFAULT))
@@ -346,6 +322,9 @@ def main() -> int:
         if parsed.what == "bits":
             found, runs = check_bits(page, parsed.states, parsed.seed, Path(place))
             print(f"{runs} runs have the bits of Python")
+        elif parsed.what == "refusals":
+            found, tried = check_refusals(page, parsed.draws, parsed.seed, Path(place), parsed.most)
+            print(f"{tried} states were tried")
         else:
             found = check_damage(page, parsed.files, parsed.seed)
     print("\n".join(found) or "nothing departs")

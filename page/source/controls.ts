@@ -95,6 +95,7 @@ export class Controls {
 
   private made(setting: Setting): Control {
     const { key, label } = setting;
+    const end = label.lastIndexOf(" ") + 1;
     const about = element("p", { class: "about", id: `about-${key}`, hidden: true });
     const describe = () => (name.title ||= this.words(setting).join("\n"));
     const name: HTMLButtonElement = element(
@@ -112,8 +113,9 @@ export class Controls {
           about.replaceChildren(...this.words(setting).map((line) => element("span", {}, line)));
         },
       },
-      label,
-      element("span", { class: `origin ${setting.origin}`, "aria-hidden": "true" }),
+      label.slice(0, end),
+      // The mark stays with the last word.
+      element("span", { class: "end" }, label.slice(end), element("span", { class: `origin ${setting.origin}`, "aria-hidden": "true" })),
     );
     const slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${label}, slider` });
     const value = element("input", { type: "text", inputmode: "text", autocomplete: "off", spellcheck: "false", "aria-label": label });

@@ -94,7 +94,7 @@ function originKey(): Node[] {
     ["derived", "derived or identified"],
     ["assumed", "assumed"],
   ];
-  return words.flatMap(([name, text]) => [element("span", { class: `origin ${name}`, "aria-hidden": "true" }), document.createTextNode(`${text}  `)]);
+  return words.flatMap(([name, text]) => [element("span", {}, element("span", { class: `origin ${name}`, "aria-hidden": "true" }), text), document.createTextNode("   ")]);
 }
 
 function choice(words: string, change: (isOn: boolean) => void): { label: HTMLElement; box: HTMLInputElement } {

@@ -14,11 +14,13 @@ export interface Panel {
   readonly channels: readonly string[];
   /** A channel that is drawn once, in ink: what was asked for. */
   readonly wanted?: string;
+  /** What the title says after the unit. */
+  readonly note?: string;
 }
 
 export const PANELS: readonly Panel[] = [
   { title: "Torque", channels: ["torque"], wanted: "reference" },
-  { title: "Pressures, chamber 2 dashed", channels: ["pressure_1", "pressure_2"] },
+  { title: "Pressures", channels: ["pressure_1", "pressure_2"], note: ", 2 dashed" },
   { title: "Command to the valve", channels: ["command"] },
   { title: "Gas taken from the supply", channels: ["supplied_mass"] },
   { title: "Angle of the ankle", channels: ["angle"], wanted: "healthy_angle" },
@@ -185,7 +187,7 @@ export class Panels {
 
   private titleOf(panel: Panel): string {
     const unit = readableUnit(this.unitOf(panel.channels[0] ?? "").shown);
-    return unit === "" || unit === "-" ? panel.title : `${panel.title} (${unit})`;
+    return `${panel.title}${unit === "" || unit === "-" ? "" : ` (${unit})`}${panel.note ?? ""}`;
   }
 
   private plotOf({ panel, shown, host }: Drawn, width: number): uPlot {

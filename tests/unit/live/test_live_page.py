@@ -15,9 +15,9 @@ from ppafo.live.workbench import DEFAULT, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks, load_walk
-from scripts.live_page import address_of, check_bits, check_damage, missing, opened, programs_by_tab
 from scripts.live_page import browser as headless
-from scripts.page_refusals import search
+from scripts.live_page import check_bits, check_damage, check_refusals, missing, opened, programs_by_tab
+from scripts.page_states import address_of
 
 MOST_BYTES = 250_000
 SOURCES = Path(__file__).parents[3] / "page"
@@ -122,7 +122,7 @@ def test_a_typed_text_becomes_the_same_bits_as_in_python(chromium: Any, file: Pa
 
 @has_browser
 def test_the_page_refuses_what_python_refuses(chromium: Any, file: Path, tmp_path: Path) -> None:
-    found, tried = search(opened(chromium, file), draws=20, seed=5, folder=tmp_path, most=150)
+    found, tried = check_refusals(opened(chromium, file), draws=20, seed=5, folder=tmp_path, most=150)
     assert found == []
     assert tried == 600
 

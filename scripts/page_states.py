@@ -1,30 +1,21 @@
-"""Whether the page that simulates refuses what Python refuses, and nothing else: hard values for every control.
+"""States of the page that simulates, random, hard and damaged ones, and whether page and Python refuse the same.
 
-    python scripts/page_refusals.py --scenarios torque-task-solenoid off
-
-Each setting of each scenario gets values at and beyond both ends of its range, nothing, tiny, huge and negative ones,
-and texts that are no numbers; then the settings of each relation are put the wrong way round, and draws set several at
-once. The page says whether it opens and runs a state; Python loads the scenario with the same overrides, and the file
-that the page writes of a state which it runs.
-
-It needs what ``live_page.py`` needs.
+Each setting gets values at and beyond both ends of its range, nothing, tiny, huge and negative ones, and texts that are
+no numbers; then the settings of each relation are put the wrong way round, and draws set several at once. The page says
+whether it opens and runs a state; Python loads the scenario with the same overrides, and the file that the page writes
+of a state which it runs. ``live_page.py`` asks for them.
 """
 
-import argparse
 import math
 import random
-import sys
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ppafo.errors import PpafoError
-from ppafo.live.workbench import DEFAULT, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.walking.loading import load_walk
-from scripts.live_page import address_of, browser, missing, opened, programs_by_tab
 
 _TEXTS = (
     "nan",
@@ -46,6 +37,8 @@ _TEXTS = (
 _SIZES = (0.0, 1e-300, 1e-12, 1e12, 1e300)
 MOST_STEPS = 100_000
 """Steps of a run that is tried; longer ones only take time."""
+AT_ONCE = 50
+"""States that the page judges before it is asked for more: its browser takes one that works for minutes for dead."""
 _SHORT = {"scenario": "0.1 s", "walk": "2 s"}
 _TIMES = ("run.duration", "run.step", "run.output_interval", "controller.period")
 
@@ -62,7 +55,33 @@ _VERDICTS = """addresses => addresses.map(address => {
 Changes = dict[str, str]
 
 
-def states(program: Mapping[str, Any], units: Mapping[str, Any], draws: int, rng: random.Random) -> Iterator[Changes]:
+def random_changes(program: Mapping[str, Any], rng: random.Random) -> dict[str, str]:
+    """Return texts for some settings, anywhere on their sliders; times so that samples divide the run."""
+    changes = {}
+    share = rng.choice((0.1, 0.3, 0.8))
+    for setting in program["settings"]:
+        key, (low, high) = setting["key"], setting["slider"]
+        if setting["kept"] == "zero" or rng.random() > share:
+            continue
+        value = rng.uniform(low, high)
+        number = f"{int(value)}" if key.endswith(".seed") else f"{value:.{rng.randint(6, 12)}g}"
+        changes[key] = f"{number} {setting['shown']}".strip()
+    for key in ("run.step", "run.output_interval", "controller.period"):
+        changes.pop(key, None)
+    shortest, longest = (50, 1500) if program["kind"] == "scenario" else (6000, 9000)
+    changes["run.duration"] = f"{rng.randint(shortest, longest)} ms"
+    return changes
+
+
+def address_of(tab: int, program: str, changes: Mapping[str, str]) -> str:
+    """Return the address of a state with one configuration."""
+    texts = ";".join([program, *(f"{key}={text}" for key, text in changes.items())])
+    return f"tab={tab}&{tab}={texts.replace('%', '%25').replace('+', '%2B').replace('&', '%26')}"
+
+
+def hard_states(
+    program: Mapping[str, Any], units: Mapping[str, Any], draws: int, rng: random.Random
+) -> Iterator[Changes]:
     """Hard states of a program, as texts by key."""
     settings = {one["key"]: one for one in program["settings"]}
     for key, setting in settings.items():
@@ -143,7 +162,12 @@ def disagreements(page: Any, tab: int, program: Mapping[str, Any], given: Sequen
     page.evaluate("address => workbench.open(address)", address_of(tab, program["name"], {}))
     while page.evaluate("workbench.run(0) === null"):
         page.wait_for_timeout(20)
-    verdicts = page.evaluate(_VERDICTS, [address_of(tab, program["name"], one) for one in shortened])
+    addresses = [address_of(tab, program["name"], one) for one in shortened]
+    verdicts = [
+        verdict
+        for first in range(0, len(addresses), AT_ONCE)
+        for verdict in page.evaluate(_VERDICTS, addresses[first : first + AT_ONCE])
+    ]
     found, file = [], folder / "state.toml"
     for changes, verdict in zip(shortened, verdicts, strict=True):
         if verdict is None or verdict.get("isFull") or "another program" in verdict["refused"]:
@@ -166,37 +190,20 @@ def _is_of_page(program: Mapping[str, Any], key: str) -> bool:
     return program["kind"] == "walk" and key in ("run.duration", "run.output_interval")
 
 
-def search(page: Any, draws: int, seed: int, folder: Path, most: int | None = None) -> tuple[list[str], int]:
-    """What page and Python disagree on in all programs of a page, and how many states were tried; ``most`` of each."""
-    rng = random.Random(seed)
-    units = page.evaluate("workbench.content")["units"]
-    found, tried = [], 0
-    for tab, program in programs_by_tab(page):
-        given = list(states(program, units, draws, rng))
-        given = given if most is None else rng.sample(given, most)
-        found += disagreements(page, tab, program, given, folder)
-        tried += len(given)
-    return found, tried
-
-
-def main() -> int:
-    """Run what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--draws", type=int, default=300, help="draws of times, and of several settings at once")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--scenarios", nargs="+", default=list(DEFAULT))
-    parsed = parser.parse_args()
-    if missing():
-        print(missing(), file=sys.stderr)
-        return 2
-    with tempfile.TemporaryDirectory() as place, browser() as chromium:
-        file = Path(place) / "page.html"
-        file.write_bytes(workbench(parsed.scenarios))
-        found, tried = search(opened(chromium, file), parsed.draws, parsed.seed, Path(place))
-    print("\n".join(found) or "both say the same")
-    print(f"{tried} states")
-    return 1 if found else 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+def mutated(text: str, rng: random.Random) -> str:
+    """Return a text with some damage: cut, doubled, letters changed, lines moved."""
+    kind = rng.randrange(6)
+    at = rng.randrange(len(text))
+    if kind == 0:
+        return text[:at]
+    if kind == 1:
+        return text[:at] + text[at + rng.randint(1, 30) :]
+    if kind == 2:
+        return text[:at] + rng.choice("\0\"'{}[],;:=%#é\n\t-e9") * rng.randint(1, 5) + text[at:]
+    if kind == 3:
+        lines = text.split("\n")
+        rng.shuffle(lines)
+        return "\n".join(lines)
+    if kind == 4:
+        return text.replace(rng.choice(text), rng.choice("0aZ,;\n[]"), rng.randint(1, 8))
+    return text * 2
