@@ -192,6 +192,29 @@ def test_a_slider_is_dragged_and_the_drag_is_undone_at_once(chromium: Any, file:
 
 
 @has_browser
+def test_a_map_comes_in_two_parts_and_is_run_again_only_where_that_can_change_it(chromium: Any, file: Path) -> None:
+    whole, forget = "canvas.map[data-milliseconds]", "delete document.querySelector('canvas.map').dataset.milliseconds"
+    page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
+    page.locator("summary", has_text="Map of two settings").click()
+    page.wait_for_selector(whole)
+    told = page.evaluate("({...document.querySelector('canvas.map').dataset})")
+    assert 0.0 < float(told["first"]) <= float(told["milliseconds"])
+    page.evaluate(forget)
+    page.locator("canvas.map").press("ArrowRight")
+    page.wait_for_function("workbench.address().includes('valve.area')")
+    page.wait_for_timeout(300)
+    assert page.locator(whole).count() == 0
+    # A map that a later wish ends is none; the last one is run to its end.
+    for _ in range(4):
+        page.locator(".control[data-key='reference.level'] input[type=range]").press("ArrowRight")
+    page.wait_for_selector(whole)
+    other = opened(chromium, file, f"#{page.evaluate('workbench.address()')}", viewport={"width": 1400, "height": 1000})
+    other.locator("summary", has_text="Map of two settings").click()
+    other.wait_for_selector(whole)
+    assert page.locator(".scale").inner_text() == other.locator(".scale").inner_text()
+
+
+@has_browser
 def test_tabs_whose_configurations_have_one_name_are_told_apart(chromium: Any, file: Path) -> None:
     page = opened(chromium, file, "#1=torque-task-solenoid", viewport={"width": 1400, "height": 1000})
     for title in ("Walk", "Torque task", "Walk"):

@@ -13,6 +13,14 @@ SLIDER = ".control[data-key='supply.pressure'] input[type=range]"
 UNDO = "button[title^=Undo]:enabled"
 FOCUSED = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent"
 
+LOAD = """text => {
+    const chooser = document.querySelector("input[accept^='.json']");
+    const chosen = new DataTransfer();
+    chosen.items.add(new File([text], "state.json"));
+    chooser.files = chosen.files;
+    chooser.dispatchEvent(new Event("change"));
+}"""
+
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -53,6 +61,21 @@ def test_a_drag_changes_the_metrics_and_is_undone_at_once(page: DrivenPage, file
     page.wait_for_selector(UNDO)
     page.evaluate("wanted => document.querySelector(wanted).click()", UNDO)
     assert page.evaluate("workbench.file()") == before
+
+
+def test_a_saved_state_is_loaded(page: DrivenPage, file: Path) -> None:
+    page.open(f"file://{file}#1=torque-task-solenoid;supply.pressure=62.5+psi_g")
+    page.wait_for_selector("[data-ready]")
+    kept, values = page.evaluate("workbench.file()"), page.evaluate("workbench.values(0)")
+    page.evaluate("[...document.querySelectorAll('button')].find(one => one.textContent === 'Reset all').click()")
+    assert page.evaluate("workbench.values(0)") != values
+    page.evaluate(LOAD, kept)
+    for _ in range(100):
+        if page.evaluate("workbench.values(0)") == values:
+            break
+        page.wait_for_timeout(50)
+    assert page.evaluate("workbench.file()") == kept
+    assert page.said == []
 
 
 def test_it_is_changed_by_keyboard_alone(page: DrivenPage, file: Path) -> None:
