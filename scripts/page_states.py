@@ -169,14 +169,14 @@ def disagreements(page: Any, tab: int, program: Mapping[str, Any], given: Sequen
         for verdict in page.evaluate(_VERDICTS, addresses[first : first + AT_ONCE])
     ]
     found, file = [], folder / "state.toml"
-    for changes, verdict in zip(shortened, verdicts, strict=True):
+    for one, changes, verdict in zip(given, shortened, verdicts, strict=True):
         if verdict is None or verdict.get("isFull") or "another program" in verdict["refused"]:
             continue
         if verdict["refused"]:
-            # The file of a walk has no length, and a bare number is one in a page only.
+            # The file of a walk has no length: only the page can refuse one.
             texts = [f"{key}={text}" for key, text in changes.items() if not _is_of_page(program, key)]
             said = python_refusal(program, texts)
-            if not said and len(texts) == len(changes) - (program["kind"] == "walk"):
+            if not said and not any(_is_of_page(program, key) for key in one):
                 found.append(f"{program['name']}: only the page refuses {changes}: {verdict['refused']}")
             continue
         file.write_text(verdict["scenario"], encoding="utf-8")
