@@ -22,6 +22,9 @@ const BAND_PLACES = 300;
 const OUTSIDE = 5;
 const BANDED = ["torque", "pressure_1", "pressure_2", "supplied_mass", "angle"];
 
+/** Settings of a run by key that are not those of a configuration. */
+type Differences = readonly (readonly [string, number])[];
+
 /** What a map shows over what. */
 export interface Axes {
   readonly across: Setting;
@@ -48,9 +51,7 @@ export async function landscapeOf(
   await new Promise((resolve) => setTimeout(resolve, 0));
   const program = programNamed(content, configuration.program);
   const base = valuesOf(content, configuration);
-  const changesOf = (setting: Setting) => placesOf(setting).map((place) => differences(content, configuration, base, setting, place));
-  const [columns, lines] = [changesOf(axes.across), changesOf(axes.up)];
-  const rows = rowsOf(program, base, ORDER.map((cell) => [...(columns[cell % SIDE] ?? []), ...(lines[Math.floor(cell / SIDE)] ?? [])]));
+  const rows = rowsOf(program, base, differencesOnMap(content, configuration, axes));
   const width = program.metrics.length;
   const at = program.metrics.indexOf(axes.metric);
   const valuesOfRuns = (runs: Ensemble) => Float64Array.from(runs.ended, (ended, place) => (ended === 0 ? (runs.metrics[place * width + at] ?? NaN) : NaN));
@@ -73,16 +74,35 @@ export function placesOf(setting: Setting): number[] {
   return Array.from({ length: SIDE }, (_, place) => from + ((to - from) * place) / (SIDE - 1));
 }
 
+/** What changes from run to run of a map, in their order. A gauge pressure counts from the atmosphere, wherever a map has that. */
+function differencesOnMap(content: Content, configuration: Configuration, { across, up }: Axes): Differences[] {
+  const [outer, inner] = up.key === ATMOSPHERE ? [up, across] : [across, up];
+  const along = (setting: Setting, from: Configuration) => placesOf(setting).map((place) => differences(content, from, setting, place));
+  const usual = along(inner, configuration);
+  const each = along(outer, configuration);
+  const within = placesOf(outer).map((place) => (outer.key === ATMOSPHERE ? along(inner, moved(configuration, outer, place)) : usual));
+  return ORDER.map((cell) => {
+    const [column, line] = [cell % SIDE, Math.floor(cell / SIDE)];
+    const [first, second] = outer === across ? [column, line] : [line, column];
+    return [...(each[first] ?? []), ...(within[first]?.[second] ?? [])];
+  });
+}
+
+function moved(configuration: Configuration, setting: Setting, shown: number): Configuration {
+  return changed(configuration, setting.key, `${String(shown)} ${setting.shown}`.trim());
+}
+
 /** What changes with a setting, that which follows it included. */
-function differences(content: Content, configuration: Configuration, base: Values, setting: Setting, shown: number): [string, number][] {
+function differences(content: Content, configuration: Configuration, setting: Setting, shown: number): Differences {
+  const base = valuesOf(content, configuration);
   const value = toSi(shown, scaleOf(setting.shown, scalesOf(content, setting.unit)), base.get(ATMOSPHERE) ?? 101325);
   if (!isInside(setting, value)) return [[setting.key, NaN]];
-  const other = valuesOf(content, changed(configuration, setting.key, `${String(shown)} ${setting.shown}`.trim()));
+  const other = valuesOf(content, moved(configuration, setting, shown));
   return [...other].filter(([key, number]) => number !== base.get(key));
 }
 
 /** The settings of many runs, one after the other: those of a configuration but for what differs in each. */
-function rowsOf(program: Program, base: Values, differing: readonly (readonly (readonly [string, number])[])[]): Float64Array<ArrayBuffer> {
+function rowsOf(program: Program, base: Values, differing: readonly Differences[]): Float64Array<ArrayBuffer> {
   const usual = Float64Array.from(program.settings, (setting) => base.get(setting.key) ?? setting.value);
   const places = new Map(program.settings.map((setting, place) => [setting.key, place]));
   const rows = new Float64Array(differing.length * usual.length);

@@ -215,6 +215,20 @@ def test_a_map_comes_in_two_parts_and_is_run_again_only_where_that_can_change_it
 
 
 @has_browser
+def test_a_map_over_the_atmosphere_is_the_same_when_it_is_turned(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
+    page.locator("summary", has_text="Map of two settings").click()
+    told = []
+    for pair in (("supply.atmospheric_pressure", "supply.pressure"), ("supply.pressure", "supply.atmospheric_pressure")):
+        for label, key in zip(("Across", "Up"), pair, strict=True):
+            page.get_by_label(label, exact=True).select_option(key)
+        page.evaluate("delete document.querySelector('canvas.map').dataset.milliseconds")
+        page.wait_for_selector("canvas.map[data-milliseconds]")
+        told.append(page.locator(".scale").inner_text())
+    assert told[0] == told[1]
+
+
+@has_browser
 def test_tabs_whose_configurations_have_one_name_are_told_apart(chromium: Any, file: Path) -> None:
     page = opened(chromium, file, "#1=torque-task-solenoid", viewport={"width": 1400, "height": 1000})
     for title in ("Walk", "Torque task", "Walk"):
