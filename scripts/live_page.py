@@ -237,12 +237,15 @@ def measure(chromium: Any, file: Path, seconds: float = 10.0) -> dict[str, float
     page.wait_for_timeout(1000)
     found |= drag(page, seconds)
     page.locator("summary", has_text="Map of two settings").click()
+    page.wait_for_selector("canvas.map[data-milliseconds]")
     page.wait_for_timeout(2000)
     page.evaluate(_FRAMES)
     times = []
     for key in ("ArrowRight", "ArrowLeft") * 4:
+        page.evaluate("delete document.querySelector('canvas.map').dataset.milliseconds")
         page.locator(_BESIDE_THE_MAP).press(key)
-        page.wait_for_timeout(1500)
+        page.wait_for_selector("canvas.map[data-milliseconds]")
+        page.wait_for_timeout(700)
         data = page.evaluate("({...document.querySelector('canvas.map').dataset})")
         times.append((float(data["first"]), float(data["milliseconds"])))
     first, whole = np.median(times, axis=0)

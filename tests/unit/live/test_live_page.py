@@ -219,7 +219,10 @@ def test_a_map_over_the_atmosphere_is_the_same_when_it_is_turned(chromium: Any, 
     page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
     page.locator("summary", has_text="Map of two settings").click()
     told = []
-    for pair in (("supply.atmospheric_pressure", "supply.pressure"), ("supply.pressure", "supply.atmospheric_pressure")):
+    for pair in (
+        ("supply.atmospheric_pressure", "supply.pressure"),
+        ("supply.pressure", "supply.atmospheric_pressure"),
+    ):
         for label, key in zip(("Across", "Up"), pair, strict=True):
             page.get_by_label(label, exact=True).select_option(key)
         page.evaluate("delete document.querySelector('canvas.map').dataset.milliseconds")
